@@ -1,0 +1,65 @@
+"""omnidyn: from the logs of an omnidirectional robot to a model one can trust, and to simulation and control.
+
+    import omnidyn
+    robot = omnidyn.load_robot("axebot")
+    run = omnidyn.simulate(robot, [[0.0, 3.0, -3.0]] * 2000, 1e-3)
+
+Names are imported on first use, so that `import omnidyn` costs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+# Public name -> where it is defined. The list is tested: a name added here is a promise.
+_HOME = {
+    "Estimate": "omnidyn.identification.estimate",
+    "OmnidynError": "omnidyn.errors",
+    "Robot": "omnidyn.model.robot",
+    "Run": "omnidyn.run",
+    "acceleration": "omnidyn.model.dynamics",
+    "axis_patterns": "omnidyn.model.deadzone",
+    "breakaway_voltage": "omnidyn.model.deadzone",
+    "fit_steady_state": "omnidyn.identification.steady_state",
+    "load_robot": "omnidyn.model.robot_file",
+    "moves": "omnidyn.model.deadzone",
+    "preset_names": "omnidyn.model.robot_file",
+    "read_steady_table": "omnidyn.logs.steady_table",
+    "read_voltages": "omnidyn.logs.voltage_file",
+    "save_robot": "omnidyn.model.robot_file",
+    "simulate": "omnidyn.simulation.simulate",
+    "state_space": "omnidyn.model.statespace",
+    "write_run": "omnidyn.logs.run_file",
+}
+
+__all__ = ["__version__", *_HOME]
+
+if TYPE_CHECKING:
+    from omnidyn.errors import OmnidynError
+    from omnidyn.identification.estimate import Estimate
+    from omnidyn.identification.steady_state import fit_steady_state
+    from omnidyn.logs.run_file import write_run
+    from omnidyn.logs.steady_table import read_steady_table
+    from omnidyn.logs.voltage_file import read_voltages
+    from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
+    from omnidyn.model.dynamics import acceleration
+    from omnidyn.model.robot import Robot
+    from omnidyn.model.robot_file import load_robot, preset_names, save_robot
+    from omnidyn.model.statespace import state_space
+    from omnidyn.run import Run
+    from omnidyn.simulation.simulate import simulate
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'omnidyn' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})

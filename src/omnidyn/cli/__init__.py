@@ -1,0 +1,17 @@
+"""The command line: `omnidyn`, `python -m omnidyn`. A skin: no formula lives here.
+
+Exit codes: 0 ok, 1 our bug, 2 usage, 3 bad input, 4 the data cannot answer, 5 a threshold is exceeded,
+6 an extra is missing, 130 interrupted, 143 terminated; a closed pipe is 0.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; `arguments` without the name of the program."""
+    from omnidyn.cli.outcome import run_guarded
+
+    return run_guarded(list(sys.argv[1:] if arguments is None else arguments))

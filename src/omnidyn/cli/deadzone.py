@@ -1,0 +1,69 @@
+"""omnidyn deadzone ROBOT: the voltages at which a robot does not move."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from omnidyn.cli.streams import show, show_json
+
+if TYPE_CHECKING:
+    from omnidyn.model.robot import Robot
+
+AXES = ("x", "y", "yaw")
+
+
+def deadzone(
+    robot: str = typer.Argument(help="A preset (see: omnidyn robots) or a robot file."),
+    pattern: str = typer.Option("", help="One number per wheel, such as 0,1,-1; default: one pattern per axis."),
+    json: bool = typer.Option(False, "--json", help="For machines."),
+) -> None:
+    """Show at which voltage a robot at rest starts to move."""
+    from omnidyn.cli.numbers import number_list
+    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.model.deadzone import axis_patterns
+    from omnidyn.model.robot_file import load_robot
+
+    loaded, source = load_robot(robot), robot_input(robot)
+    patterns = [number_list("--pattern", pattern)] if pattern else axis_patterns(loaded).tolist()
+    rows = [_row(loaded, each) for each in patterns]
+    if json:
+        show_json({"robot": loaded.name, "dead_zone": rows, "provenance": provenance([source])})
+        return
+    show(f"{loaded.name} at rest: it starts to move when the voltages of the wheels exceed\n")
+    for row in rows:
+        show(_line(loaded, row))
+
+
+def _row(robot: Robot, pattern: list[float]) -> dict[str, Any]:
+    """Breakaway of one pattern: the scale, the voltages it means, the axis that gives way."""
+    import numpy as np
+
+    from omnidyn.model.deadzone import breakaway_voltage, moves
+
+    scale = float(breakaway_voltage(robot, pattern))
+    if not np.isfinite(scale):
+        return {"axis": None, "pattern": pattern, "breakaway_scale_V": None, "voltage_V": None}
+    just_beyond = np.multiply(scale * (1.0 + 1e-9), pattern)
+    moving = [axis for axis, moved in zip(AXES, moves(robot, just_beyond), strict=True) if moved]
+    voltage = np.multiply(scale, pattern) + 0.0
+    return {"axis": "+".join(moving), "pattern": pattern, "breakaway_scale_V": scale, "voltage_V": voltage.tolist()}
+
+
+def _line(robot: Robot, row: dict[str, Any]) -> str:
+    pattern = ", ".join(f"{value:g}" for value in row["pattern"])
+    if row["breakaway_scale_V"] is None:
+        return f"  never   the pattern ({pattern}) drives no axis"
+    voltage = ", ".join(f"{value:.3f}" for value in row["voltage_V"])
+    line = f"  {row['axis']:6}  {row['breakaway_scale_V']:.3f} V x ({pattern})  =  ({voltage}) V"
+    return line + _limit_note(robot, row["voltage_V"])
+
+
+def _limit_note(robot: Robot, voltage: list[float]) -> str:
+    """A robot whose motors cannot reach that voltage does not move at all."""
+    from omnidyn.model.motor import clip_voltage
+    from omnidyn.simulation.simulate import as_floats
+
+    volts = as_floats("voltage", voltage)
+    return "" if (clip_voltage(robot.motor, volts) == volts).all() else "  (beyond the limit of the motors)"

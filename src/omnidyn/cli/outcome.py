@@ -1,0 +1,127 @@
+"""How a command ends: each way of ending is one exit code and at most one line on stderr."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import signal
+import sys
+import traceback
+from types import FrameType
+
+import typer
+
+from omnidyn.cli import session
+from omnidyn.cli.streams import prepare, say
+from omnidyn.errors import OmnidynError
+
+BUG, USAGE, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
+
+
+class Terminated(BaseException):
+    """SIGTERM arrived: unwind, so that nothing half-written stays behind."""
+
+
+def run_guarded(arguments: list[str]) -> int:
+    """Run the command line and turn whatever happens into an exit code."""
+    prepare()
+    debug, arguments = _take_debug(arguments)
+    session.begin(arguments)
+    try:
+        with _sigterm_unwinds():
+            code = _run(arguments)
+            sys.stdout.flush()
+            return code
+    except BaseException as error:
+        if debug and not isinstance(error, SystemExit):
+            say(traceback.format_exc().rstrip())
+        return _code_of(error, debug)
+
+
+def _run(arguments: list[str]) -> int:
+    from omnidyn.cli.app import app
+
+    code = app(arguments, prog_name="omnidyn", standalone_mode=False)
+    if code == INTERRUPTED:  # typer's word for Ctrl-C
+        raise KeyboardInterrupt
+    return code or 0
+
+
+def _code_of(error: BaseException, debug: bool) -> int:
+    if isinstance(error, OmnidynError):
+        say(f"omnidyn: error: {error}")
+        return error.exit_code
+    if isinstance(error, typer.TyperException):
+        return _usage(error)
+    if isinstance(error, KeyboardInterrupt):
+        say("omnidyn: interrupted")
+        return INTERRUPTED
+    if isinstance(error, Terminated):
+        say("omnidyn: terminated")
+        return TERMINATED
+    if _is_closed_pipe(error):
+        _silence()
+        return 0
+    if isinstance(error, SystemExit):
+        return error.code if isinstance(error.code, int) else BUG
+    return _unforeseen(error, debug)
+
+
+def _unforeseen(error: BaseException, debug: bool) -> int:
+    if isinstance(error, MemoryError):
+        say("omnidyn: error: not enough memory; use fewer rows")
+        return BAD_INPUT
+    if isinstance(error, OSError):
+        say(f"omnidyn: error: cannot write the result; got {error.strerror or error}")
+        _silence()
+        return BAD_INPUT
+    say(f"omnidyn: bug: {type(error).__name__}: {' '.join(str(error).split())}")
+    if not debug:
+        say("omnidyn: please report it, with what the same command says under --debug")
+    return BUG
+
+
+def _usage(error: typer.TyperException) -> int:
+    """Wrong words on the command line: what is wrong, and where to look."""
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "omnidyn"
+    say(f"omnidyn: error: {error.format_message()} Try: {path} --help")
+    return USAGE
+
+
+def _take_debug(arguments: list[str]) -> tuple[bool, list[str]]:
+    """--debug may stand anywhere before a bare --."""
+    end = arguments.index("--") if "--" in arguments else len(arguments)
+    kept = [word for word in arguments[:end] if word != "--debug"]
+    return len(kept) < end, kept + arguments[end:]
+
+
+def _is_closed_pipe(error: BaseException) -> bool:
+    """typer turns a closed pipe into an exit; what it saw hangs on it."""
+    seen = error.__context__ if isinstance(error, SystemExit) else error
+    return isinstance(seen, OSError) and seen.errno == errno.EPIPE
+
+
+def _silence() -> None:
+    """Nothing more can be said: keep the interpreter from trying at its end."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno())  # type: ignore[union-attr]
+
+
+@contextlib.contextmanager
+def _sigterm_unwinds():
+    """While it holds, SIGTERM raises Terminated. Only the main thread may set a handler."""
+
+    def raise_terminated(number: int, frame: FrameType | None) -> None:
+        raise Terminated
+
+    try:
+        before = signal.signal(signal.SIGTERM, raise_terminated)
+    except ValueError:
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,36 @@
+"""What a result was made from: the command line, the version, the inputs and their hashes."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import omnidyn
+from omnidyn.files import MAX_TEXT_BYTES, read_bytes, sha256
+
+_command_line = "omnidyn"
+
+
+def begin(arguments: list[str]) -> None:
+    """Remember the command line."""
+    global _command_line
+    _command_line = shlex.join(["omnidyn", *arguments])
+
+
+def provenance(inputs: list[dict[str, str]]) -> dict[str, Any]:
+    """The record that every result for machines carries."""
+    return {"omnidyn": omnidyn.__version__, "command": _command_line, "inputs": inputs}
+
+
+def input_file(role: str, path: str, max_bytes: int = MAX_TEXT_BYTES) -> dict[str, str]:
+    """Role, name and SHA-256 of an input. Raises InputError when it cannot be read."""
+    return {"role": role, "name": path, "sha256": sha256(read_bytes(path, max_bytes))}
+
+
+def robot_input(robot: str) -> dict[str, str]:
+    """The record of a robot given by the name of a preset or by a path."""
+    from omnidyn.model.robot_file import PRESETS, preset_names
+
+    path = str(PRESETS / f"{robot}.toml") if robot in preset_names() else robot
+    return {**input_file("robot", path), "name": robot if robot in preset_names() else str(Path(robot))}

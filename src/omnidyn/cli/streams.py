@@ -1,0 +1,99 @@
+"""What the two streams say and how: stdout is the result, stderr is talk. Both survive any terminal and locale."""
+
+from __future__ import annotations
+
+import codecs
+import contextlib
+import json
+import os
+import shutil
+import sys
+from typing import Any, TextIO
+
+import typer
+
+MIN_WIDTH, WIDTH_WITHOUT_TERMINAL = 20, 110
+
+# What a terminal that knows ASCII only gets to see.
+_PLAIN = {
+    "\N{PLUS-MINUS SIGN}": "+-", "\N{LESS-THAN OR EQUAL TO}": "<=", "\N{GREATER-THAN OR EQUAL TO}": ">=",
+    "\N{EN DASH}": "-", "\N{EM DASH}": "-", "\N{MINUS SIGN}": "-", "\N{RIGHTWARDS ARROW}": "->",
+    "\N{MULTIPLICATION SIGN}": "x", "\N{MIDDLE DOT}": " ", "\N{DOT OPERATOR}": " ", "\N{DEGREE SIGN}": " deg",
+    "\N{SUPERSCRIPT TWO}": "^2", "\N{SQUARE ROOT}": "sqrt", "\N{HORIZONTAL ELLIPSIS}": "...",
+    "\N{GREEK SMALL LETTER OMEGA}": "omega", "\N{GREEK SMALL LETTER THETA}": "theta",
+    "\N{GREEK SMALL LETTER TAU}": "tau", "\N{GREEK CAPITAL LETTER OMEGA}": "ohm", "\N{LATIN SMALL LETTER A WITH ACUTE}": "a",
+    "\N{LATIN SMALL LETTER U WITH ACUTE}": "u", "\N{LATIN SMALL LETTER C WITH CEDILLA}": "c",
+    "\N{LATIN SMALL LETTER A WITH TILDE}": "a",
+}  # fmt: skip
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    """Error handler of codecs: the plain word for a character the stream cannot carry, else its escape."""
+    assert isinstance(error, UnicodeEncodeError)
+    text = error.object[error.start : error.end]
+    words = [_PLAIN.get(c) or c.encode("ascii", "backslashreplace").decode() for c in text]
+    return "".join(words), error.end
+
+
+codecs.register_error("omnidyn-plain", _plain)
+
+
+def prepare() -> None:
+    """Make both streams unable to fail on a character; in the C locale they carry ASCII only."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            encoding = {"encoding": "ascii"} if _ascii_locale() else {}
+            with contextlib.suppress(ValueError, OSError):
+                reconfigure(errors="omnidyn-plain", **encoding)
+
+
+def _ascii_locale() -> bool:
+    """Python shows UTF-8 in the C locale; whoever asks for that locale may not be able to read it."""
+    asked = next((os.environ[name] for name in ("LC_ALL", "LC_CTYPE", "LANG") if os.environ.get(name)), "")
+    return asked in ("C", "POSIX")
+
+
+def say(words: str) -> None:
+    """Talk, to stderr. A stderr that nobody reads is no reason to stop."""
+    with contextlib.suppress(BrokenPipeError):
+        typer.echo(words, err=True)
+
+
+def show(text: str) -> None:
+    """The result, to stdout."""
+    typer.echo(text)
+
+
+def show_json(document: dict[str, Any]) -> None:
+    """The result for machines, to stdout."""
+    show(to_json(document))
+
+
+def to_json(document: Any) -> str:
+    """JSON of numbers, text, arrays and what holds them; a number that is not finite becomes null."""
+    return json.dumps(_finite(document), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if hasattr(value, "tolist"):  # NumPy, which need not be imported for this
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not -float("inf") < value < float("inf"):
+        return None
+    return value
+
+
+def width(stream: TextIO | None = None) -> int:
+    """Columns to write in: of the terminal or COLUMNS, at least 20; without a terminal a wide page."""
+    return max(MIN_WIDTH, shutil.get_terminal_size((WIDTH_WITHOUT_TERMINAL, 24)).columns)
+
+
+def coloured(text: str, colour: str, stream: TextIO | None = None) -> str:
+    """The text in a colour, where the stream is a terminal that wants colours."""
+    stream = sys.stdout if stream is None else stream
+    wanted = stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return typer.style(text, fg=colour) if wanted else text

@@ -1,0 +1,55 @@
+"""The one way to compile a kernel: native code, without the GIL, with a disk cache that is never stale.
+
+numba's disk cache looks only at the file in which a kernel stands: edit a formula that the kernel calls from
+another file, and the old machine code is served without a word. Here every cache entry is stamped with a hash of
+all sources of the package. Where no folder is writable the kernel is compiled in memory. `parallel=True` is never
+used: its thread pools break under fork and under user threads; use threads over blocks instead.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+PACKAGE = Path(__file__).resolve().parent
+ERROR_MODEL = "numpy"  # a division by zero gives inf or nan, as in NumPy, and needs no branch
+
+
+@cache
+def source_hash() -> str:
+    """SHA-256 over the names and contents of all Python files of the package."""
+    digest = hashlib.sha256()
+    for file in sorted(PACKAGE.rglob("*.py")):
+        digest.update(file.relative_to(PACKAGE).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def part(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A piece of a kernel: compiled into the kernels that call it, never cached by itself."""
+    return numba.njit(error_model=ERROR_MODEL)(function)
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """An entry point: compiled without the GIL; its cache entry belongs to all sources of the package."""
+    try:
+        compiled = _native(function)
+        compiled.enable_caching()
+        _stamp(compiled)
+    except (RuntimeError, AttributeError):  # no writable folder, or a numba whose cache we do not know
+        return _native(function)
+    return compiled
+
+
+def _native(function: Callable[..., Any]) -> Any:
+    return numba.njit(nogil=True, error_model=ERROR_MODEL)(function)
+
+
+def _stamp(compiled: Any) -> None:
+    """Tie the cache entry to `source_hash`. The attribute is private to numba: a test watches over it."""
+    index = compiled._cache._cache_file
+    index._source_stamp = (index._source_stamp, source_hash())

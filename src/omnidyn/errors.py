@@ -1,0 +1,80 @@
+"""Every error omnidyn raises on purpose, and how a message is put together.
+
+    OmnidynError                    exit 3
+    ├── InputError                  exit 3   a file, a value or an argument cannot be used
+    │   └── UnsupportedError        exit 3   it is valid, but this version has no law for it
+    ├── InsufficientDataError       exit 4   the data are valid but cannot answer the question
+    ├── ThresholdError              exit 5   a limit set with --fail-if is exceeded
+    └── MissingExtraError           exit 6   an optional dependency is not installed
+
+A message has four parts: what is wrong, what was got, what was expected, what to do about it.
+"""
+
+from __future__ import annotations
+
+
+class OmnidynError(Exception):
+    """Base of all errors of omnidyn: what, got, expected, remedy, and where it stands.
+
+    Attributes are the parts as text; `str(error)` is the whole message on one line.
+    """
+
+    exit_code = 3
+
+    def __init__(
+        self, what: str, *, got: object = None, expected: str = "", remedy: str = "", where: str = ""
+    ):
+        self.what, self.expected, self.remedy, self.where = what, expected, remedy, where
+        self.got = "" if got is None else _short(got)
+        super().__init__(self._message())
+
+    def _message(self) -> str:
+        head = f"{self.where}: {self.what}" if self.where else self.what
+        parts = [head]
+        if self.got:
+            parts.append(f"got {self.got}")
+        if self.expected:
+            parts.append(f"expected {self.expected}")
+        if self.remedy:
+            parts.append(self.remedy)
+        return "; ".join(parts)
+
+    def at(self, where: str) -> OmnidynError:
+        """The same error with the place put in front, such as a file name."""
+        place = f"{where}: {self.where}" if self.where else where
+        return type(self)(
+            self.what, got=self.got or None, expected=self.expected, remedy=self.remedy, where=place
+        )
+
+
+class InputError(OmnidynError):
+    """A file, a value or an argument cannot be used as it is."""
+
+
+class UnsupportedError(InputError):
+    """A valid request for which this version of omnidyn has no law; refused by name, never ignored."""
+
+
+class InsufficientDataError(OmnidynError):
+    """Valid data that cannot answer the question asked of them."""
+
+    exit_code = 4
+
+
+class ThresholdError(OmnidynError):
+    """A threshold asked for with --fail-if is exceeded."""
+
+    exit_code = 5
+
+
+class MissingExtraError(OmnidynError):
+    """An optional dependency is missing; the remedy is the line that installs it."""
+
+    exit_code = 6
+
+
+def _short(value: object, limit: int = 80) -> str:
+    """A value as text for a message: printable, on one line, never longer than `limit`."""
+    text = value if isinstance(value, str) else repr(value)
+    text = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,0 +1,61 @@
+"""Forces and accelerations, eqs (4)-(12) put together.
+
+    M v'_x = F_x - B_x v_x - C_x sgn v_x   (+ M omega v_y)
+    M v'_y = F_y - B_y v_y - C_y sgn v_y   (- M omega v_x)
+    I omega' = T - B_w omega - C_w sgn omega
+
+The terms in brackets belong to a turning body frame; eqs (4) (5) leave them out, `rotating_frame` keeps them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from omnidyn.model.motor import settled_current, traction
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed, wrench_from_traction
+
+
+def mass_matrix(robot: Robot) -> NDArray[np.float64]:
+    """Diagonal of the mass matrix (M, M, I_n) [kg, kg, kg m^2]. Shape (3,)."""
+    return np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
+
+
+def settled_currents(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[np.float64]:
+    """Motor currents [A] with settled windings (L di/dt = 0), eq (11).
+
+    `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, wheels).
+    """
+    return settled_current(robot.motor, voltage, wheel_speed(robot.wheels, twist))
+
+
+def wrench_from_currents(robot: Robot, current: ArrayLike) -> NDArray[np.float64]:
+    """Wrench of the motors on the body [N, N, N m], eqs (7)-(10). `current` [A], shape (*batch, wheels)."""
+    return wrench_from_traction(robot.wheels, traction(robot.motor, robot.wheels, current))
+
+
+def drive_wrench(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[np.float64]:
+    """Wrench of the motors on the body [N, N, N m], eqs (7)-(11), currents settled.
+
+    `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
+    """
+    return wrench_from_currents(robot, settled_currents(robot, twist, voltage))
+
+
+def frame_wrench(robot: Robot, twist: ArrayLike) -> NDArray[np.float64]:
+    """Apparent wrench M omega (v_y, -v_x, 0) of the turning body frame; zero where the robot leaves it out."""
+    twist = np.asarray(twist, dtype=float)
+    if not robot.body.rotating_frame:
+        return np.zeros_like(twist)
+    x, y, omega = np.moveaxis(twist, -1, 0)
+    return robot.body.mass * np.stack([omega * y, -omega * x, np.zeros_like(omega)], axis=-1)
+
+
+def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[np.float64]:
+    """Acceleration of the twist [m/s^2, m/s^2, rad/s^2], eqs (4)-(6); friction at rest balances what drives it.
+
+    `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
+    """
+    applied = drive_wrench(robot, twist, voltage) + frame_wrench(robot, twist)
+    return (applied + robot.friction.axes.wrench(twist, applied)) / mass_matrix(robot)

@@ -1,0 +1,31 @@
+"""Body frame and world frame, eqs (1) and (2).
+
+Axes are x forward, y left, yaw counter-clockwise (REP-103), which are the paper's v, v_n, theta.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def body_to_world(heading: ArrayLike) -> NDArray[np.float64]:
+    """Rotation that takes a body twist to the world frame: pose' = body_to_world(heading) @ twist.
+
+    Inverse of eq (2). `heading` [rad], shape (*batch,). Returns shape (*batch, 3, 3).
+    """
+    heading = np.asarray(heading, dtype=float)
+    cos, sin = np.cos(heading), np.sin(heading)
+    rotation = np.zeros((*heading.shape, 3, 3))
+    rotation[..., 0, 0], rotation[..., 0, 1] = cos, -sin
+    rotation[..., 1, 0], rotation[..., 1, 1] = sin, cos
+    rotation[..., 2, 2] = 1.0
+    return rotation
+
+
+def world_to_body(heading: ArrayLike) -> NDArray[np.float64]:
+    """Rotation R(theta) of eqs (1) (2): twist = world_to_body(heading) @ pose'.
+
+    `heading` [rad], shape (*batch,). Returns shape (*batch, 3, 3).
+    """
+    return np.swapaxes(body_to_world(heading), -1, -2)

@@ -1,0 +1,94 @@
+"""DC motors behind a gear, eqs (10)-(12), with the back-EMF of the motor shaft.
+
+    u = L di/dt + R i + K_v l w       (11)  w: wheel speed; the printed (11) leaves out the gear ratio l
+    T = l K_t i,  f = T / r           (10)
+    |i| <= i_max                      (12)  printed without the absolute value
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
+
+from omnidyn.model.value import Value, per_wheel_number
+from omnidyn.model.wheels import Wheels, per_wheel
+
+QUASI_STATIC, DYNAMIC = "quasi-static", "dynamic"
+
+
+class Motor(Value):
+    """The motors of a robot; a tuple means one value per wheel.
+
+    resistance [ohm], torque_constant [N m/A], emf_constant [V s/rad], both at the motor shaft; gear_ratio [-];
+    voltage_limit [V]; inductance [H]; current_limit [A], None means no limit.
+    electrical: "quasi-static" leaves L di/dt out of eq (11), "dynamic" keeps it.
+    """
+
+    resistance: Annotated[per_wheel_number(1e-6, 1e6), Field(alias="resistance_ohm", description="R")]
+    inductance: Annotated[per_wheel_number(1e-12, 1e3) | None, Field(alias="inductance_H", description="L")] = None
+    torque_constant: Annotated[
+        per_wheel_number(1e-9, 1e3), Field(alias="torque_constant_Nm_A", description="K_t at the motor shaft")
+    ]
+    emf_constant: Annotated[
+        per_wheel_number(1e-9, 1e3), Field(alias="emf_constant_Vs_rad", description="K_v at the motor shaft")
+    ]
+    gear_ratio: Annotated[per_wheel_number(1e-3, 1e5), Field(description="l, motor turns per wheel turn")]
+    voltage_limit: Annotated[
+        per_wheel_number(1e-3, 1e5), Field(alias="voltage_limit_V", description="of the driver, both signs")
+    ]
+    current_limit: Annotated[
+        per_wheel_number(1e-6, 1e6) | None, Field(alias="current_limit_A", description="|i| <= i_max, eq (12)")
+    ] = None
+    electrical: Annotated[
+        Literal["quasi-static", "dynamic"], Field(description="dynamic keeps L di/dt of eq (11)")
+    ] = QUASI_STATIC
+
+    @model_validator(mode="after")
+    def _dynamic_needs_inductance(self) -> Motor:
+        if self.electrical == DYNAMIC and self.inductance is None:
+            raise ValueError('electrical = "dynamic" needs inductance_H')
+        return self
+
+
+def back_emf(motor: Motor, wheel_speed: ArrayLike) -> NDArray[np.float64]:
+    """Back-EMF K_v l w [V] of motors whose wheels turn at `wheel_speed` [rad/s], eq (11). Shape (*batch, wheels)."""
+    speed = np.asarray(wheel_speed, dtype=float)
+    count = speed.shape[-1]
+    return per_wheel(motor.emf_constant, count) * per_wheel(motor.gear_ratio, count) * speed
+
+
+def settled_current(motor: Motor, voltage: ArrayLike, wheel_speed: ArrayLike) -> NDArray[np.float64]:
+    """Current (u - K_v l w) / R [A] of eq (11) with di/dt = 0.
+
+    `voltage` [V] and `wheel_speed` [rad/s], shape (*batch, wheels). Returns the same shape.
+    """
+    driving = np.asarray(voltage, dtype=float) - back_emf(motor, wheel_speed)
+    return driving / per_wheel(motor.resistance, driving.shape[-1])
+
+
+def wheel_torque(motor: Motor, current: ArrayLike) -> NDArray[np.float64]:
+    """Torque l K_t i at the wheel [N m], eq (10). `current` [A], shape (*batch, wheels)."""
+    current = np.asarray(current, dtype=float)
+    count = current.shape[-1]
+    return per_wheel(motor.gear_ratio, count) * per_wheel(motor.torque_constant, count) * current
+
+
+def traction(motor: Motor, wheels: Wheels, current: ArrayLike) -> NDArray[np.float64]:
+    """Traction force T / r [N] of wheels that do not slip, eq (10). `current` [A], shape (*batch, wheels)."""
+    return wheel_torque(motor, current) / wheels.radii
+
+
+def no_load_speed(motor: Motor, voltage: ArrayLike) -> NDArray[np.float64]:
+    """Wheel speed u / (K_v l) [rad/s] at which the back-EMF eats the whole voltage [V]. Shape (*batch, wheels)."""
+    voltage = np.asarray(voltage, dtype=float)
+    count = voltage.shape[-1]
+    return voltage / (per_wheel(motor.emf_constant, count) * per_wheel(motor.gear_ratio, count))
+
+
+def clip_voltage(motor: Motor, voltage: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Voltage [V] kept within the limit of the driver, symmetric about zero. Shape (*batch, wheels)."""
+    limit = per_wheel(motor.voltage_limit, voltage.shape[-1])
+    return np.clip(voltage, -limit, limit)

@@ -1,0 +1,53 @@
+"""Robot: body, wheels, motor and friction, with what is known about each number."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from omnidyn.model.friction import Friction
+from omnidyn.model.motor import Motor
+from omnidyn.model.value import Flag, Text, Value, number
+from omnidyn.model.wheels import Wheels, check_count
+
+SCHEMA = 1
+
+
+class Body(Value):
+    """The rigid body: mass M [kg], inertia I_n about the vertical axis [kg m^2].
+
+    rotating_frame: keep the terms M omega v of a turning body frame, which eqs (4) (5) leave out.
+    """
+
+    mass: Annotated[number(1e-4, 1e5), Field(alias="mass_kg", description="M")]
+    inertia: Annotated[number(1e-9, 1e6), Field(alias="inertia_kg_m2", description="I_n, about the vertical axis")]
+    rotating_frame: Annotated[Flag, Field(description="terms M omega v of a turning body")] = False
+
+
+class Prior(Value):
+    """What is known about one number: its standard deviation and where it comes from."""
+
+    std: Annotated[number(0.0, 1e9, above=True) | None, Field(description="standard deviation, same unit")] = None
+    source: Text = ""
+
+
+class Robot(Value):
+    """A robot: all that eqs (1)-(14) need. Frozen; `replace` makes a changed copy.
+
+    priors: key of the robot file, such as "motor.resistance_ohm" or "friction.axes.coulomb[0]", -> Prior.
+    """
+
+    name: Annotated[Text, Field(min_length=1)]
+    source: Text = ""
+    body: Body
+    wheels: Wheels
+    motor: Motor
+    friction: Friction
+    priors: Annotated[dict[str, Prior], Field(exclude=True)] = {}
+
+    @model_validator(mode="after")
+    def _one_value_per_wheel(self) -> Robot:
+        for name in type(self.motor).model_fields:
+            check_count(f"[motor] {name}", getattr(self.motor, name), self.wheels.count)
+        return self

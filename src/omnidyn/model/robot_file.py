@@ -1,0 +1,166 @@
+"""Robot files: TOML in and out, and the presets that come with omnidyn."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.files import read_text, write_atomic
+from omnidyn.model.robot import SCHEMA, Prior, Robot
+from omnidyn.model.value import key_path, keys_of
+
+PRESETS = Path(__file__).parent / "presets"
+MAX_ROBOT_FILE_BYTES = 2**20
+
+# Keys of the schema for which no law exists yet. They are refused by name: never ignored, never "unknown".
+PENDING = frozenset(
+    {
+        "drive",
+        "friction.direction",
+        "friction.wheels",
+        "friction.axes.law",
+        "friction.axes.stribeck_speed",
+        "friction.axes.stribeck_exponent",
+        "friction.axes.stiffness",
+        "friction.axes.damping",
+        "motor.voltage_drop_V",
+        "motor.gear_efficiency",
+        "wheels.traction_mu",
+    }
+)
+
+
+def preset_names() -> list[str]:
+    """Names of the robots that come with omnidyn."""
+    return sorted(file.stem for file in PRESETS.glob("*.toml"))
+
+
+def load_robot(robot: str | os.PathLike) -> Robot:
+    """A robot by the name of a preset, such as "axebot", or by the path of its TOML file.
+
+    Raises InputError when there is no such preset or file, or when the file breaks the schema (the path of the key,
+    what was got, what is expected), and UnsupportedError for a key for which there is no law yet.
+    """
+    name = os.fspath(robot)
+    if name in preset_names():
+        path = PRESETS / f"{name}.toml"
+    else:
+        path = Path(name)
+        if not path.exists() and path.suffix != ".toml" and path.name == name:
+            raise InputError(
+                "no such robot", got=name, expected=f"a TOML file or a preset: {', '.join(preset_names())}"
+            )
+    return parse_robot(read_text(path, MAX_ROBOT_FILE_BYTES), str(path if name != path.stem else name))
+
+
+def parse_robot(text: str, where: str = "robot") -> Robot:
+    """A robot from the text of a robot file; `where` names it in messages."""
+    try:
+        document = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise InputError("not valid TOML", got=str(error), remedy="correct that line", where=where) from None
+    try:
+        return robot_from_dict(document)
+    except InputError as error:
+        raise error.at(where) from None
+
+
+def robot_from_dict(document: dict[str, Any]) -> Robot:
+    """A robot from the content of a robot file as nested dictionaries; schema in the documentation."""
+    document = dict(document)
+    schema = document.pop("schema", None)
+    if schema != SCHEMA or isinstance(schema, bool):
+        raise InputError(
+            "unknown schema", got=schema if schema is not None else "none", expected=f"schema = {SCHEMA}", where="schema"
+        )
+    priors: dict[str, Prior] = {}
+    plain = _without_priors(document, (), priors)
+    if "priors" in plain:  # a field of Robot, not a key of the file
+        raise InputError("unknown key", got="priors", expected="{ value, std, source } at the number itself")
+    return Robot(**plain, priors=priors)
+
+
+def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Prior]) -> Any:
+    """The same tree with every { value, std, source } replaced by its value; what else it says goes to `priors`."""
+    dotted = ".".join(str(part) for part in path if not isinstance(part, int))
+    if dotted in PENDING:
+        raise UnsupportedError(
+            "this key has no law yet", got=str(path[-1]), remedy="remove it, or use a later version", where=key_path(path)
+        )
+    if isinstance(node, dict) and "value" in node:
+        known = {key: value for key, value in node.items() if key != "value"}
+        try:
+            priors[_dotted(path)] = Prior(**known)
+        except InputError as error:
+            raise error.at(key_path(path)) from None
+        return node["value"]
+    if isinstance(node, dict):
+        return {key: _without_priors(value, (*path, key), priors) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_without_priors(value, (*path, index), priors) for index, value in enumerate(node)]
+    return node
+
+
+def _dotted(path: tuple[str | int, ...]) -> str:
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def save_robot(robot: Robot, path: str | os.PathLike, force: bool = False) -> Path:
+    """Write a robot file. Raises InputError when it exists (unless `force`) or cannot be written."""
+    return write_atomic(path, robot_to_toml(robot), force)
+
+
+def robot_to_toml(robot: Robot) -> str:
+    """The robot as the text of a robot file; `parse_robot` gives the same robot back, to the last bit."""
+    head = [f"schema = {SCHEMA}", f"name = {_literal(robot.name)}"]
+    if robot.source:
+        head.append(f"source = {_literal(robot.source)}")
+    tables = [_table(name, getattr(robot, name), robot.priors) for name in ("body", "wheels", "motor", "friction")]
+    return "\n".join(head) + "\n" + "".join(tables)
+
+
+def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
+    """One table of the file, its sub-tables after it; what equals its default is left out."""
+    lines, inner = [], ""
+    for key, field in keys_of(type(value), []).items():
+        content = getattr(value, field)
+        if isinstance(content, BaseModel):
+            inner += _table(f"{name}.{key}", content, priors)
+        elif content != type(value).model_fields[field].default or field == "rotating_frame":
+            note = type(value).model_fields[field].description
+            lines.append(f"{key} = {_with_prior(content, f'{name}.{key}', priors)}" + (f"  # {note}" if note else ""))
+    return ("\n[" + name + "]\n" + "\n".join(lines) + "\n" if lines else "") + inner
+
+
+def _with_prior(content: Any, path: str, priors: dict[str, Prior]) -> str:
+    if isinstance(content, tuple) and path not in priors:
+        return "[" + ", ".join(_with_prior(item, f"{path}[{i}]", priors) for i, item in enumerate(content)) + "]"
+    if path not in priors:
+        return _literal(content)
+    prior = priors[path]
+    parts = [f"value = {_literal(content)}"]
+    if prior.std is not None:
+        parts.append(f"std = {_literal(prior.std)}")
+    if prior.source:
+        parts.append(f"source = {_literal(prior.source)}")
+    return "{ " + ", ".join(parts) + " }"
+
+
+def _literal(value: Any) -> str:
+    """A TOML literal. Floats keep every bit; JSON's string escapes are a subset of TOML's."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(_literal, value)) + "]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

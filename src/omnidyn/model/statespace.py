@@ -1,0 +1,73 @@
+"""The state space of eqs (13) (14), and its exact discretisation.
+
+    x' = A x + B u + K sgn(x),   y = C x,   x = twist, u = voltage
+
+A, B and K are not typed from the printed (13) but derived from the forces of dynamics.py, which are linear in twist
+and voltage: A = -M^-1 (k G G^T + B_viscous), k = (l K_t)(l K_v)/(R r^2); B = M^-1 g G, g = l K_t/(R r);
+K = -M^-1 C_coulomb. sgn is set-valued at 0: K sgn(x) balances what drives an axis at rest, up to its breakaway.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from omnidyn.model.dynamics import drive_wrench, mass_matrix
+from omnidyn.model.robot import Robot
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """Matrices of eqs (13) (14): A [1/s], shape (3, 3); B, shape (3, wheels); K and C, shape (3, 3).
+
+    Units follow the axes: rows of B in m/s^2/V, m/s^2/V, rad/s^2/V; diagonal of K in m/s^2, m/s^2, rad/s^2.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    K: FloatArray
+    C: FloatArray
+
+    @property
+    def time_constants(self) -> FloatArray:
+        """-1/diag(A) [s]: how fast each axis forgets. Shape (3,)."""
+        return -1.0 / np.diag(self.A)
+
+
+def state_space(robot: Robot) -> StateSpace:
+    """Eqs (13) (14) of a robot: quasi-static windings, no terms of a turning frame, friction on the axes."""
+    count = robot.wheels.count
+    at_rest, no_voltage = np.zeros(3), np.zeros(count)
+    mass = mass_matrix(robot)
+    viscous, coulomb, _ = robot.friction.axes.levels
+    braking = drive_wrench(robot, np.eye(3), no_voltage)
+    driving = drive_wrench(robot, at_rest, np.eye(count))
+    return StateSpace(
+        A=(braking.T - np.diag(viscous)) / mass[:, None] + 0.0,
+        B=driving.T / mass[:, None] + 0.0,
+        K=np.diag(-coulomb / mass),
+        C=np.eye(3),
+    )
+
+
+def is_decoupled(system: StateSpace, tolerance: float = 1e-12) -> bool:
+    """Whether each axis moves for itself: A diagonal within `tolerance`, relative to the axes it joins."""
+    scale = np.sqrt(np.abs(np.outer(np.diag(system.A), np.diag(system.A))))
+    # An entry joins axes of different units; A[i, j] A[j, i] has none.
+    coupling = np.sqrt(np.abs(system.A * system.A.T)) / scale
+    return bool(np.all(coupling - np.eye(3) <= tolerance))
+
+
+def discretise(system: StateSpace, dt: ArrayLike) -> FloatArray:
+    """phi = (1 - e^(-a dt))/a of each decoupled axis, a = -diag(A): the voltage held over dt moves a sliding axis by
+
+        v(dt) = v + phi (drive - a v),   so  A_d = 1 - a phi,  B_d = phi B,  K_d = phi K.
+
+    `dt` [s], shape (*batch,). Returns phi [s], shape (*batch, 3). expm1 keeps every digit of a short step.
+    """
+    rate = -np.diag(system.A)
+    return -np.expm1(-rate * np.asarray(dt, dtype=float)[..., None]) / rate

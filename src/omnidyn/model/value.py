@@ -1,0 +1,129 @@
+"""Value: the frozen, checked type that every part of a robot is. Each parameter is declared once.
+
+A field carries its name in Python, its key in a robot file (the alias, with the unit in its name), its range and
+its meaning. Construction checks it, from a file or from Python, and raises InputError with the path of the key.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    ValidationError,
+)
+
+from omnidyn.errors import InputError
+
+
+class Value(BaseModel):
+    """A frozen value type; `replace` makes a changed, checked copy.
+
+    Raises InputError when a field is missing, unknown, of the wrong type or out of its range.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_by_name=True, validate_by_alias=True, validate_default=False
+    )
+
+    def __init__(self, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise from_validation(error, type(self)) from None
+
+    def replace(self, **changes: Any) -> Self:
+        """The same value with some fields changed, checked again."""
+        return type(self)(**{**{name: getattr(self, name) for name in type(self).model_fields}, **changes})
+
+
+def to_list(value: Any) -> Any:
+    """A NumPy array or number as plain Python; anything else as it is."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _shape_of(value: Any) -> str:
+    return "many" if isinstance(value, list | tuple) else "one"
+
+
+def number(low: float, high: float, *, above: bool = False) -> Any:
+    """Type of a finite number in [low, high], or (low, high] when `above`; a bool or a string is refused."""
+    bound = Field(gt=low, le=high, allow_inf_nan=False) if above else Field(ge=low, le=high, allow_inf_nan=False)
+    return Annotated[float, Strict(), bound, BeforeValidator(to_list)]
+
+
+def per_wheel_number(low: float, high: float, *, above: bool = False) -> Any:
+    """Type of a number, or a tuple with one number per wheel."""
+    one = number(low, high, above=above)
+    return Annotated[
+        Annotated[one, Tag("one")] | Annotated[tuple[one, ...], Tag("many")],
+        Discriminator(_shape_of),
+        BeforeValidator(to_list),
+    ]
+
+
+def per_axis_number(low: float, high: float) -> Any:
+    """Type of three numbers: along x, along y, about yaw."""
+    one = number(low, high)
+    return Annotated[tuple[one, one, one], BeforeValidator(to_list)]
+
+
+Text = Annotated[str, Strict(), Field(max_length=400)]
+Flag = Annotated[bool, Strict()]
+
+
+def from_validation(error: ValidationError, model: type[BaseModel]) -> InputError:
+    """The first fault of a pydantic check as an InputError: where, what, got, expected, remedy."""
+    faults = error.errors(include_url=False)
+    first = faults[0]
+    path = [part for part in first["loc"] if part not in ("one", "many")]
+    kind, more = first["type"], f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    where = key_path(path)
+    if kind == "extra_forbidden":
+        return InputError(f"unknown key{more}", got=str(path[-1]), remedy=_nearest(path, model), where=where)
+    if kind == "missing":
+        return InputError(f"a key is missing{more}", expected=str(path[-1]), remedy="add it", where=where)
+    if kind == "value_error":  # one of our own checks: its words are complete
+        return InputError(first["msg"].removeprefix("Value error, ") + more, where=where)
+    expected = first["msg"].removeprefix("Input should be ")
+    return InputError(f"cannot use this value{more}", got=first["input"], expected=expected, where=where)
+
+
+def key_path(path: list[Any] | tuple[Any, ...]) -> str:
+    """A key as one finds it in the file: [motor] resistance_ohm, [friction.axes] coulomb[0]."""
+    names = [part for part in path if not isinstance(part, int)]
+    index = "".join(f"[{part}]" for part in path if isinstance(part, int))
+    if not names:
+        return index
+    table = f"[{'.'.join(map(str, names[:-1]))}] " if len(names) > 1 else ""
+    return f"{table}{names[-1]}{index}"
+
+
+def _nearest(path: list[Any], model: type[BaseModel]) -> str:
+    """The known keys at the place of an unknown one, the nearest name first."""
+    known = sorted(keys_of(model, path[:-1]))
+    close = difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0.5)
+    return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(known)}"
+
+
+def keys_of(model: type[BaseModel], path: list[Any]) -> Mapping[str, str]:
+    """File key -> field name of the table at `path` below `model`."""
+    for part in path:
+        for name, field in model.model_fields.items():
+            if part in (name, field.alias):
+                inner = [t for t in _types_in(field.annotation) if issubclass(t, BaseModel)]
+                model = inner[0] if inner else model
+    return {field.alias or name: name for name, field in model.model_fields.items()}
+
+
+def _types_in(annotation: Any) -> list[type]:
+    parts = getattr(annotation, "__args__", ())
+    return [annotation] if isinstance(annotation, type) and not parts else [t for p in parts for t in _types_in(p)]

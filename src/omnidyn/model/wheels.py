@@ -1,0 +1,155 @@
+"""Wheels: where they stand and how they push. One matrix, the wrench matrix G; eqs (3), (7)-(9) follow from it.
+
+    wrench    = G f            (7)-(9): traction f_i of the wheels [N] to (F_x, F_y, T) [N, N, N m]
+    rim speed = G^T twist      (3): by conservation of power, f . rim speed = wrench . twist
+
+Column i for a wheel at azimuth phi, at distance b from the centre, with rollers at angle gamma:
+
+    [-sin phi - tan gamma cos phi,  cos phi - tan gamma sin phi,  b]
+
+gamma = 0 is an omni wheel. For a mecanum wheel phi is the azimuth of its axle, gamma the roller angle
+(+-45 degrees), and b = half track + half wheelbase.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, Field, model_validator
+
+from omnidyn.model.value import Value, number, per_wheel_number, to_list
+
+PerWheel = float | tuple[float, ...]
+"""One number for all wheels, or one per wheel."""
+
+MIN_WHEELS, MAX_WHEELS = 3, 16
+MAX_CONDITION = 1e6  # of G scaled by the robot radius: beyond it the wheels cannot move the robot in every direction
+
+
+class Wheels(Value):
+    """The wheels of a robot; a tuple means one value per wheel.
+
+    azimuth_deg: where each wheel stands, seen from the centre, counter-clockwise from forward [degree].
+    robot_radius: distance b from the centre to the wheels [m]. wheel_radius: r [m].
+    roller_angle_deg: 0 for omni wheels, +-45 for mecanum wheels [degree].
+    """
+
+    azimuth_deg: Annotated[
+        tuple[number(-360.0, 360.0), ...],
+        BeforeValidator(to_list),
+        Field(min_length=MIN_WHEELS, max_length=MAX_WHEELS, description="counter-clockwise from forward"),
+    ]
+    robot_radius: Annotated[
+        per_wheel_number(1e-3, 100.0), Field(alias="robot_radius_m", description="b, centre to wheel")
+    ]
+    wheel_radius: Annotated[per_wheel_number(1e-3, 10.0), Field(alias="wheel_radius_m", description="r")]
+    roller_angle_deg: Annotated[per_wheel_number(-80.0, 80.0), Field(description="0 = omni, +-45 = mecanum")] = 0.0
+
+    @model_validator(mode="after")
+    def _moves_in_every_direction(self) -> Wheels:
+        for name in ("robot_radius", "wheel_radius", "roller_angle_deg"):
+            check_count(name, getattr(self, name), self.count)
+        scaled = self.wrench_matrix / np.array([[1.0], [1.0], [np.mean(self.robot_radius)]])
+        if np.linalg.cond(scaled) > MAX_CONDITION:
+            raise ValueError(f"wheels at azimuths {list(self.azimuth_deg)} cannot move the robot in every direction")
+        return self
+
+    @property
+    def count(self) -> int:
+        """Number of wheels."""
+        return len(self.azimuth_deg)
+
+    @property
+    def azimuth(self) -> NDArray[np.float64]:
+        """Wheel azimuths [rad]. Shape (wheels,)."""
+        return np.radians(self.azimuth_deg)
+
+    @property
+    def radii(self) -> NDArray[np.float64]:
+        """Wheel radius of each wheel [m]. Shape (wheels,)."""
+        return per_wheel(self.wheel_radius, self.count)
+
+    @property
+    def wrench_matrix(self) -> NDArray[np.float64]:
+        """G of eqs (7)-(9): wrench = G @ traction. Shape (3, wheels). Exact zeros at multiples of 30 degrees."""
+        sin, cos = sin_cos_deg(self.azimuth_deg)
+        roller_sin, roller_cos = sin_cos_deg(per_wheel(self.roller_angle_deg, self.count))
+        tan = roller_sin / roller_cos
+        return np.stack([-sin - tan * cos, cos - tan * sin, per_wheel(self.robot_radius, self.count)]) + 0.0
+
+
+def per_wheel(value: PerWheel, count: int) -> NDArray[np.float64]:
+    """`value` as an array with one entry per wheel. Shape (count,)."""
+    return np.broadcast_to(np.asarray(value, dtype=float), (count,)).copy()
+
+
+def check_count(name: str, value: PerWheel | None, count: int) -> None:
+    """Raises ValueError when `value` is a tuple of another length than there are wheels."""
+    if isinstance(value, tuple) and len(value) != count:
+        raise ValueError(f"{name} has {len(value)} values; expected 1, or one per wheel ({count})")
+
+
+def sin_cos_deg(angle: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sine and cosine of an angle in degrees, exact where they are 0, 1/2 or 1. Shape (*batch,) each.
+
+    A wheel that should not turn must not turn: sin(radians(180)) is 1.2e-16, here it is 0.
+    """
+    angle = np.mod(np.asarray(angle, dtype=float), 360.0)
+    return _sin_deg(angle), _sin_deg(np.mod(angle + 90.0, 360.0))
+
+
+def _sin_deg(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sine of an angle in [0, 360) degrees, folded into [0, 90] so that symmetric wheels get equal numbers."""
+    negative = angle >= 180.0
+    half = np.where(negative, angle - 180.0, angle)
+    quarter = np.where(half > 90.0, 180.0 - half, half)
+    # cos is better conditioned near 90 degrees, and gives 1/2 exactly at 30 through the table.
+    sine = np.where(quarter <= 45.0, np.sin(np.radians(quarter)), np.cos(np.radians(90.0 - quarter)))
+    sine = np.where(quarter == 30.0, 0.5, sine)
+    sine = np.where(quarter == 60.0, np.sqrt(3.0) / 2.0, sine)
+    sine = np.where(quarter == 45.0, np.sqrt(0.5), sine)
+    return np.where(negative, -sine, sine) + 0.0
+
+
+def rim_speed(wheels: Wheels, twist: ArrayLike) -> NDArray[np.float64]:
+    """Speed of the wheel rims over the floor, G^T twist [m/s]; the rows of eq (3) times r.
+
+    `twist` [m/s, m/s, rad/s], shape (*batch, 3). Returns shape (*batch, wheels).
+    """
+    return _product(np.asarray(twist, dtype=float), wheels.wrench_matrix.T)
+
+
+def wheel_speed(wheels: Wheels, twist: ArrayLike) -> NDArray[np.float64]:
+    """Angular speed of the wheels, G^T twist / r [rad/s], eq (3) solved for the wheels.
+
+    `twist` [m/s, m/s, rad/s], shape (*batch, 3). Returns shape (*batch, wheels).
+    """
+    return rim_speed(wheels, twist) / wheels.radii
+
+
+def twist_from_wheel_speed(wheels: Wheels, speed: ArrayLike) -> NDArray[np.float64]:
+    """Twist of the robot from its wheel speeds, eq (3); least squares where there are more than three wheels.
+
+    The printed row of v_n has the wrong sign for wheel 1; this is the pseudo-inverse of G^T instead.
+    `speed` [rad/s], shape (*batch, wheels). Returns shape (*batch, 3) [m/s, m/s, rad/s].
+    """
+    inverse = np.linalg.pinv(wheels.wrench_matrix.T)
+    return _product(np.asarray(speed, dtype=float) * wheels.radii, inverse)
+
+
+def wrench_from_traction(wheels: Wheels, traction: ArrayLike) -> NDArray[np.float64]:
+    """Wrench on the body, G f, eqs (7)-(9).
+
+    `traction` [N], shape (*batch, wheels). Returns (F_x, F_y, T) [N, N, N m], shape (*batch, 3).
+    """
+    return _product(np.asarray(traction, dtype=float), wheels.wrench_matrix)
+
+
+def _product(vectors: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """matrix @ vector for each vector of a batch, summed in a fixed order: equal inputs give equal zeros anywhere."""
+    total = np.zeros((*vectors.shape[:-1], matrix.shape[0]))
+    for column in range(matrix.shape[1]):
+        total += vectors[..., column, None] * matrix[:, column]
+    return total

@@ -1,0 +1,122 @@
+"""Run: one run of one robot, measured or simulated, the same type for both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from omnidyn.errors import InputError
+
+FloatArray = NDArray[np.float64]
+WHEEL, AXIS, SCALAR = "wheel", "axis", "scalar"
+
+# What the columns of a channel are: one per wheel, one per axis (x, y, yaw), or none.
+CHANNELS = {
+    "voltage": WHEEL,
+    "duty": WHEEL,
+    "current": WHEEL,
+    "wheel_speed": WHEEL,
+    "wheel_speed_command": WHEEL,
+    "twist": AXIS,
+    "twist_command": AXIS,
+    "pose": AXIS,
+    "supply": SCALAR,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run. All channels have the length of `t`; one that was not measured is None, a missing value is NaN.
+
+    t: time [s], strictly increasing, need not be regular. Shape (samples,).
+    voltage [V], duty [-1..1], current [A], wheel_speed and wheel_speed_command [rad/s]. Shape (samples, wheels).
+    twist and twist_command: (v_x, v_y, omega) in the body frame [m/s, m/s, rad/s]. Shape (samples, 3).
+    pose: (x, y, heading) in the world [m, m, rad], heading not wrapped. Shape (samples, 3).
+    supply: voltage of the battery [V]. Shape (samples,).
+    source: where it comes from. warnings: what a reader should know, in words.
+    Inputs (voltage, duty, commands) of row k hold over [t_k, t_k+1). All arrays are read-only.
+    Raises InputError when a channel has another shape or time does not increase.
+    """
+
+    t: FloatArray
+    voltage: FloatArray | None = None
+    duty: FloatArray | None = None
+    current: FloatArray | None = None
+    wheel_speed: FloatArray | None = None
+    wheel_speed_command: FloatArray | None = None
+    twist: FloatArray | None = None
+    twist_command: FloatArray | None = None
+    pose: FloatArray | None = None
+    supply: FloatArray | None = None
+    source: str = ""
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        time = _read_only("t", self.t, None)
+        bad = np.flatnonzero(~(np.diff(time) > 0.0))
+        if bad.size:
+            raise InputError("time does not increase", got=f"row {bad[0] + 1}: t = {time[bad[0] + 1]}", where="t")
+        object.__setattr__(self, "t", time)
+        for name, kind in CHANNELS.items():
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _read_only(name, value, kind, len(time)))
+
+    @property
+    def channels(self) -> dict[str, FloatArray]:
+        """The measured channels by name."""
+        return {name: value for name in CHANNELS if (value := getattr(self, name)) is not None}
+
+    @property
+    def wheels(self) -> int | None:
+        """Number of wheels, None where no channel of wheels was measured."""
+        counts = {len(value[0]) for name, value in self.channels.items() if CHANNELS[name] == WHEEL}
+        return counts.pop() if counts else None
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        span = f"{self.t[-1] - self.t[0]:.6g} s" if len(self.t) > 1 else "one sample"
+        return f"<Run {self.source or 'unnamed'}: {len(self.t)} samples, {span}, {', '.join(self.channels)}>"
+
+    def __eq__(self, other: object) -> bool:
+        """Equal to the last bit in every channel and word; NaN equals NaN."""
+        if not isinstance(other, Run):
+            return NotImplemented
+        return all(_same(a, b) for a, b in zip(_values(self), _values(other), strict=True))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def replace(self, **changes: Any) -> Run:
+        """The same run with some fields changed, checked again."""
+        return replace(self, **changes)
+
+
+def _values(run: Run) -> Iterator[Any]:
+    return (getattr(run, field.name) for field in fields(run))
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and bool(np.array_equal(a, b, equal_nan=True))
+    return bool(a is b or a == b) if not (isinstance(a, np.ndarray) or isinstance(b, np.ndarray)) else False
+
+
+def _read_only(name: str, value: ArrayLike, kind: str | None, samples: int | None = None) -> FloatArray:
+    """A read-only float64 copy of the right shape; an array that nobody can write to is not copied."""
+    array = np.asarray(value, dtype=float)
+    dimensions = 2 if kind in (WHEEL, AXIS) else 1
+    wrong = array.ndim != dimensions or array.shape[0] == 0 or (kind == AXIS and array.shape[1] != 3)
+    if wrong or (samples is not None and array.shape[0] != samples):
+        shape = {WHEEL: "(samples, wheels)", AXIS: "(samples, 3)"}.get(kind or "", "(samples,)")
+        length = f" with {samples} samples" if samples is not None else ""
+        raise InputError("wrong shape", got=array.shape, expected=shape + length, where=name)
+    if array.flags.writeable or array.base is not None:
+        array = array.copy()
+        array.flags.writeable = False
+    return array
