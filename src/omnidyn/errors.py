@@ -21,9 +21,7 @@ class OmnidynError(Exception):
 
     exit_code = 3
 
-    def __init__(
-        self, what: str, *, got: object = None, expected: str = "", remedy: str = "", where: str = ""
-    ):
+    def __init__(self, what: str, *, got: object = None, expected: str = "", remedy: str = "", where: str = ""):
         self.what, self.expected, self.remedy, self.where = what, expected, remedy, where
         self.got = "" if got is None else _short(got)
         super().__init__(self._message())
@@ -42,9 +40,7 @@ class OmnidynError(Exception):
     def at(self, where: str) -> OmnidynError:
         """The same error with the place put in front, such as a file name."""
         place = f"{where}: {self.where}" if self.where else where
-        return type(self)(
-            self.what, got=self.got or None, expected=self.expected, remedy=self.remedy, where=place
-        )
+        return type(self)(self.what, got=self.got or None, expected=self.expected, remedy=self.remedy, where=place)
 
 
 class InputError(OmnidynError):
@@ -75,6 +71,9 @@ class MissingExtraError(OmnidynError):
 
 def _short(value: object, limit: int = 80) -> str:
     """A value as text for a message: printable, on one line, never longer than `limit`."""
-    text = value if isinstance(value, str) else repr(value)
+    try:
+        text = value if isinstance(value, str) else repr(value)
+    except ValueError:  # an integer of more digits than Python prints
+        text = f"a huge {type(value).__name__}"
     text = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
     return text if len(text) <= limit else text[: limit - 3] + "..."

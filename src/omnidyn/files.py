@@ -57,7 +57,9 @@ def read_bytes(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> byte
         raise InputError("the file is empty", got="0 bytes", where=str(path))
     if len(content) > max_bytes:
         raise InputError(
-            "the file is too large", got=f"more than {max_bytes} bytes", expected=f"at most {max_bytes} bytes",
+            "the file is too large",
+            got=f"more than {max_bytes} bytes",
+            expected=f"at most {max_bytes} bytes",
             where=str(path),
         )
     return content
@@ -84,6 +86,11 @@ def read_text(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> str:
 def check_output(path: str | os.PathLike, force: bool = False) -> Path:
     """Refuse, before any work is done, a place where the result could not be written in the end."""
     path = Path(path)
+    try:
+        os.stat(path)
+    except (OSError, ValueError) as error:  # a name that is too long, or that holds a zero byte
+        if not isinstance(error, FileNotFoundError | PermissionError | NotADirectoryError):
+            raise InputError("not a file name", got=str(path), expected="a shorter name", where=str(error)) from None
     if path.is_dir():
         raise InputError("cannot write the result there", got="a folder", expected="a file name", where=str(path))
     if path.exists() and not force:
@@ -118,7 +125,9 @@ def write_atomic(path: str | os.PathLike, content: str | bytes, force: bool = Fa
             _rename_new(temporary, path)
     except FileExistsError:
         raise InputError(
-            "the file exists already", got="another process made it meanwhile", remedy="use --force to replace it",
+            "the file exists already",
+            got="another process made it meanwhile",
+            remedy="use --force to replace it",
             where=str(path),
         ) from None
     except OSError as error:

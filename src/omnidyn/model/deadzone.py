@@ -1,4 +1,4 @@
-"""The dead zone: voltages at which the robot does not move (section 4, Fig. 5)."""
+"""The dead zone: voltages at which the robot does not move (section 4, Fig. 5), for friction of every shape."""
 
 from __future__ import annotations
 
@@ -6,44 +6,95 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.dynamics import acceleration, axes_hold_alone, drive_wrench, linear_part
 from omnidyn.model.robot import Robot
+
+FloatArray = NDArray[np.float64]
+HIGHEST = 1e6  # [V] beyond which a pattern counts as one that never moves the robot
+BISECTIONS = 60
 
 
 def moves(robot: Robot, voltage: ArrayLike) -> NDArray[np.bool_]:
     """Which axes of a robot at rest start to move under a held voltage [V].
 
-    `voltage` has shape (*batch, wheels); returns (*batch, 3) for x, y, yaw. Motor limits are not applied.
+    `voltage` has shape (*batch, wheels); returns (*batch, 3) for x, y, yaw. The voltage limit is not applied.
     """
-    voltage = np.asarray(voltage, dtype=float)
-    applied = drive_wrench(robot, np.zeros((*voltage.shape[:-1], 3)), voltage)
-    return ~robot.friction.axes.holds(applied)
+    voltage = _patterns(robot, voltage)
+    at_rest = np.zeros((*voltage.shape[:-1], 3))
+    if axes_hold_alone(robot):
+        return ~robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage))
+    return acceleration(robot, at_rest, voltage) != 0.0
 
 
-def axis_patterns(robot: Robot) -> NDArray[np.float64]:
+def axis_patterns(robot: Robot) -> FloatArray:
     """Voltage patterns that drive one axis each: rows for x, y, yaw. Shape (3, wheels).
 
     Each row is the pattern of least norm that pushes along its axis only, scaled to a largest entry of 1: for the
     paper's robot (0, 1, -1), (-1, 1/2, 1/2) and (1, 1, 1).
     """
-    driving = drive_wrench(robot, np.zeros(3), np.eye(robot.wheels.count)).T
-    patterns = np.linalg.pinv(driving).T
-    patterns = patterns / np.abs(patterns).max(axis=1, keepdims=True)
-    patterns[np.abs(patterns) < 1e-12] = 0.0  # a wheel that is not needed gets no voltage at all
-    return patterns
+    return _scaled(_voltage_per_wrench(robot).T)
 
 
-def breakaway_voltage(robot: Robot, pattern: ArrayLike) -> NDArray[np.float64]:
-    """The scale s >= 0 [V] at which the first axis starts to move under the voltage s * pattern.
+def breakaway_voltage(robot: Robot, pattern: ArrayLike) -> FloatArray:
+    """The scale s >= 0 [V] up to which the robot stays at rest under the voltage s * pattern.
 
-    `pattern` has shape (*batch, wheels), no unit; returns (*batch,); infinite where the pattern drives no axis.
+    `pattern` has shape (*batch, wheels), no unit; returns (*batch,); infinite where the pattern never moves it.
     Raises InputError when its last axis is not one entry per wheel.
     """
+    pattern = _patterns(robot, pattern)
+    if axes_hold_alone(robot) and not np.any(robot.motor.voltage_drop) and robot.motor.current_limit is None:
+        wrench_per_volt = np.abs(drive_wrench(robot, np.zeros((*pattern.shape[:-1], 3)), pattern))
+        breakaway = robot.friction.axes.levels[2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = np.where(wrench_per_volt > 1e-12 * breakaway, breakaway / wrench_per_volt, np.inf)
+        return scale.min(axis=-1)
+    return _bisect(robot, pattern.reshape(-1, pattern.shape[-1])).reshape(pattern.shape[:-1])
+
+
+def dead_zone_map(robot: Robot, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """(breakaway voltage [V], shape (k,); voltage patterns, shape (k, wheels)) over directions of travel [rad], (k,).
+
+    Each pattern pushes along its direction without a torque and has a largest entry of 1: the voltage is that of the
+    most loaded motor at which the robot starts to move.
+    """
+    directions = np.atleast_1d(np.asarray(directions, dtype=float))
+    wrench = np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1)
+    patterns = _scaled(wrench @ _voltage_per_wrench(robot).T)
+    return breakaway_voltage(robot, patterns), patterns
+
+
+def _voltage_per_wrench(robot: Robot) -> FloatArray:
+    """Voltages of least norm for a unit wrench at standstill, before any loss. Shape (wheels, 3)."""
+    return np.asarray(
+        np.linalg.pinv(drive_wrench(linear_part(robot), np.zeros(3), np.eye(robot.wheels.count)).T), dtype=float
+    )
+
+
+def _scaled(patterns: FloatArray) -> FloatArray:
+    """Largest entry 1 in each row; entries that are rounding become what they stand for."""
+    patterns = patterns / np.abs(patterns).max(axis=-1, keepdims=True)
+    nearest = np.round(patterns * 2.0) / 2.0  # 0, 1/2 and 1 of the usual layouts; a wheel not needed gets no voltage
+    return np.where(np.abs(patterns - nearest) < 1e-12, nearest, patterns) + 0.0
+
+
+def _patterns(robot: Robot, pattern: ArrayLike) -> FloatArray:
     pattern = np.asarray(pattern, dtype=float)
     if pattern.ndim == 0 or pattern.shape[-1] != robot.wheels.count:
-        raise InputError("wrong voltage pattern", got=pattern.shape, expected=f"one entry per wheel ({robot.wheels.count})")
-    wrench_per_volt = np.abs(drive_wrench(robot, np.zeros((*pattern.shape[:-1], 3)), pattern))
-    breakaway = robot.friction.axes.levels[2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scale = np.where(wrench_per_volt > 1e-12 * breakaway, breakaway / wrench_per_volt, np.inf)
-    return scale.min(axis=-1)
+        raise InputError(
+            "wrong voltage pattern", got=pattern.shape, expected=f"one entry per wheel ({robot.wheels.count})"
+        )
+    return pattern
+
+
+def _bisect(robot: Robot, patterns: FloatArray) -> FloatArray:
+    """The largest scale that holds, by doubling and bisection on the exact test of `moves`. Shape (k,)."""
+    low, high = np.zeros(len(patterns)), np.full(len(patterns), 1e-3)
+    still = ~moves(robot, high[:, None] * patterns).any(axis=-1)
+    while still.any() and high.max() < HIGHEST:
+        low, high = np.where(still, high, low), np.where(still, 2.0 * high, high)
+        still &= ~moves(robot, high[:, None] * patterns).any(axis=-1)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        holds = ~moves(robot, middle[:, None] * patterns).any(axis=-1)
+        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
+    return np.where(still, np.inf, low)

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.model.motor import settled_current, traction
+from omnidyn.model.plant import LENGTH, plant
+from omnidyn.model.rest import accelerations, start_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed, wrench_from_traction
 
@@ -43,6 +45,11 @@ def drive_wrench(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[
     return wrench_from_currents(robot, settled_currents(robot, twist, voltage))
 
 
+def linear_part(robot: Robot) -> Robot:
+    """The same robot with motors whose current is linear in voltage and speed: no drop, no current limit."""
+    return robot.replace(motor=robot.motor.replace(voltage_drop=0.0, current_limit=None))
+
+
 def frame_wrench(robot: Robot, twist: ArrayLike) -> NDArray[np.float64]:
     """Apparent wrench M omega (v_y, -v_x, 0) of the turning body frame; zero where the robot leaves it out."""
     twist = np.asarray(twist, dtype=float)
@@ -53,9 +60,23 @@ def frame_wrench(robot: Robot, twist: ArrayLike) -> NDArray[np.float64]:
 
 
 def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[np.float64]:
-    """Acceleration of the twist [m/s^2, m/s^2, rad/s^2], eqs (4)-(6); friction at rest balances what drives it.
+    """Acceleration of the twist [m/s^2, m/s^2, rad/s^2], eqs (4)-(6), currents settled.
 
+    Friction at rest balances what drives it; where several parts hold at once, the inclusion of inclusion.py decides.
     `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
     """
-    applied = drive_wrench(robot, twist, voltage) + frame_wrench(robot, twist)
-    return (applied + robot.friction.axes.wrench(twist, applied)) / mass_matrix(robot)
+    twist, voltage = np.asarray(twist, dtype=float), np.asarray(voltage, dtype=float)
+    if axes_hold_alone(robot):
+        applied = drive_wrench(robot, twist, voltage) + frame_wrench(robot, twist)
+        return (applied + robot.friction.axes.wrench(twist, applied)) / mass_matrix(robot)
+    batch, n = np.broadcast_shapes(twist.shape[:-1], voltage.shape[:-1]), robot.wheels.count
+    twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
+    volts = np.ascontiguousarray(np.broadcast_to(voltage, (*batch, n)).reshape(-1, n))
+    numbers = plant(robot)
+    states = np.array([start_state(numbers, row, np.zeros(n)) for row in twists]).reshape(len(twists), -1)
+    return (accelerations(numbers, states, volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(*batch, 3)
+
+
+def axes_hold_alone(robot: Robot) -> bool:
+    """Whether nothing but the friction of each body axis, for itself, can hold the robot: the paper's case."""
+    return robot.friction.only_axes and bool(np.all(np.asarray(robot.motor.gear_efficiency) == 1.0))

@@ -1,8 +1,8 @@
 """DC motors behind a gear, eqs (10)-(12), with the back-EMF of the motor shaft.
 
-    u = L di/dt + R i + K_v l w       (11)  w: wheel speed; the printed (11) leaves out the gear ratio l
-    T = l K_t i,  f = T / r           (10)
-    |i| <= i_max                      (12)  printed without the absolute value
+u = L di/dt + R i + K_v l w       (11)  w: wheel speed; the printed (11) leaves out the gear ratio l
+T = l K_t i,  f = T / r           (10)
+|i| <= i_max                      (12)  printed without the absolute value
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from omnidyn.model.value import Value, per_wheel_number
+from omnidyn.model.value import PerWheel, Value, per_wheel_number
 from omnidyn.model.wheels import Wheels, per_wheel
 
 QUASI_STATIC, DYNAMIC = "quasi-static", "dynamic"
@@ -24,27 +24,39 @@ class Motor(Value):
 
     resistance [ohm], torque_constant [N m/A], emf_constant [V s/rad], both at the motor shaft; gear_ratio [-];
     voltage_limit [V]; inductance [H]; current_limit [A], None means no limit.
+    voltage_drop [V]: lost in brushes and driver, against the current. gear_efficiency [-]: of power through the gear.
     electrical: "quasi-static" leaves L di/dt out of eq (11), "dynamic" keeps it.
     """
 
-    resistance: Annotated[per_wheel_number(1e-6, 1e6), Field(alias="resistance_ohm", description="R")]
-    inductance: Annotated[per_wheel_number(1e-12, 1e3) | None, Field(alias="inductance_H", description="L")] = None
+    resistance: Annotated[PerWheel, per_wheel_number(1e-6, 1e6), Field(alias="resistance_ohm", description="R")]
+    inductance: Annotated[
+        Annotated[PerWheel, per_wheel_number(1e-12, 1e3)] | None, Field(alias="inductance_H", description="L")
+    ] = None
     torque_constant: Annotated[
-        per_wheel_number(1e-9, 1e3), Field(alias="torque_constant_Nm_A", description="K_t at the motor shaft")
+        PerWheel, per_wheel_number(1e-9, 1e3), Field(alias="torque_constant_Nm_A", description="K_t at the motor shaft")
     ]
     emf_constant: Annotated[
-        per_wheel_number(1e-9, 1e3), Field(alias="emf_constant_Vs_rad", description="K_v at the motor shaft")
+        PerWheel, per_wheel_number(1e-9, 1e3), Field(alias="emf_constant_Vs_rad", description="K_v at the motor shaft")
     ]
-    gear_ratio: Annotated[per_wheel_number(1e-3, 1e5), Field(description="l, motor turns per wheel turn")]
+    gear_ratio: Annotated[PerWheel, per_wheel_number(1e-3, 1e5), Field(description="l, motor turns per wheel turn")]
     voltage_limit: Annotated[
-        per_wheel_number(1e-3, 1e5), Field(alias="voltage_limit_V", description="of the driver, both signs")
+        PerWheel, per_wheel_number(1e-3, 1e5), Field(alias="voltage_limit_V", description="of the driver, both signs")
     ]
     current_limit: Annotated[
-        per_wheel_number(1e-6, 1e6) | None, Field(alias="current_limit_A", description="|i| <= i_max, eq (12)")
+        Annotated[PerWheel, per_wheel_number(1e-6, 1e6)] | None,
+        Field(alias="current_limit_A", description="|i| <= i_max, eq (12)"),
     ] = None
-    electrical: Annotated[
-        Literal["quasi-static", "dynamic"], Field(description="dynamic keeps L di/dt of eq (11)")
-    ] = QUASI_STATIC
+    voltage_drop: Annotated[
+        PerWheel,
+        per_wheel_number(0.0, 1e4),
+        Field(alias="voltage_drop_V", description="brushes and driver, against the current"),
+    ] = 0.0
+    gear_efficiency: Annotated[
+        PerWheel, per_wheel_number(0.05, 1.0), Field(description="of power through the gear, either way")
+    ] = 1.0
+    electrical: Annotated[Literal["quasi-static", "dynamic"], Field(description="dynamic keeps L di/dt of eq (11)")] = (
+        QUASI_STATIC
+    )
 
     @model_validator(mode="after")
     def _dynamic_needs_inductance(self) -> Motor:
@@ -61,12 +73,21 @@ def back_emf(motor: Motor, wheel_speed: ArrayLike) -> NDArray[np.float64]:
 
 
 def settled_current(motor: Motor, voltage: ArrayLike, wheel_speed: ArrayLike) -> NDArray[np.float64]:
-    """Current (u - K_v l w) / R [A] of eq (11) with di/dt = 0.
+    """Current [A] of eq (11) with di/dt = 0: soft(u - K_v l w, V_d) / R, within the current limit of eq (12).
 
-    `voltage` [V] and `wheel_speed` [rad/s], shape (*batch, wheels). Returns the same shape.
+    soft takes the voltage drop V_d off towards 0. `voltage` [V] and `wheel_speed` [rad/s], shape (*batch, wheels).
+    Returns the same shape.
     """
     driving = np.asarray(voltage, dtype=float) - back_emf(motor, wheel_speed)
-    return driving / per_wheel(motor.resistance, driving.shape[-1])
+    count = driving.shape[-1]
+    drop = per_wheel(motor.voltage_drop, count)
+    if drop.any():
+        driving = driving - np.clip(driving, -drop, drop)
+    current = driving / per_wheel(motor.resistance, count)
+    if motor.current_limit is None:
+        return current
+    limit = per_wheel(motor.current_limit, count)
+    return np.clip(current, -limit, limit)
 
 
 def wheel_torque(motor: Motor, current: ArrayLike) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from omnidyn.model.drive import Drive
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor
 from omnidyn.model.value import Flag, Text, Value, number
@@ -20,15 +21,19 @@ class Body(Value):
     rotating_frame: keep the terms M omega v of a turning body frame, which eqs (4) (5) leave out.
     """
 
-    mass: Annotated[number(1e-4, 1e5), Field(alias="mass_kg", description="M")]
-    inertia: Annotated[number(1e-9, 1e6), Field(alias="inertia_kg_m2", description="I_n, about the vertical axis")]
+    mass: Annotated[float, number(1e-4, 1e5), Field(alias="mass_kg", description="M")]
+    inertia: Annotated[
+        float, number(1e-9, 1e6), Field(alias="inertia_kg_m2", description="I_n, about the vertical axis")
+    ]
     rotating_frame: Annotated[Flag, Field(description="terms M omega v of a turning body")] = False
 
 
 class Prior(Value):
     """What is known about one number: its standard deviation and where it comes from."""
 
-    std: Annotated[number(0.0, 1e9, above=True) | None, Field(description="standard deviation, same unit")] = None
+    std: Annotated[
+        Annotated[float, number(0.0, 1e9, above=True)] | None, Field(description="standard deviation, same unit")
+    ] = None
     source: Text = ""
 
 
@@ -43,11 +48,14 @@ class Robot(Value):
     body: Body
     wheels: Wheels
     motor: Motor
-    friction: Friction
-    priors: Annotated[dict[str, Prior], Field(exclude=True)] = {}
+    drive: Drive = Drive()
+    friction: Friction = Friction()
+    priors: Annotated[dict[str, Prior], Field(exclude=True, default_factory=dict)]
 
     @model_validator(mode="after")
     def _one_value_per_wheel(self) -> Robot:
-        for name in type(self.motor).model_fields:
-            check_count(f"[motor] {name}", getattr(self.motor, name), self.wheels.count)
+        tables = {"motor": self.motor, "drive": self.drive, "friction.wheels": self.friction.wheels}
+        for table, value in tables.items():
+            for name in type(value).model_fields:
+                check_count(f"[{table}] {name}", getattr(value, name), self.wheels.count)
         return self

@@ -8,30 +8,23 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.files import read_text, write_atomic
 from omnidyn.model.robot import SCHEMA, Prior, Robot
-from omnidyn.model.value import key_path, keys_of
+from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 
 PRESETS = Path(__file__).parent / "presets"
 MAX_ROBOT_FILE_BYTES = 2**20
 
 # Keys of the schema for which no law exists yet. They are refused by name: never ignored, never "unknown".
 PENDING = frozenset(
-    {
-        "drive",
-        "friction.direction",
-        "friction.wheels",
-        "friction.axes.law",
-        "friction.axes.stribeck_speed",
-        "friction.axes.stribeck_exponent",
-        "friction.axes.stiffness",
-        "friction.axes.damping",
-        "motor.voltage_drop_V",
-        "motor.gear_efficiency",
-        "wheels.traction_mu",
+    {"wheels.traction_mu"}
+    | {
+        f"friction.{table}.{key}"
+        for table in ("axes", "direction", "wheels")
+        for key in ("law", "stribeck_speed", "stribeck_exponent", "stiffness", "damping")
     }
 )
 
@@ -48,15 +41,14 @@ def load_robot(robot: str | os.PathLike) -> Robot:
     what was got, what is expected), and UnsupportedError for a key for which there is no law yet.
     """
     name = os.fspath(robot)
+    if not isinstance(name, str):
+        raise InputError("not a robot", got=robot, expected="the name of a preset or the path of a TOML file")
     if name in preset_names():
-        path = PRESETS / f"{name}.toml"
-    else:
-        path = Path(name)
-        if not path.exists() and path.suffix != ".toml" and path.name == name:
-            raise InputError(
-                "no such robot", got=name, expected=f"a TOML file or a preset: {', '.join(preset_names())}"
-            )
-    return parse_robot(read_text(path, MAX_ROBOT_FILE_BYTES), str(path if name != path.stem else name))
+        return parse_robot(read_text(PRESETS / f"{name}.toml", MAX_ROBOT_FILE_BYTES), name)
+    looks_like_a_name = os.path.basename(name) == name and not name.endswith(".toml")
+    if looks_like_a_name and not os.path.exists(name):
+        raise InputError("no such robot", got=name, expected=f"a TOML file or a preset: {', '.join(preset_names())}")
+    return parse_robot(read_text(name, MAX_ROBOT_FILE_BYTES), name)
 
 
 def parse_robot(text: str, where: str = "robot") -> Robot:
@@ -69,21 +61,29 @@ def parse_robot(text: str, where: str = "robot") -> Robot:
         return robot_from_dict(document)
     except InputError as error:
         raise error.at(where) from None
+    except RecursionError:
+        raise InputError("tables nested too deeply", expected="the schema of a robot file", where=where) from None
 
 
 def robot_from_dict(document: dict[str, Any]) -> Robot:
     """A robot from the content of a robot file as nested dictionaries; schema in the documentation."""
     document = dict(document)
     schema = document.pop("schema", None)
-    if schema != SCHEMA or isinstance(schema, bool):
+    if type(schema) is not int or schema != SCHEMA:
         raise InputError(
-            "unknown schema", got=schema if schema is not None else "none", expected=f"schema = {SCHEMA}", where="schema"
+            "unknown schema",
+            got=schema if schema is not None else "none",
+            expected=f"schema = {SCHEMA}",
+            where="schema",
         )
     priors: dict[str, Prior] = {}
     plain = _without_priors(document, (), priors)
     if "priors" in plain:  # a field of Robot, not a key of the file
         raise InputError("unknown key", got="priors", expected="{ value, std, source } at the number itself")
-    return Robot(**plain, priors=priors)
+    try:
+        return Robot.model_validate({**plain, "priors": priors}, by_alias=True, by_name=False)
+    except ValidationError as error:
+        raise from_validation(error, Robot) from None
 
 
 def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Prior]) -> Any:
@@ -91,9 +91,12 @@ def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Pr
     dotted = ".".join(str(part) for part in path if not isinstance(part, int))
     if dotted in PENDING:
         raise UnsupportedError(
-            "this key has no law yet", got=str(path[-1]), remedy="remove it, or use a later version", where=key_path(path)
+            "this key has no law yet",
+            got=str(path[-1]),
+            remedy="remove it, or use a later version",
+            where=key_path(path),
         )
-    if isinstance(node, dict) and "value" in node:
+    if isinstance(node, dict) and "value" in node and table_at(Robot, path) is None:
         known = {key: value for key, value in node.items() if key != "value"}
         try:
             priors[_dotted(path)] = Prior(**known)
@@ -124,7 +127,8 @@ def robot_to_toml(robot: Robot) -> str:
     head = [f"schema = {SCHEMA}", f"name = {_literal(robot.name)}"]
     if robot.source:
         head.append(f"source = {_literal(robot.source)}")
-    tables = [_table(name, getattr(robot, name), robot.priors) for name in ("body", "wheels", "motor", "friction")]
+    parts = ("body", "wheels", "motor", "drive", "friction")
+    tables = [_table(name, getattr(robot, name), robot.priors) for name in parts]
     return "\n".join(head) + "\n" + "".join(tables)
 
 

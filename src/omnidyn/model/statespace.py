@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from omnidyn.model.dynamics import drive_wrench, mass_matrix
+from omnidyn.model.dynamics import drive_wrench, linear_part, mass_matrix
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]
@@ -39,13 +39,17 @@ class StateSpace:
 
 
 def state_space(robot: Robot) -> StateSpace:
-    """Eqs (13) (14) of a robot: quasi-static windings, no terms of a turning frame, friction on the axes."""
+    """Eqs (13) (14) of a robot: what is linear, with the friction of the body axes as K.
+
+    Left out: inductance, drop and limit of the motors, terms of a turning frame, friction of other shapes.
+    """
     count = robot.wheels.count
     at_rest, no_voltage = np.zeros(3), np.zeros(count)
     mass = mass_matrix(robot)
     viscous, coulomb, _ = robot.friction.axes.levels
-    braking = drive_wrench(robot, np.eye(3), no_voltage)
-    driving = drive_wrench(robot, at_rest, np.eye(count))
+    linear = linear_part(robot)
+    braking = drive_wrench(linear, np.eye(3), no_voltage)
+    driving = drive_wrench(linear, at_rest, np.eye(count))
     return StateSpace(
         A=(braking.T - np.diag(viscous)) / mass[:, None] + 0.0,
         B=driving.T / mass[:, None] + 0.0,

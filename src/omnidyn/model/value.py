@@ -7,7 +7,8 @@ its meaning. Construction checks it, from a file or from Python, and raises Inpu
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 from pydantic import (
@@ -16,10 +17,12 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    GetCoreSchemaHandler,
     Strict,
     Tag,
     ValidationError,
 )
+from pydantic_core import CoreSchema
 
 from omnidyn.errors import InputError
 
@@ -40,6 +43,9 @@ class Value(BaseModel):
         except ValidationError as error:
             raise from_validation(error, type(self)) from None
 
+    # pydantic would call an __init__ of our own for nested values too, and the path of the key would be lost.
+    __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
+
     def replace(self, **changes: Any) -> Self:
         """The same value with some fields changed, checked again."""
         return type(self)(**{**{name: getattr(self, name) for name in type(self).model_fields}, **changes})
@@ -54,27 +60,45 @@ def _shape_of(value: Any) -> str:
     return "many" if isinstance(value, list | tuple) else "one"
 
 
-def number(low: float, high: float, *, above: bool = False) -> Any:
-    """Type of a finite number in [low, high], or (low, high] when `above`; a bool or a string is refused."""
+@dataclass(frozen=True)
+class Checked:
+    """What a field may hold, for use in `Annotated`: the type that pydantic checks instead of the plain one."""
+
+    type: Any
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return handler.generate_schema(self.type)
+
+
+def number(low: float, high: float, *, above: bool = False) -> Checked:
+    """A finite number in [low, high], or (low, high] when `above`; a bool or a string is refused."""
     bound = Field(gt=low, le=high, allow_inf_nan=False) if above else Field(ge=low, le=high, allow_inf_nan=False)
-    return Annotated[float, Strict(), bound, BeforeValidator(to_list)]
+    return Checked(Annotated[float, Strict(), bound, BeforeValidator(to_list)])
 
 
-def per_wheel_number(low: float, high: float, *, above: bool = False) -> Any:
-    """Type of a number, or a tuple with one number per wheel."""
-    one = number(low, high, above=above)
-    return Annotated[
-        Annotated[one, Tag("one")] | Annotated[tuple[one, ...], Tag("many")],
-        Discriminator(_shape_of),
-        BeforeValidator(to_list),
-    ]
+def per_wheel_number(low: float, high: float) -> Checked:
+    """A number, or a tuple with one number per wheel."""
+    one = number(low, high).type
+    return Checked(
+        Annotated[
+            Annotated[one, Tag("one")] | Annotated[tuple[one, ...], Tag("many")],
+            Discriminator(_shape_of),
+            BeforeValidator(to_list),
+        ]
+    )
 
 
-def per_axis_number(low: float, high: float) -> Any:
-    """Type of three numbers: along x, along y, about yaw."""
-    one = number(low, high)
-    return Annotated[tuple[one, one, one], BeforeValidator(to_list)]
+def per_axis_number(low: float, high: float) -> Checked:
+    """Three numbers: along x, along y, about yaw."""
+    one = number(low, high).type
+    return Checked(Annotated[tuple[one, one, one], BeforeValidator(to_list)])
 
+
+PerWheel = float | tuple[float, ...]
+"""One number for all wheels, or one per wheel."""
+
+Levels = tuple[float, float, float]
+"""One number per axis: along x, along y, about yaw."""
 
 Text = Annotated[str, Strict(), Field(max_length=400)]
 Flag = Annotated[bool, Strict()]
@@ -89,6 +113,8 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> InputErro
     where = key_path(path)
     if kind == "extra_forbidden":
         return InputError(f"unknown key{more}", got=str(path[-1]), remedy=_nearest(path, model), where=where)
+    if kind == "missing" and isinstance(path[-1], int):
+        return InputError(f"too few values{more}", got=f"{path[-1]}", expected="more", where=key_path(path[:-1]))
     if kind == "missing":
         return InputError(f"a key is missing{more}", expected=str(path[-1]), remedy="add it", where=where)
     if kind == "value_error":  # one of our own checks: its words are complete
@@ -114,14 +140,23 @@ def _nearest(path: list[Any], model: type[BaseModel]) -> str:
     return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(known)}"
 
 
-def keys_of(model: type[BaseModel], path: list[Any]) -> Mapping[str, str]:
-    """File key -> field name of the table at `path` below `model`."""
+def table_at(model: type[BaseModel], path: Sequence[Any]) -> type[BaseModel] | None:
+    """The model of the table at `path` below `model`, None where there stands no table."""
     for part in path:
+        inner: list[type[BaseModel]] = []
         for name, field in model.model_fields.items():
             if part in (name, field.alias):
                 inner = [t for t in _types_in(field.annotation) if issubclass(t, BaseModel)]
-                model = inner[0] if inner else model
-    return {field.alias or name: name for name, field in model.model_fields.items()}
+        if not inner:
+            return None
+        model = inner[0]
+    return model
+
+
+def keys_of(model: type[BaseModel], path: Sequence[Any]) -> Mapping[str, str]:
+    """File key -> field name of the table at `path` below `model`."""
+    table = table_at(model, path)
+    return {} if table is None else {field.alias or name: name for name, field in table.model_fields.items()}
 
 
 def _types_in(annotation: Any) -> list[type]:

@@ -19,12 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
-from omnidyn.model.value import Value, number, per_wheel_number, to_list
-
-PerWheel = float | tuple[float, ...]
-"""One number for all wheels, or one per wheel."""
+from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, to_list
 
 MIN_WHEELS, MAX_WHEELS = 3, 16
+SIN_45, SIN_60 = 0.5**0.5, 0.75**0.5
 MAX_CONDITION = 1e6  # of G scaled by the robot radius: beyond it the wheels cannot move the robot in every direction
 
 
@@ -37,15 +35,17 @@ class Wheels(Value):
     """
 
     azimuth_deg: Annotated[
-        tuple[number(-360.0, 360.0), ...],
+        tuple[Annotated[float, number(-360.0, 360.0)], ...],
         BeforeValidator(to_list),
         Field(min_length=MIN_WHEELS, max_length=MAX_WHEELS, description="counter-clockwise from forward"),
     ]
     robot_radius: Annotated[
-        per_wheel_number(1e-3, 100.0), Field(alias="robot_radius_m", description="b, centre to wheel")
+        PerWheel, per_wheel_number(1e-3, 100.0), Field(alias="robot_radius_m", description="b, centre to wheel")
     ]
-    wheel_radius: Annotated[per_wheel_number(1e-3, 10.0), Field(alias="wheel_radius_m", description="r")]
-    roller_angle_deg: Annotated[per_wheel_number(-80.0, 80.0), Field(description="0 = omni, +-45 = mecanum")] = 0.0
+    wheel_radius: Annotated[PerWheel, per_wheel_number(1e-3, 10.0), Field(alias="wheel_radius_m", description="r")]
+    roller_angle_deg: Annotated[
+        PerWheel, per_wheel_number(-80.0, 80.0), Field(description="0 = omni, +-45 = mecanum")
+    ] = 0.0
 
     @model_validator(mode="after")
     def _moves_in_every_direction(self) -> Wheels:
@@ -96,21 +96,21 @@ def sin_cos_deg(angle: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float
 
     A wheel that should not turn must not turn: sin(radians(180)) is 1.2e-16, here it is 0.
     """
-    angle = np.mod(np.asarray(angle, dtype=float), 360.0)
-    return _sin_deg(angle), _sin_deg(np.mod(angle + 90.0, 360.0))
+    angle = np.asarray(angle, dtype=float)
+    turned = np.fmod(np.abs(angle), 360.0)
+    half = np.where(turned > 180.0, 360.0 - turned, turned)
+    sin, cos = _quarter_sin_cos(np.where(half > 90.0, 180.0 - half, half))
+    negative = (turned > 180.0) ^ (angle < 0.0)
+    return np.where(negative, -sin, sin) + 0.0, np.where(half > 90.0, -cos, cos) + 0.0
 
 
-def _sin_deg(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sine of an angle in [0, 360) degrees, folded into [0, 90] so that symmetric wheels get equal numbers."""
-    negative = angle >= 180.0
-    half = np.where(negative, angle - 180.0, angle)
-    quarter = np.where(half > 90.0, 180.0 - half, half)
-    # cos is better conditioned near 90 degrees, and gives 1/2 exactly at 30 through the table.
-    sine = np.where(quarter <= 45.0, np.sin(np.radians(quarter)), np.cos(np.radians(90.0 - quarter)))
-    sine = np.where(quarter == 30.0, 0.5, sine)
-    sine = np.where(quarter == 60.0, np.sqrt(3.0) / 2.0, sine)
-    sine = np.where(quarter == 45.0, np.sqrt(0.5), sine)
-    return np.where(negative, -sine, sine) + 0.0
+def _quarter_sin_cos(angle: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sine and cosine of angles in [0, 90] degrees; folded, so that mirrored wheels get equal numbers."""
+    sin, cos = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+    known = {0.0: (0.0, 1.0), 30.0: (0.5, SIN_60), 45.0: (SIN_45, SIN_45), 60.0: (SIN_60, 0.5), 90.0: (1.0, 0.0)}
+    for degrees, (exact_sin, exact_cos) in known.items():
+        sin, cos = np.where(angle == degrees, exact_sin, sin), np.where(angle == degrees, exact_cos, cos)
+    return sin, cos
 
 
 def rim_speed(wheels: Wheels, twist: ArrayLike) -> NDArray[np.float64]:
@@ -135,7 +135,7 @@ def twist_from_wheel_speed(wheels: Wheels, speed: ArrayLike) -> NDArray[np.float
     The printed row of v_n has the wrong sign for wheel 1; this is the pseudo-inverse of G^T instead.
     `speed` [rad/s], shape (*batch, wheels). Returns shape (*batch, 3) [m/s, m/s, rad/s].
     """
-    inverse = np.linalg.pinv(wheels.wrench_matrix.T)
+    inverse = np.asarray(np.linalg.pinv(wheels.wrench_matrix.T), dtype=float)
     return _product(np.asarray(speed, dtype=float) * wheels.radii, inverse)
 
 

@@ -1,7 +1,7 @@
 """Coulomb and viscous friction on the body axes, eqs (4)-(6): the paper's box, with breakaway.
 
-    sliding:  F = -(B v + C sgn v)      per axis
-    at rest:  F = -applied while |applied| <= S,  S >= C the breakaway level
+sliding:  F = -(B v + C sgn v)      per axis
+at rest:  F = -applied while |applied| <= S,  S >= C the breakaway level
 """
 
 from __future__ import annotations
@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from omnidyn.model.value import Value, per_axis_number
-
-Levels = tuple[float, float, float]
+from omnidyn.model.value import Levels, Value, per_axis_number
 
 
 class AxesFriction(Value):
@@ -23,9 +21,11 @@ class AxesFriction(Value):
     viscous: B [N s/m, N s/m, N m s]. coulomb: C [N, N, N m]. breakaway: S >= C, None means S = C.
     """
 
-    viscous: Annotated[per_axis_number(0.0, 1e6), Field(description="B [N s/m, N s/m, N m s]")]
-    coulomb: Annotated[per_axis_number(0.0, 1e6), Field(description="C [N, N, N m]")]
-    breakaway: Annotated[per_axis_number(0.0, 1e6) | None, Field(description="S >= C [N, N, N m]")] = None
+    viscous: Annotated[Levels, per_axis_number(0.0, 1e6), Field(description="B [N s/m, N s/m, N m s]")]
+    coulomb: Annotated[Levels, per_axis_number(0.0, 1e6), Field(description="C [N, N, N m]")]
+    breakaway: Annotated[
+        Annotated[Levels, per_axis_number(0.0, 1e6)] | None, Field(description="S >= C [N, N, N m]")
+    ] = None
 
     @model_validator(mode="after")
     def _breakaway_at_least_coulomb(self) -> AxesFriction:

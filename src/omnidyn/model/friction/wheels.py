@@ -1,0 +1,63 @@
+"""Friction at the wheels: each resists along its own rolling direction, at the rim.
+
+sliding    f_i = -(b_i s_i + c_i sgn s_i),  s_i = g_i . twist the rim speed;  c_i may differ forward and backward
+at rest    -S_forward <= f_i <= S_backward
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from omnidyn.model.value import PerWheel, Value, per_wheel_number
+
+Level = Annotated[PerWheel, per_wheel_number(0.0, 1e6)]
+
+
+class WheelFriction(Value):
+    """Friction of wheels, bearings and gears, seen at the rim; a tuple means one value per wheel.
+
+    coulomb: c [N] while the wheel turns forward, and backward too unless coulomb_backward says otherwise.
+    breakaway, breakaway_backward: what holds a wheel at rest [N], at least as large. viscous: b [N s/m].
+    """
+
+    coulomb: Annotated[Level, Field(description="c [N] at the rim")] = 0.0
+    coulomb_backward: Annotated[Level | None, Field(description="c [N] while it turns backward")] = None
+    breakaway: Annotated[Level | None, Field(description=">= coulomb [N]")] = None
+    breakaway_backward: Annotated[Level | None, Field(description=">= coulomb_backward [N]")] = None
+    viscous: Annotated[Level, Field(description="b [N s/m] at the rim")] = 0.0
+
+    @property
+    def backward(self) -> float | tuple[float, ...]:
+        """Coulomb level of a wheel that turns backward [N]."""
+        return self.coulomb if self.coulomb_backward is None else self.coulomb_backward
+
+    @property
+    def hold_forward(self) -> float | tuple[float, ...]:
+        """Level up to which a wheel at rest resists being turned forward [N]."""
+        return self.coulomb if self.breakaway is None else self.breakaway
+
+    @property
+    def hold_backward(self) -> float | tuple[float, ...]:
+        """Level up to which a wheel at rest resists being turned backward [N]."""
+        if self.breakaway_backward is not None:
+            return self.breakaway_backward
+        return self.backward if self.breakaway is None or self.coulomb_backward is not None else self.breakaway
+
+    @model_validator(mode="after")
+    def _breakaway_at_least_coulomb(self) -> WheelFriction:
+        forward = self.hold_forward, self.coulomb, "breakaway"
+        backward = self.hold_backward, self.backward, "breakaway_backward"
+        for hold, slide, name in (forward, backward):
+            if any(s < c for s, c in _pairs(hold, slide)):
+                raise ValueError(f"{name} {hold} is below coulomb {slide}")
+        return self
+
+
+def _pairs(a: float | tuple[float, ...], b: float | tuple[float, ...]) -> list[tuple[float, float]]:
+    """Entries of two per-wheel values side by side; one number serves all wheels."""
+    count = max(len(value) if isinstance(value, tuple) else 1 for value in (a, b))
+    first = a if isinstance(a, tuple) else (a,) * count
+    second = b if isinstance(b, tuple) else (b,) * count
+    return list(zip(first, second, strict=False))

@@ -1,0 +1,461 @@
+"""Motion under dry friction: one monotone inclusion in three unknowns, solved to the last bit, rest included.
+
+    0 in (M/tau)(x - x*) - F(x) + sum_e g_e N_e(g_e . x) + dE(x)
+
+x = (v_x, v_y, rho omega); F: motors, viscous friction, turning frame; N_e: the dry friction of element e, -hold..hold
+at rest and the slide level in motion; E: the potential sqrt(Cx^2 vx^2 + Cy^2 vy^2) of the ellipse. A stage of an
+implicit step is such a problem; with tau = 1, x* = 0 and speeds frozen its solution is the acceleration.
+
+Method: all kinks g_e . x = 0 pass through the origin, so space falls into cells (signs of the elements) and faces
+(some stuck). Newton within a face; on the way, stop at a kink that holds, pass one that gives way; at the optimum of
+a face ask whether the stuck elements can hold (holding.py), and if not, release along the direction that they cannot.
+A stuck element's speed is exactly 0: it is a flag, not a small number.
+
+The problem stands in a Plant (plant.py names its entries): `body` and `element`. `s` is the scratch of `scratch()`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from omnidyn.compiled import part
+from omnidyn.model.holding import worst_direction
+from omnidyn.model.plant import (
+    AXES,
+    BEFORE,
+    BOUND,
+    CURRENT,
+    DROP,
+    EFFICIENCY,
+    ELLIPSE,
+    EMF,
+    FOUND,
+    GAIN,
+    GOAL,
+    GX,
+    GY,
+    GZ,
+    HOLD,
+    HOLD_X,
+    HOLD_Y,
+    INDUCTANCE,
+    LOSS,
+    MASS,
+    NOW,
+    PUSH,
+    RESISTANCE,
+    SIGN,
+    SLIDE,
+    SLIDE_X,
+    SLIDE_Y,
+    TAU,
+    TURNING,
+    VISCOUS,
+    VOLTAGE,
+)  # fmt: skip
+from omnidyn.model.scratch import BASIS, JACOBIAN, MATRIX, NEWTON, PIVOT, RESIDUAL, ROW, SPARE, TRIAL, WORST
+
+CAP = 80  # Newton steps, kinks and releases of one solve; a solve that hits it is reported
+TIGHT = 1e-13  # residual that counts as 0, relative to the forces at work
+TIE = 1e-12  # kinks as near as this are met together
+FLAT = 1e-10  # a relative size that is rounding: an element does not move along a direction
+
+
+@part
+def winding(speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
+    """(current [A], its slope [A s/m]) of a motor at the end of a stage: eq (11) with the currents eliminated.
+
+    i = clip(soft(L i* + tau (u - E s), tau V_d)/(L + tau R), +-i_max); L = 0 gives the settled current for any tau.
+    """
+    flux = inductance * now + tau * (voltage - emf * speed)
+    lost, below = tau * drop, inductance + tau * resistance
+    if abs(flux) <= lost:
+        return 0.0, 0.0
+    i = (flux - math.copysign(lost, flux)) / below
+    if abs(i) > bound:
+        return math.copysign(bound, i), 0.0
+    return i, -tau * emf / below
+
+
+@part
+def gear(i, sign, gain, efficiency):
+    """Force per ampere behind a gear: eta while the motor drives (i s > 0), 1/eta while it is driven, 1 at rest."""
+    if sign * i > 0.0:
+        return gain * efficiency
+    if sign * i < 0.0:
+        return gain / efficiency
+    return gain
+
+
+@part
+def set_losses(body, element):
+    """What each gear takes at rest from a motion forward and backward [N]: dry friction with a level ~ |i|."""
+    for e in range(AXES, len(element)):
+        element[e, LOSS] = element[e, LOSS + 1] = 0.0
+        if element[e, EFFICIENCY] != 1.0:
+            i = winding(
+                0.0, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
+                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
+            )[0]  # fmt: skip
+            gain, efficiency = element[e, GAIN], element[e, EFFICIENCY]
+            element[e, LOSS] = i * (gain - gear(i, 1.0, gain, efficiency))
+            element[e, LOSS + 1] = i * (gear(i, -1.0, gain, efficiency) - gain)
+
+
+@part
+def forces_at_work(body, element):
+    """The sum of all force levels [N]: motors at standstill, friction, push. No force in the problem is larger."""
+    total = abs(body[PUSH]) + abs(body[PUSH + 1]) + abs(body[PUSH + 2]) + body[HOLD_X] + body[HOLD_Y]
+    for e in range(len(element)):
+        total += max(element[e, HOLD], element[e, HOLD + 1])
+        if e >= AXES:
+            i = winding(
+                0.0, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
+                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
+            )[0]  # fmt: skip
+            total += abs(i) * element[e, GAIN] / element[e, EFFICIENCY]
+    return total
+
+
+@part
+def residual(body, element, x, s):
+    """(M/tau)(x - x*) minus all forces but those of stuck elements, its Jacobian, and the currents at x."""
+    stiff = body[MASS] / body[TAU]
+    r0 = stiff * (x[0] - body[GOAL]) - body[PUSH]
+    r1 = stiff * (x[1] - body[GOAL + 1]) - body[PUSH + 1]
+    r2 = stiff * (x[2] - body[GOAL + 2]) - body[PUSH + 2]
+    j00, j11, j22, j01, j02, j12 = stiff, stiff, stiff, 0.0, 0.0, 0.0
+    for e in range(len(element)):
+        g0, g1, g2, sign = element[e, GX], element[e, GY], element[e, GZ], element[e, SIGN]
+        speed = g0 * x[0] + g1 * x[1] + g2 * x[2] if sign != 0.0 else 0.0
+        force, slope = -element[e, VISCOUS] * speed, -element[e, VISCOUS]
+        if sign == 1.0:
+            force -= element[e, SLIDE]
+        elif sign == -1.0:
+            force += element[e, SLIDE + 1]
+        if e >= AXES:
+            i, di = winding(
+                speed, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
+                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
+            )  # fmt: skip
+            gain = element[e, GAIN] if sign == 2.0 else gear(i, sign, element[e, GAIN], element[e, EFFICIENCY])
+            element[e, CURRENT] = i
+            force, slope = force + gain * i, slope + gain * di
+        r0, r1, r2 = r0 - force * g0, r1 - force * g1, r2 - force * g2
+        j00, j11, j22 = j00 - slope * g0 * g0, j11 - slope * g1 * g1, j22 - slope * g2 * g2
+        j01, j02, j12 = j01 - slope * g0 * g1, j02 - slope * g0 * g2, j12 - slope * g1 * g2
+    if body[ELLIPSE] == 1.0:  # gradient and Hessian of sqrt(Cx^2 vx^2 + Cy^2 vy^2)
+        cx, cy = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2
+        size = max(math.sqrt(cx * x[0] * x[0] + cy * x[1] * x[1]), 1e-300)
+        px, py = cx * x[0] / size, cy * x[1] / size
+        r0, r1 = r0 + px, r1 + py
+        j00, j11, j01 = j00 + (cx - px * px) / size, j11 + (cy - py * py) / size, j01 - px * py / size
+    t0, t1, t2 = body[TURNING] * x[0], body[TURNING] * x[1], body[TURNING] * x[2]
+    s[RESIDUAL, 0], s[RESIDUAL, 1], s[RESIDUAL, 2] = r0 - t2 * x[1], r1 + t2 * x[0], r2
+    s[JACOBIAN, 0], s[JACOBIAN, 1], s[JACOBIAN, 2] = j00, j01 - t2, j02 - t1
+    s[JACOBIAN + 1, 0], s[JACOBIAN + 1, 1], s[JACOBIAN + 1, 2] = j01 + t2, j11, j12 + t0
+    s[JACOBIAN + 2, 0], s[JACOBIAN + 2, 1], s[JACOBIAN + 2, 2] = j02, j12, j22
+
+
+@part
+def _forbid(s, rank, g0, g1, g2):
+    """Add a stuck direction to the Gauss-Jordan rows of the face. Returns the new rank."""
+    row = s[SPARE]
+    row[0], row[1], row[2] = g0, g1, g2
+    size = max(abs(g0), abs(g1), abs(g2))
+    for j in range(rank):
+        p = int(s[PIVOT, j])
+        factor = row[p]
+        for a in range(3):
+            row[a] -= factor * s[ROW + j, a]
+        row[p] = 0.0
+    p = 0
+    for a in range(1, 3):
+        if abs(row[a]) > abs(row[p]):
+            p = a
+    if rank == 3 or abs(row[p]) <= FLAT * size:
+        return rank
+    for a in range(3):
+        s[ROW + rank, a] = row[a] / row[p] if a != p else 1.0
+    for j in range(rank):
+        factor = s[ROW + j, p]
+        for a in range(3):
+            s[ROW + j, a] -= factor * s[ROW + rank, a]
+        s[ROW + j, p] = 0.0
+    s[PIVOT, rank] = p
+    return rank + 1
+
+
+@part
+def face(body, element, s):
+    """The velocities that the stuck elements allow: s[BASIS + i], i < k. Returns rank = 3 - k.
+
+    Pivot components follow from the free ones, so that a stuck axis is exactly 0.
+    """
+    rank = 0
+    for e in range(len(element)):
+        if element[e, SIGN] == 0.0:
+            rank = _forbid(s, rank, element[e, GX], element[e, GY], element[e, GZ])
+    if body[ELLIPSE] == 0.0:
+        rank = _forbid(s, rank, 1.0, 0.0, 0.0)
+        rank = _forbid(s, rank, 0.0, 1.0, 0.0)
+    k = 0
+    for c in range(3):
+        free = True
+        for j in range(rank):
+            free &= s[PIVOT, j] != c
+        if free:
+            for a in range(3):
+                s[BASIS + k, a] = 1.0 if a == c else 0.0
+            for j in range(rank):
+                s[BASIS + k, int(s[PIVOT, j])] = -s[ROW + j, c]
+            k += 1
+    return rank
+
+
+@part
+def _moves_along(g0, g1, g2, d0, d1, d2):
+    """Whether an element moves along a direction by more than rounding."""
+    p0, p1, p2 = g0 * d0, g1 * d1, g2 * d2
+    return abs(p0 + p1 + p2) > FLAT * (abs(p0) + abs(p1) + abs(p2))
+
+
+@part
+def _absorb(body, element, s, rank):
+    """Elements that cannot move on this face are stuck too, the ellipse included. Returns whether any was not yet."""
+    changed = False
+    for e in range(len(element)):
+        if element[e, SIGN] == 1.0 or element[e, SIGN] == -1.0:
+            moves = False
+            for i in range(3 - rank):
+                b = BASIS + i
+                moves |= _moves_along(element[e, GX], element[e, GY], element[e, GZ], s[b, 0], s[b, 1], s[b, 2])
+            if not moves:
+                element[e, SIGN], changed = 0.0, True
+    if body[ELLIPSE] == 1.0:
+        moves = False
+        for i in range(3 - rank):
+            moves |= (s[BASIS + i, 0] != 0.0) | (s[BASIS + i, 1] != 0.0)
+        if not moves:
+            body[ELLIPSE], changed = 0.0, True
+    return changed
+
+
+@part
+def _onto_face(x, s, rank):
+    """Move x onto the face, in place."""
+    for j in range(rank):
+        x[int(s[PIVOT, j])] = 0.0
+    for j in range(rank):
+        p, total = int(s[PIVOT, j]), 0.0
+        for a in range(3):
+            total -= s[ROW + j, a] * x[a] if a != p else 0.0
+        x[p] = total
+
+
+@part
+def _newton_direction(s, rank):
+    """d = B z with (B' J B) z = -B' r: Newton's step within the face. Returns the largest |B' r|."""
+    k, largest = 3 - rank, 0.0
+    for i in range(k):
+        for j in range(k):
+            s[MATRIX + i, j] = 0.0
+        s[MATRIX + i, 3] = 0.0
+        for a in range(3):
+            weight = s[BASIS + i, a]
+            if weight != 0.0:
+                s[MATRIX + i, 3] -= weight * s[RESIDUAL, a]
+                for j in range(k):
+                    for b in range(3):
+                        s[MATRIX + i, j] += weight * s[JACOBIAN + a, b] * s[BASIS + j, b]
+        largest = max(largest, abs(s[MATRIX + i, 3]))
+    for i in range(k):  # elimination without pivoting: the symmetric part is positive definite
+        for j in range(i + 1, k):
+            factor = s[MATRIX + j, i] / s[MATRIX + i, i]
+            for c in range(i, k):
+                s[MATRIX + j, c] -= factor * s[MATRIX + i, c]
+            s[MATRIX + j, 3] -= factor * s[MATRIX + i, 3]
+    s[NEWTON, 0] = s[NEWTON, 1] = s[NEWTON, 2] = 0.0
+    for i in range(k - 1, -1, -1):
+        z = s[MATRIX + i, 3]
+        for c in range(i + 1, k):
+            z -= s[MATRIX + i, c] * s[MATRIX + c, 3]
+        z /= s[MATRIX + i, i]
+        s[MATRIX + i, 3] = z
+        for a in range(3):
+            s[NEWTON, a] += z * s[BASIS + i, a]
+    return largest
+
+
+@part
+def _slope(s):
+    """Slope of the potential along the Newton direction at the last residual."""
+    return s[NEWTON, 0] * s[RESIDUAL, 0] + s[NEWTON, 1] * s[RESIDUAL, 1] + s[NEWTON, 2] * s[RESIDUAL, 2]
+
+
+@part
+def _kink_of_element(element, e, x, s):
+    """Step along the Newton direction after which a sliding element's speed is 0; inf where it never is."""
+    sign = element[e, SIGN]
+    if sign != 1.0 and sign != -1.0:
+        return np.inf
+    g0, g1, g2 = element[e, GX], element[e, GY], element[e, GZ]
+    dw = g0 * s[NEWTON, 0] + g1 * s[NEWTON, 1] + g2 * s[NEWTON, 2]
+    if sign * dw >= 0.0:
+        return np.inf
+    return max(-(g0 * x[0] + g1 * x[1] + g2 * x[2]) / dw, 0.0)
+
+
+@part
+def _kink_of_ellipse(body, x, s):
+    """The same for the ellipse: only a line through its axis meets it."""
+    if body[ELLIPSE] != 1.0:
+        return np.inf
+    cx, cy = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2
+    dd = cx * s[NEWTON, 0] ** 2 + cy * s[NEWTON, 1] ** 2
+    xd = cx * x[0] * s[NEWTON, 0] + cy * x[1] * s[NEWTON, 1]
+    xx = cx * x[0] * x[0] + cy * x[1] * x[1]
+    if xd >= 0.0 or xx * dd - xd * xd > 1e-24 * xx * dd:
+        return np.inf
+    return -xd / dd
+
+
+@part
+def _next_kink(body, element, x, s, t):
+    """Smallest step from t on at which anything that slides comes to rest; FOUND marks what is met there.
+
+    Returns (step, whether the ellipse is met).
+    """
+    nearest = _kink_of_ellipse(body, x, s)
+    nearest = nearest if nearest >= t - TIE else np.inf
+    for e in range(len(element)):
+        when = _kink_of_element(element, e, x, s)
+        element[e, BEFORE] = when
+        nearest = when if t - TIE <= when < nearest else nearest
+    if nearest > 1.0:
+        return np.inf, False
+    limit = nearest + TIE * max(1.0, nearest)
+    for e in range(len(element)):
+        element[e, FOUND] = 1.0 if t - TIE <= element[e, BEFORE] <= limit else 0.0
+    return nearest, t - TIE <= _kink_of_ellipse(body, x, s) <= limit
+
+
+@part
+def _jump(body, element, s, met):
+    """By how much the slope rises at a kink whose elements hold: slide level behind, hold level ahead."""
+    total = 0.0
+    for e in range(len(element)):
+        if element[e, FOUND] == 1.0:
+            dw = element[e, GX] * s[NEWTON, 0] + element[e, GY] * s[NEWTON, 1] + element[e, GZ] * s[NEWTON, 2]
+            behind, ahead = (1, 0) if dw > 0.0 else (0, 1)
+            total += (element[e, SLIDE + behind] + element[e, HOLD + ahead]) * abs(dw)
+            total += (element[e, LOSS] + element[e, LOSS + 1]) * abs(dw)
+    if met:
+        total += math.hypot(body[SLIDE_X] * s[NEWTON, 0], body[SLIDE_Y] * s[NEWTON, 1])
+        total += math.hypot(body[HOLD_X] * s[NEWTON, 0], body[HOLD_Y] * s[NEWTON, 1])
+    return total
+
+
+@part
+def _holds_more(element):
+    """Whether an element met at a kink holds more than it slides with. It stops there, whatever else goes on along
+    the way: passing would skip its breakaway. If it cannot hold, it is released from rest.
+    """
+    for e in range(len(element)):
+        if element[e, FOUND] == 1.0 and (
+            element[e, HOLD] > element[e, SLIDE] or element[e, HOLD + 1] > element[e, SLIDE + 1]
+        ):
+            return True
+    return False
+
+
+@part
+def _at(x, s, t):
+    """Put x + t d into s[TRIAL]."""
+    for a in range(3):
+        s[TRIAL, a] = x[a] + t * s[NEWTON, a]
+
+
+@part
+def _walk(body, element, x, s):
+    """Go along the Newton direction from x to the end, past kinks that give way, up to one that holds.
+
+    Changes x and the signs in place. The slope of the potential along the way rises; where it is 0, stop.
+    Returns whether an element got stuck.
+    """
+    t, stuck = 0.0, False
+    for _ in range(2 * len(element)):
+        kink, met = _next_kink(body, element, x, s, t)
+        if kink > 1.0:
+            t = 1.0
+            break
+        _at(x, s, kink)
+        residual(body, element, s[TRIAL], s)
+        slope = _slope(s)
+        if slope > 0.0 and kink > t:  # the least value lies before the kink: a secant, and Newton goes on from there
+            _at(x, s, t)
+            residual(body, element, s[TRIAL], s)
+            below = min(_slope(s), 0.0)
+            t += below / (below - slope) * (kink - t)
+            break
+        t, stuck = kink, _holds_more(element) or slope + _jump(body, element, s, met) >= 0.0
+        for e in range(len(element)):
+            if element[e, FOUND] == 1.0:
+                element[e, SIGN] = 0.0 if stuck else -element[e, SIGN]
+        if met and stuck:
+            body[ELLIPSE] = 0.0
+        if stuck:
+            break
+    for a in range(3):
+        x[a] += t * s[NEWTON, a]
+    return stuck
+
+
+@part
+def _release(body, element, x, s, slope):
+    """Let those stuck elements go that move along s[WORST], and take the step that a quadratic would."""
+    d0, d1, d2, curvature = s[WORST, 0], s[WORST, 1], s[WORST, 2], 0.0
+    for a in range(3):
+        for b in range(3):
+            curvature += s[WORST, a] * s[JACOBIAN + a, b] * s[WORST, b]
+    for e in range(len(element)):
+        g0, g1, g2 = element[e, GX], element[e, GY], element[e, GZ]
+        if element[e, SIGN] == 0.0 and _moves_along(g0, g1, g2, d0, d1, d2):
+            element[e, SIGN] = 1.0 if g0 * d0 + g1 * d1 + g2 * d2 > 0.0 else -1.0
+    if body[ELLIPSE] == 0.0 and (abs(d0) > FLAT or abs(d1) > FLAT):
+        body[ELLIPSE] = 1.0
+    for a in range(3):
+        x[a] -= slope / curvature * s[WORST, a]
+
+
+@part
+def solve(body, element, x, s):
+    """Solve the inclusion in place, from a first guess x on the face of the signs. Returns the number of iterations.
+
+    The currents at the solution stand in CURRENT. A return of CAP means that the last digits are not there: say so.
+    """
+    set_losses(body, element)
+    inertia = body[MASS] / body[TAU] * max(abs(body[GOAL]), abs(body[GOAL + 1]), abs(body[GOAL + 2]))
+    tight = TIGHT * (inertia + forces_at_work(body, element))
+    stale, rank = True, 0
+    for iteration in range(CAP):
+        if stale:
+            rank = face(body, element, s)
+            while rank > 0 and _absorb(body, element, s, rank):
+                rank = face(body, element, s)
+            _onto_face(x, s, rank)
+            stale = False
+        residual(body, element, x, s)
+        if _newton_direction(s, rank) <= tight:
+            if rank == 0:
+                return iteration
+            found = worst_direction(body, element, s, rank)
+            if found >= -tight:
+                return iteration
+            _release(body, element, x, s, found)
+            stale = True
+        else:
+            stale = _walk(body, element, x, s)
+    return CAP

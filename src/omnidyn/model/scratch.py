@@ -1,0 +1,15 @@
+"""The scratch array of the solvers: rows of four numbers, named here, so that no solve allocates anything."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+RESIDUAL, NEWTON, TRIAL, WORST, SPARE, LINE = 0, 1, 2, 3, 4, 5
+BASIS, ROW, JACOBIAN, MATRIX = 6, 9, 12, 15  # three rows each
+PIVOT, ROWS = 18, 19
+
+
+def scratch() -> NDArray[np.float64]:
+    """A fresh scratch array."""
+    return np.zeros((ROWS, 4))
