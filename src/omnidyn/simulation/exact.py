@@ -41,6 +41,14 @@ def why_not_exact(robot: Robot) -> list[str]:
         reasons.append('dynamic electrics ([motor] electrical = "dynamic")')
     if robot.body.rotating_frame:
         reasons.append("rotating frame ([body] rotating_frame = true)")
+    if not robot.friction.only_axes:
+        reasons.append(
+            "friction along the direction of travel or at the wheels ([friction.direction], [friction.wheels])"
+        )
+    if np.any(np.asarray(motor.voltage_drop) != 0.0):
+        reasons.append("voltage drop ([motor] voltage_drop_V)")
+    if np.any(np.asarray(motor.gear_efficiency) != 1.0):
+        reasons.append("gear efficiency ([motor] gear_efficiency)")
     per_wheel = [motor.resistance, motor.torque_constant, motor.emf_constant, motor.gear_ratio]
     if any(isinstance(value, tuple) and len(set(value)) > 1 for value in (*per_wheel, robot.wheels.wheel_radius)):
         reasons.append("unequal motors or wheel radii (a list in [motor] or [wheels])")
@@ -85,8 +93,10 @@ def _refuse_spin(turn: FloatArray) -> None:
     row = int(np.argmax(turn))
     if not turn[row] <= MAX_TURN_PER_STEP:
         raise InputError(
-            "one step turns the robot too far", got=f"{turn[row]:.3g} rad in row {row}",
-            expected=f"at most {MAX_TURN_PER_STEP:g} rad", remedy="use a shorter dt",
+            "one step turns the robot too far",
+            got=f"{turn[row]:.3g} rad in row {row}",
+            expected=f"at most {MAX_TURN_PER_STEP:g} rad",
+            remedy="use a shorter dt",
         )
 
 
@@ -105,13 +115,13 @@ def _twists(drive, phi, which, rate, coulomb, breakaway, start):
 
 @part
 def _fastest_rate(t, event, rate, spin):
-    """The largest rate at which anything still changes at time t of a step: axes not yet settled, and the turning."""
-    fastest = spin
+    """How fast the motion still changes at time t of a step: the fastest axis not yet settled, plus the turning."""
+    fastest = 0.0
     for axis in range(3):
         since = t - event[axis] if t >= event[axis] else t
         if rate[axis] * since < SETTLED and rate[axis] > fastest:
             fastest = rate[axis]
-    return fastest
+    return fastest + spin
 
 
 @part

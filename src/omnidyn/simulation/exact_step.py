@@ -5,7 +5,7 @@
 All divided by mass or inertia. Seen in the direction of motion: x = |v|, q = +-g; phi = (1 - e^(-a h))/a.
 
     x = 0 and q <= S                      stays at rest: exactly 0
-    x1 = x + phi (q - c - a x) >= 0       keeps its direction: x1
+    x1 = x + phi (q - c - a x) >= 0       keeps its direction: x1; and so it does for q >= c, whatever rounding says
     else q >= -S                          stops inside the step and stays: exactly 0
     else                                  reverses: x1 = (q + c) (phi - e x/(c - q)),  e = e^(-a h) = 1 - a phi
 
@@ -15,7 +15,6 @@ The style compiles well everywhere: conditional expressions, & and |, a typed `z
 makes float32 code compute in float64), no early return, no divisor that can be 0 in any lane, taken or not.
 """
 
-# ruff: noqa: SIM108
 from __future__ import annotations
 
 import math
@@ -31,13 +30,13 @@ def exact_step(speed, drive, coulomb, breakaway, rate, phi, zero):
     x = abs(speed)
     q = -drive if mirrored else drive
     slid = x + phi * (q - coulomb - rate * x)
-    crosses = slid < zero
+    crosses = (slid < zero) & (q < coulomb)
     divisor = coulomb - q if crosses else coulomb + breakaway + phi  # never 0, in either lane
     reversed_ = (q + coulomb) * (phi - (x - phi * rate * x) / divisor)
     reversed_ = reversed_ if q < -breakaway else zero
-    result = reversed_ if crosses else slid
+    result = reversed_ if crosses else (slid if slid > zero else zero)
     result = zero if (x == zero) & (q <= breakaway) else result
-    return -result if mirrored else result
+    return -result if mirrored & (result != zero) else result  # rest is 0, never -0
 
 
 def pieces(speed, drive, coulomb, breakaway, rate, phi, dt):
@@ -52,7 +51,7 @@ def pieces(speed, drive, coulomb, breakaway, rate, phi, dt):
     if (x == 0.0) & (q <= breakaway):
         return dt, 0.0, 0.0
     before = -(q - coulomb) if mirrored else q - coulomb
-    if x + phi * (q - coulomb - rate * x) >= 0.0:
+    if (q >= coulomb) | (x + phi * (q - coulomb - rate * x) >= 0.0):
         return dt, before, 0.0
     event = min(dt, math.log1p(rate * x / (coulomb - q)) / rate)
     after = q + coulomb if q < -breakaway else 0.0

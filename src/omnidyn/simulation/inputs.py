@@ -18,7 +18,7 @@ def steps(levels: ArrayLike, duration: float, dt: float) -> FloatArray:
 
 def ramp(pattern: ArrayLike, peak: float, duration: float, dt: float) -> FloatArray:
     """`pattern`, shape (wheels,), times a scale that rises evenly from 0 to `peak` [V]; the ramps of Fig. 5."""
-    return np.outer(np.linspace(0.0, peak, _count(duration, dt)), pattern)
+    return np.outer(np.linspace(0.0, peak, _count(duration, dt)), np.asarray(pattern, dtype=float))
 
 
 def prbs(amplitude: ArrayLike, clock: float, duration: float, dt: float, seed: int) -> FloatArray:

@@ -1,112 +1,139 @@
-"""simulate: robot and voltages in, Run out."""
+"""simulate: robot and commands in, Run out. The exact engine where the robot allows it, else the implicit one."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
-from omnidyn.model.motor import clip_voltage
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.plant import AXES, LENGTH, plant
+from omnidyn.model.rest import SIGNS, start_state
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import wheel_speed
+from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import Run
+from omnidyn.simulation.commands import Commands, as_floats, commands, loop_gains, on_ticks
 from omnidyn.simulation.exact import simulate_exact, why_not_exact
+from omnidyn.simulation.implicit import Loop, Outcome, capped, no_loop, run_implicit
 
 FloatArray = NDArray[np.float64]
-MIN_DT, MAX_DT = 1e-9, 3600.0
+TOLERANCE = 1e-6
 
 
 def simulate(
     robot: Robot,
-    voltage: ArrayLike,
-    dt: ArrayLike,
+    voltage: ArrayLike | None = None,
+    dt: ArrayLike | None = None,
     *,
+    duty: ArrayLike | None = None,
+    wheel_speed_command: ArrayLike | None = None,
+    twist_command: ArrayLike | None = None,
+    supply: ArrayLike | None = None,
     twist: ArrayLike = (0.0, 0.0, 0.0),
     pose: ArrayLike = (0.0, 0.0, 0.0),
+    current: ArrayLike | None = None,
+    tol: float | None = TOLERANCE,
 ) -> Run:
-    """Simulate a robot exactly under voltages held from step to step, eqs (1)-(14).
+    """Simulate a robot under commands held from row to row, eqs (1)-(14).
 
-    voltage: one row per step [V], shape (n, wheels); what exceeds the motor's limit is clipped, with a warning.
-    dt: length of the steps [s], a number or shape (n,). twist, pose: where it starts, shape (3,).
+    voltage: one row per step [V], shape (n, wheels); what exceeds the motor's limit is clipped, with a warning. Or
+    duty [-1..1] of the supply [V]; or, for a drive with a speed loop, wheel_speed_command [rad/s], shape (n, wheels),
+    or twist_command [m/s, m/s, rad/s], shape (n, 3).
+    dt: length of the rows [s], a number or shape (n,). twist, pose, current: where it starts, shapes (3,), (3,),
+    (wheels,); current [A] matters for dynamic electrics only.
+    tol: global error of the implicit engine [m/s], 10 tol [rad/s]; None takes one fixed step per row. The exact
+    engine, used wherever the robot allows it, needs no tolerance; Run.source says which engine ran.
     Returns a Run of n + 1 samples: t, voltage (the last row repeats), current, wheel_speed, twist, pose.
-    A robot at rest within its dead zone has a twist of exactly 0.0.
-    Raises InputError for wrong shapes, NaN or infinite values, or dt outside 1e-9..3600 s, and UnsupportedError,
-    by name, for what this version has no engine for.
+    What is at rest within its dead zone has a speed of exactly 0.0.
+    Raises InputError for wrong shapes, NaN or infinite values, dt outside 1e-9..3600 s, or a missing supply.
     """
-    refuse_unsupported(robot)
-    wanted, dt = _checked_inputs(robot, voltage, dt)
-    applied = clip_voltage(robot.motor, wanted)
-    twists, poses = simulate_exact(robot, applied, dt, _start("twist", twist), _start("pose", pose))
-    return _run(robot, applied, dt, twists, poses, _clipping(wanted, applied))
+    given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
+    start = _start("twist", twist, 3), _start("pose", pose, 3)
+    if given.set_point is None and given.open_circuit is None and not why_not_exact(robot):
+        assert given.voltage is not None
+        twists, poses = simulate_exact(robot, given.voltage, given.dt, *start)
+        return _run(robot, given, given.voltage, twists, poses, None, "exact engine", ())
+    amperes = _start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
+    return _implicit(robot, given, *start, amperes, _tolerance(tol))
 
 
-def refuse_unsupported(robot: Robot) -> None:
-    """Raises UnsupportedError when no engine can simulate this robot; it names every reason."""
-    reasons = why_not_exact(robot)
-    if reasons:
-        raise UnsupportedError(
-            f"cannot simulate {robot.name} yet", got="; ".join(reasons),
-            expected="what the exact engine can do", remedy="switch it off in the robot file, or use a later version",
-        )
+def _tolerance(tol: float | None) -> float:
+    if tol is None:
+        return 0.0
+    if not 1e-10 <= tol <= 1.0:
+        raise InputError("tolerance out of range", got=tol, expected="1e-10 to 1 m/s, or None for a fixed step")
+    return float(tol)
 
 
-def _checked_inputs(robot: Robot, voltage: ArrayLike, dt: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Voltage of shape (n, wheels) and dt of shape (n,), finite and in range."""
-    volts, steps = as_floats("voltage", voltage), as_floats("dt", dt)
-    if volts.ndim != 2 or volts.shape[1] != robot.wheels.count or not len(volts):
-        raise InputError("wrong shape", got=volts.shape, expected=f"(n, {robot.wheels.count}), n >= 1", where="voltage")
-    if steps.ndim > 1 or (steps.ndim == 1 and len(steps) != len(volts)):
-        raise InputError("wrong shape", got=steps.shape, expected=f"a number or ({len(volts)},)", where="dt")
-    bad = np.flatnonzero(~np.isfinite(volts).all(axis=1))
-    if bad.size:
-        raise InputError("not a finite number", got=list(volts[bad[0]]), expected="volts", where=f"voltage row {bad[0]}")
-    steps = np.ascontiguousarray(np.broadcast_to(steps, (len(volts),)))
-    bad = np.flatnonzero(~((steps >= MIN_DT) & (steps <= MAX_DT)))
-    if bad.size:
-        raise InputError(
-            "step out of range", got=float(steps[bad[0]]), expected=f"{MIN_DT:g} to {MAX_DT:g} s",
-            where=f"dt row {bad[0]}",
-        )
-    return volts, steps
-
-
-def as_floats(name: str, value: ArrayLike) -> FloatArray:
-    """A float64 array; raises InputError for what is not numbers."""
-    try:
-        return np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("not numbers", got=value, expected="an array of numbers", where=name) from None
-
-
-def _start(name: str, value: ArrayLike) -> FloatArray:
+def _start(name: str, value: ArrayLike, size: int) -> FloatArray:
     array = as_floats(name, value)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise InputError("cannot start there", got=value, expected="three finite numbers", where=name)
+    if array.shape != (size,) or not np.isfinite(array).all():
+        raise InputError("cannot start there", got=value, expected=f"{size} finite numbers", where=name)
     return array
 
 
-def _clipping(wanted: FloatArray, applied: FloatArray) -> tuple[str, ...]:
-    rows = np.flatnonzero((wanted != applied).any(axis=1))
-    if not rows.size:
-        return ()
-    return (f"voltage beyond the limit was clipped in {rows.size} of {len(wanted)} rows, first in row {rows[0]}",)
+def _implicit(
+    robot: Robot, given: Commands, twist: FloatArray, pose: FloatArray, current: FloatArray, tol: float
+) -> Run:
+    """Run the implicit engine, on the grid of the speed loop where there is one, and keep the rows asked for."""
+    numbers, n = plant(robot), robot.wheels.count
+    if given.set_point is None:
+        assert given.voltage is not None
+        dt, loop, keep, voltage = given.dt, no_loop(n), np.arange(len(given.dt) + 1), given.voltage.copy()
+    else:
+        dt, set_point, tick, keep = on_ticks(robot, given)
+        voltage = np.zeros_like(set_point)
+        loop = Loop(*loop_gains(robot), set_point, tick, 1.0 / (robot.drive.rate or np.inf), np.zeros(n))
+    bound = np.broadcast_to(_limits(robot), voltage.shape).copy()
+    if given.open_circuit is not None:
+        bound[given.open_circuit] = 0.0
+    outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
+    how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
+    stopped = capped(outcome)
+    doubts = (f"the friction solver hit its cap in {stopped} of {len(dt)} rows: look there",) if stopped else ()
+    kept = Outcome(outcome.pose[keep], outcome.state[keep], outcome.iterations, outcome.steps)
+    twists = kept.state[:, :AXES] / [1.0, 1.0, numbers.body[LENGTH]]
+    return _run(robot, given, voltage[keep[:-1]], twists, kept.pose, kept, how, doubts)
+
+
+def _limits(robot: Robot) -> FloatArray:
+    limit = robot.motor.current_limit
+    return per_wheel(np.inf if limit is None else limit, robot.wheels.count)
 
 
 def _run(
-    robot: Robot, applied: FloatArray, dt: FloatArray, twists: FloatArray, poses: FloatArray, warnings: tuple[str, ...]
-) -> Run:
+    robot: Robot, given: Commands, voltage: FloatArray, twists: FloatArray, poses: FloatArray,
+    outcome: Outcome | None, engine: str, doubts: tuple[str, ...],
+) -> Run:  # fmt: skip
     """The Run of a simulation: what the instruments of an ideal robot would have recorded."""
-    equal = bool(np.all(dt == dt[0]))
-    t = np.arange(len(dt) + 1) * dt[0] if equal else np.concatenate([[0.0], np.cumsum(dt)])
-    held = np.concatenate([applied, applied[-1:]])
+    dt, n = given.dt, robot.wheels.count
+    t = np.arange(len(dt) + 1) * dt[0] if np.all(dt == dt[0]) else np.concatenate([[0.0], np.cumsum(dt)])
+    held, turning = _with_last(voltage), wheel_speed(robot.wheels, twists)
+    if outcome is not None:  # a wheel that sticks is at rest, to the last bit
+        turning[outcome.state[:, SIGNS + AXES : SIGNS + AXES + n] == 0.0] = 0.0
+    if outcome is not None and robot.motor.electrical == DYNAMIC:
+        current = outcome.state[:, -n:]
+    else:
+        current = settled_currents(robot, twists, held)
+    if given.open_circuit is not None:
+        current = np.where(_with_last(given.open_circuit), 0.0, current)
     return Run(
         t=t,
         voltage=held,
-        current=settled_currents(robot, twists, held),
-        wheel_speed=wheel_speed(robot.wheels, twists),
+        duty=None if given.duty is None else _with_last(given.duty),
+        current=current,
+        wheel_speed=turning,
+        wheel_speed_command=None if given.set_point is None else _with_last(given.set_point),
         twist=twists,
+        twist_command=None if given.twist is None else _with_last(given.twist),
         pose=poses,
-        source=f"simulated: {robot.name}, exact engine",
-        warnings=warnings,
+        supply=None if given.supply is None else _with_last(given.supply),
+        source=f"simulated: {robot.name}, {engine}",
+        warnings=given.warnings + doubts,
     )
+
+
+def _with_last(rows: NDArray) -> NDArray:
+    """Input rows as samples: the last one repeats."""
+    return np.concatenate([rows, rows[-1:]])

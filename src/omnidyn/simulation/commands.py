@@ -1,0 +1,158 @@
+"""From commands to what the motors get: volts, a duty of the supply, or set points of a speed loop in the firmware."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.model.drive import COAST, DUTY, SPEED
+from omnidyn.model.motor import clip_voltage
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel, wheel_speed
+
+FloatArray = NDArray[np.float64]
+MIN_DT, MAX_DT = 1e-9, 3600.0
+
+
+@dataclass(frozen=True)
+class Commands:
+    """What is applied, row by row; each row holds for its dt. Shapes (n,), (n, wheels).
+
+    voltage: None while a speed loop makes it. open_circuit: motors that coast. set_point: wheel speeds [rad/s] of a
+    speed loop. duty, twist, supply: what was commanded, for the record.
+    """
+
+    dt: FloatArray
+    voltage: FloatArray | None
+    open_circuit: NDArray[np.bool_] | None = None
+    set_point: FloatArray | None = None
+    duty: FloatArray | None = None
+    twist: FloatArray | None = None
+    supply: FloatArray | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def commands(
+    robot: Robot, voltage: ArrayLike | None, dt: ArrayLike | None, duty: ArrayLike | None,
+    wheel_speed_command: ArrayLike | None, twist_command: ArrayLike | None, supply: ArrayLike | None,
+) -> Commands:  # fmt: skip
+    """Check what was asked for and bring it into one form. Exactly one kind of command must be given.
+
+    Raises InputError for wrong shapes, values that are not finite, dt out of range, or a kind the drive cannot take.
+    """
+    given = {
+        "voltage": voltage, "duty": duty, "wheel_speed_command": wheel_speed_command, "twist_command": twist_command
+    }  # fmt: skip
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) != 1 or dt is None:
+        raise InputError(
+            "cannot tell what to apply", got=" and ".join(named) or "no command",
+            expected=f"one of {', '.join(given)}, and dt",
+        )  # fmt: skip
+    name, width = named[0], 3 if named[0] == "twist_command" else robot.wheels.count
+    rows = _rows(name, given[name], width)
+    steps = _steps(dt, len(rows))
+    if name == "voltage":
+        applied = clip_voltage(robot.motor, rows)
+        return Commands(steps, applied, warnings=_clipped("voltage", rows, applied))
+    if name == "duty":
+        return _from_duty(robot, rows, steps, supply)
+    if robot.drive.kind != SPEED:
+        raise InputError(
+            f"the drive of {robot.name} takes no {name}", got=f'[drive] kind = "{robot.drive.kind}"',
+            expected='kind = "speed"', remedy="add the gains and the rate of its speed loop to the robot file",
+        )  # fmt: skip
+    if name == "twist_command":
+        return Commands(steps, None, set_point=wheel_speed(robot.wheels, rows), twist=rows)
+    return Commands(steps, None, set_point=rows)
+
+
+def _from_duty(robot: Robot, rows: FloatArray, steps: FloatArray, supply: ArrayLike | None) -> Commands:
+    """voltage = duty * supply; a duty of 0 shorts the motor, or opens it where the drive coasts."""
+    if supply is None:
+        supply = robot.drive.supply
+    if supply is None:
+        raise InputError(
+            "a duty needs a supply", got="no supply", expected="supply= or [drive] supply_V",
+            remedy='add [drive] kind = "duty" and supply_V to the robot file',
+        )  # fmt: skip
+    battery = as_floats("supply", supply)
+    if battery.shape not in ((), (len(rows),)) or not np.all(np.isfinite(battery) & (battery > 0.0)):
+        raise InputError("cannot use this supply", got=supply, expected=f"positive volts, one or {len(rows)}")
+    battery = np.broadcast_to(battery, (len(rows),))
+    duty = np.clip(rows, -1.0, 1.0)
+    applied = duty * battery[:, None]
+    held = clip_voltage(robot.motor, applied)
+    coasts = (duty == 0.0) if robot.drive.off == COAST and robot.drive.kind == DUTY else None
+    warnings = _clipped("duty", rows, duty) + _clipped("voltage", applied, held)
+    return Commands(steps, held, open_circuit=coasts, duty=duty, supply=battery, warnings=warnings)
+
+
+def on_ticks(robot: Robot, given: Commands) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.intp]]:
+    """A speed loop's own time grid: rows cut at the ticks of the loop.
+
+    Returns (dt, set point, whether the loop runs at the start of the row, index where each original row begins, and
+    the end). A command counts from the first tick at or after its start, as in a firmware that polls.
+    """
+    edges = np.concatenate([[0.0], np.cumsum(given.dt)])
+    period = 1.0 / (robot.drive.rate or np.inf)
+    ticks = np.arange(int(np.ceil(edges[-1] / period - 1e-9))) * period
+    near = np.clip(np.searchsorted(edges, ticks), 1, len(edges) - 1)
+    nearest = np.where(np.abs(edges[near] - ticks) < np.abs(edges[near - 1] - ticks), near, near - 1)
+    snapped = np.where(np.abs(edges[nearest] - ticks) <= 1e-9 * period, edges[nearest], ticks)
+    grid = np.unique(np.concatenate([edges, snapped]))
+    row = np.clip(np.searchsorted(edges, grid[:-1], side="right") - 1, 0, len(given.dt) - 1)
+    assert given.set_point is not None
+    return np.diff(grid), given.set_point[row], np.isin(grid[:-1], snapped), np.searchsorted(grid, edges)
+
+
+def loop_gains(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """(kp [V s/rad], ki [V/rad], voltage limit [V], wheel radius [m]) of each wheel. Shape (wheels,) each."""
+    n, drive = robot.wheels.count, robot.drive
+    return per_wheel(drive.kp, n), per_wheel(drive.ki, n), per_wheel(robot.motor.voltage_limit, n), robot.wheels.radii
+
+
+def _rows(name: str, value: ArrayLike | None, width: int) -> FloatArray:
+    """Commands of shape (n, width), finite."""
+    rows = as_floats(name, value)
+    if rows.ndim != 2 or rows.shape[1] != width or not len(rows):
+        raise InputError("wrong shape", got=rows.shape, expected=f"(n, {width}), n >= 1", where=name)
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if bad.size:
+        raise InputError(
+            "not a finite number", got=list(rows[bad[0]]), expected="numbers", where=f"{name} row {bad[0]}"
+        )
+    return rows
+
+
+def _steps(dt: ArrayLike, count: int) -> FloatArray:
+    """dt as one positive length per row."""
+    steps = as_floats("dt", dt)
+    if steps.ndim > 1 or (steps.ndim == 1 and len(steps) != count):
+        raise InputError("wrong shape", got=steps.shape, expected=f"a number or ({count},)", where="dt")
+    steps = np.ascontiguousarray(np.broadcast_to(steps, (count,)))
+    bad = np.flatnonzero(~((steps >= MIN_DT) & (steps <= MAX_DT)))
+    if bad.size:
+        raise InputError(
+            "step out of range", got=float(steps[bad[0]]), expected=f"{MIN_DT:g} to {MAX_DT:g} s",
+            where=f"dt row {bad[0]}",
+        )  # fmt: skip
+    return steps
+
+
+def as_floats(name: str, value: ArrayLike | None) -> FloatArray:
+    """A float64 array; raises InputError for what is not numbers."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("not numbers", got=value, expected="an array of numbers", where=name) from None
+
+
+def _clipped(name: str, wanted: FloatArray, applied: FloatArray) -> tuple[str, ...]:
+    rows = np.flatnonzero((wanted != applied).any(axis=1))
+    if not rows.size:
+        return ()
+    return (f"{name} beyond the limit was clipped in {rows.size} of {len(wanted)} rows, first in row {rows[0]}",)

@@ -1,0 +1,224 @@
+"""Every other law than the paper's: an implicit step that sticks exactly, at fixed or adaptive step.
+
+Fixed: one SDIRK2 step per row. Adaptive: step doubling in smooth motion to a local share of `tol` that scales with
+the step, so that `tol` bounds the global error; a step in which an element starts, stops or reverses is cut until
+its length times the acceleration at work is below `tol`: step doubling alone is blind to reversals.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.compiled import kernel, part
+from omnidyn.model.inclusion import CAP, forces_at_work
+from omnidyn.model.plant import (
+    AXES,
+    BOUND,
+    GX,
+    GY,
+    GZ,
+    INDUCTANCE,
+    LENGTH,
+    MASS,
+    NOW,
+    TAU,
+    VOLTAGE,
+    Plant,
+)  # fmt: skip
+from omnidyn.model.rest import SIGNS, put, settle, with_given_currents
+from omnidyn.model.scratch import scratch
+from omnidyn.simulation.implicit_step import GAMMA, step
+
+FloatArray = NDArray[np.float64]
+
+MEMORY = 0.15  # [s] a robot forgets an error in about this time
+FLOOR = 1e-3  # least share of tol a step is given
+SHORTEST = 1e-11  # [s]
+YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
+CURRENT_SHARE = 1e-2  # and 100 tol in A
+SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 5.0 / 24.0, 8.0 / 24.0, -1.0 / 24.0)
+STAGES = (0.0, 1.0 - GAMMA, GAMMA, 0.0, GAMMA, 0.0)
+
+
+class Loop(NamedTuple):
+    """The firmware's speed loop: PI on the wheel speed, saturating; without commands the voltages are given."""
+
+    kp: FloatArray  # (n,) [V s/rad]
+    ki: FloatArray  # (n,) [V/rad]
+    limit: FloatArray  # (n,) [V]
+    radius: FloatArray  # (n,) [m]
+    command: FloatArray  # (rows, n) [rad/s], or (0, n)
+    tick: NDArray[np.bool_]  # (rows,) whether the loop runs at the start of the row; else its voltage stays
+    period: float  # [s]
+    sum: FloatArray  # (n,) integral so far [V]
+
+
+def no_loop(wheels: int) -> Loop:
+    """No speed loop: voltages are given."""
+    zeros = np.zeros(wheels)
+    return Loop(zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy())
+
+
+class Outcome(NamedTuple):
+    """What a run of the kernel gives; row 0 is the start."""
+
+    pose: FloatArray  # (rows + 1, 3)
+    state: FloatArray  # (rows + 1, size of a state), see implicit_step
+    iterations: NDArray[np.int64]  # (rows,) most solver iterations of a stage in the row
+    steps: NDArray[np.int64]  # (rows,) steps solved
+
+
+def run_implicit(
+    plant: Plant, voltage: FloatArray, bound: FloatArray, dt: FloatArray, state: FloatArray, pose: FloatArray,
+    loop: Loop, tol: float,
+) -> Outcome:  # fmt: skip
+    """Simulate rows of held voltage (filled in place by a speed loop). tol 0: one fixed step per row.
+
+    voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,).
+    """
+    rows = len(dt)
+    plant, bare = plant.copy(), with_given_currents(plant)
+    out = Outcome(
+        np.zeros((rows + 1, 3)), np.zeros((rows + 1, len(state))), np.zeros(rows, np.int64), np.zeros(rows, np.int64)
+    )
+    out.pose[0], out.state[0] = pose, state
+    spare = np.zeros((4, len(state)))
+    _march(
+        *plant, *bare, scratch(), spare, voltage, bound, dt, *loop, tol, out.pose, out.state, out.iterations, out.steps
+    )
+    return out
+
+
+@part
+def _close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total):
+    """One tick of the speed loop: u = clip(kp e + sum), sum += ki e dt unless that pushes further into the limit."""
+    for w in range(len(kp)):
+        if not tick[k]:
+            voltage[k, w] = voltage[k - 1, w]
+            continue
+        e = AXES + w
+        rim = element[e, GX] * state[0] + element[e, GY] * state[1] + element[e, GZ] * state[2]
+        error = command[k, w] - (rim / radius[w] if state[SIGNS + e] != 0.0 else 0.0)
+        more = total[w] + ki[w] * error * period
+        wanted = kp[w] * error + more
+        if abs(wanted) <= limit[w] or wanted * error < 0.0:
+            total[w] = more
+        voltage[k, w] = min(max(kp[w] * error + total[w], -limit[w]), limit[w])
+
+
+@part
+def _travel(pose, x0, xm, x1, length, h, rule):
+    """Advance the pose over a step from velocities at its start, at a middle node and at its end.
+
+    rule: weights of the three; then c, heading at the middle node = heading + h (c0 omega0 + cm omega_m + c1 omega1).
+    """
+    turn = h / length * (rule[0] * x0[2] + rule[1] * xm[2] + rule[2] * x1[2])
+    half = h / length * (rule[3] * x0[2] + rule[4] * xm[2] + rule[5] * x1[2])
+    vx = vy = 0.0
+    for node in range(3):
+        x, y = (x0[0], x0[1]) if node == 0 else ((xm[0], xm[1]) if node == 1 else (x1[0], x1[1]))
+        turned = 0.0 if node == 0 else (half if node == 1 else turn)
+        if rule[node] != 0.0 and (x != 0.0 or y != 0.0):
+            cos, sin = math.cos(pose[2] + turned), math.sin(pose[2] + turned)
+            vx += rule[node] * (cos * x - sin * y)
+            vy += rule[node] * (sin * x + cos * y)
+    pose[0], pose[1], pose[2] = pose[0] + h * vx, pose[1] + h * vy, pose[2] + turn
+
+
+@part
+def _event(a, b, m):
+    """Whether two states differ in what sticks or in a direction of sliding; for the ellipse, by more than 0.5 rad."""
+    for e in range(SIGNS, SIGNS + m + 1):
+        if a[e] != b[e]:
+            return True
+    if a[SIGNS + m] == 1.0 and (a[0] != 0.0 or a[1] != 0.0):
+        cross, dot = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
+        return (dot < 0.0) | (abs(cross) > 0.5 * dot)
+    return False
+
+
+@part
+def _error(body, element, one, two):
+    """Estimated error of `two`, half steps against one whole step, in m/s."""
+    worst = max(abs(two[0] - one[0]), abs(two[1] - one[1]))
+    worst = max(worst, YAW_SHARE * abs(two[2] - one[2]) / body[LENGTH])
+    first = SIGNS + 1 + len(element)
+    for e in range(AXES, len(element)):
+        if element[e, INDUCTANCE] > 0.0:
+            worst = max(worst, CURRENT_SHARE * abs(two[first + e - AXES] - one[first + e - AXES]))
+    return worst / 3.0
+
+
+@part
+def _unresolved(body, element, state, h):
+    """A bound of how far a start, a stop or a reversal inside a step of length h can lead astray [m/s]."""
+    put(body, element, state)
+    body[TAU] = h
+    for e in range(AXES, len(element)):
+        element[e, NOW] = state[SIGNS + 1 + len(element) + e - AXES]
+    return 2.0 * h * forces_at_work(body, element) / body[MASS] * max(1.0, YAW_SHARE / body[LENGTH])
+
+
+@part
+def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, h, pose, counts):
+    """Advance over one row of held voltage with adaptive steps. Returns the step length to begin the next row with."""
+    one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(element)
+    counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
+    left = dt
+    while left > 0.0:
+        h = min(h, left)
+        if left - h < 1e-9 * dt:
+            h = left
+        first = step(body, element, s, state, one, inner, h)
+        second = step(body, element, s, state, middle, inner, 0.5 * h)
+        third = step(body, element, s, middle, two, inner, 0.5 * h)
+        counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
+        ratio = _error(body, element, one, two) / (tol * max(h / MEMORY, FLOOR))
+        if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
+            ratio = max(ratio, 64.0) if _unresolved(body, element, state, h) > tol else 0.5
+        if ratio > 1.0 and h > SHORTEST:
+            h = max(SHORTEST, h * max(0.125, min(0.5, 0.9 / math.sqrt(ratio))))
+            continue
+        _travel(pose, state, middle, two, body[LENGTH], h, SIMPSON)
+        for j in range(len(state)):
+            state[j] = two[j]
+        left = left - h if h < left else 0.0
+        h *= min(4.0, max(1.0, 0.9 / math.sqrt(ratio + 1e-12)))
+    return h
+
+
+@kernel
+def _march(
+    body, element, bare_body, bare_element, s, spare, voltage, bound, dt, kp, ki, limit, radius, command, tick, period,
+    total, tol,     poses, states, iterations, steps,
+):  # fmt: skip
+    """All rows; see run_implicit."""
+    state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(2, np.int64)
+    h = dt[0]
+    for k in range(len(dt)):
+        counts[0] = counts[1] = 0
+        if len(command) > 0:
+            _close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total)
+        for w in range(voltage.shape[1]):
+            element[AXES + w, VOLTAGE], element[AXES + w, BOUND] = voltage[k, w], bound[k, w]
+        if tol > 0.0:
+            h = _row(body, element, bare_body, bare_element, s, spare, state, dt[k], tol, h, pose, counts)
+        else:
+            counts[0], counts[1] = step(body, element, s, state, spare[2], spare[3], dt[k]), 1
+            _travel(pose, state, spare[3], spare[2], body[LENGTH], dt[k], STAGES)
+            for j in range(len(state)):
+                state[j] = spare[2, j]
+        iterations[k], steps[k] = counts[0], counts[1]
+        for j in range(len(state)):
+            states[k + 1, j] = state[j]
+        for a in range(3):
+            poses[k + 1, a] = pose[a]
+
+
+def capped(outcome: Outcome) -> int:
+    """Number of rows in which the solver hit its cap on iterations; 0 in a sound run."""
+    return int(np.count_nonzero(outcome.iterations >= CAP))

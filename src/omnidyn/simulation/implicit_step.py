@@ -1,0 +1,127 @@
+"""One implicit step under dry friction: SDIRK2 whose stages are inclusions, so that rest is exact.
+
+    stage:  M (x - x*) = tau F(x) - tau dD(x),  tau = gamma h,  gamma = 1 - 1/sqrt 2
+    1:      x* = x0                                    x1 at t + gamma h
+    2:      x* = x0 + (1 - gamma)/gamma (x1 - x0)      the end of the step
+
+Second order in smooth motion, L-stable. Currents follow the same two stages and are eliminated (inclusion.winding).
+States are vectors, laid out as in rest.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+from omnidyn.compiled import part
+from omnidyn.model.inclusion import forces_at_work, solve
+from omnidyn.model.plant import (
+    AXES,
+    CURRENT,
+    ELLIPSE,
+    GOAL,
+    HOLD,
+    HOLD_X,
+    HOLD_Y,
+    MASS,
+    NOW,
+    SIGN,
+    SLIDE,
+    SLIDE_X,
+    SLIDE_Y,
+    TAU,
+)  # fmt: skip
+from omnidyn.model.rest import SIGNS, put, take
+
+GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+BACK = (1.0 - GAMMA) / GAMMA
+
+
+@part
+def _aim(body, element, start, end, back):
+    """Set x* and i* of a stage: start + back (end - start), `end` holding x and the plant the currents of stage 1."""
+    m = len(element)
+    for a in range(3):
+        body[GOAL + a] = start[a] + back * (end[a] - start[a])
+    for e in range(AXES, m):
+        i = start[SIGNS + 1 + m + e - AXES]
+        element[e, NOW] = i + back * (element[e, CURRENT] - i) if back != 0.0 else i
+
+
+@part
+def _hold_as(body, x, y):
+    """Set what the ellipse holds; returns what it held before."""
+    before = body[HOLD_X], body[HOLD_Y]
+    body[HOLD_X], body[HOLD_Y] = x, y
+    return before
+
+
+@part
+def _stop_ellipse(body, state):
+    state[0] = state[1] = 0.0
+    body[ELLIPSE] = 0.0
+
+
+@part
+def _stage(body, element, s, start, end):
+    """Solve one stage in place, from the guess `end`; `start` is the state before the step. Returns the iterations."""
+    if body[ELLIPSE] != 1.0:
+        return solve(body, element, end, s)
+    # A body that slides meets the Coulomb level; only when it would go through rest can breakaway hold it.
+    x, y = _hold_as(body, body[SLIDE_X], body[SLIDE_Y])
+    reach = body[TAU] / body[MASS] * forces_at_work(body, element)
+    if math.hypot(body[GOAL], body[GOAL + 1]) <= reach:
+        _stop_ellipse(body, end)  # it could stop in this stage: a first guess, which solve takes back if wrong
+    count = solve(body, element, end, s)
+    _hold_as(body, x, y)
+    if body[ELLIPSE] == 1.0 and end[0] * start[0] + end[1] * start[1] < 0.0:
+        _stop_ellipse(body, end)
+        count = max(count, solve(body, element, end, s))
+    return count
+
+
+@part
+def _slips_back(body, element, start):
+    """Whether an element that holds more than it slides with has stopped or reversed since `start`."""
+    for e in range(len(element)):
+        if element[e, HOLD] > element[e, SLIDE] or element[e, HOLD + 1] > element[e, SLIDE + 1]:
+            before = start[SIGNS + e]
+            if before != 0.0 and before != element[e, SIGN]:
+                return True
+    before = start[SIGNS + len(element)]
+    return (body[HOLD_X] > body[SLIDE_X] or body[HOLD_Y] > body[SLIDE_Y]) and before == 1.0 and body[ELLIPSE] == 0.0
+
+
+@part
+def _begin(body, element, start, end, tau):
+    """Make ready for a first stage of length tau from `start`."""
+    for j in range(len(start)):
+        end[j] = start[j]
+    put(body, element, start)
+    body[TAU] = tau
+    _aim(body, element, start, end, 0.0)
+
+
+@part
+def step(body, element, s, start, end, middle, h):
+    """One SDIRK2 step of length h from `start` to `end`; `middle` receives x at t + gamma h. Returns the iterations.
+
+    Where breakaway exceeds Coulomb and something stops or reverses, one implicit Euler stage takes its place: x* of
+    the second stage lies beyond the stop, and would tear loose what holds.
+    """
+    m = len(element)
+    _begin(body, element, start, end, GAMMA * h)
+    count = _stage(body, element, s, start, end)
+    for a in range(3):
+        middle[a] = end[a]
+    stopped = _slips_back(body, element, start)
+    if not stopped:
+        _aim(body, element, start, end, BACK)
+        count = max(count, _stage(body, element, s, start, end))
+        stopped = _slips_back(body, element, start)
+    if stopped:
+        _begin(body, element, start, end, h)
+        count = max(count, _stage(body, element, s, start, end))
+    take(body, element, end)
+    for e in range(AXES, m):
+        end[SIGNS + 1 + m + e - AXES] = element[e, CURRENT]
+    return count
