@@ -1,0 +1,175 @@
+"""A friction line through points at constant speed, with honest intervals.
+
+    force = B speed + C sgn(speed),  B >= 0, C >= 0                                 eqs (15)-(17)
+
+Weighted least squares. Where the speeds carry errors too, the sum of r^2 / (force_std^2 + B^2 speed_std^2) is
+minimised over B and C (effective variance, with the slope in it): York et al., Am. J. Phys. 72, 367 (2004).
+Iterating weights alone would leave the slope too flat, as much as ordinary least squares does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri, stdtrit
+
+from omnidyn.errors import InsufficientDataError
+
+FloatArray = NDArray[np.float64]
+
+PARAMETERS = 2
+MAX_ITERATIONS, TOLERANCE = 500, 1e-12
+MAX_CONDITION = 1e13
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A fitted line. Order of all pairs: B (slope), C (level).
+
+    estimate: within B >= 0 and C >= 0. free: without these bounds. covariance: of `free`, shape (2, 2).
+    at_bound: which of the two the bounds hold at 0. rows, degrees_of_freedom: rows, and rows - 2.
+    reduced_chi2: mean square of the residuals over their variances (over 1 where no std was given).
+    quantile: standard errors in half a 95 % interval. converged: whether the iteration for speed_std ended.
+    """
+
+    estimate: FloatArray
+    free: FloatArray
+    covariance: FloatArray
+    rows: int
+    reduced_chi2: float
+    quantile: float
+    converged: bool = True
+
+    @property
+    def at_bound(self) -> tuple[bool, bool]:
+        slope, level = (self.estimate == 0.0) & (self.free != 0.0)
+        return bool(slope), bool(level)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        return self.rows - PARAMETERS
+
+    @property
+    def std(self) -> FloatArray:
+        """Standard errors of the fit without bounds: what the data alone say. Shape (2,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> float:
+        """Between B and C; 0 where the points lie on the line and nothing is uncertain."""
+        product = float(np.prod(self.std))
+        return float(self.covariance[0, 1]) / product if product > 0.0 else 0.0
+
+    @property
+    def ci95(self) -> FloatArray:
+        """95 % intervals, shape (2, 2): (low, high) of B, then of C.
+
+        free +- quantile * std. At a bound: from 0 to what the free fit would reach from 0, which covers every true
+        value >= 0 that the interval of the free fit covers. The other parameter, moved by the bound, keeps the free
+        interval, widened to hold its estimate.
+        """
+        half = self.quantile * self.std
+        low, high = self.free - half, self.free + half
+        bound = np.array(self.at_bound)
+        low = np.where(bound, 0.0, np.minimum(low, self.estimate))
+        return np.stack([low, np.where(bound, np.maximum(high, half), np.maximum(high, self.estimate))], axis=1)
+
+
+def fit_line(
+    speed: FloatArray,
+    force: FloatArray,
+    speed_std: FloatArray | None = None,
+    force_std: FloatArray | None = None,
+    *,
+    absolute_std: bool = False,
+) -> Line:
+    """Fit B and C. All arrays have shape (rows,); a row at rest is a point of the line on the side its force pushes.
+
+    Two different |speed| are needed, and three rows (two with `absolute_std`): the caller checks.
+    absolute_std: the given std are exact, intervals use the normal quantile; otherwise only their ratios count, the
+    scatter itself sets their scale and Student's t the interval.
+    """
+    side = np.where(speed != 0.0, np.sign(speed), np.sign(force))
+    scale = np.array([np.abs(speed).max(), 1.0])  # both columns of order one
+    design = np.stack([speed / scale[0], side], axis=1)
+    variance = np.ones_like(speed) if force_std is None else force_std**2
+    wobble = np.zeros_like(speed) if speed_std is None else np.where(speed != 0.0, speed_std / scale[0], 0.0) ** 2
+    free, adjusted, weight, converged = _minimise(design, force, variance, wobble, (True, True))
+    rows = len(speed)
+    mean_square = _cost(free, design, force, variance, wobble) / max(rows - PARAMETERS, 1)
+    normal = adjusted.T @ (weight[:, None] * adjusted)
+    covariance = _solve(normal, np.eye(PARAMETERS)) * (1.0 if absolute_std else mean_square)
+    return Line(
+        estimate=_bounded(free, design, force, variance, wobble) / scale,
+        free=free / scale,
+        covariance=covariance / np.outer(scale, scale),
+        rows=rows,
+        reduced_chi2=mean_square,
+        quantile=quantile(rows - PARAMETERS, absolute_std),
+        converged=converged,
+    )
+
+
+def quantile(degrees_of_freedom: int, absolute_std: bool = False) -> float:
+    """Standard errors in half a 95 % interval: Student's t, or the normal 1.96."""
+    tail = 0.5 + CONFIDENCE / 2.0
+    return float(ndtri(tail) if absolute_std else stdtrit(degrees_of_freedom, tail))
+
+
+def _minimise(
+    design: FloatArray, force: FloatArray, variance: FloatArray, wobble: FloatArray, free: tuple[bool, bool]
+) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+    """Best (B, C) over the free ones: (parameters, speeds adjusted to the line, weights, converged).
+
+    The gradient of the cost is sum W r (x + B wobble W r): the normal equations with adjusted speeds, repeated.
+    """
+    chosen = np.flatnonzero(free)
+    parameters = np.zeros(PARAMETERS)
+    adjusted, weight = design, 1.0 / variance
+    for _ in range(MAX_ITERATIONS):
+        weighted = (weight[:, None] * adjusted[:, chosen]).T
+        previous = parameters
+        parameters = np.zeros(PARAMETERS)
+        parameters[chosen] = _solve(weighted @ design[:, chosen], weighted @ force)
+        if not wobble.any() or not free[0]:
+            return parameters, design, weight, True
+        weight = 1.0 / (variance + parameters[0] ** 2 * wobble)
+        residual = force - design @ parameters
+        adjusted = design + np.outer(parameters[0] * wobble * weight * residual, [1.0, 0.0])
+        if np.abs(parameters - previous).max() <= TOLERANCE * np.abs(parameters).max():
+            return parameters, adjusted, weight, True
+    return parameters, adjusted, weight, False
+
+
+def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """matrix^-1 right; raises InsufficientDataError when one row outweighs all others, so that no line is left."""
+    if not np.isfinite(matrix).all() or np.linalg.cond(matrix) > MAX_CONDITION:
+        raise InsufficientDataError(
+            "the line is not determined",
+            got="one point outweighs all others",
+            expected="two speeds of like weight",
+            remedy="check speed_std and force_std",
+        )
+    return np.asarray(np.linalg.solve(matrix, right), dtype=float)
+
+
+def _cost(
+    parameters: FloatArray, design: FloatArray, force: FloatArray, variance: FloatArray, wobble: FloatArray
+) -> float:
+    residual = force - design @ parameters
+    return float(np.sum(residual**2 / (variance + parameters[0] ** 2 * wobble)))
+
+
+def _bounded(
+    free: FloatArray, design: FloatArray, force: FloatArray, variance: FloatArray, wobble: FloatArray
+) -> FloatArray:
+    """The best point with B >= 0 and C >= 0: two parameters, so every choice of active bounds is tried."""
+    if (free >= 0.0).all():
+        return free
+    problem = (design, force, variance, wobble)
+    corners = [_minimise(*problem, choice)[0] for choice in ((True, False), (False, True))]
+    allowed = [corner for corner in (*corners, np.zeros(PARAMETERS)) if (corner >= 0.0).all()]
+    return min(allowed, key=lambda parameters: _cost(parameters, *problem))

@@ -1,0 +1,143 @@
+"""Run files: a Run as CSV, to the last bit.
+
+    t_s,u1_V..,d1_duty..,i1_A..,w1_rad_s..,w1_cmd_rad_s..,vx_m_s,vy_m_s,omega_rad_s,
+    vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V
+
+A channel that was not measured has no columns, a missing value is an empty cell. Numbers are written with the
+shortest digits that read back as the same float. Source and warnings of a Run are not in the file.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from itertools import starmap
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.files import check_output, write_atomic
+from omnidyn.logs.table import Table, read_table
+from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
+
+FloatArray = NDArray[np.float64]
+
+_WHEEL_COLUMNS = {
+    "voltage": "u{}_V",
+    "duty": "d{}_duty",
+    "current": "i{}_A",
+    "wheel_speed": "w{}_rad_s",
+    "wheel_speed_command": "w{}_cmd_rad_s",
+}
+_OTHER_COLUMNS = {
+    "twist": ("vx_m_s", "vy_m_s", "omega_rad_s"),
+    "twist_command": ("vx_cmd_m_s", "vy_cmd_m_s", "omega_cmd_rad_s"),
+    "pose": ("x_m", "y_m", "heading_rad"),
+    "supply": ("supply_V",),
+}
+
+
+def columns_of(channel: str, wheels: int) -> list[str]:
+    """Names of the columns of a channel, such as u1_V, u2_V, u3_V."""
+    if CHANNELS[channel] == WHEEL:
+        return [_WHEEL_COLUMNS[channel].format(wheel + 1) for wheel in range(wheels)]
+    return list(_OTHER_COLUMNS[channel])
+
+
+def write_run(run: Run, path: str | os.PathLike, force: bool = False) -> Path:
+    """Write a run as CSV, whole or not at all.
+
+    Raises InputError when the file exists (unless `force`) or cannot be written, or when a value is infinite, and
+    UnsupportedError for the name of a Parquet file.
+    """
+    refuse_format(path)
+    check_output(path, force)
+    return write_atomic(path, run_to_csv(run), force)
+
+
+def refuse_format(path: str | os.PathLike) -> None:
+    """Raises UnsupportedError for the name of a Parquet file: this version reads and writes CSV."""
+    suffix = Path(path).suffix
+    if suffix.lower() in (".parquet", ".pq"):
+        raise UnsupportedError("no Parquet yet", got=suffix, expected="a name that ends in .csv", where=str(path))
+
+
+def run_to_csv(run: Run) -> str:
+    """The run as the text of a run file. Raises InputError where a value is infinite."""
+    columns = dict(_columns(run))
+    rows = zip(*starmap(_cells, columns.items()), strict=True)
+    return ",".join(columns) + "\n" + "\n".join(map(",".join, rows)) + "\n"
+
+
+def _columns(run: Run) -> Iterator[tuple[str, FloatArray]]:
+    """Every column by name, in the order of the file."""
+    yield "t_s", run.t
+    for channel, values in run.channels.items():
+        values = values.reshape(len(run), -1)
+        yield from zip(columns_of(channel, values.shape[1]), values.T, strict=True)
+
+
+def _cells(name: str, values: FloatArray) -> list[str]:
+    """A column as text: repr keeps every bit, NaN is an empty cell."""
+    finite = np.isfinite(values)
+    if finite.all():
+        return list(map(repr, values.tolist()))
+    infinite = np.flatnonzero(np.isinf(values))
+    if infinite.size:
+        row = int(infinite[0])
+        raise InputError(
+            "cannot write an infinite value",
+            got=float(values[row]),
+            expected="a finite number, or NaN where missing",
+            where=f"row {row}, column {name}",
+        )
+    return ["" if value != value else repr(value) for value in values.tolist()]
+
+
+def read_run(path: str | os.PathLike) -> Run:
+    """Read a run file: the same numbers, to the last bit, that `write_run` wrote.
+
+    The order of the columns does not matter, a channel needs all of its columns, a blank cell is NaN. `source` of the
+    Run is the path, its `warnings` say what the reader had to decide.
+    Raises InputError for any other column, a missing or decreasing time, and all that `read_table` refuses.
+    """
+    refuse_format(path)
+    table = read_table(path)
+    wheels = _wheel_count(table.names)
+    known = {channel: columns_of(channel, wheels) for channel in CHANNELS}
+    table.check_names(["t_s"], [name for names in known.values() for name in names])
+    channels = {channel: _channel(table, channel, names) for channel, names in known.items()}
+    time = table.numbers("t_s")
+    bad = np.flatnonzero(~(np.diff(time) > 0.0))
+    if bad.size:
+        row = int(bad[0]) + 1
+        got = f"{time[row]:.17g} after {time[row - 1]:.17g}"
+        raise table.fault(row, "t_s", "time does not increase", got, "increasing times")
+    return Run(t=time, **channels, source=str(path), warnings=table.notes)
+
+
+def _wheel_count(names: Sequence[str]) -> int:
+    """The highest number of a wheel in the names of the columns; no more than there are columns."""
+    numbered = (re.fullmatch(r"[udiw](\d{1,4})_\w+", name, re.ASCII) for name in names)
+    return min(max((int(match[1]) for match in numbered if match), default=0), len(names))
+
+
+def _channel(table: Table, channel: str, names: list[str]) -> FloatArray | None:
+    """A channel from its columns, None where the file has none of them."""
+    there = [name for name in names if name in table.names]
+    if not there:
+        return None
+    absent = [name for name in names if name not in there]
+    if absent:
+        raise InputError(
+            f"the channel {channel} is not complete",
+            got=", ".join(there),
+            expected=", ".join(names),
+            remedy=f"add {', '.join(absent)}",
+            where=table.source,
+        )
+    values = np.stack([table.numbers(name, missing=True) for name in names], axis=1)
+    return values[:, 0] if CHANNELS[channel] == SCALAR else values

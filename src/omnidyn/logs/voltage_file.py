@@ -1,0 +1,143 @@
+"""Voltage files: CSV `t_s,u1_V,u2_V,...`, each row holding until the next. The input of a simulation."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.logs.table import Table, read_table
+
+FloatArray = NDArray[np.float64]
+MAX_STEPS = 10_000_000
+_UNITS = {"t": "s", "u": "V"}
+
+
+@dataclass(frozen=True, eq=False)
+class HeldVoltages:
+    """Voltages held from row to row. Unpacks as `voltage, dt, t0, sha256 = read_voltages(...)`.
+
+    voltage [V], shape (n, wheels); dt: how long each row holds [s], shape (n,); t0: time of the first row [s];
+    sha256: of the file; notes: what the reader had to decide, in words.
+    """
+
+    voltage: FloatArray
+    dt: FloatArray
+    t0: float
+    sha256: str
+    notes: tuple[str, ...] = ()
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter((self.voltage, self.dt, self.t0, self.sha256))
+
+
+def read_voltages(
+    path: str | os.PathLike, wheels: int, duration: float | None = None, max_steps: int = MAX_STEPS
+) -> HeldVoltages:
+    """Read a voltage file for a robot of `wheels` wheels.
+
+    Each row holds until the next. The last row holds as long as the one before it, or until `duration` [s] after the
+    first row; a file of one row needs `duration`. Rows that begin after the duration are left out, with a note.
+    Times on a regular grid, up to the rounding of decimal numbers, give one and the same dt everywhere.
+    Raises InputError for wrong columns, times that do not increase, more than `max_steps` rows, a bad duration.
+    """
+    if duration is not None and not (0.0 < duration < np.inf):
+        raise InputError("cannot simulate for that long", got=duration, expected="a duration above 0 s")
+    table = read_table(path)
+    _check_columns(table, wheels)
+    if len(table) > max_steps:
+        raise InputError(
+            "too many rows",
+            got=len(table),
+            expected=f"at most {max_steps}",
+            remedy="shorten the file or raise --max-steps",
+            where=table.source,
+        )
+    t = table.numbers("t_s")
+    voltage = np.stack([table.numbers(f"u{k + 1}_V") for k in range(wheels)], axis=1)
+    _check_time(table, t)
+    dt, used = _intervals(table, t, duration)
+    notes = (
+        table.notes if used == len(t) else (*table.notes, f"{len(t) - used} rows begin after the duration: left out")
+    )
+    return HeldVoltages(voltage[:used], dt, float(t[0]), table.sha256, notes)
+
+
+def _check_columns(table: Table, wheels: int) -> None:
+    expected = ["t_s", *(f"u{k + 1}_V" for k in range(wheels))]
+    numbered = [name for name in table.names if name[:1] == "u" and name[1:-2].isdigit() and name.endswith("_V")]
+    if "t_s" in table.names and len(table.names) == len(numbered) + 1 and len(numbered) != wheels:
+        raise InputError(
+            "the file is for another number of wheels",
+            got=", ".join(table.names),
+            expected=", ".join(expected),
+            remedy="take the robot and the file that belong together",
+            where=table.source,
+        )
+    table.check_names(expected)
+    for name, unit in table.units.items():
+        if unit != _UNITS[name[0]]:
+            raise InputError(
+                "the row of units contradicts the name",
+                got=unit,
+                expected=_UNITS[name[0]],
+                remedy="convert the column",
+                where=f"{table.source}, column {name}",
+            )
+
+
+def _check_time(table: Table, t: FloatArray) -> None:
+    bad = np.flatnonzero(~(np.diff(t) > 0.0))
+    if bad.size:
+        row = int(bad[0]) + 1
+        word = "the same time stands twice" if t[row] == t[row - 1] else "time runs backwards"
+        raise table.fault(
+            row,
+            "t_s",
+            word,
+            f"{t[row]:.12g} after {t[row - 1]:.12g}",
+            "increasing times",
+            "sort the rows by time and keep one of each",
+        )
+
+
+def _intervals(table: Table, t: FloatArray, duration: float | None) -> tuple[FloatArray, int]:
+    """How long each row holds [s], and how many rows there are within the duration."""
+    if len(t) == 1 and duration is None:
+        raise InputError(
+            "one row: how long it holds is not said",
+            got="1 row",
+            expected="two rows, or a duration",
+            remedy="add --duration SECONDS",
+            where=table.source,
+        )
+    steps = _regular(t) if len(t) > 1 else np.empty(0)
+    if duration is None:
+        return np.append(steps, steps[-1]), len(t)
+    starts = np.concatenate([[0.0], np.cumsum(steps)])
+    # A row that begins less than a rounding error before the end holds for no time: it is not used.
+    used = int(np.searchsorted(starts, duration * (1.0 - 1e-12), side="left"))
+    last = duration - starts[used - 1]
+    if used > 1 and abs(last - steps[used - 2]) <= 1e-9 * last:
+        last = steps[used - 2]
+    return np.append(steps[: used - 1], last), used
+
+
+def _regular(t: FloatArray) -> FloatArray:
+    """Differences of the times; one and the same number where they differ by no more than the times are rounded.
+
+    0.1, 0.2, 0.3 differ by 0.1 and 0.09999999999999998: equal steps are meant, and simulate faster.
+    """
+    count = len(t) - 1
+    rounding = min(4.0 * np.finfo(float).eps * np.abs(t).max(), 1e-2 * (t[-1] - t[0]) / count)
+    for digits in range(1, 18):  # the shortest decimal that fits is the one that was meant
+        step = float(f"{(t[-1] - t[0]) / count:.{digits}g}")
+        if abs(t[0] + step * count - t[-1]) <= rounding:
+            grid = t[0] + step * np.arange(len(t))
+            return np.full(count, step) if np.abs(t - grid).max() <= rounding else np.diff(t)
+    return np.diff(t)
