@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from omnidyn.model.deadzone import breakaway_voltage
 from omnidyn.model.robot import Robot
+from omnidyn.paper.steady import measured_speed, pattern_of, settled_speed
 from omnidyn.paper.tables import AXES, DEAD_ZONE_TEXT, TABLE_1, TABLE_4, Three
 from omnidyn.run import Run
 from omnidyn.simulation.inputs import ramp, steps
@@ -71,23 +72,6 @@ def step_responses(robot: Robot) -> dict[str, list[StepResponse]]:
 def dead_zone_ramps(robot: Robot) -> dict[str, Ramp]:
     """A slow voltage ramp along each axis, through the dead zone and out of it, simulated (Fig. 5)."""
     return {axis: _ramp(robot, axis, np.array(pattern_of(axis))) for axis in AXES}
-
-
-def pattern_of(axis: str) -> Three:
-    """The voltages of Table 4 along `axis`, scaled to a largest entry of 1: (0, 1, -1), (-1, 1/2, 1/2), (1, 1, 1)."""
-    first, second, third = TABLE_4[axis][0]
-    largest = max(abs(first), abs(second), abs(third))
-    return first / largest, second / largest, third / largest
-
-
-def settled_speed(robot: Robot, axis: str, voltage: Three) -> float:
-    """Speed along `axis` at which the robot settles from rest [m/s, yaw rad/s]; simulated, 400 s in one step."""
-    return float(simulate(robot, [voltage], 400.0).twist[-1, AXES.index(axis)])
-
-
-def measured_speed(axis: str, voltage: Three) -> float | None:
-    """The speed Table 1 prints for these voltages [m/s, yaw rad/s], None where it has no such row."""
-    return next((row.speed for row in TABLE_1[axis] if row.voltage == voltage), None)
 
 
 def _step(robot: Robot, voltage: Three) -> Run:

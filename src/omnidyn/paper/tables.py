@@ -90,14 +90,12 @@ TABLE_4: dict[str, tuple[Three, ...]] = {
 }
 """Table 4: the nine voltage steps [V] of the validation, three per axis."""
 
-EQ_3_TIMES_3: tuple[tuple[str, str, str], ...] = (
-    ("0", "+sqrt(3) r2", "-sqrt(3) r3"),
-    ("+2 r1", "+r2", "+r3"),
-    ("+r1/b", "+r2/b", "+r3/b"),
+EQ_3: tuple[Three, Three, Three] = (
+    (0.0, 3.0**0.5 / 3.0, -(3.0**0.5) / 3.0),
+    (2.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0),
+    (1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0),
 )
-"""Eq (3), three times its coefficients, as printed: rows v, v_n, w; columns the wheels. Only the sign of 2 r1 is wrong."""
-EQ_3_WHEEL_1_ROW_V_N = 2.0 / 3.0
-"""Eq (3), row v_n, wheel 1: the printed factor of r1."""
+"""Eq (3) as printed: rows v and v_n times r, row w times r/b; columns are the wheels. See the claim on its sign."""
 EQ_11_POWER_OF_GEAR = 0
 """Eq (11): the back-EMF is printed K_v w_m; w_m is the speed of the wheel in (3)."""
 EQ_12 = "0 <= i <= i_max"
