@@ -23,6 +23,7 @@ _HOME = {
     "acceleration": "omnidyn.model.dynamics",
     "axis_patterns": "omnidyn.model.deadzone",
     "breakaway_voltage": "omnidyn.model.deadzone",
+    "dead_zone_map": "omnidyn.model.deadzone",
     "fit_steady_state": "omnidyn.identification.steady_state",
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
@@ -35,7 +36,7 @@ _HOME = {
     "write_run": "omnidyn.logs.run_file",
 }
 
-__all__ = ["__version__", *_HOME]
+__all__ = ["__version__", *_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 
 if TYPE_CHECKING:
     from omnidyn.errors import OmnidynError
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
     from omnidyn.logs.voltage_file import read_voltages
-    from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
+    from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
     from omnidyn.model.dynamics import acceleration
     from omnidyn.model.robot import Robot
     from omnidyn.model.robot_file import load_robot, preset_names, save_robot
@@ -62,4 +63,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
+    return sorted(__all__)

@@ -15,11 +15,11 @@ AXES = ("x", "y", "yaw")
 
 
 def deadzone(
-    robot: str = typer.Argument(help="A preset (see: omnidyn robots) or a robot file."),
+    robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
     pattern: str = typer.Option("", help="One number per wheel, such as 0,1,-1; default: one pattern per axis."),
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:
-    """Show at which voltage a robot at rest starts to move."""
+    """Show at which voltage it starts to move."""
     from omnidyn.cli.numbers import number_list
     from omnidyn.cli.session import provenance, robot_input
     from omnidyn.model.deadzone import axis_patterns

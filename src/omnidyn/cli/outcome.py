@@ -31,7 +31,8 @@ def run_guarded(arguments: list[str]) -> int:
     try:
         with _sigterm_unwinds():
             code = _run(arguments)
-            sys.stdout.flush()
+            if sys.stdout is not None:
+                sys.stdout.flush()
             return code
     except BaseException as error:
         if debug and not isinstance(error, SystemExit):
@@ -73,7 +74,8 @@ def _unforeseen(error: BaseException, debug: bool) -> int:
         say("omnidyn: error: not enough memory; use fewer rows")
         return BAD_INPUT
     if isinstance(error, OSError):
-        say(f"omnidyn: error: cannot write the result; got {error.strerror or error}")
+        place = f"{str(error.filename)[:80]}: " if error.filename else ""
+        say(f"omnidyn: error: {place}the system refuses; got {error.strerror or error}")
         _silence()
         return BAD_INPUT
     say(f"omnidyn: bug: {type(error).__name__}: {' '.join(str(error).split())}")

@@ -8,7 +8,7 @@ from omnidyn.cli.streams import show, show_json
 
 
 def robots(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
-    """List the robots that come with omnidyn."""
+    """List the robots that come along."""
     from omnidyn.cli.session import provenance, robot_input
     from omnidyn.model.robot_file import load_robot, preset_names
 

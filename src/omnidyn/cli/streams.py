@@ -8,7 +8,7 @@ import json
 import os
 import shutil
 import sys
-from typing import Any, TextIO
+from typing import Any
 
 import typer
 
@@ -16,14 +16,8 @@ MIN_WIDTH, WIDTH_WITHOUT_TERMINAL = 20, 110
 
 # What a terminal that knows ASCII only gets to see.
 _PLAIN = {
-    "\N{PLUS-MINUS SIGN}": "+-", "\N{LESS-THAN OR EQUAL TO}": "<=", "\N{GREATER-THAN OR EQUAL TO}": ">=",
-    "\N{EN DASH}": "-", "\N{EM DASH}": "-", "\N{MINUS SIGN}": "-", "\N{RIGHTWARDS ARROW}": "->",
-    "\N{MULTIPLICATION SIGN}": "x", "\N{MIDDLE DOT}": " ", "\N{DOT OPERATOR}": " ", "\N{DEGREE SIGN}": " deg",
-    "\N{SUPERSCRIPT TWO}": "^2", "\N{SQUARE ROOT}": "sqrt", "\N{HORIZONTAL ELLIPSIS}": "...",
-    "\N{GREEK SMALL LETTER OMEGA}": "omega", "\N{GREEK SMALL LETTER THETA}": "theta",
-    "\N{GREEK SMALL LETTER TAU}": "tau", "\N{GREEK CAPITAL LETTER OMEGA}": "ohm", "\N{LATIN SMALL LETTER A WITH ACUTE}": "a",
-    "\N{LATIN SMALL LETTER U WITH ACUTE}": "u", "\N{LATIN SMALL LETTER C WITH CEDILLA}": "c",
-    "\N{LATIN SMALL LETTER A WITH TILDE}": "a",
+    "±": "+-", "≤": "<=", "≥": ">=", "≈": "~", "–": "-", "—": "-", "−": "-", "→": "->", "×": "x", "·": " ", "⋅": " ",
+    "°": " deg", "²": "^2", "√": "sqrt", "…": "...", "ω": "omega", "θ": "theta", "τ": "tau", "Ω": "ohm",
 }  # fmt: skip
 
 
@@ -55,14 +49,17 @@ def _ascii_locale() -> bool:
 
 
 def say(words: str) -> None:
-    """Talk, to stderr. A stderr that nobody reads is no reason to stop."""
+    """Talk, to stderr. A stderr that nobody reads, or that is not there, is no reason to stop."""
+    if sys.stderr is None:
+        return
+    # Not typer.echo: it overrides the encoding of an ASCII stream.
     with contextlib.suppress(BrokenPipeError):
-        typer.echo(words, err=True)
+        print(words, file=sys.stderr, flush=True)
 
 
 def show(text: str) -> None:
     """The result, to stdout."""
-    typer.echo(text)
+    print(text, flush=True)
 
 
 def show_json(document: dict[str, Any]) -> None:
@@ -87,13 +84,17 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def width(stream: TextIO | None = None) -> int:
+def width() -> int:
     """Columns to write in: of the terminal or COLUMNS, at least 20; without a terminal a wide page."""
     return max(MIN_WIDTH, shutil.get_terminal_size((WIDTH_WITHOUT_TERMINAL, 24)).columns)
 
 
-def coloured(text: str, colour: str, stream: TextIO | None = None) -> str:
-    """The text in a colour, where the stream is a terminal that wants colours."""
-    stream = sys.stdout if stream is None else stream
-    wanted = stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+def coloured(text: str, colour: str) -> str:
+    """The text in a colour, where stdout is a terminal that wants colours."""
+    wanted = (
+        sys.stdout is not None
+        and sys.stdout.isatty()
+        and not os.environ.get("NO_COLOR")
+        and os.environ.get("TERM") != "dumb"
+    )
     return typer.style(text, fg=colour) if wanted else text

@@ -1,0 +1,92 @@
+"""omnidyn demo: the paper, end to end."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from omnidyn.cli.progress import progress
+from omnidyn.cli.streams import say, show, show_json, to_json
+
+if TYPE_CHECKING:
+    from omnidyn.paper.claim import Claim
+    from omnidyn.report.style import Picture
+
+TITLE = "A three-wheeled omnidirectional robot with friction: the paper, recomputed"
+INTRODUCTION = (
+    "M. Dourado Correia and A. G. S. Conceição, Modeling of a Three Wheeled Omnidirectional Robot Including "
+    "Friction Models (2012). Every equation, table and figure is a claim; beside it stands what omnidyn "
+    "computes, and the verdict. Lines in the figures are simulated exactly, dots are numbers that the paper "
+    "prints."
+)
+
+
+def demo(
+    out: str = typer.Option("omnidyn-demo", metavar="FOLDER", help="Folder for report, numbers and figures."),
+    force: bool = typer.Option(False, "--force", help="Write into a folder that the demo did not make."),
+    json: bool = typer.Option(False, "--json", help="The result for machines, instead of the table."),
+) -> None:
+    """Recompute the paper, end to end.
+
+    Prints every claim with its verdict; writes report.html, result.json and the figures.
+    """
+    from omnidyn.cli.demo_folder import check_folder, write_folder
+
+    folder = check_folder(out, force)
+    with progress("loading") as now:
+        claims, pictures, record = _made(now)
+        result = _result(claims, pictures, record)
+        now("writing the report")
+        write_folder(folder, _files(claims, pictures, record, result))
+    if json:
+        show_json(result)
+    else:
+        from omnidyn.cli.claims_table import claims_table
+
+        show(claims_table(claims))
+    say(f"omnidyn: open {folder / 'report.html'}")
+
+
+def _made(now: Any) -> tuple[tuple[Claim, ...], list[Picture], dict[str, Any]]:
+    """Claims, pictures and the record of what they were made from."""
+    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.model.robot_file import load_robot
+    from omnidyn.paper.claims import PRESET, all_claims
+    from omnidyn.report.figures import paper_pictures
+
+    now("computing the claims (the first run compiles the simulation)")
+    claims = all_claims()
+    pictures = []
+    for picture in paper_pictures(load_robot(PRESET)):
+        pictures.append(picture)
+        now(f"drawing, {len(pictures)} figures done")
+    return claims, pictures, provenance([robot_input(PRESET)])
+
+
+def _result(claims: tuple[Claim, ...], pictures: list[Picture], record: dict[str, Any]) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    from omnidyn.paper.claim import Verdict
+
+    return {
+        "verdicts": {verdict.value: sum(claim.verdict == verdict for claim in claims) for verdict in Verdict},
+        "claims": [asdict(claim) for claim in claims],
+        "figures": [{"name": each.name, "title": each.title, "caption": each.caption} for each in pictures],
+        "provenance": record,
+    }
+
+
+def _files(
+    claims: tuple[Claim, ...], pictures: list[Picture], record: dict[str, Any], result: dict[str, Any]
+) -> dict[str, bytes]:
+    from omnidyn.report.page import render_page
+
+    files = {
+        "report.html": render_page(TITLE, INTRODUCTION, claims, pictures, record).encode(),
+        "result.json": (to_json(result) + "\n").encode(),
+    }
+    for picture in pictures:
+        files[f"figures/{picture.name}.png"] = picture.png
+        files[f"figures/{picture.name}.svg"] = picture.svg
+    return files

@@ -1,0 +1,115 @@
+"""omnidyn simulate ROBOT VOLTAGES -o OUT: what the robot does under given voltages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from omnidyn.cli.progress import progress
+from omnidyn.cli.streams import say, show, show_json
+
+if TYPE_CHECKING:
+    from omnidyn.run import Run
+
+DEFAULT_MAX_STEPS = 1_000_000
+
+
+def simulate(
+    robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
+    voltages: str = typer.Argument(metavar="VOLTAGES", help="CSV file t_s,u1_V,..; a row holds until the next."),
+    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Run file to write (CSV); - is stdout."),
+    duration: float | None = typer.Option(None, help="End of the run [s]; default: the last interval repeats."),
+    max_steps: int = typer.Option(DEFAULT_MAX_STEPS, min=1, help="Refuse more steps than this."),
+    twist: str = typer.Option("0,0,0", metavar="VX,VY,W", help="Where it starts [m/s, m/s, rad/s]."),
+    pose: str = typer.Option("0,0,0", metavar="X,Y,HEADING", help="Where it starts [m, m, rad]."),
+    force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
+    json: bool = typer.Option(False, "--json", help="The summary for machines."),
+) -> None:
+    """Simulate a robot exactly.
+
+    The dead zone included. The run is written as CSV.
+    Without -o nothing is written: only the summary is shown.
+    """
+    from omnidyn.cli.numbers import three
+
+    start_twist, start_pose = three("--twist", twist), three("--pose", pose)
+    # -o - and --json both want stdout
+    if out == "-" and json:
+        raise typer.BadParameter("-o - and --json both want stdout.")
+    if out not in ("", "-"):
+        _refuse_early(out, force)
+    with progress("simulating") as now:
+        run, record = _simulated(robot, voltages, duration, max_steps, start_twist, start_pose)
+        now("writing the run")
+        _write(run, out, force)
+    for warning in run.warnings:
+        say(f"omnidyn: warning: {warning}")
+    if json:
+        show_json({**_summary(run), "output": out or None, "provenance": record})
+    elif out != "-":
+        show(_text(run))
+        say(f"omnidyn: wrote {out}" if out else "omnidyn: nothing written; -o FILE writes the run")
+
+
+def _refuse_early(out: str, force: bool) -> None:
+    """Before any work: a place where the run could not be written in the end."""
+    from omnidyn.files import check_output
+    from omnidyn.logs.run_file import refuse_format
+
+    refuse_format(out)
+    check_output(out, force)
+
+
+def _simulated(
+    robot: str, voltages: str, duration: float | None, max_steps: int, twist: list[float], pose: list[float]
+) -> tuple[Run, dict[str, Any]]:
+    """The run and the record of what it was made from."""
+    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.logs.voltage_file import read_voltages
+    from omnidyn.model.robot_file import load_robot
+    from omnidyn.simulation.simulate import simulate as simulate_robot
+
+    loaded = load_robot(robot)
+    held = read_voltages(voltages, loaded.wheels.count, duration, max_steps)
+    record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": held.sha256}])
+    run = simulate_robot(loaded, held.voltage, held.dt, twist=twist, pose=pose)
+    return run.replace(t=run.t + held.t0, warnings=(*held.notes, *run.warnings)), record
+
+
+def _write(run: Run, out: str, force: bool) -> None:
+    from omnidyn.logs.run_file import run_to_csv, write_run
+
+    if out == "-":
+        show(run_to_csv(run).rstrip("\n"))
+    elif out:
+        write_run(run, out, force)
+
+
+def _summary(run: Run) -> dict[str, Any]:
+    """What one wants to know first about a run, for machines."""
+    assert run.twist is not None
+    assert run.pose is not None
+    return {
+        "source": run.source,
+        "samples": len(run),
+        "duration_s": run.t[-1] - run.t[0],
+        "moved": bool(run.twist.any()),
+        "final_twist": dict(zip(("vx_m_s", "vy_m_s", "omega_rad_s"), run.twist[-1].tolist(), strict=True)),
+        "final_pose": dict(zip(("x_m", "y_m", "heading_rad"), run.pose[-1].tolist(), strict=True)),
+        "warnings": run.warnings,
+    }
+
+
+def _text(run: Run) -> str:
+    """The same for people."""
+    assert run.twist is not None
+    assert run.pose is not None
+    vx, vy, omega = run.twist[-1]
+    x, y, heading = run.pose[-1]
+    lines = [f"{run.source}: {len(run)} samples, {run.t[-1] - run.t[0]:.6g} s"]
+    if not run.twist.any():
+        lines.append("it never moved: the voltages stay within the dead zone (see: omnidyn deadzone)")
+    lines.append(f"at the end   vx {vx:.4f} m/s   vy {vy:.4f} m/s   omega {omega:.4f} rad/s")
+    lines.append(f"             x {x:.4f} m   y {y:.4f} m   heading {heading:.4f} rad")
+    return "\n".join(lines)

@@ -1,0 +1,68 @@
+"""Fig. 4: the nine step responses of Table 4."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from matplotlib.axes import Axes
+
+from omnidyn.paper.experiments import StepResponse
+from omnidyn.paper.tables import AXES, SPEED_UNIT
+from omnidyn.report.style import (
+    LEVEL_COLOURS,
+    LEVEL_LINES,
+    MEASURED,
+    WIDTH,
+    Picture,
+    axis_title,
+    look,
+    new_figure,
+    note,
+    picture,
+    thin_out,
+)
+
+SHOWN_S = 1.2  # of each response; the rest is steady
+
+
+def draw_steps(responses: Mapping[str, Sequence[StepResponse]]) -> Picture:
+    """One panel per axis, three steps each; a dot where Table 1 prints a speed for the same voltages."""
+    with look():
+        figure = new_figure(WIDTH, 4.0)
+        panels = figure.subplots(1, len(AXES))
+        figure.subplots_adjust(left=0.075, right=0.985, top=0.9, bottom=0.24, wspace=0.3)
+        for axis, panel in zip(AXES, panels, strict=True):
+            _panel(panel, axis, responses[axis])
+        figure.text(0.075, 0.03, _words(), fontsize=10)
+        return picture("fig4_steps", "Fig. 4: nine voltage steps (Table 4)", _caption(), figure)
+
+
+def _words() -> str:
+    return "Lines: simulated with Table 3.   Dots: steady speed printed in Table 1 for the same voltages."
+
+
+def _caption() -> str:
+    return (
+        "The steps of Table 4 from rest, simulated with the parameters of Table 3. Dots: the steady speed that Table 1 "
+        "prints for the same voltages, where it has such a row."
+    )
+
+
+def _panel(axes: Axes, axis: str, responses: Sequence[StepResponse]) -> None:
+    for k, response in enumerate(responses):
+        twist = response.run.twist
+        assert twist is not None
+        kept = response.run.t <= SHOWN_S
+        speed, colour = twist[kept, AXES.index(axis)], LEVEL_COLOURS[k]
+        axes.plot(response.run.t[kept], speed, LEVEL_LINES[k], color=colour)
+        note(axes, 0.62 * SHOWN_S, response.settled_speed, f"{response.level:g} V", ha="center", va="center")
+        if response.measured_speed is not None:
+            axes.plot([SHOWN_S] * 2, [response.settled_speed, response.measured_speed], color=colour, linewidth=1.2,
+                      clip_on=False)  # fmt: skip
+            axes.plot([SHOWN_S], [response.measured_speed], "o", color=colour, markeredgecolor=MEASURED,
+                      markersize=8, clip_on=False, zorder=5)  # fmt: skip
+    axes.set_title(f"{axis_title(axis)}: speed, {SPEED_UNIT[axis]}")
+    axes.set_xlabel("time, s")
+    axes.set_xlim(0.0, SHOWN_S)
+    axes.set_ylim(bottom=0.0)
+    thin_out(axes, 4, 6)

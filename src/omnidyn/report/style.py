@@ -1,0 +1,122 @@
+"""How pictures look: one palette that colour-blind readers can tell apart, sizes, and the two file formats.
+
+matplotlib is used through Figure and an Agg canvas: no pyplot, no window, no setting that outlives a picture. A
+picture made twice is the same file, byte by byte.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import matplotlib
+import matplotlib.style
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from omnidyn.paper.tables import PAPER_AXES
+
+# Okabe & Ito 2008.
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
+    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
+)  # fmt: skip
+INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
+
+AXIS_COLOUR = {"x": BLUE, "y": VERMILLION, "yaw": GREEN}
+LEVEL_COLOURS = (SKY, ORANGE, BLUE, PURPLE)  # small to large; each line carries its own words too
+LEVEL_LINES = ("-", "--", "-.", ":")
+MEASURED = BLACK
+
+WIDTH = 8.0  # inch; text of 11 points stays readable at half the width
+DPI = 150
+
+LOOK = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 11.0,
+    "axes.titlesize": 11.5,
+    "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # fixed: to look for a free place costs as much as the drawing
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": PALE,
+    "grid.linewidth": 0.8,
+    "lines.linewidth": 1.8,
+    "legend.frameon": False,
+    "legend.fontsize": 10.0,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "svg.hashsalt": "omnidyn",
+    "svg.fonttype": "path",  # looks the same where the font is missing
+    "path.simplify": True,
+}
+
+_DRAWING = threading.RLock()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as files: name without ending, title, caption in plain words, and the bytes of both formats."""
+
+    name: str
+    title: str
+    caption: str
+    png: bytes
+    svg: bytes
+
+
+@contextlib.contextmanager
+def look() -> Iterator[None]:
+    """Our style while it holds, whatever the user's matplotlibrc says; afterwards all is as before.
+
+    The settings of matplotlib belong to the whole process: one thread draws at a time.
+    """
+    with _DRAWING, matplotlib.style.context(["default", LOOK]):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [inch], drawn by Agg."""
+    figure = Figure(figsize=(width, height), facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def picture(name: str, title: str, caption: str, figure: Figure) -> Picture:
+    """The figure in both formats; the same figure gives the same bytes."""
+    return Picture(name, title, caption, _saved(figure, "png"), _saved(figure, "svg"))
+
+
+def _saved(figure: Figure, form: str) -> bytes:
+    metadata = {"Software": None} if form == "png" else {"Date": None, "Creator": None}
+    stream = io.BytesIO()
+    figure.savefig(stream, format=form, dpi=DPI, metadata=metadata)
+    return stream.getvalue()
+
+
+def thin_out(axes: Axes, x: int | None = None, y: int | None = None) -> None:
+    """At most so many steps between ticks, so that their labels stay apart at half size."""
+    if x is not None:
+        axes.locator_params(axis="x", nbins=x)
+    if y is not None:
+        axes.locator_params(axis="y", nbins=y)
+
+
+def axis_title(axis: str) -> str:
+    """Name of a body axis with the paper's letter and the unit of its speed."""
+    letter = PAPER_AXES[axis].replace("v_n", "vₙ").replace("w", "ω")
+    return f"{axis} ({letter})"
+
+
+def note(axes: Axes, x: float, y: float, words: str, **how) -> None:
+    """Words at a place in the data, on a white ground that keeps lines away from them."""
+    ground = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+    axes.text(x, y, words, **{"fontsize": 10.0, "bbox": ground, **how})
