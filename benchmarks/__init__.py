@@ -1,0 +1,13 @@
+"""Benchmarks of omnidyn: accuracy, speed and rest, each measured beside a goal and, where there is one, a rival.
+
+    python -m benchmarks            # what there is
+    python -m benchmarks simulate   # one of them; --json for machines
+    python -m benchmarks all
+
+A ratio counts only inside one run: same inputs, same machine, same minute. Every time stands beside an error.
+"""
+
+import os
+
+for _name in ("OMP", "OPENBLAS", "MKL", "NUMBA"):  # before NumPy is imported: one thread each
+    os.environ[f"{_name}_NUM_THREADS"] = "1"

@@ -1,0 +1,343 @@
+"""The commands, in process: what they print, write and refuse."""
+
+import json
+
+import numpy as np
+import pytest
+
+from omnidyn.cli import main
+from omnidyn.logs.run_file import read_run
+from omnidyn.model.robot_file import load_robot, preset_names
+
+VOLTAGES = "t_s,u1_V,u2_V,u3_V\n0,0,3,-3\n1,0,0,0\n2,1,1,1\n"
+TABLE_1 = (
+    "axis,speed,force\nx,0,2.25\nx,0.37,2.48\nx,0.74,2.79\nx,1.08,3.28\ny,0,1.47\ny,0.42,1.97\ny,0.75,2.33\n"
+    "y,1.08,2.49\nyaw,0,0.1\nyaw,5.84,0.14\nyaw,8.04,0.18\nyaw,10.02,0.21\n"
+)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An own folder with a voltage file and a steady table."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "u.csv").write_text(VOLTAGES)
+    (tmp_path / "t.csv").write_text(TABLE_1)
+    return tmp_path
+
+
+@pytest.fixture
+def call(here, capsys):
+    """Run a command: (exit code, stdout, stderr)."""
+
+    def run(*arguments):
+        code = main(list(arguments))
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def strict(text):
+    def refuse(name):
+        raise AssertionError(f"{name} in JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+# ---- usage ----------------------------------------------------------------------------------------------
+
+
+def test_no_command_shows_the_help_and_is_a_usage_error(call):
+    code, out, err = call()
+    assert (code, out) == (2, "")
+    assert "Usage: omnidyn" in err
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["simulate", "--help"], ["demo", "-h"]])
+def test_help_is_a_result(call, arguments):
+    code, out, err = call(*arguments)
+    assert (code, err) == (0, "")
+    assert out.startswith("Usage: omnidyn")
+
+
+def test_version(call):
+    assert call("--version") == (0, "omnidyn 0.1.0\n", "")
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["fly"], "No such command 'fly'"),
+        (["simulate"], "Missing argument"),
+        (["simulate", "axebot", "u.csv", "--max-steps", "0"], "--max-steps"),
+        (["simulate", "axebot", "u.csv", "--duration", "long"], "--duration"),
+        (["simulate", "axebot", "u.csv", "-o", "-", "--json"], "both want stdout"),
+        (["identify", "t.csv"], "--robot"),
+        (["deadzone", "axebot", "--loud"], "--loud"),
+    ],
+)
+def test_wrong_words_are_usage(call, arguments, words):
+    code, out, err = call(*arguments)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert err.startswith("omnidyn: error: ")
+    assert err.count("\n") == 1
+
+
+# ---- robots, deadzone -----------------------------------------------------------------------------------
+
+
+def test_robots_lists_every_preset(call):
+    code, out, _ = call("robots")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == preset_names()
+    listed = strict(call("robots", "--json")[1])
+    assert [robot["name"] for robot in listed["robots"]] == preset_names()
+    assert listed["robots"][0]["wheels"] == 3
+
+
+def test_deadzone_has_the_paper_s_numbers(call):
+    code, out, _ = call("deadzone", "axebot")
+    assert code == 0
+    lines = [line.split() for line in out.splitlines()[2:]]
+    assert [(line[0], line[1]) for line in lines] == [("x", "0.670"), ("y", "0.528"), ("yaw", "0.174")]
+
+
+def test_deadzone_for_machines(call):
+    result = strict(call("deadzone", "axebot", "--json")[1])
+    assert [row["axis"] for row in result["dead_zone"]] == ["x", "y", "yaw"]
+    assert result["dead_zone"][0]["breakaway_scale_V"] == pytest.approx(0.6702104418344872, rel=1e-14)
+    assert result["provenance"]["command"] == "omnidyn deadzone axebot --json"
+    assert len(result["provenance"]["inputs"][0]["sha256"]) == 64
+
+
+def test_deadzone_of_a_pattern_names_the_axis_that_gives_way(call):
+    row = strict(call("deadzone", "axebot", "--pattern", "-1,2,-3", "--json")[1])["dead_zone"][0]
+    assert row["axis"] == "yaw"
+    assert row["voltage_V"] == pytest.approx([-0.26119, 0.52238, -0.78357], abs=1e-5)
+
+
+def test_a_pattern_that_drives_nothing_never_moves(call):
+    code, out, _ = call("deadzone", "axebot", "--pattern", "0,0,0")
+    assert code == 0
+    assert "never   the pattern (0, 0, 0) drives no axis" in out
+    assert strict(call("deadzone", "axebot", "--pattern", "0,0,0", "--json")[1])["dead_zone"][0]["voltage_V"] is None
+
+
+def test_a_dead_zone_beyond_the_motors_is_said(call, here):
+    weak = load_robot("axebot")
+    weak = weak.replace(motor=weak.motor.replace(voltage_limit=0.5))
+    from omnidyn import save_robot
+
+    save_robot(weak, here / "weak.toml")
+    lines = call("deadzone", "weak.toml")[1].splitlines()[2:]
+    assert [line.endswith("(beyond the limit of the motors)") for line in lines] == [True, True, False]
+
+
+@pytest.mark.parametrize("pattern", ["1,2", "a,b,c", "1,,1", "nan,0,0", "inf,1,1", "1_0,1,1", "1e400,0,0", "1" * 2000])
+def test_a_bad_pattern_is_refused(call, pattern):
+    code, out, err = call("deadzone", "axebot", "--pattern", pattern)
+    assert (code, out) == (3, "")
+    assert "pattern" in err
+
+
+@pytest.mark.parametrize(
+    "robot",
+    ["axbot", "none.toml", "", ".", "u.csv", "a\0b", "\N{ROBOT FACE}", "-", "x" * 4000, "none/x.toml", "axebot/"],
+)
+def test_a_bad_robot_is_refused_in_one_line(call, robot):
+    code, out, err = call("deadzone", "--", robot)
+    assert (code, out) == (3, "")
+    assert err.startswith("omnidyn: error: ")
+    assert err.count("\n") == 1
+
+
+# ---- simulate -------------------------------------------------------------------------------------------
+
+
+def test_simulate_writes_the_run_that_python_gives(call, here):
+    from omnidyn import read_voltages, simulate
+
+    code, out, err = call("simulate", "axebot", "u.csv", "-o", "run.csv")
+    assert code == 0
+    assert "4 samples, 3 s" in out
+    assert "wrote run.csv" in err
+    held = read_voltages(here / "u.csv", 3)
+    wanted = simulate(load_robot("axebot"), held.voltage, held.dt)
+    assert read_run(here / "run.csv").pose.tobytes() == wanted.pose.tobytes()
+
+
+def test_without_an_output_nothing_is_written(call, here):
+    before = sorted(here.iterdir())
+    code, out, err = call("simulate", "axebot", "u.csv")
+    assert code == 0
+    assert "at the end" in out
+    assert "nothing written" in err
+    assert sorted(here.iterdir()) == before
+
+
+def test_a_dash_writes_the_run_to_stdout(call, here):
+    _, out, _ = call("simulate", "axebot", "u.csv", "-o", "-")
+    call("simulate", "axebot", "u.csv", "-o", "run.csv")
+    assert out == (here / "run.csv").read_text()
+
+
+def test_the_summary_for_machines(call):
+    result = strict(call("simulate", "axebot", "u.csv", "--json", "--pose", "1,-2,0.5")[1])
+    assert result["moved"] is True
+    assert result["samples"] == 4
+    assert result["final_pose"]["x_m"] > 1.0
+    assert {each["role"] for each in result["provenance"]["inputs"]} == {"robot", "voltages"}
+
+
+def test_the_run_keeps_the_time_of_the_voltages(call, here):
+    (here / "late.csv").write_text("t_s,u1_V,u2_V,u3_V\n10,0,3,-3\n11,0,0,0\n")
+    call("simulate", "axebot", "late.csv", "-o", "run.csv")
+    assert read_run(here / "run.csv").t.tolist() == [10.0, 11.0, 12.0]
+
+
+def test_the_duration_ends_the_run(call, here):
+    call("simulate", "axebot", "u.csv", "-o", "run.csv", "--duration", "1.5")
+    assert read_run(here / "run.csv").t.tolist() == [0.0, 1.0, 1.5]
+
+
+def test_a_robot_that_never_moves_is_said(call, here):
+    (here / "low.csv").write_text("t_s,u1_V,u2_V,u3_V\n0,0,0.6,-0.6\n1,0,0,0\n")
+    assert "it never moved" in call("simulate", "axebot", "low.csv")[1]
+
+
+def test_clipped_voltages_are_a_warning_on_stderr_and_in_the_result(call, here):
+    (here / "high.csv").write_text("t_s,u1_V,u2_V,u3_V\n0,0,30,-30\n1,0,0,0\n")
+    _, out, err = call("simulate", "axebot", "high.csv", "--json")
+    assert "omnidyn: warning: voltage beyond the limit was clipped" in err
+    assert np.size(strict(out)["warnings"]) == 1
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("t_s,u1_V,u2_V,u3_V\n0,nan,3,-3\n1,0,0,0\n", "bad.csv:2, column u1_V"),
+        ("t_s,u1_V,u2_V,u3_V\n0,,3,-3\n1,0,0,0\n", "bad.csv:2, column u1_V"),
+        ("t_s,u1_V,u2_V,u3_V\n0,1e400,3,-3\n1,0,0,0\n", "not a finite number"),
+        ("t_s;u1_V;u2_V;u3_V\n0;1,5;3\n", "bad.csv"),
+        ("", "the file is empty"),
+        ("t_s,u1_V\n0,1\n1,1\n", "another number of wheels"),
+        ("t_s,u1_V,u2_V,u3_V\n0,1,1,1\n", "--duration"),
+    ],
+)
+def test_a_bad_voltage_file_is_refused_with_its_place(call, here, text, words):
+    (here / "bad.csv").write_text(text)
+    code, out, err = call("simulate", "axebot", "bad.csv", "-o", "run.csv")
+    assert (code, out) == (3, "")
+    assert words in err
+    assert not (here / "run.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["--pose", "0,0"], "--pose: wrong number of values"),
+        (["--pose", "0,0,nan"], "--pose: not a list of numbers"),
+        (["--twist", "1;2;3"], "--twist: not a list of numbers"),
+        (["--duration", "nan"], "duration"),
+        (["--duration", "-1"], "duration"),
+        (["--max-steps", "2"], "too many rows"),
+        (["-o", "run.parquet"], "no Parquet yet"),
+        (["-o", "none/run.csv"], "mkdir -p none"),
+        (["-o", "u.csv"], "the file exists already"),
+        (["-o", "."], "a folder"),
+        (["-o", "run.csv", "--force", "--pose", "x"], "--pose"),
+    ],
+)
+def test_bad_values_are_refused(call, here, arguments, words):
+    code, out, err = call("simulate", "axebot", "u.csv", *arguments)
+    assert (code, out) == (3, "")
+    assert words in err
+    assert (here / "u.csv").read_text() == VOLTAGES
+    assert sorted(file.name for file in here.iterdir()) == ["t.csv", "u.csv"]
+
+
+def test_an_existing_output_is_refused_before_any_work(call, here, monkeypatch):
+    (here / "run.csv").write_text("mine")
+    monkeypatch.setattr("omnidyn.simulation.simulate.simulate", None)  # would be a bug, exit 1
+    assert call("simulate", "axebot", "u.csv", "-o", "run.csv")[0] == 3
+    assert (here / "run.csv").read_text() == "mine"
+
+
+# ---- identify -------------------------------------------------------------------------------------------
+
+
+def test_identify_gives_table_2_in_the_paper_s_way(call):
+    result = strict(call("identify", "t.csv", "--robot", "axebot", "--rest", "line", "--json")[1])
+    values = {name: entry["value"] for name, entry in result["parameters"].items()}
+    assert values["friction.axes.viscous[0]"] == pytest.approx(0.9382, abs=5e-5)
+    assert values["friction.axes.coulomb[2]"] == pytest.approx(0.09337, abs=5e-6)
+
+
+def test_identify_writes_a_robot_that_loads(call, here):
+    code, out, err = call("identify", "t.csv", "--robot", "axebot", "-o", "fit.toml")
+    assert code == 0
+    assert "95 % interval" in out
+    assert "wrote fit.toml" in err
+    assert load_robot(here / "fit.toml").friction.axes.coulomb[0] == pytest.approx(2.0306, abs=5e-5)
+
+
+def test_identify_says_its_warnings_in_words(call):
+    _, out, err = call("identify", "t.csv", "--robot", "axebot", "--json")
+    warnings = strict(out)["warnings"]
+    assert warnings
+    assert all(f"omnidyn: warning: {warning}" in err for warning in warnings)
+
+
+def test_another_method_is_refused_by_name(call):
+    code, _, err = call("identify", "t.csv", "--robot", "axebot", "--method", "output-error")
+    assert code == 3
+    assert "no such method yet; got output-error; expected steady-state" in err
+
+
+def test_too_few_points_are_exit_4(call, here):
+    (here / "few.csv").write_text("axis,speed,force\nx,0.4,2.5\nx,0.7,2.8\n")
+    assert call("identify", "few.csv", "--robot", "axebot", "-o", "fit.toml")[0] == 4
+    assert not (here / "fit.toml").exists()
+
+
+# ---- errors ---------------------------------------------------------------------------------------------
+
+
+def test_debug_adds_the_traceback_and_keeps_the_code(call):
+    code, _, err = call("deadzone", "axbot", "--debug")
+    assert code == 3
+    assert "Traceback (most recent call last)" in err
+    assert "no such robot" in err
+
+
+def test_our_own_bug_is_exit_1_without_a_traceback(call, monkeypatch):
+    def broken(robot):
+        raise ZeroDivisionError("oh\nno")
+
+    monkeypatch.setattr("omnidyn.model.robot_file.load_robot", broken)
+    code, out, err = call("deadzone", "axebot")
+    assert (code, out) == (1, "")
+    assert "omnidyn: bug: ZeroDivisionError: oh no" in err
+    assert "Traceback" not in err
+
+
+def test_a_missing_extra_is_exit_6(call, monkeypatch):
+    from omnidyn.errors import MissingExtraError
+
+    def missing(robot):
+        raise MissingExtraError("mcap is not installed", remedy="pip install omnidyn[logs]")
+
+    monkeypatch.setattr("omnidyn.model.robot_file.load_robot", missing)
+    code, _, err = call("deadzone", "axebot")
+    assert code == 6
+    assert "pip install omnidyn[logs]" in err
+
+
+def test_no_memory_is_no_bug(call, monkeypatch):
+    def full(robot):
+        raise MemoryError
+
+    monkeypatch.setattr("omnidyn.model.robot_file.load_robot", full)
+    code, _, err = call("deadzone", "axebot")
+    assert code == 3
+    assert "not enough memory" in err

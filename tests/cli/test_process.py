@@ -1,0 +1,214 @@
+"""The command line as a process: signals, pipes, locales, time."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+SOURCES = Path(__file__).resolve().parents[2] / "src"
+DROPPED = ("LC_", "LANG", "NO_COLOR", "COLUMNS")
+CLEAN = {name: value for name, value in os.environ.items() if not name.startswith(DROPPED)}
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and pipes of POSIX")
+VOLTAGES = "t_s,u1_V,u2_V,u3_V\n" + "".join(f"{k / 1000},0,3,-3\n" for k in range(5000))
+
+# A command that stops at a place of ours, says so, and waits to be ended.
+WAITING = """
+import sys, time
+import {module} as module
+def wait(*_, **__):
+    print("ready", file=sys.stderr, flush=True)
+    time.sleep(60)
+module.{name} = wait
+from omnidyn.cli import main
+sys.exit(main({arguments!r}))
+"""
+
+
+def environment(**more):
+    return {**CLEAN, "PYTHONPATH": str(SOURCES), **more}
+
+
+def omnidyn(*arguments, cwd, **more):
+    command = [sys.executable, "-m", "omnidyn", *arguments]
+    return subprocess.run(command, cwd=cwd, env=environment(**more), capture_output=True, text=True, timeout=120)
+
+
+def waiting(module, name, *arguments, cwd):
+    """A process that waits inside `module.name`."""
+    script = WAITING.format(module=module, name=name, arguments=list(arguments))
+    command = [sys.executable, "-c", script]
+    process = subprocess.Popen(command, cwd=cwd, env=environment(), stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if line == "ready\n":
+            return process
+    raise AssertionError(f"ended with {process.wait()}")
+
+
+def ended(process, number):
+    """Exit code and stderr after a signal."""
+    process.send_signal(number)
+    _, err = process.communicate(timeout=30)
+    return process.returncode, err
+
+
+@posix
+@pytest.mark.parametrize(
+    "number, code, words",
+    [(signal.SIGINT, 130, "omnidyn: interrupted\n"), (signal.SIGTERM, 143, "omnidyn: terminated\n")],
+)
+def test_a_signal_ends_it_without_a_traceback(tmp_path, number, code, words):
+    process = waiting("omnidyn.model.robot_file", "load_robot", "deadzone", "axebot", cwd=tmp_path)
+    assert ended(process, number) == (code, words)
+
+
+@posix
+@pytest.mark.parametrize("number, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_while_writing_leaves_nothing_behind(tmp_path, number, code):
+    (tmp_path / "u.csv").write_text(VOLTAGES)
+    process = waiting("os", "fsync", "simulate", "axebot", "u.csv", "-o", "run.csv", cwd=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2  # the temporary file is there
+    assert ended(process, number)[0] == code
+    assert [file.name for file in tmp_path.iterdir()] == ["u.csv"]
+
+
+@posix
+@pytest.mark.parametrize("arguments", [["robots"], ["--help"], ["simulate", "axebot", "u.csv", "-o", "-"]])
+def test_a_closed_pipe_is_no_error(tmp_path, arguments):
+    (tmp_path / "u.csv").write_text(VOLTAGES)
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "omnidyn", *arguments]
+    result = subprocess.run(
+        command, cwd=tmp_path, env=environment(), stdout=writing, stderr=subprocess.PIPE, text=True, timeout=120,
+    )  # fmt: skip
+    os.close(writing)
+    assert result.returncode == 0
+    assert "Traceback" not in result.stderr
+    assert "Exception" not in result.stderr
+
+
+@posix
+@pytest.mark.parametrize("arguments, code", [(["robots"], 0), (["deadzone", "axbot"], 3), ([], 2)])
+def test_streams_that_are_not_there_change_nothing(tmp_path, arguments, code):
+    command = [sys.executable, "-m", "omnidyn", *arguments]
+    for closed in (">&-", "2>&-", ">&- 2>&-"):
+        script = f'exec "$@" {closed}'
+        result = subprocess.run(
+            ["sh", "-c", script, "sh", *command],
+            cwd=tmp_path,
+            env=environment(),
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        assert result.returncode == code
+        assert "Traceback" not in result.stdout + result.stderr
+        assert "omnidyn: " not in result.stdout
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_behind_stdout_is_said(tmp_path):
+    with open("/dev/full", "w") as full:
+        result = subprocess.run(
+            [sys.executable, "-m", "omnidyn", "robots"], cwd=tmp_path, env=environment(), stdout=full,
+            stderr=subprocess.PIPE, text=True, timeout=120, check=False,
+        )  # fmt: skip
+    assert result.returncode == 3
+    assert "No space left on device" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="needs /proc, where nobody may write")
+def test_a_place_where_nobody_may_write_is_refused(tmp_path):
+    (tmp_path / "u.csv").write_text(VOLTAGES)
+    result = omnidyn("simulate", "axebot", "u.csv", "-o", "/proc/run.csv", cwd=tmp_path)
+    assert result.returncode == 3
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_folder_is_refused(tmp_path):
+    (tmp_path / "u.csv").write_text(VOLTAGES)
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o500)
+    for arguments in (["simulate", "axebot", "u.csv", "-o", "locked/run.csv"], ["demo", "--out", "locked/demo"]):
+        result = omnidyn(*arguments, cwd=tmp_path)
+        assert result.returncode == 3
+        assert "the folder is not writable" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"LC_ALL": "C"},
+        {"LC_ALL": "POSIX", "COLUMNS": "20"},
+        {"LC_ALL": "C", "NO_COLOR": "1", "TERM": "dumb"},
+        {"PYTHONIOENCODING": "ascii"},
+    ],
+)
+def test_a_plain_terminal_gets_plain_text(tmp_path, more):
+    broken = tmp_path / "Größe \N{SNOWMAN}.toml"
+    broken.write_text("schema = 2")
+    result = omnidyn("deadzone", broken.name, cwd=tmp_path, **more)
+    assert result.returncode == 3
+    assert result.stderr.isascii()
+    assert omnidyn("--help", cwd=tmp_path, **more).stdout.isascii()
+
+
+def test_an_error_has_no_colour_codes(tmp_path):
+    result = omnidyn("robots", cwd=tmp_path, FORCE_COLOR="1")
+    assert "\x1b" not in result.stdout
+
+
+def test_help_imports_nothing_heavy(tmp_path):
+    script = (
+        "import sys\nfrom omnidyn.cli import main\nmain(['--help'])\n"
+        "heavy = {'click', 'numpy', 'numba', 'scipy', 'pydantic', 'matplotlib', 'rich'}\n"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60,
+        check=True,
+    )  # fmt: skip
+    assert result.stderr == "[]\n"
+
+
+@posix
+def test_help_is_quick(tmp_path):
+    assert min(_seconds_of_work(tmp_path) for _ in range(5)) < 0.3
+
+
+def _seconds_of_work(cwd):
+    """Processor time, so that a busy machine does not count."""
+    before = os.times()
+    omnidyn("--help", cwd=cwd)
+    after = os.times()
+    return after.children_user + after.children_system - before.children_user - before.children_system
+
+
+def test_work_past_two_seconds_shows_progress(capsys, monkeypatch):
+    monkeypatch.setattr("omnidyn.cli.progress.SILENT_S", 0.05)
+    monkeypatch.setattr("omnidyn.cli.progress.BEAT_S", 0.05)
+    from omnidyn.cli.progress import progress
+
+    with progress("walking") as now:
+        time.sleep(0.2)
+        now("running")
+        time.sleep(0.2)
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "omnidyn: walking ... 0 s" in err
+    assert "omnidyn: running ... 0 s" in err
+
+
+def test_quick_work_is_silent(capsys):
+    from omnidyn.cli.progress import progress
+
+    with progress("walking"):
+        pass
+    assert capsys.readouterr() == ("", "")

@@ -1,0 +1,35 @@
+"""Hypothesis profiles and the robots that many tests share.
+
+OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in each run.
+"""
+
+import os
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from omnidyn.model.robot_file import load_robot
+
+settings.register_profile(
+    "ci",
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    database=None,
+    print_blob=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.register_profile("thorough", settings.get_profile("ci"), max_examples=3000, derandomize=False)
+settings.load_profile(os.environ.get("OMNIDYN_HYPOTHESIS", "ci"))
+
+
+@pytest.fixture(scope="session")
+def axebot():
+    """The paper's robot, Table 3."""
+    return load_robot("axebot")
+
+
+@pytest.fixture(scope="session")
+def four_wheel():
+    """Four omni wheels at 45 degrees, otherwise Table 3."""
+    return load_robot("four-wheel")

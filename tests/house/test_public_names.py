@@ -1,0 +1,48 @@
+"""The public names of omnidyn, as a list: adding or losing one is a decision, made here."""
+
+from types import ModuleType
+
+import omnidyn
+
+PUBLIC = [
+    "Estimate",
+    "OmnidynError",
+    "Robot",
+    "Run",
+    "__version__",
+    "acceleration",
+    "axis_patterns",
+    "breakaway_voltage",
+    "dead_zone_map",
+    "fit_steady_state",
+    "load_robot",
+    "moves",
+    "preset_names",
+    "read_steady_table",
+    "read_voltages",
+    "save_robot",
+    "simulate",
+    "state_space",
+    "write_run",
+]
+
+
+def test_all_is_the_list():
+    assert sorted(omnidyn.__all__) == sorted(PUBLIC)
+
+
+def test_dir_shows_nothing_else():
+    # Submodules become attributes when they are imported; they are no part of the promise.
+    shown = {name for name in dir(omnidyn) if not name.startswith("_")}
+    shown = {name for name in shown if not isinstance(getattr(omnidyn, name), ModuleType)}
+    assert shown == {name for name in PUBLIC if not name.startswith("_")}
+
+
+def test_every_name_is_there():
+    missing = [name for name in PUBLIC if not hasattr(omnidyn, name)]
+    assert not missing
+
+
+def test_every_name_says_what_it_is():
+    silent = [name for name in PUBLIC if not name.startswith("_") and not getattr(omnidyn, name).__doc__]
+    assert not silent

@@ -1,0 +1,148 @@
+"""Run files: to the last bit and back, and nothing half-written."""
+
+import os
+import time
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from omnidyn import load_robot, simulate, write_run
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.logs.run_file import read_run, run_to_csv
+from omnidyn.run import Run
+
+HEADER = (
+    "t_s,u1_V,u2_V,u3_V,d1_duty,d2_duty,d3_duty,i1_A,i2_A,i3_A,w1_rad_s,w2_rad_s,w3_rad_s,"
+    "w1_cmd_rad_s,w2_cmd_rad_s,w3_cmd_rad_s,vx_m_s,vy_m_s,omega_rad_s,"
+    "vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V"
+)
+
+
+def full_run(n=5, seed=1):
+    draw = np.random.default_rng(seed).normal
+    wheel = {name: draw(size=(n, 3)) for name in ("voltage", "duty", "current", "wheel_speed", "wheel_speed_command")}
+    axis = {name: draw(size=(n, 3)) for name in ("twist", "twist_command", "pose")}
+    return Run(t=np.arange(n) * 0.1, **wheel, **axis, supply=draw(size=n))
+
+
+def bits(run):
+    return {
+        field.name: None if (value := getattr(run, field.name)) is None else value.tobytes()
+        for field in fields(run)
+        if field.name not in ("source", "warnings")
+    }
+
+
+def test_the_columns_are_those_of_the_design():
+    assert run_to_csv(full_run()).splitlines()[0] == HEADER
+
+
+def test_it_reads_back_to_the_last_bit(tmp_path):
+    run = full_run(200)
+    write_run(run, tmp_path / "run.csv")
+    assert bits(read_run(tmp_path / "run.csv")) == bits(run)
+
+
+def test_a_simulation_reads_back_to_the_last_bit(tmp_path):
+    run = simulate(load_robot("axebot"), [[0.0, 3.0, -3.0]] * 300 + [[1.0, 0.3, -6.0]] * 300, 1e-3)
+    write_run(run, tmp_path / "run.csv")
+    assert bits(read_run(tmp_path / "run.csv")) == bits(run)
+
+
+@given(arrays(float, (4, 3), elements=st.floats(allow_infinity=False, allow_nan=False)))
+def test_every_finite_float_survives(tmp_path_factory, values):
+    path = tmp_path_factory.mktemp("run") / "run.csv"
+    run = Run(t=[0.0, 1e-9, 0.1, 1e12], pose=values)
+    write_run(run, path)
+    assert bits(read_run(path)) == bits(run)
+
+
+def test_a_missing_value_is_an_empty_cell(tmp_path):
+    run = Run(t=[0.0, 1.0], twist=[[1.0, np.nan, -0.0], [np.nan] * 3])
+    assert run_to_csv(run) == "t_s,vx_m_s,vy_m_s,omega_rad_s\n0.0,1.0,,-0.0\n1.0,,,\n"
+    write_run(run, tmp_path / "run.csv")
+    back = read_run(tmp_path / "run.csv")
+    assert np.array_equal(back.twist, run.twist, equal_nan=True)
+    assert np.signbit(back.twist[0, 2])
+
+
+def test_time_alone_is_a_run(tmp_path):
+    write_run(Run(t=[0.0, 0.5]), tmp_path / "run.csv")
+    assert list(read_run(tmp_path / "run.csv").channels) == []
+
+
+@pytest.mark.parametrize("wheels", [1, 4, 12])
+def test_any_number_of_wheels(tmp_path, wheels):
+    run = Run(t=[0.0, 1.0], current=np.arange(2.0 * wheels).reshape(2, wheels))
+    write_run(run, tmp_path / "run.csv")
+    assert np.array_equal(read_run(tmp_path / "run.csv").current, run.current)
+
+
+def test_an_infinite_value_is_refused_with_its_place(tmp_path):
+    run = Run(t=[0.0, 1.0], pose=[[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]])
+    with pytest.raises(InputError, match="row 1, column y_m: cannot write an infinite value; got inf"):
+        write_run(run, tmp_path / "run.csv")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_existing_file_stays_unless_forced(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("mine")
+    with pytest.raises(InputError, match=r"run\.csv: the file exists already; use --force"):
+        write_run(full_run(), path)
+    assert path.read_text() == "mine"
+    write_run(full_run(), path, force=True)
+    assert path.read_text().startswith("t_s,")
+    assert [file.name for file in tmp_path.iterdir()] == ["run.csv"]
+
+
+@pytest.mark.parametrize("name", ["run.parquet", "run.PQ"])
+def test_parquet_is_refused_by_name(tmp_path, name):
+    for refused in (lambda path: write_run(full_run(), path), read_run):
+        with pytest.raises(UnsupportedError, match=f"no Parquet yet; got {os.path.splitext(name)[1]}"):
+            refused(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("t_s,vx_m_s,vy_m_s\n0,1,2\n", "channel twist is not complete; got vx_m_s, vy_m_s"),
+        ("t_s,u1_V,u3_V\n0,1,2\n", "channel voltage is not complete; got u1_V, u3_V; expected u1_V, u2_V, u3_V"),
+        ("t_s,u1_V,speed\n0,1,2\n", "unknown column; got speed"),
+        ("t_s,u9999_V\n0,1\n", "unknown column; got u9999_V"),
+        ("u1_V,u2_V\n0,1\n", "a column is missing"),
+        ("t_s,supply_V\n0,1\n0,1\n", r"run.csv:3, column t_s: time does not increase; got 0 after 0"),
+        ("t_s,supply_V\n0,1\n,1\n", r"run.csv:3, column t_s: a number is missing"),
+        ("t_s,supply_V\n0,1e400\n", "not a finite number"),
+        ("t_s,supply_V\n0,twelve\n", "not a number; got twelve"),
+        ("t_s,supply_V\n", "no rows"),
+        ("", "the file is empty"),
+    ],
+)
+def test_bad_files_are_refused_by_name(tmp_path, text, message):
+    path = tmp_path / "run.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_run(path)
+
+
+def test_the_order_of_the_columns_does_not_matter(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("heading_rad,t_s,y_m,x_m\n3,0,2,1\n")
+    assert read_run(path).pose.tolist() == [[1.0, 2.0, 3.0]]
+
+
+def test_ten_thousand_rows_are_quick():
+    run = full_run(10_000)
+    best = min(_seconds(lambda: run_to_csv(run)) for _ in range(5))
+    assert best < 0.3
+
+
+def _seconds(work):
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started

@@ -1,0 +1,264 @@
+"""The CSV reader: what it takes, what it refuses, and in which words. Numbers: rows of BAD_INPUTS."""
+
+import hashlib
+import os
+import time
+
+import numpy as np
+import pytest
+
+from omnidyn.errors import InputError
+from omnidyn.logs.table import read_table
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(content, name="table.csv"):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return to_file
+
+
+def numbers(path, missing=False):
+    table = read_table(path)
+    return {name: table.numbers(name, missing=missing).tolist() for name in table.names}
+
+
+PLAIN = "t_s,u1_V\n0,1.5\n0.1,-2e-1\n"
+VALUES = {"t_s": [0.0, 0.1], "u1_V": [1.5, -0.2]}
+
+
+# ---- what it takes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        PLAIN,
+        PLAIN.rstrip("\n"),  # 9
+        PLAIN.replace("\n", "\r\n"),  # 9
+        PLAIN.replace("\n", "\r"),  # 9
+        "\ufeff" + PLAIN,  # 7
+        PLAIN.encode("utf-16"),
+        "# made by hand\n\n" + PLAIN + "# the end\n\n",  # 12
+        "t_s,u1_V\n[s],(V)\n0,1.5\n0.1,-2e-1\n",  # 12
+        "t_s,u1_V\ns,V\n# really\n0,1.5\n0.1,-2e-1\n",
+        '"t_s","u1_V"\n"0","1.5"\n0.1,"-2e-1"\n',
+        " t_s , u1_V \n 0 , 1.5 \n 0.1 , -.2 \n",
+        "t_s;u1_V\n0;1.5\n0.1;-0.2\n",
+        "t_s;u1_V\n0;1,5\n0,1;-2e-1\n",  # 6
+        "t_s\tu1_V\n0\t1,5\n0,1\t-0,2\n",  # 6
+        '"t_s";"u1_V"\n"0";"1,5"\n"0,1";"-0,2"\n',
+    ],
+)
+def test_it_reads(write, content):
+    assert numbers(write(content)) == VALUES
+
+
+def test_a_comma_that_is_certain_only_late_is_read(write):
+    rows = "".join(f"{k};1,500\n" for k in range(100))
+    assert read_table(write("t;u\n" + rows + "100;0,25\n")).numbers("u")[[0, -1]].tolist() == [1.5, 0.25]
+
+
+def test_a_late_point_among_commas_is_refused(write):
+    rows = "".join(f"{k};1,5\n" for k in range(100))
+    with pytest.raises(InputError, match=r"decimal commas and decimal points are mixed; got 1,5 and 0\.25"):
+        read_table(write("t;u\n" + rows + "100;0.25\n"))
+
+
+def test_a_latin_1_header_is_read(write):  # 8
+    table = read_table(write("t_s,Drehmoment [N·m]\n0,1\n".encode("latin-1")))
+    assert table.names == ("t_s", "Drehmoment [N·m]")
+
+
+def test_what_it_decided_stands_in_the_notes(write):
+    assert read_table(write(PLAIN)).notes == ()
+    assert read_table(write("t;u\n0;1,5\n")).notes == (
+        "columns are separated by a semicolon",
+        "numbers have a decimal comma",
+    )
+
+
+def test_a_header_of_savetxt_is_read_and_noted(write):
+    table = read_table(write("# run 7\n# t_s,u1_V\n0,1.5\n0.1,-0.2\n"))
+    assert table.names == ("t_s", "u1_V")
+    assert table.notes == ("line 2, a comment, was read as the header",)
+    assert table.lines.tolist() == [3, 4]
+
+
+def test_units_lines_and_hash_are_kept(write):
+    path = write("# one\nt_s,u1_V\ns,[V]\n0,1\n\n# two\n1,2\n")
+    table = read_table(path)
+    assert dict(table.units) == {"t_s": "s", "u1_V": "V"}
+    assert table.lines.tolist() == [4, 7]
+    assert table.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert len(table) == 2
+
+
+def test_every_bit_of_a_float_is_kept(write):
+    values = np.random.default_rng(1).standard_normal(200) * 10.0 ** np.arange(-100, 100)
+    careful = "a,b\n" + "".join(f"{value!r},x\n" for value in values.tolist())  # a word makes it read cell by cell
+    plain = "a\n" + "".join(f"{value!r}\n" for value in values.tolist())
+    for content in (plain, careful):
+        assert read_table(write(content)).numbers("a").tolist() == values.tolist()
+
+
+def test_columns_cannot_be_changed(write):
+    column = read_table(write(PLAIN)).numbers("t_s")
+    with pytest.raises(ValueError, match="read-only"):
+        column[0] = 1.0
+
+
+def test_missing_cells_are_nan_where_they_may_be(write):  # 13
+    assert np.isnan(numbers(write("a,b\n1,\n2,nan\n"), missing=True)["b"]).all()
+
+
+def test_words_are_words(write):
+    table = read_table(write("axis,v\nx,1\nyaw,2\n"))
+    assert table.text("axis") == ("x", "yaw")
+    with pytest.raises(InputError, match=r"table\.csv:2, column v: not text; got 1\.0; expected x or y"):
+        table.text("v", "x or y")
+
+
+# ---- what it refuses ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "content, words",
+    [
+        ("", r"table\.csv: the file is empty; got 0 bytes"),  # 2
+        ("\n\n# nothing\n", r"no table in the file; got only blank lines and comments"),
+        ("t_s,u1_V\n", r"table\.csv: no rows; got 0 samples; expected at least one row"),  # 3
+        ("t_s,u1_V\ns,V\n", r"no rows; got 0 samples"),
+        (
+            "0,1.5\n0.1,2\n",
+            r"table\.csv:1: the table has no header.*; got 0,1\.5; expected column names.*; add a first line",
+        ),  # 5
+        ("# 3,4\n0,1.5\n", r"table\.csv:2: the table has no header"),
+        ("t_s,1.5\n0,1\n", r"table\.csv:1: the table has no header: a number stands.*; got 1\.5"),
+        ("t_s,,u\n1,2,3\n", r"table\.csv:1: column 2 has no name"),
+        ("t_s,u,\n1,2,\n", r"table\.csv:1: column 3 has no name"),
+        ("t,t\n1,2\n", r"table\.csv:1: two columns have the same name; got t"),
+        (
+            "t,u\n0,1\n1,2,3\n",
+            r"table\.csv:3: row 2 has another number of cells.*; got 3: 1,2,3; expected 2 cells",
+        ),  # 10
+        ("t,u\n0,1\n1\n", r"table\.csv:3: row 2 has .*; got 1: 1; expected 2 cells"),
+        (
+            "t,u\n0,1,5\n1,2,5\n",
+            r"table\.csv:2: row 1 has .*; a decimal comma\? then separate the columns by semicolons",
+        ),
+        ('t,u\n0,"1\n1,2\n', r'table\.csv:2: a quote is not closed on its line; got 0,"1'),  # 11
+        ('"t,u\n0,1\n', r"table\.csv:1: a quote is not closed|cannot tell what separates"),
+        ('t,u\n0,"1"2\n', r"table\.csv:2: a quote is not closed"),
+        (
+            "t,u\n0,inf\n",
+            r"table\.csv:2, column u: not a finite number; got inf.*; expected a finite number; correct or",
+        ),  # 15
+        ("t,u\n0,1\n-1e400,2\n", r"table\.csv:3, column t: not a finite number"),  # 15
+        ("t,u,w\n0,1,x\n-1e400,2,y\n", r"table\.csv:3, column t: not a finite number"),
+        (
+            "t;u\n0;1,500\n",
+            r"table\.csv: a comma in a number is ambiguous; got 1,500; expected 1500 or a decimal point",
+        ),  # 6
+        ("t;u\n0.5;1,5\n", r"decimal commas and decimal points are mixed; got 1,5 and 0\.5"),  # 6
+        ("t;u,v\n0;1,5\n", r"table\.csv:1: cannot tell what separates the columns"),  # 6
+        ("v\n1,5\n", r"table\.csv:1: cannot tell what separates the columns; got 1,5"),  # 6
+        (
+            "t u\n0 1\n",
+            r"cannot tell what separates the columns; got 0 1; expected comma, semicolon or tab .*spaces do not",
+        ),
+        (b"PAR1\x00\x01", r"this is not a text file; got a Parquet file"),  # 37
+        (b"PK\x03\x04\x00", r"this is not a text file; got a zip archive"),  # 37
+        (b"t,u\n1,\x00\n", r"this is not a text file; got zero bytes in it"),
+        ("a" + ",a" * 2000 + "\n1\n", r"too many columns; got 2001; expected at most 1000"),
+    ],
+)
+def test_it_refuses_a_file(write, content, words):
+    with pytest.raises(InputError, match=words):
+        read_table(write(content))
+
+
+@pytest.mark.parametrize(
+    "cell, words",
+    [
+        (
+            "fast",
+            r"table\.csv:3, column u: not a number; got fast; expected a number such as .*; correct or remove the row",
+        ),  # 16
+        ("1_000", r"table\.csv:3, column u: not a number; got 1_000; .*write plain decimal digits"),  # 16
+        ("0x10", r"table\.csv:3, column u: not a number; got 0x10; .*write plain decimal digits"),  # 16
+        ("#N/A", r"table\.csv:3, column u: not a number; got #N/A; .*an error value of a spreadsheet"),  # 16
+        ("1 000", r"column u: not a number; got 1 000"),
+        ("٣", r"column u: not a number"),
+        ("1d5", r"column u: not a number; got 1d5"),
+        ("True", r"column u: not a number; got True"),
+        ("--", r"column u: not a number; got --"),
+        ("", r"table\.csv:3, column u: a number is missing; got a blank cell or nan; .*\(1 of 2 are missing\)"),  # 13
+        ("NaN", r"table\.csv:3, column u: a number is missing"),  # 14
+        ('"1,500"', r"column u: not a number; got 1,500; .*write a decimal point, and no separator of thousands"),
+    ],
+)
+def test_it_refuses_a_cell_where_a_number_is_needed(write, cell, words):
+    table = read_table(write(f"t,u\n0,1\n1,{cell}\n"))
+    with pytest.raises(InputError, match=words):
+        table.numbers("u")
+    assert table.numbers("t").tolist() == [0.0, 1.0]
+
+
+def test_an_error_value_at_the_start_of_a_row_is_no_comment(write):
+    table = read_table(write("t,u\n0,1\n#N/A,2\n#DIV/0!,3\n"))
+    assert len(table) == 3
+    with pytest.raises(InputError, match=r"table\.csv:3, column t: not a number; got #N/A"):
+        table.numbers("t")
+
+
+def test_a_row_under_the_header_that_is_not_clearly_units_is_data(write):
+    table = read_table(write("t,u\nsecond,volt\n0,1\n"))
+    with pytest.raises(InputError, match=r"table\.csv:2, column t: not a number; got second"):
+        table.numbers("t")
+
+
+def test_it_refuses_what_is_no_file(tmp_path):  # 1
+    with pytest.raises(InputError, match=r"nothing\.csv: no such file"):
+        read_table(tmp_path / "nothing.csv")
+    with pytest.raises(InputError, match=r"cannot read it; got a folder; expected a file"):
+        read_table(tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes of POSIX")
+def test_it_refuses_a_pipe_at_once(tmp_path):  # 1
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(InputError, match="a pipe or a device"):
+        read_table(tmp_path / "pipe.csv")
+
+
+def test_it_refuses_a_file_beyond_the_limit(write):
+    with pytest.raises(InputError, match="the file is too large; got more than 10 bytes"):
+        read_table(write(PLAIN), max_bytes=10)
+
+
+def test_check_names_tells_the_nearest(write):
+    table = read_table(write("axis,speed,forse\nx,1,2\n"))
+    with pytest.raises(InputError, match=r"unknown column; got forse; .*did you mean force\?"):
+        table.check_names(["axis", "speed", "force"])
+    with pytest.raises(InputError, match=r"a column is missing; got axis, speed, forse; .*; add t"):
+        table.check_names(["axis", "speed", "forse", "t"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("separator, limit", [(",", 15.0), (";", 15.0)])  # limits for a busy machine; some 2 s alone
+def test_a_million_rows_take_seconds(write, separator, limit):
+    comma = separator == ";"
+    rows = (
+        f"{k * 1e-3:.3f}{separator}{k % 7 - 3.25}{separator}1.5".replace(".", "," if comma else ".")
+        for k in range(10**6)
+    )
+    path = write(f"a{separator}b{separator}c\n" + "\n".join(rows))
+    start = time.perf_counter()
+    table = read_table(path)
+    assert time.perf_counter() - start < limit
+    assert table.numbers("a")[-1] == 999.999
+    assert table.numbers("b")[:4].tolist() == [-3.25, -2.25, -1.25, -0.25]

@@ -1,0 +1,102 @@
+"""The numbers of a robot that the reference of modes.py needs, and nothing else of omnidyn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Plant:
+    """The numbers of a robot, SI units. Scalar elements in rows: direction, levels, wheel (whose gear
+    adds)."""
+
+    mass: np.ndarray
+    turning: bool
+    dynamic: bool
+    G: np.ndarray
+    K: np.ndarray
+    E: np.ndarray
+    R: np.ndarray
+    L: np.ndarray
+    drop: np.ndarray
+    limit: np.ndarray
+    volts: np.ndarray
+    eta: np.ndarray
+    viscous: np.ndarray  # (3, 3)
+    direction: np.ndarray  # (elements, 3)
+    slide: np.ndarray  # (elements, 2): forward, backward
+    hold: np.ndarray  # (elements, 2)
+    wheel: np.ndarray  # (elements,), -1 where the element is no wheel
+    names: tuple[str, ...]
+    slide_ellipse: np.ndarray | None
+    hold_ellipse: np.ndarray | None
+
+    @property
+    def wheels(self) -> int:
+        """Number of wheels."""
+        return self.G.shape[1]
+
+    @property
+    def middle(self) -> np.ndarray:
+        """m of the gear: the part of the traction that goes with the current."""
+        return (1 / self.eta + self.eta) / 2
+
+    @property
+    def dry(self) -> np.ndarray:
+        """q of the gear: the part that acts as dry friction."""
+        return (1 / self.eta - self.eta) / 2
+
+
+def plant_of(robot) -> Plant:
+    """The numbers of an omnidyn Robot."""
+    n = robot.wheels.count
+
+    def each(value, absent=0.0):
+        return np.broadcast_to(np.asarray(absent if value is None else value, dtype=float), (n,)).copy()
+
+    m, axes, way, rim = robot.motor, robot.friction.axes, robot.friction.direction, robot.friction.wheels
+    G, radius, gear = (
+        np.array(robot.wheels.wrench_matrix),
+        each(robot.wheels.wheel_radius),
+        each(m.gear_ratio),
+    )
+    coulomb = np.array(axes.coulomb, dtype=float)
+    breakaway = np.array(axes.coulomb if axes.breakaway is None else axes.breakaway, dtype=float)
+    coulomb[2] += way.yaw_coulomb
+    breakaway[2] += way.yaw_coulomb if way.yaw_breakaway is None else way.yaw_breakaway
+    forward = each(rim.coulomb)
+    backward = forward if rim.coulomb_backward is None else each(rim.coulomb_backward)
+    hold_forward, hold_backward = each(rim.hold_forward), each(rim.hold_backward)
+    b, efficiency = each(rim.viscous), each(m.gear_efficiency)
+    rows = [(np.eye(3)[k], (coulomb[k],) * 2, (breakaway[k],) * 2, -1, "xyw"[k]) for k in range(3) if breakaway[k] > 0]
+    rows += [
+        (G[:, k], (forward[k], backward[k]), (hold_forward[k], hold_backward[k]), k, f"wheel {k + 1}")
+        for k in range(n)
+        if hold_forward[k] > 0 or hold_backward[k] > 0 or efficiency[k] < 1
+    ]
+    holds = way.coulomb if way.breakaway is None else way.breakaway
+    return Plant(
+        mass=np.array([robot.body.mass, robot.body.mass, robot.body.inertia]),
+        turning=robot.body.rotating_frame,
+        dynamic=m.electrical == "dynamic",
+        G=G,
+        K=gear * each(m.torque_constant) / radius,
+        E=gear * each(m.emf_constant) / radius,
+        R=each(m.resistance),
+        L=each(m.inductance),
+        drop=each(m.voltage_drop),
+        limit=each(m.current_limit, math.inf),
+        volts=each(m.voltage_limit),
+        eta=efficiency,
+        viscous=np.diag(np.add(axes.viscous, (way.viscous, way.viscous, way.yaw_viscous))) + (G * b) @ G.T,
+        direction=np.array([row[0] for row in rows]).reshape(-1, 3),
+        slide=np.array([row[1] for row in rows]).reshape(-1, 2),
+        hold=np.array([row[2] for row in rows]).reshape(-1, 2),
+        wheel=np.array([row[3] for row in rows], dtype=int),
+        names=tuple(row[4] for row in rows),
+        slide_ellipse=np.array(way.coulomb) if max(holds) > 0 else None,
+        hold_ellipse=np.array(holds) if max(holds) > 0 else None,
+    )

@@ -1,0 +1,241 @@
+"""The compile cache: never stale, never in the way.
+
+numba looks only at the file of the kernel itself: edit a formula that a kernel calls from another file, and the old
+machine code is served without a word. `compiled.kernel` stamps every cache entry with a hash of all sources. Here a
+copy of the whole package is edited and run in fresh processes; the same formulas in plain Python are the truth.
+"""
+
+import ast
+import importlib
+import json
+import os
+import pkgutil
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+from numba.core.caching import NullCache
+from numba.core.dispatcher import Dispatcher
+
+import omnidyn
+from omnidyn import compiled
+
+PACKAGE = Path(omnidyn.__file__).parent
+
+# Twist and heading of the paper's robot from the kernels of the exact engine, and from its formulas in plain Python.
+SCRIPT = """
+import json, sys
+import numpy as np
+from omnidyn.model.robot_file import load_robot
+from omnidyn.model.statespace import discretise, state_space
+from omnidyn.simulation import exact
+from omnidyn.simulation.exact_step import exact_step, pieces, turned_within
+from omnidyn.simulation.simulate import simulate
+robot, dt = load_robot("axebot"), 0.05
+voltage = np.array([[3.0, -1.0, 2.5]] * 4 + [[-2.0, 4.0, 1.0]] * 4)
+run = simulate(robot, voltage, dt)
+system = state_space(robot)
+levels = [level.tolist() for level in exact.axis_levels(robot, system)]
+phi, drive = discretise(system, dt).tolist(), exact.drive_acceleration(system, voltage).tolist()
+twist, heading = [], 0.0
+for axis in range(3):
+    a, c, s = (level[axis] for level in levels)
+    speed = 0.0
+    for row in drive:
+        end = exact_step(speed, row[axis], c, s, a, phi[axis], 0.0)
+        if axis == 2:
+            event, before, after = pieces(speed, row[axis], c, s, a, phi[axis], dt)
+            heading += turned_within(dt, speed, end, event, before, after, a)
+        speed = end
+    twist.append(speed)
+hits = [len(getattr(kernel, "stats").cache_hits) if hasattr(kernel, "stats") else None
+        for kernel in (exact._twists, exact._poses)]
+json.dump({"twist": run.twist[-1].tolist(), "heading": run.pose[-1, 2], "python twist": twist,
+           "python heading": heading, "hits": hits, "x": run.pose[-1, 0]}, sys.stdout)
+"""
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """A copy of the package in a folder of its own, with its own cache."""
+    folder = tmp_path_factory.mktemp("copy")
+    shutil.copytree(PACKAGE, folder / "omnidyn", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+def fresh(folder, **environment):
+    """The numbers of SCRIPT from a new process that uses the package in `folder`."""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    clean |= {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"} | environment
+    done = subprocess.run([sys.executable, "-c", SCRIPT], env=clean, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def agrees_with_python(numbers):
+    assert numbers["twist"] == pytest.approx(numbers["python twist"], rel=1e-13, abs=1e-15)
+    assert numbers["heading"] == pytest.approx(numbers["python heading"], rel=1e-13)
+    return True
+
+
+def test_an_edited_formula_is_compiled_anew(copy):
+    """exact_step.py is called by both kernels of exact.py, whose own file stays untouched."""
+    cache = {"NUMBA_CACHE_DIR": str(copy / "cache")}
+    before = fresh(copy, **cache)
+    assert agrees_with_python(before)
+    assert before["hits"] == [0, 0]
+    again = fresh(copy, **cache)
+    assert again["hits"] == [1, 1], "the second process should find the machine code of the first"
+    assert {**again, "hits": 0} == {**before, "hits": 0}
+    formula = copy / "omnidyn" / "simulation" / "exact_step.py"
+    text = formula.read_text()
+    edited = text.replace("slid = x + phi *", "slid = x + phi * (1 + 1) *", 1)
+    edited = edited.replace(
+        "return (speed - now + before * t) / rate", "return 3 * (speed - now + before * t) / rate", 1
+    )
+    assert edited.count("(1 + 1)") == edited.count("3 * (speed") == 1, "exact_step.py reads differently now"
+    formula.write_text(edited)
+    try:
+        after = fresh(copy, **cache)
+    finally:
+        formula.write_text(text)
+    assert agrees_with_python(after)  # a stale _twists or _poses would give the old numbers
+    assert after["hits"] == [0, 0]
+    for name in ("twist", "heading", "x"):
+        assert after[name] != pytest.approx(before[name], rel=1e-3)
+
+
+def test_without_a_writable_folder_it_compiles_in_memory(copy, tmp_path):
+    """A file stands wherever numba would make a folder: works for root too, whom no permission stops."""
+    shutil.copytree(copy / "omnidyn", tmp_path / "omnidyn")
+    for source in (tmp_path / "omnidyn").rglob("*.py"):
+        (source.parent / "__pycache__").unlink(missing_ok=True)
+        (source.parent / "__pycache__").touch()
+    blocked = tmp_path / "blocked"
+    blocked.touch()
+    homes = {name: str(blocked / "x") for name in ("HOME", "XDG_CACHE_HOME", "USERPROFILE", "LOCALAPPDATA", "APPDATA")}
+    numbers = fresh(tmp_path, NUMBA_CACHE_DIR=str(blocked / "cache"), **homes)
+    assert agrees_with_python(numbers)
+    assert numbers["hits"] == [0, 0]
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc")]
+
+
+def test_without_a_compiler_it_runs_as_plain_python(copy):
+    """NUMBA_DISABLE_JIT, for debuggers: the same numbers."""
+    numbers = fresh(copy, NUMBA_DISABLE_JIT="1")
+    assert agrees_with_python(numbers)
+    assert numbers["hits"] == [None, None]
+
+
+# ---- every kernel of the package -------------------------------------------------------------------------
+
+
+def dispatchers():
+    """(where, compiled function) for everything numba has compiled in the package."""
+    found = {}
+    for info in pkgutil.walk_packages([str(PACKAGE)], "omnidyn."):
+        if info.name.endswith("__main__"):
+            continue
+        module = importlib.import_module(info.name)
+        for name, value in vars(module).items():
+            if isinstance(value, Dispatcher):
+                found.setdefault(f"{value.py_func.__module__}.{value.py_func.__name__}", value)
+                assert value.py_func.__module__.startswith("omnidyn."), name
+    return found
+
+
+def decorated(decorator):
+    """Names of functions under `@decorator` in the sources, found without running them."""
+    found = set()
+    for file in PACKAGE.rglob("*.py"):
+        module = ".".join(("omnidyn", *file.relative_to(PACKAGE).with_suffix("").parts))
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                names = [getattr(mark, "id", getattr(mark, "attr", "")) for mark in node.decorator_list]
+                found |= {f"{module}.{node.name}"} if decorator in names else set()
+    return found
+
+
+def test_every_kernel_is_stamped_and_nothing_else_is_cached():
+    kernels = decorated("kernel")
+    assert {"omnidyn.simulation.exact._twists", "omnidyn.simulation.exact._poses"} <= kernels
+    everything = dispatchers()
+    assert kernels <= set(everything)
+    for name, function in everything.items():
+        options = function.targetoptions
+        assert options["error_model"] == "numpy", name
+        assert not options.get("parallel"), name
+        assert not options.get("fastmath"), name
+        if name in kernels:
+            assert options["nogil"] is True, name
+            assert function._cache._cache_file._source_stamp[1] == compiled.source_hash(), name
+        else:
+            assert isinstance(function._cache, NullCache), f"{name} is cached without a stamp"
+
+
+def test_nobody_compiles_behind_our_back():
+    """numba is imported in compiled.py alone."""
+    for file in PACKAGE.rglob("*.py"):
+        if file.name == "compiled.py":
+            continue
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not [name for name in names if name.split(".")[0] == "numba"], file
+
+
+# ---- the private corner of numba -------------------------------------------------------------------------
+
+
+def test_the_private_attribute_of_numba_is_still_what_we_stamp(tmp_path, monkeypatch):
+    """If this fails, numba has changed its cache: `compiled._stamp` must learn the new one."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    plain = numba.njit(thrice)
+    plain.enable_caching()
+    stamp = plain._cache._cache_file._source_stamp
+    assert stamp  # of the kernel's own file: all that numba looks at
+    stamped = compiled.kernel(thrice)
+    assert stamped(2.0) == 6.0
+    assert stamped._cache._cache_file._source_stamp == (stamp, compiled.source_hash())
+    (index,) = tmp_path.rglob("*.nbi")
+    assert compiled.source_hash().encode() in index.read_bytes()
+
+
+def thrice(x):
+    return 3.0 * x
+
+
+@pytest.mark.parametrize("problem", [AttributeError, RuntimeError])
+def test_a_cache_that_cannot_be_stamped_is_not_used(monkeypatch, problem):
+    """Better compiled in each process than served stale."""
+
+    def refuse(function):
+        raise problem
+
+    monkeypatch.setattr(compiled, "_stamp", refuse)
+    kernel = compiled.kernel(thrice)
+    assert isinstance(kernel._cache, NullCache)
+    assert kernel(2.0) == 6.0
+
+
+def test_the_hash_covers_names_and_contents(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiled, "PACKAGE", tmp_path)
+    hash_now = compiled.source_hash.__wrapped__
+    (tmp_path / "a").mkdir()
+    seen = set()
+    for name, content in (("a.py", "x"), ("a.py", "y"), ("a/b.py", "y"), ("a/c.py", ""), ("a/b.py", "")):
+        (tmp_path / name).write_text(content)
+        seen.add(hash_now())
+    (tmp_path / "a" / "c.py").rename(tmp_path / "a" / "d.py")
+    seen.add(hash_now())
+    assert len(seen) == 6
+    (tmp_path / "data.toml").write_text("not a source")
+    assert hash_now() in seen
+
+
+def test_source_hash_is_computed_once_per_process():
+    assert compiled.source_hash() is compiled.source_hash()
+    assert len(compiled.source_hash()) == 64
