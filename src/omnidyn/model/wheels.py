@@ -13,6 +13,7 @@ gamma = 0 is an omni wheel. For a mecanum wheel phi is the azimuth of its axle, 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -73,11 +74,18 @@ class Wheels(Value):
 
     @property
     def wrench_matrix(self) -> NDArray[np.float64]:
-        """G of eqs (7)-(9): wrench = G @ traction. Shape (3, wheels). Exact zeros at multiples of 30 degrees."""
-        sin, cos = sin_cos_deg(self.azimuth_deg)
-        roller_sin, roller_cos = sin_cos_deg(per_wheel(self.roller_angle_deg, self.count))
-        tan = roller_sin / roller_cos
-        return np.stack([-sin - tan * cos, cos - tan * sin, per_wheel(self.robot_radius, self.count)]) + 0.0
+        """G of eqs (7)-(9): wrench = G @ traction. Shape (3, wheels), read-only. Exact zeros at multiples of 30 deg."""
+        return _wrench_matrix(self)
+
+
+@lru_cache(maxsize=256)
+def _wrench_matrix(wheels: Wheels) -> NDArray[np.float64]:
+    sin, cos = sin_cos_deg(wheels.azimuth_deg)
+    roller_sin, roller_cos = sin_cos_deg(per_wheel(wheels.roller_angle_deg, wheels.count))
+    tan = roller_sin / roller_cos
+    matrix = np.stack([-sin - tan * cos, cos - tan * sin, per_wheel(wheels.robot_radius, wheels.count)]) + 0.0
+    matrix.flags.writeable = False
+    return matrix
 
 
 def per_wheel(value: PerWheel, count: int) -> NDArray[np.float64]:
