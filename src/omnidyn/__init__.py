@@ -28,8 +28,9 @@ _HOME = {
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
     "preset_names": "omnidyn.model.robot_file",
+    "read_commands": "omnidyn.logs.command_file",
     "read_steady_table": "omnidyn.logs.steady_table",
-    "read_voltages": "omnidyn.logs.voltage_file",
+    "read_voltages": "omnidyn.logs.command_file",
     "save_robot": "omnidyn.model.robot_file",
     "simulate": "omnidyn.simulation.simulate",
     "state_space": "omnidyn.model.statespace",
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from omnidyn.identification.steady_state import fit_steady_state
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
-    from omnidyn.logs.voltage_file import read_voltages
+    from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
     from omnidyn.model.dynamics import acceleration
     from omnidyn.model.robot import Robot

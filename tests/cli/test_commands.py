@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.cli import main
 from omnidyn.logs.run_file import read_run
-from omnidyn.model.robot_file import load_robot, preset_names
+from omnidyn.model.robot_file import load_robot, preset_names, robot_to_toml
 
 VOLTAGES = "t_s,u1_V,u2_V,u3_V\n0,0,3,-3\n1,0,0,0\n2,1,1,1\n"
 TABLE_1 = (
@@ -341,3 +341,24 @@ def test_no_memory_is_no_bug(call, monkeypatch):
     code, _, err = call("deadzone", "axebot")
     assert code == 3
     assert "not enough memory" in err
+
+
+def test_simulate_takes_a_duty_file(here, call):
+    """A duty of 1/4 of 12 V is 3 V: the run of the voltage file."""
+    text = robot_to_toml(load_robot("axebot")) + '\n[drive]\nkind = "duty"\nsupply_V = 12.0\n'
+    (here / "duty.toml").write_text(text)
+    (here / "d.csv").write_text("t_s,d1_duty,d2_duty,d3_duty\n0,0,0.25,-0.25\n1,0,0,0\n")
+    (here / "v.csv").write_text("t_s,u1_V,u2_V,u3_V\n0,0,3,-3\n1,0,0,0\n")
+    assert call("simulate", "duty.toml", "d.csv", "-o", "a.csv")[0] == 0
+    assert call("simulate", "duty.toml", "v.csv", "-o", "b.csv")[0] == 0
+    by_duty, by_volts = read_run(here / "a.csv"), read_run(here / "b.csv")
+    np.testing.assert_array_equal(by_duty.twist, by_volts.twist)
+    assert by_duty.duty[:, 1].tolist() == [0.25, 0.0, 0.0]
+    assert by_duty.supply.tolist() == [12.0] * 3
+
+
+def test_simulate_refuses_a_speed_file_for_a_drive_that_takes_volts(here, call):
+    (here / "w.csv").write_text("t_s,w1_cmd_rad_s,w2_cmd_rad_s,w3_cmd_rad_s\n0,1,2,3\n1,0,0,0\n")
+    code, _, error = call("simulate", "axebot", "w.csv")
+    assert code == 3
+    assert "the drive of axebot takes no wheel_speed_command" in error

@@ -21,7 +21,7 @@ ORDER = {
     "model/friction": "law axes direction wheels",
     "simulation": """inputs commands exact_step travel exact exact_inductance_step exact_inductance_kernels
         exact_inductance implicit_step implicit simulate tangent""",
-    "logs": "dialect table run_file steady_table voltage_file",
+    "logs": "dialect table run_file steady_table command_file",
     "comparison": "",
     "identification": "estimate line points doubts steady_state band",
     "control": "",

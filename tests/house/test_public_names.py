@@ -18,6 +18,7 @@ PUBLIC = [
     "load_robot",
     "moves",
     "preset_names",
+    "read_commands",
     "read_steady_table",
     "read_voltages",
     "save_robot",

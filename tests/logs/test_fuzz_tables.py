@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.steady_state import fit_steady_state
+from omnidyn.logs.command_file import read_voltages
 from omnidyn.logs.steady_table import read_steady_table
 from omnidyn.logs.table import read_table
-from omnidyn.logs.voltage_file import read_voltages
 from omnidyn.model.robot_file import load_robot
 
 STEADY = (

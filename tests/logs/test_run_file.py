@@ -1,7 +1,6 @@
 """Run files: to the last bit and back, and nothing half-written."""
 
 import os
-import time
 from dataclasses import fields
 
 import numpy as np
@@ -134,15 +133,3 @@ def test_the_order_of_the_columns_does_not_matter(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("heading_rad,t_s,y_m,x_m\n3,0,2,1\n")
     assert read_run(path).pose.tolist() == [[1.0, 2.0, 3.0]]
-
-
-def test_ten_thousand_rows_are_quick():
-    run = full_run(10_000)
-    best = min(_seconds(lambda: run_to_csv(run)) for _ in range(5))
-    assert best < 0.3
-
-
-def _seconds(work):
-    started = time.perf_counter()
-    work()
-    return time.perf_counter() - started

@@ -17,12 +17,16 @@ DEFAULT_MAX_STEPS = 1_000_000
 
 def simulate(
     robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
-    voltages: str = typer.Argument(metavar="VOLTAGES", help="CSV file t_s,u1_V,..; a row holds until the next."),
+    voltages: str = typer.Argument(
+        metavar="VOLTAGES",
+        help="CSV file t_s,u1_V,.. (or d1_duty, w1_cmd_rad_s, vx_cmd_m_s); a row holds until the next.",
+    ),
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Run file to write (CSV); - is stdout."),
     duration: float | None = typer.Option(None, help="End of the run [s]; default: the last interval repeats."),
     max_steps: int = typer.Option(DEFAULT_MAX_STEPS, min=1, help="Refuse more steps than this."),
     twist: str = typer.Option("0,0,0", metavar="VX,VY,W", help="Where it starts [m/s, m/s, rad/s]."),
     pose: str = typer.Option("0,0,0", metavar="X,Y,HEADING", help="Where it starts [m, m, rad]."),
+    tol: float = typer.Option(1e-6, help="Error of the implicit engine [m/s]; 0 takes one fixed step a row."),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="The summary for machines."),
 ) -> None:
@@ -40,7 +44,7 @@ def simulate(
     if out not in ("", "-"):
         _refuse_early(out, force)
     with progress("simulating") as now:
-        run, record = _simulated(robot, voltages, duration, max_steps, start_twist, start_pose)
+        run, record = _simulated(robot, voltages, duration, max_steps, start_twist, start_pose, tol)
         now("writing the run")
         _write(run, out, force)
     for warning in run.warnings:
@@ -62,18 +66,25 @@ def _refuse_early(out: str, force: bool) -> None:
 
 
 def _simulated(
-    robot: str, voltages: str, duration: float | None, max_steps: int, twist: list[float], pose: list[float]
+    robot: str,
+    voltages: str,
+    duration: float | None,
+    max_steps: int,
+    twist: list[float],
+    pose: list[float],
+    tol: float,
 ) -> tuple[Run, dict[str, Any]]:
     """The run and the record of what it was made from."""
     from omnidyn.cli.session import provenance, robot_input
-    from omnidyn.logs.voltage_file import read_voltages
+    from omnidyn.logs.command_file import read_commands
     from omnidyn.model.robot_file import load_robot
     from omnidyn.simulation.simulate import simulate as simulate_robot
 
     loaded = load_robot(robot)
-    held = read_voltages(voltages, loaded.wheels.count, duration, max_steps)
+    held = read_commands(voltages, loaded.wheels.count, duration, max_steps)
     record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": held.sha256}])
-    run = simulate_robot(loaded, held.voltage, held.dt, twist=twist, pose=pose)
+    command = {held.kind: held.rows, "supply": held.supply}
+    run = simulate_robot(loaded, dt=held.dt, twist=twist, pose=pose, tol=tol or None, **command)
     return run.replace(t=run.t + held.t0, warnings=(*held.notes, *run.warnings)), record
 
 

@@ -75,7 +75,7 @@ class Wheels(Value):
     @property
     def wrench_matrix(self) -> NDArray[np.float64]:
         """G of eqs (7)-(9): wrench = G @ traction. Shape (3, wheels), read-only. Exact zeros at multiples of 30 deg."""
-        return _wrench_matrix(self)
+        return _wrench_matrix(self)  # pyright: ignore[reportArgumentType]
 
 
 @lru_cache(maxsize=256)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnidyn.errors import InputError
-from omnidyn.logs.voltage_file import _regular, read_voltages
+from omnidyn.logs.command_file import _regular, read_commands, read_voltages
 
 HEADER = "t_s,u1_V,u2_V,u3_V\n"
 
@@ -123,3 +123,32 @@ def test_it_refuses_a_duration_that_is_none(write, duration):
 def test_it_refuses_more_rows_than_the_limit(write):  # 33
     with pytest.raises(InputError, match=r"too many rows; got 2; expected at most 1; .*--max-steps"):
         read_voltages(write(HEADER + "0,1,2,3\n1,1,2,3\n"), 3, max_steps=1)
+
+
+KINDS = {
+    "duty": ("t_s,d1_duty,d2_duty,d3_duty,supply_V\n0,0.5,-0.5,0,12\n0.1,1,0,0,11.5\n", 3),
+    "wheel_speed_command": ("t_s,w1_cmd_rad_s,w2_cmd_rad_s\n0,5,-5\n0.1,0,0\n", 2),
+    "twist_command": ("t_s,vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s\n0,0.5,0,1\n0.1,0,0,0\n", 4),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_other_kinds_of_commands_are_told_by_their_columns(tmp_path, kind):
+    text, wheels = KINDS[kind]
+    (tmp_path / "c.csv").write_text(text)
+    held = read_commands(tmp_path / "c.csv", wheels)
+    assert held.kind == kind
+    assert held.dt.tolist() == [0.1, 0.1]
+    first = text.splitlines()[1].split(",")[1:]
+    assert held.rows[0].tolist() == [float(cell) for cell in first][: held.rows.shape[1]]
+    assert (held.supply.tolist() == [12.0, 11.5]) if kind == "duty" else held.supply is None
+    with pytest.raises(InputError, match=r"this file holds no voltages; got"):
+        _ = held.voltage
+    with pytest.raises(InputError, match=r"unknown column; got"):
+        read_voltages(tmp_path / "c.csv", wheels)
+
+
+def test_a_duty_file_for_another_number_of_wheels_is_refused(tmp_path):
+    (tmp_path / "c.csv").write_text(KINDS["duty"][0])
+    with pytest.raises(InputError, match=r"another number of wheels.*d4_duty"):
+        read_commands(tmp_path / "c.csv", 4)

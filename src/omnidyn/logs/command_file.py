@@ -1,8 +1,13 @@
-"""Voltage files: CSV `t_s,u1_V,u2_V,...`, each row holding until the next. The input of a simulation."""
+"""Command files: CSV `t_s,u1_V,u2_V,...`, each row holding until the next. The input of a simulation.
+
+Volts, or in their place a duty `d1_duty,...` (with or without `supply_V`), wheel speeds `w1_cmd_rad_s,...` or a twist
+`vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s` for drives that take them: the columns of a run file.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -11,45 +16,71 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
+from omnidyn.logs.run_file import columns_of
 from omnidyn.logs.table import Table, read_table
 
 FloatArray = NDArray[np.float64]
 MAX_STEPS = 10_000_000
-_UNITS = {"t": "s", "u": "V"}
+KINDS = ("voltage", "duty", "wheel_speed_command", "twist_command")
 
 
 @dataclass(frozen=True, eq=False)
-class HeldVoltages:
-    """Voltages held from row to row. Unpacks as `voltage, dt, t0, sha256 = read_voltages(...)`.
+class HeldCommands:
+    """Commands held from row to row.
 
-    voltage [V], shape (n, wheels); dt: how long each row holds [s], shape (n,); t0: time of the first row [s];
-    sha256: of the file; notes: what the reader had to decide, in words.
+    kind: "voltage" [V], "duty" [-], "wheel_speed_command" [rad/s], each of shape (n, wheels), or "twist_command"
+    [m/s, m/s, rad/s], shape (n, 3). dt: how long each row holds [s], shape (n,); t0: time of the first row [s];
+    supply [V], shape (n,), where the file has it; sha256: of the file; notes: what the reader had to decide, in words.
     """
 
-    voltage: FloatArray
+    kind: str
+    rows: FloatArray
     dt: FloatArray
     t0: float
     sha256: str
+    supply: FloatArray | None = None
     notes: tuple[str, ...] = ()
 
+    @property
+    def voltage(self) -> FloatArray:
+        """The rows of a voltage file [V]. Raises InputError for another kind."""
+        if self.kind != "voltage":
+            raise InputError("this file holds no voltages", got=self.kind, expected="columns u1_V, u2_V, ...")
+        return self.rows
+
     def __iter__(self) -> Iterator[Any]:
+        """Unpacks as `voltage, dt, t0, sha256 = read_voltages(...)`."""
         return iter((self.voltage, self.dt, self.t0, self.sha256))
 
 
 def read_voltages(
     path: str | os.PathLike, wheels: int, duration: float | None = None, max_steps: int = MAX_STEPS
-) -> HeldVoltages:
-    """Read a voltage file for a robot of `wheels` wheels.
+) -> HeldCommands:
+    """Read a voltage file for a robot of `wheels` wheels; see `read_commands`, of which only volts are taken."""
+    return _read(path, wheels, duration, max_steps, KINDS[:1])
+
+
+def read_commands(
+    path: str | os.PathLike, wheels: int, duration: float | None = None, max_steps: int = MAX_STEPS
+) -> HeldCommands:
+    """Read a command file for a robot of `wheels` wheels.
 
     Each row holds until the next. The last row holds as long as the one before it, or until `duration` [s] after the
     first row; a file of one row needs `duration`. Rows that begin after the duration are left out, with a note.
     Times on a regular grid, up to the rounding of decimal numbers, give one and the same dt everywhere.
     Raises InputError for wrong columns, times that do not increase, more than `max_steps` rows, a bad duration.
     """
+    return _read(path, wheels, duration, max_steps, KINDS)
+
+
+def _read(
+    path: str | os.PathLike, wheels: int, duration: float | None, max_steps: int, kinds: tuple[str, ...]
+) -> HeldCommands:
     if duration is not None and not (0.0 < duration < np.inf):
         raise InputError("cannot simulate for that long", got=duration, expected="a duration above 0 s")
     table = read_table(path)
-    _check_columns(table, wheels)
+    kind = next((kind for kind in kinds if _numbered(table, kind)), kinds[0])
+    _check_columns(table, kind, wheels)
     if len(table) > max_steps:
         raise InputError(
             "too many rows",
@@ -59,19 +90,31 @@ def read_voltages(
             where=table.source,
         )
     t = table.numbers("t_s")
-    voltage = np.stack([table.numbers(f"u{k + 1}_V") for k in range(wheels)], axis=1)
+    rows = np.stack([table.numbers(name) for name in columns_of(kind, wheels)], axis=1)
+    supply = table.numbers("supply_V") if "supply_V" in table.names else None
     _check_time(table, t)
     dt, used = _intervals(table, t, duration)
-    notes = (
-        table.notes if used == len(t) else (*table.notes, f"{len(t) - used} rows begin after the duration: left out")
-    )
-    return HeldVoltages(voltage[:used], dt, float(t[0]), table.sha256, notes)
+    notes = table.notes
+    if used < len(t):
+        notes = (*notes, f"{len(t) - used} rows begin after the duration: left out")
+    battery = None if supply is None else supply[:used]
+    return HeldCommands(kind, rows[:used], dt, float(t[0]), table.sha256, battery, notes)
 
 
-def _check_columns(table: Table, wheels: int) -> None:
-    expected = ["t_s", *(f"u{k + 1}_V" for k in range(wheels))]
-    numbered = [name for name in table.names if name[:1] == "u" and name[1:-2].isdigit() and name.endswith("_V")]
-    if "t_s" in table.names and len(table.names) == len(numbered) + 1 and len(numbered) != wheels:
+def _numbered(table: Table, kind: str) -> list[str]:
+    """The columns of the table that belong to a kind of command, for any number of wheels."""
+    if kind == "twist_command":
+        return [name for name in table.names if name in columns_of(kind, 0)]
+    pattern = re.escape(columns_of(kind, 1)[0]).replace("1", r"\d+", 1)
+    return [name for name in table.names if re.fullmatch(pattern, name)]
+
+
+def _check_columns(table: Table, kind: str, wheels: int) -> None:
+    expected = ["t_s", *columns_of(kind, wheels)]
+    optional = ["supply_V"] if kind == "duty" else []
+    found = _numbered(table, kind)
+    others = len(table.names) - len(found) - sum(name in table.names for name in ("t_s", *optional))
+    if "t_s" in table.names and found and not others and len(found) != len(expected) - 1:
         raise InputError(
             "the file is for another number of wheels",
             got=", ".join(table.names),
@@ -79,16 +122,24 @@ def _check_columns(table: Table, wheels: int) -> None:
             remedy="take the robot and the file that belong together",
             where=table.source,
         )
-    table.check_names(expected)
+    table.check_names(expected, optional)
     for name, unit in table.units.items():
-        if unit != _UNITS[name[0]]:
+        if unit.lower() != _unit(name).lower():
             raise InputError(
                 "the row of units contradicts the name",
                 got=unit,
-                expected=_UNITS[name[0]],
+                expected=_unit(name) or "no unit",
                 remedy="convert the column",
                 where=f"{table.source}, column {name}",
             )
+
+
+def _unit(name: str) -> str:
+    """The unit that stands in the name of a column."""
+    for ending, unit in (("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_duty", ""), ("_V", "V"), ("_s", "s")):
+        if name.endswith(ending):
+            return unit
+    return ""
 
 
 def _check_time(table: Table, t: FloatArray) -> None:
