@@ -27,6 +27,11 @@ class Friction(Value):
     wheels: Annotated[WheelFriction, Field(description="at the wheels")] = WheelFriction()
 
     @property
+    def laws(self) -> tuple[FrictionLaw, ...]:
+        """The parts, which add up."""
+        return self.axes, self.direction, self.wheels
+
+    @property
     def only_axes(self) -> bool:
         """Whether all friction acts on the body axes, as in the paper."""
         return self.direction == DirectionFriction() and self.wheels == WheelFriction()

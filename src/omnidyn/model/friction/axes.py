@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
+from omnidyn.model.layout import AXES, HOLD, SLIDE, VISCOUS
 from omnidyn.model.value import Levels, Value, per_axis_number
 
 
@@ -38,6 +39,15 @@ class AxesFriction(Value):
         """(viscous, coulomb, breakaway) as arrays. Shape (3,) each; breakaway = coulomb where none is given."""
         coulomb = np.array(self.coulomb)
         return np.array(self.viscous), coulomb, coulomb if self.breakaway is None else np.array(self.breakaway)
+
+    def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
+        """Add the levels of the three axes; see FrictionLaw."""
+        viscous, coulomb, breakaway = self.levels
+        units = np.array([1.0, 1.0, length])
+        element[:AXES, VISCOUS] += viscous / units**2
+        for side in range(2):
+            element[:AXES, SLIDE + side] += coulomb / units
+            element[:AXES, HOLD + side] += breakaway / units
 
     def sliding_wrench(self, twist: ArrayLike) -> NDArray[np.float64]:
         """-(B v + C sgn v) of the axes that move; 0 for an axis at rest. Shape (*batch, 3)."""

@@ -12,8 +12,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
+from omnidyn.model.layout import AXES, HOLD, HOLD_X, HOLD_Y, SLIDE, SLIDE_X, SLIDE_Y, VISCOUS, YAW
 from omnidyn.model.value import Value, number, to_list
 
 Level = Annotated[float, number(0.0, 1e6)]
@@ -33,6 +36,15 @@ class DirectionFriction(Value):
     yaw_coulomb: Annotated[Level, Field(description="[N m]")] = 0.0
     yaw_breakaway: Annotated[Level | None, Field(description=">= yaw_coulomb [N m]")] = None
     yaw_viscous: Annotated[Level, Field(description="[N m s]")] = 0.0
+
+    def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
+        """Add the ellipse, the same damping in every direction, and what resists turning; see FrictionLaw."""
+        body[[SLIDE_X, SLIDE_Y]] += self.coulomb
+        body[[HOLD_X, HOLD_Y]] += self.coulomb if self.breakaway is None else self.breakaway
+        yaw_hold = self.yaw_coulomb if self.yaw_breakaway is None else self.yaw_breakaway
+        element[:AXES, VISCOUS] += [self.viscous, self.viscous, self.yaw_viscous / length**2]
+        element[YAW, SLIDE : SLIDE + 2] += self.yaw_coulomb / length
+        element[YAW, HOLD : HOLD + 2] += yaw_hold / length
 
     @model_validator(mode="after")
     def _levels_in_order(self) -> DirectionFriction:

@@ -1,32 +1,33 @@
-"""The contract of a friction law. One file per family; the parts of a robot's friction add up.
+"""The contract of a friction law. One file per place where friction acts; the parts of a robot's friction add up.
 
 A law acts between body and floor. It must:
 
-1. oppose motion: `sliding_wrench` is what it exerts on a moving body; its power is never positive;
-2. be set-valued at rest: `holds(applied)` tells whether the set of wrenches it can exert at zero twist contains the
-   balance of `applied`. sgn(0) = 0, as printed, would let a robot creep inside its dead zone;
-3. say how much it can hold: `breakaway` >= `coulomb` >= 0, element by element;
-4. never smooth sgn: no tanh, no small speed below which it changes.
+1. oppose motion: its power is never positive;
+2. be set-valued at rest: it exerts whatever balances the drive, up to a breakaway level. sgn(0) = 0, as printed in the
+   paper, would let a robot creep inside its dead zone;
+3. hold at least as much as it slides with: breakaway >= coulomb >= 0, element by element;
+4. never smooth sgn: no tanh, no small speed below which it changes;
+5. derive from a convex potential of the velocity (maximum dissipation), so that the inclusion of inclusion.py has one
+   solution and says by itself what sticks;
+6. say so in two tables: `add_to` adds its levels to those of the elements on which it acts. That is all the solvers,
+   the dead zone and the derivatives need.
 """
 
 from __future__ import annotations
 
 from typing import Protocol
 
-from numpy.typing import ArrayLike, NDArray
+import numpy as np
+from numpy.typing import NDArray
 
 
 class FrictionLaw(Protocol):
-    """What every family of friction provides. Twists and wrenches have shape (*batch, 3)."""
+    """What every family of friction provides: a frozen value type (its ranges checked) with this function."""
 
-    def sliding_wrench(self, twist: ArrayLike) -> NDArray:
-        """Wrench on the moving body [N, N, N m]; an element at rest contributes nothing."""
-        ...
+    def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
+        """Add the levels to the tables of a plant, in place.
 
-    def wrench(self, twist: ArrayLike, applied: ArrayLike) -> NDArray:
-        """Wrench on the body under the `applied` wrench [N, N, N m], the balance of rest included."""
-        ...
-
-    def holds(self, applied: ArrayLike) -> NDArray:
-        """Whether a body at rest stays at rest under the `applied` wrench. Shape (*batch, 3), per element."""
+        body: shape (BODY_SIZE,), element: shape (3 + wheels, ELEMENT_SIZE), entries named in layout.py. `length` is
+        rho [m] by which yaw is measured: a torque T counts as T/rho [N], a damping D [N m s] as D/rho^2 [N s/m].
+        """
         ...

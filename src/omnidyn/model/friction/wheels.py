@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from omnidyn.model.layout import AXES, HOLD, SLIDE, VISCOUS
 from omnidyn.model.value import PerWheel, Value, per_wheel_number
 
 Level = Annotated[PerWheel, per_wheel_number(0.0, 1e6)]
@@ -44,6 +47,19 @@ class WheelFriction(Value):
         if self.breakaway_backward is not None:
             return self.breakaway_backward
         return self.backward if self.breakaway is None or self.coulomb_backward is not None else self.breakaway
+
+    def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
+        """Add the levels of each wheel, forward and backward; see FrictionLaw."""
+        wheels = element[AXES:]
+        levels = {
+            VISCOUS: self.viscous,
+            SLIDE: self.coulomb,
+            SLIDE + 1: self.backward,
+            HOLD: self.hold_forward,
+            HOLD + 1: self.hold_backward,
+        }
+        for column, level in levels.items():
+            wheels[:, column] += level
 
     @model_validator(mode="after")
     def _breakaway_at_least_coulomb(self) -> WheelFriction:
