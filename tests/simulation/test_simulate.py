@@ -18,7 +18,6 @@ OPTIONS = {
         ("gear_ratio = 19.0\ngear_efficiency = 0.8", "gear_efficiency"),
         ("gear_ratio = [19.0, 19.0, 20.0]", "unequal motors"),
     ],
-    '"quasi-static"': [('"dynamic"', 'electrical = "dynamic"')],
     "rotating_frame = false": [("rotating_frame = true", "rotating_frame")],
     "wheel_radius_m = 0.035": [("wheel_radius_m = [0.035, 0.035, 0.036]", "wheel radii")],
     "resistance_ohm = 1.69": [("resistance_ohm = [1.69, 1.69, 1.7]", "unequal motors")],
@@ -199,11 +198,11 @@ def test_an_option_of_the_robot_file_is_never_ignored(axebot, old, new, words):
 def test_every_reason_is_named(axebot):
     robot = axebot.replace(
         body=axebot.body.replace(rotating_frame=True),
-        motor=axebot.motor.replace(current_limit=1.0, electrical="dynamic"),
+        motor=axebot.motor.replace(current_limit=1.0, voltage_drop=0.1),
     )
     reasons = why_not_exact(robot)
     assert len(reasons) == 3
-    assert re.search(r"current_limit_A.*dynamic.*rotating_frame", " ".join(reasons))
+    assert re.search(r"current_limit_A.*rotating_frame.*voltage_drop", " ".join(reasons))
     assert why_not_exact(axebot) == []
 
 
@@ -250,3 +249,15 @@ def test_without_any_friction_the_speed_only_tends_to_zero(axebot):
     run = simulate(free, np.zeros((20, 3)), 0.05, twist=(1.0, 0.0, 0.0))
     np.testing.assert_allclose(run.twist[:, 0], np.exp(-a * run.t), rtol=1e-12)
     assert (run.twist[:, 1:] == 0.0).all()
+
+
+def test_dynamic_electrics_run_on_the_exact_engine(axebot):
+    """And agree with the implicit one, which a turning frame forces but which acts on nothing along one axis."""
+    dynamic = axebot.replace(motor=axebot.motor.replace(electrical="dynamic", inductance=2e-3))
+    turning = dynamic.replace(body=dynamic.body.replace(rotating_frame=True))
+    voltage = np.outer(4.0 * np.sin(np.arange(100) * 0.1), [0.0, 1.0, -1.0])
+    exact, run = simulate(dynamic, voltage, 0.01), simulate(turning, voltage, 0.01, tol=1e-8)
+    assert exact.source == "simulated: axebot, exact engine"
+    np.testing.assert_allclose(run.twist, exact.twist, atol=1e-8)
+    np.testing.assert_allclose(run.current, exact.current, atol=1e-5)
+    assert np.abs(exact.twist - simulate(axebot, voltage, 0.01).twist).max() > 1e-3

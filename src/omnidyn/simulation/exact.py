@@ -1,7 +1,7 @@
 """The paper's law, exact: twist by `exact_step`, heading in closed form, position by Gauss nodes between events.
 
-It serves robots whose axes do not couple: quasi-static equal motors, G G^T diagonal, friction on the body axes,
-no turning frame, no current limit. `why_not_exact` says by name what stands against it.
+It serves robots whose axes do not couple: equal motors, G G^T diagonal, friction on the body axes, no turning frame,
+no current limit. `why_not_exact` says by name what stands against it. Winding inductance: exact_inductance.py.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import StateSpace, discretise, is_decoupled, state_space
 from omnidyn.simulation import exact_step as formula
+from omnidyn.simulation.travel import put_next_pose, rotated
 
 FloatArray = NDArray[np.float64]
 
@@ -25,6 +26,7 @@ FloatArray = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 NODES, WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
 PIECE = 0.4
+SPIN_UP = 3.0  # weight of the yaw acceleration among the rates
 SETTLED = 40.0  # a t beyond which e^(-a t) is below the last bit
 MAX_TURN_PER_STEP = 1e5  # [rad]: more would be minutes of quadrature for one row
 
@@ -37,8 +39,6 @@ def why_not_exact(robot: Robot) -> list[str]:
     motor, reasons = robot.motor, []
     if motor.current_limit is not None:
         reasons.append("current limit ([motor] current_limit_A)")
-    if motor.electrical == DYNAMIC:
-        reasons.append('dynamic electrics ([motor] electrical = "dynamic")')
     if robot.body.rotating_frame:
         reasons.append("rotating frame ([body] rotating_frame = true)")
     if not robot.friction.only_axes:
@@ -50,6 +50,8 @@ def why_not_exact(robot: Robot) -> list[str]:
     if np.any(np.asarray(motor.gear_efficiency) != 1.0):
         reasons.append("gear efficiency ([motor] gear_efficiency)")
     per_wheel = [motor.resistance, motor.torque_constant, motor.emf_constant, motor.gear_ratio]
+    if motor.electrical == DYNAMIC:
+        per_wheel.append(motor.inductance)
     if any(isinstance(value, tuple) and len(set(value)) > 1 for value in (*per_wheel, robot.wheels.wheel_radius)):
         reasons.append("unequal motors or wheel radii (a list in [motor] or [wheels])")
     elif not is_decoupled(state_space(robot)):
@@ -71,7 +73,7 @@ def simulate_exact(
     steps, which = np.unique(dt, return_inverse=True)
     phi = discretise(system, steps)
     twists = _twists(drive, phi, which, rate, coulomb, breakaway, twist)
-    _refuse_spin(np.abs(twists[:-1, 2]) * dt)
+    refuse_spin(np.abs(twists[:-1, 2]) * dt)
     poses = _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, pose, NODES, WEIGHTS)
     return twists, poses
 
@@ -89,7 +91,7 @@ def drive_acceleration(system: StateSpace, voltage: FloatArray) -> FloatArray:
     return total
 
 
-def _refuse_spin(turn: FloatArray) -> None:
+def refuse_spin(turn: FloatArray) -> None:
     row = int(np.argmax(turn))
     if not turn[row] <= MAX_TURN_PER_STEP:
         raise InputError(
@@ -134,9 +136,9 @@ def _displacement(start, event, before, after, rate, left, right, nodes, weights
         for axis in range(3):
             now[axis] = _speed_within(t, start[axis], event[axis], before[axis], after[axis], rate[axis])
         turned = _turned_within(t, start[2], now[2], event[2], before[2], after[2], rate[2])
-        cos, sin, weight = math.cos(turned), math.sin(turned), (right - left) * weights[node]
-        x += weight * (cos * now[0] - sin * now[1])
-        y += weight * (sin * now[0] + cos * now[1])
+        dx, dy = rotated(turned, now[0], now[1])
+        x += (right - left) * weights[node] * dx
+        y += (right - left) * weights[node] * dy
     return x, y
 
 
@@ -145,6 +147,8 @@ def _travel(start, end, event, before, after, rate, dt, nodes, weights):
     """Displacement over a whole step in the body frame at its start: pieces between events, short where it is fast."""
     x = y = left = 0.0
     spin = max(abs(start[2]), abs(end[2]))
+    # A heading that speeds up is e^(i alpha t^2/2) to the nodes: sqrt(alpha) is a rate too.
+    spin += SPIN_UP * math.sqrt(max(abs(before[2] - rate[2] * start[2]), abs(after[2])))
     while left < dt:
         right = dt
         for axis in range(3):
@@ -173,10 +177,6 @@ def _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, start, no
         out[k + 1] = out[k]
         if moving:
             x, y = _travel(twists[k], twists[k + 1], event, before, after, rate, dt, nodes, weights)
-            cos, sin = math.cos(out[k, 2]), math.sin(out[k, 2])
-            out[k + 1, 0] += cos * x - sin * y
-            out[k + 1, 1] += sin * x + cos * y
-            turn = _turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2]) - lost
-            out[k + 1, 2] += turn
-            lost = (out[k + 1, 2] - out[k, 2]) - turn
+            turn = _turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2])
+            lost = put_next_pose(out, k, x, y, turn, lost)
     return out

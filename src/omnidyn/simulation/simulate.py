@@ -15,6 +15,7 @@ from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, as_floats, commands, loop_gains, on_ticks
 from omnidyn.simulation.exact import simulate_exact, why_not_exact
+from omnidyn.simulation.exact_inductance import simulate_exact_inductance
 from omnidyn.simulation.implicit import Loop, Outcome, capped, no_loop, run_implicit
 
 FloatArray = NDArray[np.float64]
@@ -50,11 +51,14 @@ def simulate(
     """
     given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
     start = _start("twist", twist, 3), _start("pose", pose, 3)
+    amperes = _start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
     if given.set_point is None and given.open_circuit is None and not why_not_exact(robot):
         assert given.voltage is not None
-        twists, poses = simulate_exact(robot, given.voltage, given.dt, *start)
-        return _run(robot, given, given.voltage, twists, poses, None, "exact engine", ())
-    amperes = _start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
+        if robot.motor.electrical == DYNAMIC:
+            twists, poses, currents = simulate_exact_inductance(robot, given.voltage, given.dt, *start, amperes)
+        else:
+            (twists, poses), currents = simulate_exact(robot, given.voltage, given.dt, *start), None
+        return _run(robot, given, given.voltage, twists, poses, None, "exact engine", (), currents)
     return _implicit(robot, given, *start, amperes, _tolerance(tol))
 
 
@@ -104,7 +108,7 @@ def _limits(robot: Robot) -> FloatArray:
 
 def _run(
     robot: Robot, given: Commands, voltage: FloatArray, twists: FloatArray, poses: FloatArray,
-    outcome: Outcome | None, engine: str, doubts: tuple[str, ...],
+    outcome: Outcome | None, engine: str, doubts: tuple[str, ...], currents: FloatArray | None = None,
 ) -> Run:  # fmt: skip
     """The Run of a simulation: what the instruments of an ideal robot would have recorded."""
     dt, n = given.dt, robot.wheels.count
@@ -112,7 +116,9 @@ def _run(
     held, turning = _with_last(voltage), wheel_speed(robot.wheels, twists)
     if outcome is not None:  # a wheel that sticks is at rest, to the last bit
         turning[outcome.state[:, SIGNS + AXES : SIGNS + AXES + n] == 0.0] = 0.0
-    if outcome is not None and robot.motor.electrical == DYNAMIC:
+    if currents is not None:
+        current = currents
+    elif outcome is not None and robot.motor.electrical == DYNAMIC:
         current = outcome.state[:, -n:]
     else:
         current = settled_currents(robot, twists, held)
