@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import deadzone, demo, identify, robots, simulate
+from omnidyn.cli import deadzone, demo, identify, init, robots, simulate
 from omnidyn.cli.streams import show
 
 app = typer.Typer(
@@ -36,5 +36,5 @@ def _omnidyn(
         raise typer.Exit(2)
 
 
-for _command in (demo.demo, simulate.simulate, identify.identify, deadzone.deadzone, robots.robots):
+for _command in (demo.demo, init.init, simulate.simulate, identify.identify, deadzone.deadzone, robots.robots):
     app.command()(_command)

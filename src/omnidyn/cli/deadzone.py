@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli.streams import show, show_json
+from omnidyn.cli.streams import say, show, show_json
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -17,9 +17,12 @@ AXES = ("x", "y", "yaw")
 def deadzone(
     robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
     pattern: str = typer.Option("", help="One number per wheel, such as 0,1,-1; default: one pattern per axis."),
+    picture: str = typer.Option("", "--map", metavar="FILE", help="Map over all directions, as .png or .svg."),
+    force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:
     """Show at which voltage it starts to move."""
+    _refuse_picture(picture, force)
     from omnidyn.cli.numbers import number_list
     from omnidyn.cli.session import provenance, robot_input
     from omnidyn.model.deadzone import axis_patterns
@@ -28,12 +31,36 @@ def deadzone(
     loaded, source = load_robot(robot), robot_input(robot)
     patterns = [number_list("--pattern", pattern)] if pattern else axis_patterns(loaded).tolist()
     rows = [_row(loaded, each) for each in patterns]
+    if picture:
+        _draw(loaded, picture, force)
     if json:
         show_json({"robot": loaded.name, "dead_zone": rows, "provenance": provenance([source])})
         return
     show(f"{loaded.name} at rest: it starts to move when the voltages of the wheels exceed\n")
     for row in rows:
         show(_line(loaded, row))
+
+
+def _refuse_picture(path: str, force: bool) -> None:
+    """Before any work: a place where the map could not be written in the end."""
+    from omnidyn.errors import InputError
+    from omnidyn.files import check_output
+
+    if path and (not path.endswith((".png", ".svg")) or "\0" in path):
+        raise InputError("cannot tell the kind of picture", got=path, expected="a name that ends in .png or .svg")
+    if path:
+        check_output(path, force)
+
+
+def _draw(robot: Robot, path: str, force: bool) -> None:
+    from omnidyn.cli.progress import progress
+    from omnidyn.files import write_atomic
+    from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
+
+    with progress("drawing the map"):
+        drawn = draw_dead_zone_map({robot.name: robot})
+        write_atomic(path, drawn.svg if path.endswith(".svg") else drawn.png, force)
+    say(f"omnidyn: wrote {path}")
 
 
 def _row(robot: Robot, pattern: list[float]) -> dict[str, Any]:

@@ -63,6 +63,20 @@ def dead_zone_map(robot: Robot, directions: ArrayLike) -> tuple[FloatArray, Floa
     return breakaway_voltage(robot, patterns), patterns
 
 
+def dead_zone_force(robot: Robot, directions: ArrayLike) -> FloatArray:
+    """Force of the motors along each direction of travel [rad] at which the robot starts to move [N]. Shapes (k,).
+
+    The pattern and its voltage are those of `dead_zone_map`; what a lossy gear takes is not taken off.
+    """
+    directions = np.atleast_1d(np.asarray(directions, dtype=float))
+    voltage, patterns = dead_zone_map(robot, directions)
+    reached = np.isfinite(voltage)
+    volts = np.where(reached, voltage, 0.0)[:, None] * patterns
+    wrench = drive_wrench(robot, np.zeros((len(directions), 3)), volts)
+    along = wrench[:, 0] * np.cos(directions) + wrench[:, 1] * np.sin(directions)
+    return np.where(reached, along, np.inf)
+
+
 def _voltage_per_wrench(robot: Robot) -> FloatArray:
     """Voltages of least norm for a unit wrench at standstill, before any loss. Shape (wheels, 3)."""
     return np.asarray(

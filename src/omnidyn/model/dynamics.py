@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from omnidyn.model.motor import settled_current, traction
+from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.plant import LENGTH, plant
 from omnidyn.model.rest import accelerations, start_state
 from omnidyn.model.robot import Robot
@@ -72,7 +72,7 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[
     batch, n = np.broadcast_shapes(twist.shape[:-1], voltage.shape[:-1]), robot.wheels.count
     twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
     volts = np.ascontiguousarray(np.broadcast_to(voltage, (*batch, n)).reshape(-1, n))
-    numbers = plant(robot)
+    numbers = plant(robot.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
     states = np.array([start_state(numbers, row, np.zeros(n)) for row in twists]).reshape(len(twists), -1)
     return (accelerations(numbers, states, volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(*batch, 3)
 

@@ -133,15 +133,19 @@ def robot_to_toml(robot: Robot) -> str:
 
 
 def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
-    """One table of the file, its sub-tables after it; what equals its default is left out."""
+    """One table of the file, its sub-tables after it; what equals its default and has no prior is left out."""
     lines, inner = [], ""
     for key, field in keys_of(type(value), []).items():
         content = getattr(value, field)
+        path, default = f"{name}.{key}", type(value).model_fields[field].default
+        told = any(known == path or known.startswith((f"{path}[", f"{path}.")) for known in priors)
+        if content == default and not told and field != "rotating_frame":
+            continue
         if isinstance(content, BaseModel):
-            inner += _table(f"{name}.{key}", content, priors)
-        elif content != type(value).model_fields[field].default or field == "rotating_frame":
+            inner += _table(path, content, priors)
+        else:
             note = type(value).model_fields[field].description
-            lines.append(f"{key} = {_with_prior(content, f'{name}.{key}', priors)}" + (f"  # {note}" if note else ""))
+            lines.append(f"{key} = {_with_prior(content, path, priors)}" + (f"  # {note}" if note else ""))
     return ("\n[" + name + "]\n" + "\n".join(lines) + "\n" if lines else "") + inner
 
 

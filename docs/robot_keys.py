@@ -1,0 +1,183 @@
+"""The tables of keys in robot-file.md, made from the model's own fields: `python docs/robot_keys.py` writes them anew.
+
+A test fails where the page and the model differ.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel
+
+from omnidyn.model.robot import Robot
+from omnidyn.model.value import keys_of
+
+PAGE = Path(__file__).with_name("robot-file.md")
+TABLES = ("body", "wheels", "motor", "drive", "friction")
+UNITS = {
+    "_kg": "kg", "_kg_m2": "kg m²", "_m": "m", "_deg": "degree", "_ohm": "Ω", "_H": "H", "_Nm_A": "N m/A",
+    "_Vs_rad": "V s/rad", "_V": "V", "_A": "A", "_V_s_rad": "V s/rad", "_V_rad": "V/rad", "_Hz": "Hz",
+}  # fmt: skip
+
+
+# The descriptions in the model are notes for the margin of a robot file; these are sentences.
+MEANING = {
+    "body.mass_kg": "mass M",
+    "body.inertia_kg_m2": "inertia I_n about the vertical axis",
+    "body.rotating_frame": "keep the terms M ω v of axes that turn with the robot",
+    "wheels.azimuth_deg": "where each wheel stands, seen from the centre, counter-clockwise from forward",
+    "wheels.robot_radius_m": "b, from the centre to the wheels",
+    "wheels.wheel_radius_m": "r, of the wheels",
+    "wheels.roller_angle_deg": "0 for omni wheels, ±45 for mecanum wheels",
+    "motor.resistance_ohm": "R, of the winding, with what stands in series",
+    "motor.inductance_H": "L, of the winding; needed for dynamic electrics",
+    "motor.torque_constant_Nm_A": "K_t, torque per current at the motor shaft",
+    "motor.emf_constant_Vs_rad": "K_v, back-EMF per speed at the motor shaft",
+    "motor.gear_ratio": "l, turns of the motor per turn of the wheel",
+    "motor.voltage_limit_V": "most the driver can give, of either sign",
+    "motor.current_limit_A": "most the driver lets through, of either sign, eq (12)",
+    "motor.voltage_drop_V": "lost in brushes and driver, against the current",
+    "motor.gear_efficiency": "share of the power that comes through the gear, either way",
+    "motor.electrical": '"dynamic" keeps L di/dt of eq (11)',
+    "drive.kind": "what a command is",
+    "drive.supply_V": "voltage of the battery, where it is not logged",
+    "drive.off": "what a duty of 0 does: short the motor, or open it",
+    "drive.kp_V_s_rad": "proportional gain, on the speed of a wheel",
+    "drive.ki_V_rad": "integral gain, on the speed of a wheel",
+    "drive.rate_Hz": "how often the speed loop runs; needed for it",
+    "friction.axes.viscous": "B, per speed: along x, along y, about yaw",
+    "friction.axes.coulomb": "C, whatever the speed: along x, along y, about yaw",
+    "friction.axes.breakaway": "S, up to which it holds at rest; absent: as coulomb",
+    "friction.direction.coulomb": "C along x and along y; equal for a disc",
+    "friction.direction.breakaway": "S along x and along y, up to which it holds at rest; absent: as coulomb",
+    "friction.direction.viscous": "B, the same in every direction",
+    "friction.direction.yaw_coulomb": "C about yaw",
+    "friction.direction.yaw_breakaway": "S about yaw; absent: as yaw_coulomb",
+    "friction.direction.yaw_viscous": "B about yaw",
+    "friction.wheels.coulomb": "c of a wheel that turns forward, at the rim",
+    "friction.wheels.coulomb_backward": "c of a wheel that turns backward; absent: as coulomb",
+    "friction.wheels.breakaway": "up to which a wheel resists being turned forward; absent: as coulomb",
+    "friction.wheels.breakaway_backward": "the same, backward; absent: as coulomb_backward, or else as breakaway",
+    "friction.wheels.viscous": "b, per speed of the rim",
+}
+
+
+class Key(NamedTuple):
+    """One key of a robot file, in words."""
+
+    table: str
+    key: str
+    unit: str
+    meaning: str
+    default: str
+    allowed: str
+
+
+def all_keys() -> list[Key]:
+    """Every key of every table, in the order of the file."""
+    found: list[Key] = []
+    for table in TABLES:
+        annotation = Robot.model_fields[table].annotation
+        assert isinstance(annotation, type)
+        found += _keys(table, annotation)
+    return found
+
+
+def _keys(table: str, model: type[BaseModel]) -> Iterator[Key]:
+    schema = model.model_json_schema(by_alias=True, ref_template="{model}")["properties"]
+    inner: list[tuple[str, type[BaseModel]]] = []
+    for key, name in keys_of(model, []).items():
+        field = model.model_fields[name]
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            inner.append((f"{table}.{key}", field.annotation))
+            continue
+        unit, meaning = _unit(key, field.description or "", schema[key]), MEANING[f"{table}.{key}"]
+        default = "needed" if field.is_required() else _literal(field.default)
+        yield Key(table, key, unit, meaning, default, _allowed(schema[key]))
+    for path, each in inner:
+        yield from _keys(path, each)
+
+
+def _unit(key: str, words: str, schema: dict[str, Any]) -> str:
+    """From the ending of the key, else from the brackets of its description; 1 for a pure number."""
+    endings = sorted((ending for ending in UNITS if key.endswith(ending)), key=len)
+    found = re.search(r"\[(.+?)\]", words)
+    if endings:
+        return UNITS[endings[-1]]
+    if found:
+        return found.group(1)
+    return "1" if "number" in str(schema) else ""
+
+
+def _literal(value: Any) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return "[" + ", ".join(f"{one:g}" for one in value) + "]"
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"
+
+
+def _allowed(schema: dict[str, Any]) -> str:
+    """The range of a number, the words of a choice, and whether it may be a list."""
+    choices = _first(schema, "enum")
+    if choices:
+        return ", ".join(f'"{choice}"' for choice in choices)
+    low, above, high = (_first(schema, word) for word in ("minimum", "exclusiveMinimum", "maximum"))
+    if high is None:
+        return "true, false"
+    words = f"above {above:g}, to {high:g}" if low is None else f"{low:g} to {high:g}"
+    arrays = list(_arrays(schema))
+    if not arrays:
+        return words
+    least, most = (arrays[0].get(f"{which}Items", arrays[0].get(f"{which}Length")) for which in ("min", "max"))
+    if least is None:
+        return f"{words}; or one per wheel"
+    return f"{least} × {words}" if least == most else f"{least} to {most} × {words}"
+
+
+def _first(schema: Any, word: str) -> Any:
+    """The first value of a keyword anywhere in a JSON schema."""
+    if isinstance(schema, dict):
+        if word in schema:
+            return schema[word]
+        schema = [each for key, each in schema.items() if key not in ("default", "description")]
+    if isinstance(schema, list):
+        return next((found for each in schema if (found := _first(each, word)) is not None), None)
+    return None
+
+
+def _arrays(schema: Any) -> Iterator[dict[str, Any]]:
+    if isinstance(schema, dict):
+        if schema.get("type") == "array":
+            yield schema
+        schema = list(schema.values())
+    if isinstance(schema, list):
+        for each in schema:
+            yield from _arrays(each)
+
+
+def as_markdown(table: str) -> str:
+    """The keys of one table as a Markdown table."""
+    rows = ["| key | unit | meaning | default | allowed |", "|---|---|---|---|---|"]
+    for each in all_keys():
+        if each.table == table:
+            rows.append(f"| `{each.key}` | {each.unit} | {each.meaning} | {each.default} | {each.allowed} |")
+    return "\n".join(rows) + "\n"
+
+
+def filled(page: str) -> str:
+    """The page with every table between its marks made anew."""
+
+    def made(match: re.Match[str]) -> str:
+        return f"{match.group(1)}{as_markdown(match.group(2))}{match.group(3)}"
+
+    return re.sub(r"(<!-- keys of ([a-z.]+) -->\n).*?(<!-- end -->)", made, page, flags=re.DOTALL)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(filled(PAGE.read_text("utf-8")), "utf-8")

@@ -1,0 +1,282 @@
+"""The first guess: a robot one can simulate, from what a ruler and a scale tell: azimuths, radii, mass.
+
+Everything else is guessed from what such robots have in common, with a standard deviation so wide that a measurement
+overrules it at once. What is known, by stall force per mass, friction per weight and yaw torque per (force * b):
+
+    axebot (2012)    11 m/s^2    0.10..0.15    0.45
+    axebot-lab       7.6 m/s^2   0.01..0.02    0.31
+    robotino         15 m/s^2    0.46..0.54    not measured
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from omnidyn.model.drive import Drive
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.motor import Motor
+from omnidyn.model.robot import Body, Prior, Robot
+from omnidyn.model.value import keys_of
+from omnidyn.model.wheels import PerWheel, Wheels
+
+GIVEN, GUESS = "given", "guess"
+DIRECTION, AXES = "direction", "axes"
+GRAVITY = 9.81  # [m/s^2]
+
+TOP_SPEED = 1.0  # [m/s] that the robot reaches at the voltage limit, friction included
+STALL_ACCELERATION = 8.0  # [m/s^2] stall force over mass: between a gentle robot (4) and a Robotino (15)
+VOLTAGE_LIMIT = 12.0  # [V]
+MOTOR_SPEED = 600.0  # [rad/s] no-load speed of the motor shaft: small brushed motors turn at 4000 to 10 000 rpm
+FRICTION_SHARE = 0.2  # of the weight: Coulomb friction; 0.02 to 0.5 are known
+VISCOUS_SHARE = 0.2  # of the Coulomb friction, added at 1 m/s
+YAW_SHARE = 0.5  # of Coulomb friction * b: turning on the spot omni wheels roll, and hardly scrub
+
+# Standard deviations over values. 0.5: a factor of about 2 either way; 1: only the order of magnitude is known.
+SPREAD = {
+    "body.inertia_kg_m2": 0.5,
+    "motor.resistance_ohm": 1.0,
+    "motor.torque_constant_Nm_A": 0.5,
+    "motor.emf_constant_Vs_rad": 0.5,
+    "motor.gear_ratio": 0.5,
+    "motor.voltage_limit_V": 0.5,
+    "friction.": 1.0,
+}
+LIKE_SPREAD = 0.3  # of what is taken over from another robot
+EXACT = ("wheels.azimuth_deg", "wheels.roller_angle_deg")  # a drawing, not a measurement
+
+_COULOMB, _VISCOUS = f"{FRICTION_SHARE:g} of the weight", f"{VISCOUS_SHARE:g} C at 1 m/s"
+_YAW = f"{YAW_SHARE:g} C b"
+WHY = {
+    "body.inertia_kg_m2": "a uniform disc out to the wheels, M b^2/2",
+    "motor.voltage_limit_V": "a common battery",
+    "motor.resistance_ohm": f"stalled motors push with M * {STALL_ACCELERATION:g} m/s^2",
+    "motor.torque_constant_Nm_A": "equal to the EMF constant in SI units",
+    "motor.emf_constant_Vs_rad": f"the motor turns at {MOTOR_SPEED:g} rad/s at the voltage limit without load",
+    "motor.gear_ratio": f"the robot reaches {TOP_SPEED:g} m/s at the voltage limit",
+    "friction.axes.coulomb": f"{_COULOMB}, C; about yaw {_YAW}",
+    "friction.axes.viscous": f"{_VISCOUS}, B; about yaw B b^2",
+    "friction.direction.coulomb": f"{_COULOMB}, C, the same in every direction",
+    "friction.direction.viscous": f"{_VISCOUS}, B",
+    "friction.direction.yaw_coulomb": _YAW,
+    "friction.direction.yaw_viscous": "B b^2",
+}
+
+
+def even_azimuths(count: int) -> tuple[float, ...]:
+    """Evenly spaced wheels, none straight ahead, one straight behind when odd [degree]: 60, 180, 300; 45, 135, ..."""
+    return tuple(180.0 / count * (2 * k + 1) for k in range(count))
+
+
+def mecanum_wheels(wheel_radius: PerWheel, robot_radius: PerWheel) -> Wheels:
+    """Four mecanum wheels, rollers in an X seen from above: front left, front right, rear left, rear right.
+
+    robot_radius: half track + half wheelbase [m].
+    """
+    return Wheels(
+        azimuth_deg=(90.0, -90.0, 90.0, -90.0), roller_angle_deg=(-45.0, 45.0, 45.0, -45.0),
+        wheel_radius=wheel_radius, robot_radius=robot_radius,
+    )  # fmt: skip
+
+
+def first_guess(
+    name: str, wheels: Wheels, mass: float, voltage_limit: float | None = None, shape: str = DIRECTION
+) -> Robot:
+    """A robot from its wheels and its mass [kg]; voltage_limit [V] where it is known.
+
+    shape: where friction acts, on the "direction" of travel (a disc) or on the body "axes" (the paper's box).
+
+    Its priors say of every number whether it was given or guessed, and how wide the guess is. Raises InputError.
+    """
+    body = Body(mass=mass, inertia=_round(0.5 * mass * _mean(wheels.robot_radius) ** 2), rotating_frame=True)
+    friction = _friction(mass, _mean(wheels.robot_radius))
+    motor = _motor(wheels, mass, friction, VOLTAGE_LIMIT if voltage_limit is None else voltage_limit)
+    robot = Robot(
+        name=name, source="omnidyn init: a first guess, to be identified", body=body, wheels=wheels, motor=motor,
+        friction=Friction(direction=friction) if shape == DIRECTION else Friction(axes=_as_box(friction)), priors={},
+    )  # fmt: skip
+    given = {"body.mass_kg"} | ({"motor.voltage_limit_V"} if voltage_limit is not None else set())
+    priors = {}
+    for key, value in numbers_of(robot):
+        table = key.partition("[")[0]
+        if table in given or table.startswith("wheels."):
+            priors[table] = Prior(source=GIVEN)
+        else:
+            spread = next(share for start, share in SPREAD.items() if key.startswith(start))
+            priors[key] = Prior(std=_round(spread * value), source=GUESS)
+    return robot.replace(priors=priors)
+
+
+def default_prior(key: str, value: Any) -> Prior:
+    """What is known of a number of `init` that its user took as it was offered: not much."""
+    return Prior(std=None if key in EXACT else _round(LIKE_SPREAD * value), source="default of omnidyn init, accepted")
+
+
+def _friction(mass: float, robot_radius: float) -> DirectionFriction:
+    """A disc: on real floors friction is collinear with the motion and the same in every direction (EVIDENCE.md, 2).
+
+    C = 0.2 M g;  B = 0.2 C per m/s;  about yaw the wheels slide at b, but mostly roll: C b/2 and B b^2.
+    """
+    coulomb = FRICTION_SHARE * mass * GRAVITY
+    viscous = VISCOUS_SHARE * coulomb
+    return DirectionFriction(
+        coulomb=(_round(coulomb), _round(coulomb)), viscous=_round(viscous),
+        yaw_coulomb=_round(YAW_SHARE * coulomb * robot_radius), yaw_viscous=_round(viscous * robot_radius**2),
+    )  # fmt: skip
+
+
+def _as_box(friction: DirectionFriction) -> AxesFriction:
+    """The same levels on the body axes."""
+    viscous, (along_x, along_y) = friction.viscous, friction.coulomb
+    return AxesFriction(
+        viscous=(viscous, viscous, friction.yaw_viscous), coulomb=(along_x, along_y, friction.yaw_coulomb)
+    )
+
+
+def _motor(wheels: Wheels, mass: float, friction: DirectionFriction, voltage_limit: float) -> Motor:
+    """Motors from two things one knows of a robot that drives: how hard it pushes and how fast it gets.
+
+    Under u_i = U g_i . e the wheels push along e with e^T G G^T e times the force f of one wheel, which falls from its
+    stall value f0 to 0 at the no-load speed v0 of the rim. In the weakest direction, lambda = min eigenvalue of the
+    x, y part of G G^T:
+
+        stall      lambda f0 = F = M * 8 m/s^2
+        top speed  F (1 - v/v0) = C + B v   =>   v0 = v F/(F - C - B v)
+
+    v0 = U r/(K l) and f0 = l K U/(R r) then give  l = w0 r/v0,  K = U/w0,  R = U^2/(v0 f0),  w0 the motor's speed.
+    """
+    stall = mass * STALL_ACCELERATION
+    held = friction.coulomb[0] + friction.viscous * TOP_SPEED
+    no_load = TOP_SPEED * stall / (stall - held)
+    plane = wheels.wrench_matrix[:2]
+    one = stall / float(np.linalg.eigvalsh(plane @ plane.T)[0])
+    constant = _round(voltage_limit / MOTOR_SPEED)
+    return Motor(
+        resistance=_round(voltage_limit**2 / (no_load * one)), torque_constant=constant, emf_constant=constant,
+        gear_ratio=_round(MOTOR_SPEED * float(wheels.radii.mean()) / no_load), voltage_limit=voltage_limit,
+    )  # fmt: skip
+
+
+def like(
+    preset: Robot, name: str, wheels: Wheels, mass: float, voltage_limit: float | None = None,
+    given: Collection[str] = (),
+) -> Robot:  # fmt: skip
+    """A robot built like another one: its motors and drive, its inertia and friction scaled to the new size.
+
+    Inertia goes with M b^2, friction with M (the weight on the floor), about yaw with M b, viscous M b^2.
+    given: keys of the file that were not taken from the preset. Raises InputError, also where the preset has one value
+    per wheel and another number of wheels.
+    """
+    heavier, wider = mass / preset.body.mass, _mean(wheels.robot_radius) / _mean(preset.wheels.robot_radius)
+    friction = _scaled(preset.friction, heavier, wider, preset.wheels.count / wheels.count)
+    inertia = _times(preset.body.inertia, heavier * wider**2)
+    motor = preset.motor if voltage_limit is None else preset.motor.replace(voltage_limit=voltage_limit)
+    robot = Robot(
+        name=name, source=f"omnidyn init: like {preset.name}, to be identified", wheels=wheels, motor=motor,
+        body=Body(mass=mass, inertia=inertia, rotating_frame=True), drive=preset.drive, friction=friction,
+        priors={},
+    )  # fmt: skip
+    return robot.replace(priors=_priors_like(robot, preset, given))
+
+
+def _priors_like(robot: Robot, preset: Robot, given: Collection[str]) -> dict[str, Prior]:
+    """Source and spread of every number: at least 30 %, more where the preset is less certain than that."""
+    before, priors = dict(numbers_of(preset)), {}
+    for key, value in numbers_of(robot.replace(priors=preset.priors)):
+        table = key.partition("[")[0]
+        if table in given:
+            priors[table] = Prior(source=GIVEN)
+        elif table in EXACT:
+            priors[table] = Prior(source=f"like {preset.name}")
+        else:
+            known = preset.priors.get(key) or preset.priors.get(table) or Prior()
+            scale = abs(value / before[key]) if before.get(key) else 1.0
+            std = max(LIKE_SPREAD * abs(value), (known.std or 0.0) * scale)
+            priors[key] = Prior(std=_round(std) if std > 0.0 else None, source=f"like {preset.name}")
+    return priors
+
+
+def _scaled(friction: Friction, heavier: float, wider: float, wheels: float) -> Friction:
+    """Friction of a robot `heavier` and `wider` times as much, with 1/`wheels` times as many wheels."""
+    turning, turning_viscous = heavier * wider, heavier * wider**2
+    axes, along, rim = friction.axes, friction.direction, friction.wheels
+    return Friction(
+        axes=AxesFriction(
+            viscous=_times(axes.viscous, (heavier, heavier, turning_viscous)),
+            coulomb=_times(axes.coulomb, (heavier, heavier, turning)),
+            breakaway=_times(axes.breakaway, (heavier, heavier, turning)),
+        ),
+        direction=DirectionFriction(
+            coulomb=_times(along.coulomb, heavier), breakaway=_times(along.breakaway, heavier),
+            viscous=_times(along.viscous, heavier), yaw_coulomb=_times(along.yaw_coulomb, turning),
+            yaw_breakaway=_times(along.yaw_breakaway, turning),
+            yaw_viscous=_times(along.yaw_viscous, turning_viscous),
+        ),
+        wheels=WheelFriction(
+            **{field: _times(getattr(rim, field), heavier * wheels) for field in WheelFriction.model_fields}
+        ),
+    )  # fmt: skip
+
+
+def _times(value: Any, factor: float | tuple[float, ...]) -> Any:
+    """value * factor for a number, a tuple or nothing; a product is rounded, what stays the same is not touched."""
+    if value is None or factor == 1.0:
+        return value
+    if isinstance(value, tuple):
+        factors = factor if isinstance(factor, tuple) else (factor,) * len(value)
+        return tuple(_times(one, each) for one, each in zip(value, factors, strict=True))
+    return _round(value * factor, 6)
+
+
+def numbers_of(robot: Robot) -> Iterator[tuple[str, float]]:
+    """(key of the robot file, value) of every number that its file writes: "friction.direction.coulomb[0]", 15.7."""
+    for table in ("body", "wheels", "motor", "drive", "friction"):
+        yield from _numbers(table, getattr(robot, table), tuple(robot.priors))
+
+
+def _numbers(path: str, value: BaseModel, told: tuple[str, ...]) -> Iterator[tuple[str, float]]:
+    for name, field in keys_of(type(value), []).items():
+        key, content = f"{path}.{name}", getattr(value, field)
+        if isinstance(content, BaseModel):
+            if content != type(value).model_fields[field].default or any(each.startswith(f"{key}.") for each in told):
+                yield from _numbers(key, content, told)
+        elif content == type(value).model_fields[field].default and not any(
+            each == key or each.startswith(f"{key}[") for each in told
+        ):
+            continue
+        elif isinstance(content, tuple):
+            yield from ((f"{key}[{k}]", one) for k, one in enumerate(content))
+        elif isinstance(content, float):
+            yield key, content
+
+
+def guessed(robot: Robot) -> list[str]:
+    """What of a robot is a guess, as short names: ["inertia", "resistance", ...]; all friction is one word."""
+    keys = [key for key, prior in robot.priors.items() if prior.source == GUESS]
+    names = [_PLAIN.get(key, "friction" if key.startswith("friction.") else key) for key in keys]
+    return list(dict.fromkeys(names))
+
+
+_PLAIN = {
+    f"{table}.{field.alias or name}": name.replace("_", " ")
+    for table, model in (("body", Body), ("motor", Motor), ("drive", Drive))
+    for name, field in model.model_fields.items()
+}
+
+
+def reasons(robot: Robot) -> list[tuple[str, str]]:
+    """(key, why) of every guess of `first_guess`, in the order of the file."""
+    keys = dict.fromkeys(key.partition("[")[0] for key, prior in robot.priors.items() if prior.source == GUESS)
+    return [(key, WHY[key]) for key in keys if key in WHY]
+
+
+def _mean(value: PerWheel) -> float:
+    return float(np.mean(value))
+
+
+def _round(value: float, digits: int = 3) -> float:
+    """A guess has no more digits than that."""
+    return float(f"{value:.{digits}g}")

@@ -1,0 +1,360 @@
+"""omnidyn init and deadzone --map: what they write, ask and refuse."""
+
+import contextlib
+import io
+import json
+import os
+import re
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnidyn.cli import main
+from omnidyn.model.robot import Prior
+from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+
+MINI = ["--azimuth", "60,180,300", "--wheel-radius", "0.04", "--robot-radius", "0.125", "--mass", "8"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def call(here, capsys):
+    """Run a command: (exit code, stdout, stderr)."""
+
+    def run(*arguments):
+        code = main(list(arguments))
+        return code, *capsys.readouterr()
+
+    return run
+
+
+class Terminal(io.StringIO):
+    """Somebody who types these lines."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def typed(call, monkeypatch):
+    """Run a command at a terminal with these answers."""
+
+    def run(answers, *arguments):
+        monkeypatch.setattr("sys.stdin", Terminal(answers))
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+        return call(*arguments)
+
+    return run
+
+
+# ---- what it writes --------------------------------------------------------------------------------------
+
+
+def test_azimuths_radii_and_a_mass_are_enough(call, here):
+    code, out, err = call("init", "mini", "--wheels", "3", *MINI)
+    assert (code, out) == (0, "mini.toml\n")
+    assert err == (
+        "omnidyn: guessed: inertia, resistance, torque constant, emf constant, gear ratio, voltage limit, friction\n"
+    )
+    robot = load_robot(here / "mini.toml")
+    assert robot.name == "mini"
+    assert (robot.body.mass, robot.wheels.wheel_radius, robot.wheels.robot_radius) == (8.0, 0.04, 0.125)
+    assert robot.wheels.azimuth_deg == (60.0, 180.0, 300.0)
+    assert robot.body.rotating_frame is True
+    assert robot.priors["body.mass_kg"] == Prior(source="given")
+    assert robot.priors["motor.resistance_ohm"] == Prior(std=robot.motor.resistance, source="guess")
+
+
+def test_the_file_is_for_people_too(call, here):
+    call("init", "mini", *MINI)
+    text = (here / "mini.toml").read_text()
+    assert text.startswith("# Written by omnidyn init.")
+    assert "#   body.inertia_kg_m2: a uniform disc out to the wheels, M b^2/2\n" in text
+    assert 'mass_kg = { value = 8.0, source = "given" }  # M\n' in text
+    assert "[N]" in text
+    assert text.endswith(robot_to_toml(load_robot(here / "mini.toml")))
+
+
+def test_the_file_simulates_at_once(call, here):
+    call("init", "mini", *MINI)
+    (here / "u.csv").write_text("t_s,u1_V,u2_V,u3_V\n0,-10.4,0,10.4\n2,0,0,0\n3,0,0,0\n")
+    code, out, err = call("simulate", "mini.toml", "u.csv", "--json")
+    assert code == 0
+    assert "warning" not in err
+    result = json.loads(out)
+    assert result["moved"] is True
+    assert 1.0 < result["final_pose"]["x_m"] < 2.5
+    assert result["final_twist"] == {"vx_m_s": 0.0, "vy_m_s": 0.0, "omega_rad_s": 0.0}
+
+
+def test_the_guess_for_machines(call):
+    code, out, _ = call("init", "mini", *MINI, "--voltage-limit", "24", "--json")
+    assert code == 0
+    result = json.loads(out)
+    assert (result["robot"], result["output"]) == ("mini", "mini.toml")
+    assert result["guessed"][-1] == "friction"
+    assert "voltage limit" not in result["guessed"]
+    assert result["provenance"]["command"].startswith("omnidyn init mini --azimuth 60,180,300")
+
+
+def test_the_file_to_stdout_or_elsewhere(call, here):
+    _, out, _ = call("init", "mini", *MINI, "-o", "-")
+    assert os.listdir(here) == []
+    assert call("init", "mini", *MINI, "--out", "other.toml")[1] == "other.toml\n"
+    assert (here / "other.toml").read_text() == out
+    assert call("init", "mini.toml", *MINI)[1] == "mini.toml\n"
+    assert load_robot(here / "mini.toml").name == "mini"
+
+
+def test_mecanum_wheels_need_no_azimuths(call, here):
+    code, _, _ = call("init", "crab", "--mecanum", "--wheel-radius", "0.05", "--robot-radius", "0.3", "--mass", "12")
+    assert code == 0
+    robot = load_robot(here / "crab.toml")
+    assert robot.wheels.roller_angle_deg == (-45.0, 45.0, 45.0, -45.0)
+    assert robot.wheels.count == 4
+
+
+def test_friction_on_the_axes_can_be_identified_today(call, here):
+    call("init", "box", *MINI, "--friction", "axes")
+    robot = load_robot(here / "box.toml")
+    assert robot.friction.only_axes
+    assert robot.friction.axes.coulomb == (15.7, 15.7, 0.981)
+
+
+def test_like_a_preset(call, here):
+    code, out, err = call("init", "mine", "--like", "robotino", "--mass", "16")
+    assert (code, out) == (0, "mine.toml\n")
+    assert err == "omnidyn: what was not given is like robotino; inertia and friction are scaled to the size\n"
+    robot, preset = load_robot(here / "mine.toml"), load_robot("robotino")
+    assert robot.motor == preset.motor
+    assert robot.drive == preset.drive
+    assert robot.friction.direction.coulomb == (85.0, 72.2)
+    assert robot.priors["body.mass_kg"] == Prior(source="given")
+    assert robot.priors["motor.gear_ratio"] == Prior(std=4.8, source="like robotino")
+
+
+def test_like_a_preset_with_other_wheels(call, here):
+    code, _, err = call("init", "mine", "--like", "axebot", "--wheels", "4")
+    assert code == 2
+    assert "--azimuth missing" in err
+    assert call("init", "mine", "--like", "axebot", "--azimuth", "45,135,-135,-45")[0] == 0
+    assert load_robot(here / "mine.toml").wheels.azimuth_deg == (45.0, 135.0, -135.0, -45.0)
+    assert call("init", "crab", "--like", "axebot", "--mecanum")[0] == 0
+    assert load_robot(here / "crab.toml").wheels.wheel_radius == 0.035
+
+
+def test_like_one_s_own_file(call, here):
+    call("init", "mini", *MINI)
+    assert call("init", "maxi", "--like", "mini.toml", "--mass", "9")[0] == 0
+    assert load_robot(here / "maxi.toml").priors["motor.gear_ratio"].source == "like mini"
+
+
+def test_radii_in_millimetres_are_noticed(call):
+    _, _, err = call("init", "mini", *MINI[:-6], "--wheel-radius", "4", "--robot-radius", "0.125", "--mass", "8")
+    assert "omnidyn: warning: a wheel is larger than the robot; are both radii in metres?" in err
+
+
+# ---- at a terminal ---------------------------------------------------------------------------------------
+
+
+def test_it_asks_at_a_terminal(typed, here):
+    code, out, err = typed("4\n\n0.06\n0.2\n10\n", "init", "asked")
+    assert (code, out) == (0, "asked.toml\n")
+    assert "how many wheels [3]: " in err
+    assert "where the wheels stand, counter-clockwise from forward [degree] [45,135,225,315]: " in err
+    assert "mass of the robot [kg] [3]: " in err
+    robot = load_robot(here / "asked.toml")
+    assert robot.wheels.azimuth_deg == (45.0, 135.0, 225.0, 315.0)
+    assert (robot.wheels.wheel_radius, robot.wheels.robot_radius, robot.body.mass) == (0.06, 0.2, 10.0)
+    assert robot.priors["wheels.azimuth_deg"] == Prior(source="default of omnidyn init, accepted")
+    assert robot.priors["body.mass_kg"] == Prior(source="given")
+
+
+def test_enter_accepts_everything_and_a_default_is_no_measurement(typed, here):
+    assert typed("\n\n\n\n\n", "init", "asked")[0] == 0
+    robot = load_robot(here / "asked.toml")
+    assert robot.wheels.azimuth_deg == (60.0, 180.0, 300.0)
+    assert robot.priors["body.mass_kg"] == Prior(std=0.9, source="default of omnidyn init, accepted")
+
+
+def test_it_asks_only_for_what_is_missing(typed, here):
+    code, _, err = typed("7\n", "init", "asked", *MINI[:-2])
+    assert code == 0
+    assert err.count("]: ") == 1
+    assert load_robot(here / "asked.toml").body.mass == 7.0
+
+
+def test_it_asks_again_after_a_bad_answer(typed, here):
+    answers = "2\nmany\n3\n0,1\n0,0,0\n60,180,300\n0,04\n-1\n0.04\nnan\n0.1\n0\n1e400\n5\n"
+    code, _, err = typed(answers, "init", "asked")
+    assert code == 0
+    for words in (
+        "got 2; expected 3 to 16 wheels", "got many; expected 3 to 16 wheels", "got 0,1; expected 3 numbers",
+        "cannot move the robot in every direction", "got 0,04; expected one number, such as 0.05",
+        "got -1.0; expected greater than", "got nan; expected one number", "mass: cannot use this value; got 0.0",
+        "got 1e400; expected one number",
+    ):  # fmt: skip
+        assert words in err
+    assert load_robot(here / "asked.toml").body.mass == 5.0
+
+
+def test_a_preset_is_what_stands_in_brackets(typed, here):
+    code, _, err = typed("\n\n\n\n9\n", "init", "asked", "--like", "axebot")
+    assert code == 0
+    assert "[180,-60,60]: " in err
+    assert "how many wheels" in err
+    robot = load_robot(here / "asked.toml")
+    assert robot.wheels == load_robot("axebot").wheels
+    assert robot.priors["wheels.wheel_radius_m"].source == "like axebot"
+
+
+def test_an_input_that_ends_is_refused(typed, here):
+    code, out, err = typed("3\n", "init", "asked")
+    assert (code, out) == (3, "")
+    assert err.endswith("the input ended before all was answered; or give the numbers as options\n")
+    assert os.listdir(here) == []
+
+
+def test_ctrl_c_at_a_question(call, here, monkeypatch):
+    class Impatient(Terminal):
+        def readline(self, *_):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("sys.stdin", Impatient())
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    assert call("init", "asked")[0] == 130
+    assert os.listdir(here) == []
+
+
+# ---- what it refuses -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["mini"], "--azimuth, --wheel-radius, --robot-radius, --mass missing"),
+        (["mini", *MINI[:-2]], "--mass missing; without them it asks, but only at a terminal."),
+        (["mini", "--mecanum", "--mass", "3"], "--wheel-radius, --robot-radius missing"),
+        (["mini", "--mecanum", *MINI], "leave out the rest"),
+        (["mini", "--mecanum", "--wheels", "3"], "leave out the rest"),
+        (["mini", "--wheels", "4", *MINI], "--azimuth has 3 values for --wheels 4."),
+        (["mini", "--wheels", "2"], "--wheels"),
+        (["mini", "--wheels", "17"], "--wheels"),
+        (["mini", "--wheels", "three"], "--wheels"),
+        (["mini", "--mass", "heavy"], "--mass"),
+        (["mini", *MINI, "--friction", "disc"], "--friction is direction or axes."),
+        (["mini", "--like", "axebot", "--friction", "axes"], "--friction is for a guess"),
+        (["mini", *MINI, "-o", "-", "--json"], "both want stdout"),
+        ([], "Missing argument"),
+    ],
+)
+def test_wrong_words_are_usage(call, here, arguments, words):
+    code, out, err = call("init", *arguments)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+    assert os.listdir(here) == []
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["axebot", *MINI], "NAME: a preset has this name; got axebot; choose another one"),
+        (["", *MINI], "NAME: cannot name a robot"),
+        (["a/b", *MINI], "use --out for a file in another folder"),
+        (["..", *MINI], "NAME: cannot name a robot"),
+        (["a\nb", *MINI], "NAME: cannot name a robot"),
+        (["x" * 61, *MINI], "a plain name of 1 to 60 letters"),
+        (["mini", *MINI, "--out", "a\0b"], "--out: not a file name"),
+        (["mini", *MINI, "--out", "none/mini.toml"], "mkdir -p none"),
+        (["mini", *MINI, "--out", "."], "a folder"),
+        (["mini", "--like", "axbot"], "no such robot; got axbot"),
+        (["mini", *MINI, "--mass", "nan"], "mass: cannot use this value; got nan; expected a finite number"),
+        (["mini", *MINI, "--mass", "-8"], "mass: cannot use this value; got -8.0; expected greater than"),
+        (["mini", *MINI, "--mass", "1e400"], "got inf"),
+        (["mini", *MINI, "--wheel-radius", "40"], "wheel_radius: cannot use this value; got 40.0; expected less"),
+        (["mini", *MINI, "--robot-radius", "0"], "robot_radius: cannot use this value; got 0.0; expected greater"),
+        (["mini", *MINI, "--azimuth", "60,60,60"], "cannot move the robot in every direction"),
+        (["mini", *MINI, "--azimuth", "60,180"], "azimuth_deg: cannot use .*at least 3"),
+        (["mini", *MINI, "--azimuth", "60;180;300"], "--azimuth: not a list of numbers"),
+        (["mini", *MINI, "--azimuth", "60,180,inf"], "--azimuth: not a list of numbers"),
+        (["mini", *MINI, "--voltage-limit", "0"], "mini: cannot make such a robot; got .*; check the units"),
+        (["mini", *MINI, "--voltage-limit", "1e-3"], "mini: cannot make such a robot; got .*resistance"),
+        (["mini", *MINI[:-4], "--robot-radius", "0.001", "--mass", "0.0001"], "cannot .*inertia"),
+    ],
+)
+def test_bad_values_are_refused(call, here, arguments, words):
+    code, out, err = call("init", *arguments)
+    assert (code, out) == (3, "")
+    assert re.search(words, err)
+    assert err.startswith("omnidyn: error: ")
+    assert err.count("\n") == 1
+    assert os.listdir(here) == []
+
+
+def test_an_existing_file_is_refused_before_any_question(typed, here):
+    (here / "mini.toml").write_text("mine")
+    code, _, err = typed("\n" * 9, "init", "mini")
+    assert code == 3
+    assert "the file exists already; use --force" in err
+    assert "]: " not in err
+    assert (here / "mini.toml").read_text() == "mine"
+    assert typed("", "init", "mini", *MINI, "--force")[0] == 0
+    assert load_robot(here / "mini.toml").name == "mini"
+
+
+TEXT = st.text(max_size=12)
+NUMBER = st.floats().map(repr) | st.integers().map(str) | TEXT
+FLAGS = st.one_of(
+    st.tuples(st.sampled_from(["--wheels", "--wheel-radius", "--robot-radius", "--mass", "--voltage-limit"]), NUMBER),
+    st.tuples(st.just("--azimuth"), st.lists(NUMBER, max_size=5).map(",".join) | TEXT),
+    st.tuples(st.just("--like"), st.sampled_from(["axebot", "robotino", "four-wheel"]) | TEXT),
+    st.tuples(st.just("--friction"), st.sampled_from(["axes", "direction"]) | TEXT),
+    st.sampled_from([("--mecanum",), ("--json",), ("--force",)]),
+)
+
+
+@given(st.lists(FLAGS, max_size=6), st.booleans(), TEXT | st.just("mini"))
+def test_any_words_end_in_a_file_or_a_refusal(flags, whole, name):
+    """Never a bug (1), never a traceback, never a file that does not load."""
+    words = [*(MINI if whole else []), *(word for flag in flags for word in flag)]
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(["init", *words, "-o", "-", "--", name])
+    assert code in (0, 2, 3), (code, words, err.getvalue())
+    assert "Traceback" not in err.getvalue()
+    if code == 0:
+        assert parse_robot(out.getvalue()).priors
+
+
+# ---- deadzone --map --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name, start", [("map.png", b"\x89PNG"), ("map.svg", b"<?xml")])
+def test_a_map_of_the_dead_zone(call, here, name, start):
+    code, out, err = call("deadzone", "robotino", "--map", name)
+    assert code == 0
+    assert "7.101 V x (-1, 0, 1)" in out
+    assert f"omnidyn: wrote {name}\n" in err
+    assert (here / name).read_bytes().startswith(start)
+    code, _, err = call("deadzone", "robotino", "--map", name)
+    assert code == 3
+    assert "the file exists already" in err
+    assert call("deadzone", "axebot", "--map", name, "--force", "--json")[0] == 0
+
+
+@pytest.mark.parametrize(
+    "name, words", [("map.jpg", "expected a name that ends in .png or .svg"), ("none/map.png", "mkdir -p none")]
+)
+def test_a_map_that_cannot_be_written_is_refused_first(call, here, monkeypatch, name, words):
+    monkeypatch.setattr("omnidyn.model.robot_file.load_robot", None)  # would be a bug, exit 1
+    code, out, err = call("deadzone", "axebot", "--map", name)
+    assert (code, out) == (3, "")
+    assert words in err
