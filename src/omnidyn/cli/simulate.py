@@ -43,7 +43,7 @@ def simulate(
         raise typer.BadParameter("-o - and --json both want stdout.")
     if out not in ("", "-"):
         _refuse_early(out, force)
-    with progress("simulating") as now:
+    with progress("simulating (the first run of an engine compiles it)") as now:
         run, record = _simulated(robot, voltages, duration, max_steps, start_twist, start_pose, tol)
         now("writing the run")
         _write(run, out, force)
