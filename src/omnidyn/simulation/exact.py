@@ -51,7 +51,7 @@ def why_not_exact(robot: Robot) -> list[str]:
         reasons.append("gear efficiency ([motor] gear_efficiency)")
     per_wheel = [motor.resistance, motor.torque_constant, motor.emf_constant, motor.gear_ratio]
     if motor.electrical == DYNAMIC:
-        per_wheel.append(motor.inductance)
+        per_wheel.append(motor.inductance or 0.0)
     if any(isinstance(value, tuple) and len(set(value)) > 1 for value in (*per_wheel, robot.wheels.wheel_radius)):
         reasons.append("unequal motors or wheel radii (a list in [motor] or [wheels])")
     elif not is_decoupled(state_space(robot)):
