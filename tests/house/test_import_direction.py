@@ -16,11 +16,12 @@ PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
 ORDER = {
     "": """errors files units compiled run model simulation logs comparison identification control campaigns
         paper report export interop __init__ cli studio __main__""",
-    "model": """frames value layout wheels motor drive friction robot robot_file starter plant scratch holding inclusion rest
-        dynamics statespace deadzone""",
+    "model": """frames value layout wheels motor drive friction robot robot_file starter plant scratch
+        forces holding inclusion rest dynamics statespace deadzone""",
     "model/friction": "law axes direction wheels",
     "simulation": """inputs commands exact_step travel exact exact_inductance_step exact_inductance_travel
-        exact_inductance implicit_step implicit simulate tangent_step tangent_march tangent""",
+        exact_inductance implicit_step implicit simulate tangent_step tangent_events
+        tangent_march tangent""",
     "logs": "dialect table run_file steady_table command_file",
     "comparison": "",
     "identification": "estimate line points doubts steady_state band",

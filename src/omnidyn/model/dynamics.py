@@ -12,8 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from omnidyn.model.layout import LENGTH
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
-from omnidyn.model.plant import LENGTH, plant
+from omnidyn.model.plant import plant
 from omnidyn.model.rest import accelerations, start_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed, wrench_from_traction

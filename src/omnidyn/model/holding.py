@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled import part
-from omnidyn.model.plant import ELLIPSE, GX, GY, GZ, HOLD, HOLD_X, HOLD_Y, LOSS, SIGN
+from omnidyn.model.layout import ELLIPSE, GX, GY, GZ, HOLD, HOLD_X, HOLD_Y, LOSS, SIGN
 from omnidyn.model.scratch import BASIS, RESIDUAL, WORST
 
 

@@ -21,18 +21,12 @@ import math
 import numpy as np
 
 from omnidyn.compiled import part
+from omnidyn.model.forces import forces_at_work, residual, set_losses
 from omnidyn.model.holding import worst_direction
-from omnidyn.model.plant import (
-    AXES,
+from omnidyn.model.layout import (
     BEFORE,
-    BOUND,
-    CURRENT,
-    DROP,
-    EFFICIENCY,
     ELLIPSE,
-    EMF,
     FOUND,
-    GAIN,
     GOAL,
     GX,
     GY,
@@ -40,123 +34,20 @@ from omnidyn.model.plant import (
     HOLD,
     HOLD_X,
     HOLD_Y,
-    INDUCTANCE,
     LOSS,
     MASS,
-    NOW,
-    PUSH,
-    RESISTANCE,
     SIGN,
     SLIDE,
     SLIDE_X,
     SLIDE_Y,
     TAU,
-    TURNING,
-    VISCOUS,
-    VOLTAGE,
-)  # fmt: skip
+)
 from omnidyn.model.scratch import BASIS, JACOBIAN, MATRIX, NEWTON, PIVOT, RESIDUAL, ROW, SPARE, TRIAL, WORST
 
 CAP = 80  # Newton steps, kinks and releases of one solve; a solve that hits it is reported
 TIGHT = 1e-13  # residual that counts as 0, relative to the forces at work
 TIE = 1e-12  # kinks as near as this are met together
 FLAT = 1e-10  # a relative size that is rounding: an element does not move along a direction
-
-
-@part
-def winding(speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
-    """(current [A], its slope [A s/m]) of a motor at the end of a stage: eq (11) with the currents eliminated.
-
-    i = clip(soft(L i* + tau (u - E s), tau V_d)/(L + tau R), +-i_max); L = 0 gives the settled current for any tau.
-    """
-    flux = inductance * now + tau * (voltage - emf * speed)
-    lost, below = tau * drop, inductance + tau * resistance
-    if abs(flux) <= lost:
-        return 0.0, 0.0
-    i = (flux - math.copysign(lost, flux)) / below
-    if abs(i) > bound:
-        return math.copysign(bound, i), 0.0
-    return i, -tau * emf / below
-
-
-@part
-def gear(i, sign, gain, efficiency):
-    """Force per ampere behind a gear: eta while the motor drives (i s > 0), 1/eta while it is driven, 1 at rest."""
-    if sign * i > 0.0:
-        return gain * efficiency
-    if sign * i < 0.0:
-        return gain / efficiency
-    return gain
-
-
-@part
-def set_losses(body, element):
-    """What each gear takes at rest from a motion forward and backward [N]: dry friction with a level ~ |i|."""
-    for e in range(AXES, len(element)):
-        element[e, LOSS] = element[e, LOSS + 1] = 0.0
-        if element[e, EFFICIENCY] != 1.0:
-            i = winding(
-                0.0, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
-                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
-            )[0]  # fmt: skip
-            gain, efficiency = element[e, GAIN], element[e, EFFICIENCY]
-            element[e, LOSS] = i * (gain - gear(i, 1.0, gain, efficiency))
-            element[e, LOSS + 1] = i * (gear(i, -1.0, gain, efficiency) - gain)
-
-
-@part
-def forces_at_work(body, element):
-    """The sum of all force levels [N]: motors at standstill, friction, push. No force in the problem is larger."""
-    total = abs(body[PUSH]) + abs(body[PUSH + 1]) + abs(body[PUSH + 2]) + body[HOLD_X] + body[HOLD_Y]
-    for e in range(len(element)):
-        total += max(element[e, HOLD], element[e, HOLD + 1])
-        if e >= AXES:
-            i = winding(
-                0.0, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
-                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
-            )[0]  # fmt: skip
-            total += abs(i) * element[e, GAIN] / element[e, EFFICIENCY]
-    return total
-
-
-@part
-def residual(body, element, x, s):
-    """(M/tau)(x - x*) minus all forces but those of stuck elements, its Jacobian, and the currents at x."""
-    stiff = body[MASS] / body[TAU]
-    r0 = stiff * (x[0] - body[GOAL]) - body[PUSH]
-    r1 = stiff * (x[1] - body[GOAL + 1]) - body[PUSH + 1]
-    r2 = stiff * (x[2] - body[GOAL + 2]) - body[PUSH + 2]
-    j00, j11, j22, j01, j02, j12 = stiff, stiff, stiff, 0.0, 0.0, 0.0
-    for e in range(len(element)):
-        g0, g1, g2, sign = element[e, GX], element[e, GY], element[e, GZ], element[e, SIGN]
-        speed = g0 * x[0] + g1 * x[1] + g2 * x[2] if sign != 0.0 else 0.0
-        force, slope = -element[e, VISCOUS] * speed, -element[e, VISCOUS]
-        if sign == 1.0:
-            force -= element[e, SLIDE]
-        elif sign == -1.0:
-            force += element[e, SLIDE + 1]
-        if e >= AXES:
-            i, di = winding(
-                speed, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
-                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
-            )  # fmt: skip
-            gain = element[e, GAIN] if sign == 2.0 else gear(i, sign, element[e, GAIN], element[e, EFFICIENCY])
-            element[e, CURRENT] = i
-            force, slope = force + gain * i, slope + gain * di
-        r0, r1, r2 = r0 - force * g0, r1 - force * g1, r2 - force * g2
-        j00, j11, j22 = j00 - slope * g0 * g0, j11 - slope * g1 * g1, j22 - slope * g2 * g2
-        j01, j02, j12 = j01 - slope * g0 * g1, j02 - slope * g0 * g2, j12 - slope * g1 * g2
-    if body[ELLIPSE] == 1.0:  # gradient and Hessian of sqrt(Cx^2 vx^2 + Cy^2 vy^2)
-        cx, cy = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2
-        size = max(math.sqrt(cx * x[0] * x[0] + cy * x[1] * x[1]), 1e-300)
-        px, py = cx * x[0] / size, cy * x[1] / size
-        r0, r1 = r0 + px, r1 + py
-        j00, j11, j01 = j00 + (cx - px * px) / size, j11 + (cy - py * py) / size, j01 - px * py / size
-    t0, t1, t2 = body[TURNING] * x[0], body[TURNING] * x[1], body[TURNING] * x[2]
-    s[RESIDUAL, 0], s[RESIDUAL, 1], s[RESIDUAL, 2] = r0 - t2 * x[1], r1 + t2 * x[0], r2
-    s[JACOBIAN, 0], s[JACOBIAN, 1], s[JACOBIAN, 2] = j00, j01 - t2, j02 - t1
-    s[JACOBIAN + 1, 0], s[JACOBIAN + 1, 1], s[JACOBIAN + 1, 2] = j01 + t2, j11, j12 + t0
-    s[JACOBIAN + 2, 0], s[JACOBIAN + 2, 1], s[JACOBIAN + 2, 2] = j02, j12, j22
 
 
 @part

@@ -10,53 +10,31 @@ from numpy.typing import NDArray
 from omnidyn.model.layout import (
     ACTIVE,
     AXES,
-    BEFORE,
     BODY_SIZE,
     BOUND,
-    CURRENT,
     DROP,
     EFFICIENCY,
     ELEMENT_SIZE,
     ELLIPSE,
     EMF,
-    FOUND,
     GAIN,
-    GOAL,
     GX,
-    GY,
     GZ,
     HOLD,
     HOLD_X,
-    HOLD_Y,
     INDUCTANCE,
     LENGTH,
     LIMIT,
-    LOSS,
     MASS,
-    NOW,
-    PUSH,
     RESISTANCE,
     SIGN,
-    SLIDE,
-    SLIDE_X,
-    SLIDE_Y,
-    TAU,
     TURNING,
-    VISCOUS,
-    VOLTAGE,
-)  # fmt: skip
+)
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 
 FloatArray = NDArray[np.float64]
-
-__all__ = [
-    "ACTIVE", "AXES", "BEFORE", "BODY_SIZE", "BOUND", "CURRENT", "DROP", "EFFICIENCY", "ELEMENT_SIZE", "ELLIPSE",
-    "EMF", "FOUND", "GAIN", "GOAL", "GX", "GY", "GZ", "HOLD", "HOLD_X", "HOLD_Y", "INDUCTANCE", "LENGTH", "LIMIT",
-    "LOSS", "MASS", "NOW", "PUSH", "RESISTANCE", "SIGN", "SLIDE", "SLIDE_X", "SLIDE_Y", "TAU", "TURNING", "VISCOUS",
-    "VOLTAGE", "Plant", "plant",
-]  # fmt: skip
 
 
 class Plant(NamedTuple):

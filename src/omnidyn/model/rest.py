@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled import kernel, part
-from omnidyn.model.inclusion import residual, solve, winding
-from omnidyn.model.plant import (
+from omnidyn.model.forces import residual, winding
+from omnidyn.model.inclusion import solve
+from omnidyn.model.layout import (
     AXES,
     BOUND,
     DROP,
@@ -34,8 +35,8 @@ from omnidyn.model.plant import (
     TURNING,
     VISCOUS,
     VOLTAGE,
-    Plant,
-)  # fmt: skip
+)
+from omnidyn.model.plant import Plant
 from omnidyn.model.scratch import RESIDUAL, scratch
 
 FloatArray = NDArray[np.float64]

@@ -14,21 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled import kernel, part
-from omnidyn.model.inclusion import CAP, forces_at_work
-from omnidyn.model.plant import (
-    AXES,
-    BOUND,
-    GX,
-    GY,
-    GZ,
-    INDUCTANCE,
-    LENGTH,
-    MASS,
-    NOW,
-    TAU,
-    VOLTAGE,
-    Plant,
-)  # fmt: skip
+from omnidyn.model.forces import forces_at_work
+from omnidyn.model.inclusion import CAP
+from omnidyn.model.layout import AXES, BOUND, GX, GY, GZ, INDUCTANCE, LENGTH, MASS, NOW, TAU, VOLTAGE
+from omnidyn.model.plant import Plant
 from omnidyn.model.rest import SIGNS, put, settle, with_given_currents
 from omnidyn.model.scratch import scratch
 from omnidyn.simulation.implicit_step import GAMMA, step

@@ -13,8 +13,9 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled import part
-from omnidyn.model.inclusion import forces_at_work, solve
-from omnidyn.model.plant import (
+from omnidyn.model.forces import forces_at_work
+from omnidyn.model.inclusion import solve
+from omnidyn.model.layout import (
     AXES,
     CURRENT,
     ELLIPSE,
@@ -29,7 +30,7 @@ from omnidyn.model.plant import (
     SLIDE_X,
     SLIDE_Y,
     TAU,
-)  # fmt: skip
+)
 from omnidyn.model.rest import SIGNS, put, take
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)

@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.layout import AXES, LENGTH
 from omnidyn.model.motor import DYNAMIC
-from omnidyn.model.plant import AXES, LENGTH, plant
+from omnidyn.model.plant import plant
 from omnidyn.model.rest import SIGNS, start_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
