@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     from omnidyn.errors import OmnidynError
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.steady_state import fit_steady_state
+    from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
-    from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
     from omnidyn.model.dynamics import acceleration
     from omnidyn.model.robot import Robot
