@@ -270,6 +270,22 @@ def _at(x, s, t):
 
 
 @part
+def _not_too_far(body, element, x, s, t):
+    """1, or less where a full step past a sharp bend of the ellipse would climb again: secants on the slope."""
+    _at(x, s, t)
+    residual(body, element, s[TRIAL], s)
+    below, first, end = _slope(s), abs(_slope(s)), 1.0
+    for _ in range(20):
+        _at(x, s, end)
+        residual(body, element, s[TRIAL], s)
+        slope = _slope(s)
+        if slope <= 0.9 * first or below >= 0.0:
+            return end
+        end = t + max(below / (below - slope), 0.1) * (end - t)
+    return end
+
+
+@part
 def _walk(body, element, x, s):
     """Go along the Newton direction from x to the end, past kinks that give way, up to one that holds.
 
@@ -280,7 +296,10 @@ def _walk(body, element, x, s):
     for _ in range(2 * len(element)):
         kink, met = _next_kink(body, element, x, s, t)
         if kink > 1.0:
-            t = 1.0
+            if body[ELLIPSE] == 1.0:
+                t = _not_too_far(body, element, x, s, t)
+            else:
+                t = 1.0
             break
         _at(x, s, kink)
         residual(body, element, s[TRIAL], s)
@@ -291,7 +310,7 @@ def _walk(body, element, x, s):
             below = min(_slope(s), 0.0)
             t += below / (below - slope) * (kink - t)
             break
-        t, stuck = kink, _holds_more(element) or slope + _jump(body, element, s, met) >= 0.0
+        t, stuck = kink, met or _holds_more(element) or slope + _jump(body, element, s, met) >= 0.0
         for e in range(len(element)):
             if element[e, FOUND] == 1.0:
                 element[e, SIGN] = 0.0 if stuck else -element[e, SIGN]
@@ -299,9 +318,27 @@ def _walk(body, element, x, s):
             body[ELLIPSE] = 0.0
         if stuck:
             break
+    cx, cy, before0, before1 = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2, x[0], x[1]
     for a in range(3):
         x[a] += t * s[NEWTON, a]
+    if (
+        body[ELLIPSE] == 1.0 and cx * before0 * x[0] + cy * before1 * x[1] <= 0.0
+    ):  # past the tip of its cone: stop there
+        body[ELLIPSE], stuck = 0.0, True
     return stuck
+
+
+@part
+def _stop_contradictions(element, x):
+    """Hold every element whose sign is against its speed, which no solution may have. Returns whether there was one."""
+    found = False
+    for e in range(len(element)):
+        sign = element[e, SIGN]
+        if sign == 1.0 or sign == -1.0:
+            p0, p1, p2 = element[e, GX] * x[0], element[e, GY] * x[1], element[e, GZ] * x[2]
+            if sign * (p0 + p1 + p2) < -FLAT * (abs(p0) + abs(p1) + abs(p2)):
+                element[e, SIGN], found = 0.0, True
+    return found
 
 
 @part
@@ -317,8 +354,14 @@ def _release(body, element, x, s, slope):
             element[e, SIGN] = 1.0 if g0 * d0 + g1 * d1 + g2 * d2 > 0.0 else -1.0
     if body[ELLIPSE] == 0.0 and (abs(d0) > FLAT or abs(d1) > FLAT):
         body[ELLIPSE] = 1.0
+    t = -slope / curvature
+    for e in range(len(element)):  # not past a kink of what slides: its sign would be wrong from there on
+        g0, g1, g2, sign = element[e, GX], element[e, GY], element[e, GZ], element[e, SIGN]
+        speed, along = g0 * x[0] + g1 * x[1] + g2 * x[2], g0 * d0 + g1 * d1 + g2 * d2
+        if (sign == 1.0 or sign == -1.0) and sign * along < 0.0 and sign * speed > 0.0:
+            t = min(t, -0.9 * speed / along)
     for a in range(3):
-        x[a] -= slope / curvature * s[WORST, a]
+        x[a] += t * s[WORST, a]
 
 
 @part
@@ -340,12 +383,11 @@ def solve(body, element, x, s):
             stale = False
         residual(body, element, x, s)
         if _newton_direction(s, rank) <= tight:
-            if rank == 0:
+            found = worst_direction(body, element, s, rank) if rank > 0 else 0.0
+            if found < -tight:
+                _release(body, element, x, s, found)
+            elif not _stop_contradictions(element, x):
                 return iteration
-            found = worst_direction(body, element, s, rank)
-            if found >= -tight:
-                return iteration
-            _release(body, element, x, s, found)
             stale = True
         else:
             stale = _walk(body, element, x, s)

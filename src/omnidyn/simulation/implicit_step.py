@@ -23,8 +23,10 @@ from omnidyn.model.layout import (
     HOLD,
     HOLD_X,
     HOLD_Y,
+    INDUCTANCE,
     MASS,
     NOW,
+    RESISTANCE,
     SIGN,
     SLIDE,
     SLIDE_X,
@@ -35,6 +37,7 @@ from omnidyn.model.rest import SIGNS, put, take
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 BACK = (1.0 - GAMMA) / GAMMA
+STIFF = GAMMA / (1.0 - 2.0 * GAMMA)  # tau R/L from which SDIRK2 passes the end of an exponential
 
 
 @part
@@ -93,6 +96,17 @@ def _slips_back(body, element, start):
 
 
 @part
+def _torn_loose(body, element, start):
+    """Whether something at rest gave way in a step so long (h R/L > 1 + sqrt 2) that its currents overshoot their end."""
+    m, stiff, released = len(element), False, start[SIGNS + len(element)] == 0.0 and body[ELLIPSE] == 1.0
+    for e in range(m):
+        released |= start[SIGNS + e] == 0.0 and element[e, SIGN] != 0.0
+        if e >= AXES and element[e, INDUCTANCE] > 0.0:
+            stiff |= body[TAU] * element[e, RESISTANCE] > STIFF * element[e, INDUCTANCE]
+    return stiff and released
+
+
+@part
 def _begin(body, element, start, end, tau):
     """Make ready for a first stage of length tau from `start`."""
     for j in range(len(start)):
@@ -118,7 +132,7 @@ def step(body, element, s, start, end, middle, h):
     if not stopped:
         _aim(body, element, start, end, BACK)
         count = max(count, _stage(body, element, s, start, end))
-        stopped = _slips_back(body, element, start)
+        stopped = _slips_back(body, element, start) or _torn_loose(body, element, start)
     if stopped:
         _begin(body, element, start, end, h)
         count = max(count, _stage(body, element, s, start, end))
