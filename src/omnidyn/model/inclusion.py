@@ -44,6 +44,7 @@ from omnidyn.model.layout import (
 )
 from omnidyn.model.scratch import BASIS, JACOBIAN, MATRIX, NEWTON, PIVOT, RESIDUAL, ROW, SPARE, TRIAL, WORST
 
+AFRESH = 40  # after so many, begin again from rest: the problem has one solution, whatever the first guess
 CAP = 80  # Newton steps, kinks and releases of one solve; a solve that hits it is reported
 TIGHT = 1e-13  # residual that counts as 0, relative to the forces at work
 TIE = 1e-12  # kinks as near as this are met together
@@ -329,6 +330,15 @@ def _walk(body, element, x, s):
 
 
 @part
+def _rest(body, element, x):
+    """Everything at rest and stuck: a first guess that misleads nobody."""
+    x[0] = x[1] = x[2] = 0.0
+    for e in range(len(element)):
+        element[e, SIGN] = 2.0 if element[e, SIGN] == 2.0 else 0.0
+    body[ELLIPSE] = 2.0 if body[ELLIPSE] == 2.0 else 0.0
+
+
+@part
 def _stop_contradictions(element, x):
     """Hold every element whose sign is against its speed, which no solution may have. Returns whether there was one."""
     found = False
@@ -375,6 +385,9 @@ def solve(body, element, x, s):
     tight = TIGHT * (inertia + forces_at_work(body, element))
     stale, rank = True, 0
     for iteration in range(CAP):
+        if iteration == AFRESH:
+            _rest(body, element, x)
+            stale = True
         if stale:
             rank = face(body, element, s)
             while rank > 0 and _absorb(body, element, s, rank):
@@ -387,6 +400,7 @@ def solve(body, element, x, s):
             if found < -tight:
                 _release(body, element, x, s, found)
             elif not _stop_contradictions(element, x):
+                _onto_face(x, s, rank)
                 return iteration
             stale = True
         else:

@@ -97,7 +97,7 @@ def _slips_back(body, element, start):
 
 @part
 def _torn_loose(body, element, start):
-    """Whether something at rest gave way in a step so long (h R/L > 1 + sqrt 2) that its currents overshoot their end."""
+    """Whether something at rest gave way in a step so long, h R/L > 1 + sqrt 2, that its currents overshoot."""
     m, stiff, released = len(element), False, start[SIGNS + len(element)] == 0.0 and body[ELLIPSE] == 1.0
     for e in range(m):
         released |= start[SIGNS + e] == 0.0 and element[e, SIGN] != 0.0
