@@ -1,0 +1,256 @@
+"""Derivatives of a simulated run with respect to numbers of the robot file, by the implicit function theorem.
+
+The run is simulated once, by the implicit engine; every stage is differentiated where it was solved. What sticks has
+a derivative of exactly 0 along what it holds; a stop, a reversal and a release move with the parameter.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.layout import ACTIVE, AXES, EFFICIENCY, ELLIPSE, GX, GZ, HOLD, LENGTH, SLIDE, SLIDE_X, SLIDE_Y
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.plant import Plant, plant
+from omnidyn.model.rest import new_state, start_state, with_given_currents
+from omnidyn.model.robot import Robot
+from omnidyn.model.scratch import scratch
+from omnidyn.model.value import Value, keys_of
+from omnidyn.run import Run
+from omnidyn.simulation.commands import Commands, commands
+from omnidyn.simulation.implicit import Outcome, capped
+from omnidyn.simulation.simulate import TOLERANCE, _run, _start, _tolerance
+from omnidyn.simulation.tangent_march import _march
+from omnidyn.simulation.tangent_step import EPS, Ways
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """A run and its derivatives with respect to robot-file keys, in SI units over the unit of the key.
+
+    twist, pose: shape (samples, 3, keys). current [A per unit of the key]: shape (samples, wheels, keys).
+    """
+
+    run: Run
+    keys: tuple[str, ...]
+    twist: FloatArray
+    pose: FloatArray
+    current: FloatArray
+
+
+def derivatives(
+    robot: Robot, voltage: ArrayLike, dt: ArrayLike, keys: Sequence[str], *, twist: ArrayLike = (0.0, 0.0, 0.0),
+    pose: ArrayLike = (0.0, 0.0, 0.0), tol: float | None = TOLERANCE,
+) -> Derivatives:  # fmt: skip
+    """Simulate and differentiate with respect to numbers of the robot file, such as "friction.axes.coulomb[1]".
+
+    robot, voltage, dt, twist, pose, tol: as for `simulate`; the implicit engine runs whatever the robot. keys: numbers
+    that the robot has; `with_parameter` says how they are named. tol None: derivatives of the fixed-step map itself.
+
+    They belong to the sequence of starts, stops and reversals that the run shows. Not differentiable, and not seen:
+    whether something breaks away at all, a stop that only just happens, an ellipse crossing rest at an angle, a voltage
+    exactly at its limit. At tol 1e-6 a derivative is within 1e-5 of its largest value in the run, within 2e-4 after a
+    current has met its limit or passed 0 against a voltage drop.
+    Raises InputError for what `simulate` refuses, for an unknown key, and for friction or a gear loss that is off.
+    """
+    start = _start("twist", twist, 3), _start("pose", pose, 3)
+    given = commands(robot, voltage, dt, None, None, None, None)
+    assert given.voltage is not None
+    scale = np.array([_scale(robot, key) for key in keys])
+    robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
+    volts = [commands(r, voltage, dt, None, None, None, None).voltage for r in robots]
+    rates = _difference(np.array(volts).reshape(-1, *given.voltage.shape))
+    return _derivatives(robot, robots, rates, given, tuple(keys), scale, start, _tolerance(tol))
+
+
+def _derivatives(
+    robot: Robot, robots: list[Robot], rates: FloatArray, given: Commands, keys: tuple[str, ...], scale: FloatArray,
+    start: tuple[FloatArray, FloatArray], tol: float,
+) -> Derivatives:  # fmt: skip
+    """`robots`: up and down each key by EPS scale, `rates`: derivatives of the voltages that they apply.
+
+    All derivatives are d/d(key / scale) up to the last line.
+    """
+    numbers, plants = plant(robot), [plant(r) for r in robots]
+    for j, key in enumerate(keys):
+        _refuse_switched_off(key, numbers, plants[2 * j])
+    ways = _ways(numbers, plants, rates)
+    length = numbers.body[LENGTH]
+    stretch = _difference(np.array([p.body[LENGTH] for p in plants]))
+    first = np.zeros((len(keys), AXES + numbers.wheels))
+    first[:, 2] = start[0][2] * stretch
+    outcome, ds, dposes = run_tangent(numbers, ways, given, start, first, tol)
+    how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
+    stopped = capped(outcome)
+    doubts = (f"the friction solver hit its cap in {stopped} of {len(given.dt)} rows: look there",) if stopped else ()
+    assert given.voltage is not None
+    twists = outcome.state[:, :AXES] / [1.0, 1.0, length]
+    run = _run(robot, given, given.voltage, twists, outcome.pose, outcome, how, doubts)
+    slopes = ds[..., :AXES].copy()
+    slopes[..., 2] = (slopes[..., 2] - twists[:, 2, None] * stretch) / length
+    if robot.motor.electrical == DYNAMIC:
+        currents = ds[..., AXES:]
+    else:
+        currents = _settled(robots, run, slopes, ways.voltage)
+    parts = (np.moveaxis(part, 1, 2) / scale for part in (slopes, dposes, currents))
+    return Derivatives(run, keys, *parts)
+
+
+def run_tangent(
+    numbers: Plant, ways: Ways, given: Commands, start: tuple[FloatArray, FloatArray], first: FloatArray, tol: float
+) -> tuple[Outcome, FloatArray, FloatArray]:
+    """The run of `run_implicit`, with derivatives of state (rows + 1, K, 3 + n) and pose (rows + 1, K, 3)."""
+    assert given.voltage is not None
+    rows, n, bare = len(given.dt), numbers.wheels, with_given_currents(numbers)
+    state = start_state(numbers, start[0], np.zeros(n))
+    out = Outcome(
+        np.zeros((rows + 1, 3)), np.zeros((rows + 1, len(state))), np.zeros(rows, np.int64), np.zeros(rows, np.int64)
+    )
+    out.pose[0], out.state[0] = start[1], state
+    ds, dposes = np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, len(first), 3))
+    ds[0] = first
+    spare = np.zeros((4, len(state)))
+    _march(
+        *numbers.copy(), *bare, scratch(), spare, ways, given.voltage, given.dt, tol, out.pose, out.state,
+        out.iterations, out.steps, ds, dposes,
+    )  # fmt: skip
+    return out, ds, dposes
+
+
+def _ways(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Ways:
+    """Tables of the plants up and down each key, the robot's own as the last one, and room to work in."""
+    body = np.array([*(p.body for p in plants), numbers.body])
+    element = np.array([*(p.element for p in plants), numbers.element])
+    count, n = len(plants) // 2, numbers.wheels
+    arm = np.ascontiguousarray(np.swapaxes(_difference(element[:-1, :, GX : GZ + 1]), 0, 1))
+    work = np.zeros((4, count, AXES + n))
+    return Ways(
+        body=body, element=element, arm=arm, voltage=rates, scratch=np.array([scratch(), scratch()]),
+        lift=np.zeros((3, 6)), held=np.zeros((2, 3), np.int64), point=np.zeros((5, 3)), aim=work[0], middle=work[1],
+        half=work[2], state=np.zeros((2, len(new_state(numbers)))), gained=np.zeros(3), carry=np.zeros((2, n)),
+        kept=work[3],
+    )  # fmt: skip
+
+
+def _difference(values: FloatArray) -> FloatArray:
+    """Derivatives from values up (even) and down (odd) each key. Shape (2 K, ...) -> (K, ...)."""
+    return np.ascontiguousarray((values[0::2] - values[1::2]) / (2.0 * EPS))
+
+
+def _settled(robots: list[Robot], run: Run, slopes: FloatArray, dvolts: FloatArray) -> FloatArray:
+    """Derivatives of settled currents. Shape (samples, K, wheels)."""
+    assert run.twist is not None
+    assert run.voltage is not None
+    values = []
+    for j, robot in enumerate(robots):
+        eps, more = EPS * (1 - 2 * (j % 2)), dvolts[j // 2]
+        volts = run.voltage + eps * np.concatenate([more, more[-1:]])
+        values.append(settled_currents(robot, run.twist + eps * slopes[:, j // 2], volts))
+    return np.moveaxis(_difference(np.array(values)), 0, 1)
+
+
+def _refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
+    """Dry friction, or a gear loss, of 0 is not a number to differentiate by: where it is off nothing can stick."""
+    levels = np.r_[SLIDE : HOLD + 2, EFFICIENCY]
+    off = (numbers.element[:, levels] != up.element[:, levels]).any(axis=1) & (numbers.element[:, ACTIVE] == 0.0)
+    ellipse = numbers.body[ELLIPSE] == 2.0 and up.body[SLIDE_X] + up.body[SLIDE_Y] > 0.0
+    if off.any() or ellipse:
+        raise InputError(
+            "cannot differentiate with respect to what is off", got=key, expected="a level that is not 0, a loss",
+            remedy="give it a value first", where="keys",
+        )  # fmt: skip
+
+
+def with_parameter(robot: Robot, key: str, value: float) -> Robot:
+    """The robot with one number changed, checked. Raises InputError for an unknown key or a value out of range.
+
+    key: as in the robot file, such as "body.mass_kg", "friction.axes.viscous[0]". What stands once for all wheels can
+    be changed as a whole or, as "motor.resistance_ohm[2]", for one wheel, the others keeping theirs.
+    """
+    try:
+        return _set(robot, key, value, checked=True)
+    except InputError as error:
+        got, where = error.got or None, error.where if error.where.startswith(key) else key
+        raise InputError(error.what, got=got, expected=error.expected, remedy=error.remedy, where=where) from None
+
+
+def parameter(robot: Robot, key: str) -> float:
+    """The number of a robot that stands under `key`."""
+    node, field, index = _find(robot, key)
+    content = getattr(node, field)
+    return content if index is None or not isinstance(content, tuple) else content[index]
+
+
+def _scale(robot: Robot, key: str) -> float:
+    """The size of a parameter, 1 where it is 0: changes are relative to it."""
+    return abs(parameter(robot, key)) or 1.0
+
+
+def _moved(robot: Robot, key: str, scale: float, side: float) -> Robot:
+    """The robot with one number changed a little; not checked, for it may be at the end of its range."""
+    return _set(robot, key, parameter(robot, key) + side * EPS * scale, checked=False)
+
+
+_KEY = re.compile(r"([a-z_]+(?:\.[A-Za-z_0-9]+)+)(?:\[(\d+)\])?")
+
+
+def _find(robot: Robot, key: str) -> tuple[Value, str, int | None]:
+    """(the table, the name of the field, the index or None) of a key that names one number."""
+    match = _KEY.fullmatch(key)
+    if match is None:
+        raise InputError("not a key", got=key, expected='such as "body.mass_kg", "friction.axes.coulomb[1]"')
+    path, index = match[1].split("."), None if match[2] is None else int(match[2])
+    node: Any = robot
+    table, field = robot, ""
+    for part in path:
+        known = keys_of(type(node), []) if isinstance(node, Value) else {}
+        if part not in known:
+            raise InputError("unknown key", got=part, expected=" or ".join(known) or "no more", where=key)
+        table, field = node, known[part]
+        node = getattr(table, field)
+    if isinstance(node, bool) or not isinstance(node, float | int | tuple):
+        raise InputError("not a number of this robot", got=node, expected="a number that it has", where=key)
+    count = len(node) if isinstance(node, tuple) else robot.wheels.count if _one_per_wheel(path) else 0
+    if (index is None) if isinstance(node, tuple) else (index is not None and not count):
+        raise InputError("needs an index" if index is None else "has no index", got=key, where=key)
+    if index is not None and index >= count:
+        raise InputError("index out of range", got=index, expected=f"0 to {count - 1}", where=key)
+    return table, field, index
+
+
+def _one_per_wheel(path: list[str]) -> bool:
+    """Whether a list under this key means one value per wheel."""
+    return path[0] in ("wheels", "motor") or path[:2] == ["friction", "wheels"]
+
+
+def _set(robot: Robot, key: str, value: float, checked: bool) -> Robot:
+    table, field, index = _find(robot, key)
+    content: Any = value
+    if index is not None:
+        old = getattr(table, field)
+        many = list(old) if isinstance(old, tuple) else [old] * robot.wheels.count
+        many[index] = value
+        content = tuple(many)
+    changes: Any = {field: content}
+    names: list[tuple[Any, str]] = []  # the tables on the way, outermost first
+    node: Any = robot
+    for part in key.partition("[")[0].split(".")[:-1]:
+        names.append((node, keys_of(type(node), [])[part]))
+        node = getattr(*names[-1])
+    new = _changed(node, changes, checked)
+    for outer, name in reversed(names):
+        new = _changed(outer, {name: new}, checked)
+    return new
+
+
+def _changed(node: Value, changes: dict[str, Any], checked: bool) -> Any:
+    return node.replace(**changes) if checked else node.model_copy(update=changes)
