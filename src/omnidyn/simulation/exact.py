@@ -92,6 +92,7 @@ def drive_acceleration(system: StateSpace, voltage: FloatArray) -> FloatArray:
 
 
 def refuse_spin(turn: FloatArray) -> None:
+    """Raises InputError when one step turns the robot by more than MAX_TURN_PER_STEP. `turn` [rad], shape (n,)."""
     row = int(np.argmax(turn))
     if not turn[row] <= MAX_TURN_PER_STEP:
         raise InputError(
