@@ -19,6 +19,7 @@ CHANNELS = {
     "voltage": WHEEL,
     "duty": WHEEL,
     "current": WHEEL,
+    "wheel_angle": WHEEL,
     "wheel_speed": WHEEL,
     "wheel_speed_command": WHEEL,
     "twist": AXIS,
@@ -33,7 +34,8 @@ class Run:
     """One run. All channels have the length of `t`; one that was not measured is None, a missing value is NaN.
 
     t: time [s], strictly increasing, need not be regular. Shape (samples,).
-    voltage [V], duty [-1..1], current [A], wheel_speed and wheel_speed_command [rad/s]. Shape (samples, wheels).
+    voltage [V], duty [-1..1], current [A], wheel_angle (turned since the start, not wrapped) [rad], wheel_speed and
+    wheel_speed_command [rad/s], all at the wheel, behind the gear. Shape (samples, wheels).
     twist and twist_command: (v_x, v_y, omega) in the body frame [m/s, m/s, rad/s]. Shape (samples, 3).
     pose: (x, y, heading) in the world [m, m, rad], heading not wrapped. Shape (samples, 3).
     supply: voltage of the battery [V]. Shape (samples,).
@@ -46,6 +48,7 @@ class Run:
     voltage: FloatArray | None = None
     duty: FloatArray | None = None
     current: FloatArray | None = None
+    wheel_angle: FloatArray | None = None
     wheel_speed: FloatArray | None = None
     wheel_speed_command: FloatArray | None = None
     twist: FloatArray | None = None

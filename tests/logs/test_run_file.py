@@ -12,10 +12,10 @@ from hypothesis.extra.numpy import arrays
 from omnidyn import load_robot, simulate, write_run
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.logs.run_file import read_run, run_to_csv
-from omnidyn.run import Run
+from omnidyn.run import CHANNELS, Run
 
 HEADER = (
-    "t_s,u1_V,u2_V,u3_V,d1_duty,d2_duty,d3_duty,i1_A,i2_A,i3_A,w1_rad_s,w2_rad_s,w3_rad_s,"
+    "t_s,u1_V,u2_V,u3_V,d1_duty,d2_duty,d3_duty,i1_A,i2_A,i3_A,a1_rad,a2_rad,a3_rad,w1_rad_s,w2_rad_s,w3_rad_s,"
     "w1_cmd_rad_s,w2_cmd_rad_s,w3_cmd_rad_s,vx_m_s,vy_m_s,omega_rad_s,"
     "vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V"
 )
@@ -23,7 +23,7 @@ HEADER = (
 
 def full_run(n=5, seed=1):
     draw = np.random.default_rng(seed).normal
-    wheel = {name: draw(size=(n, 3)) for name in ("voltage", "duty", "current", "wheel_speed", "wheel_speed_command")}
+    wheel = {name: draw(size=(n, 3)) for name in CHANNELS if CHANNELS[name] == "wheel"}
     axis = {name: draw(size=(n, 3)) for name in ("twist", "twist_command", "pose")}
     return Run(t=np.arange(n) * 0.1, **wheel, **axis, supply=draw(size=n))
 

@@ -1,6 +1,6 @@
 """Run files: a Run as CSV, to the last bit.
 
-    t_s,u1_V..,d1_duty..,i1_A..,w1_rad_s..,w1_cmd_rad_s..,vx_m_s,vy_m_s,omega_rad_s,
+    t_s,u1_V..,d1_duty..,i1_A..,a1_rad..,w1_rad_s..,w1_cmd_rad_s..,vx_m_s,vy_m_s,omega_rad_s,
     vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V
 
 A channel that was not measured has no columns, a missing value is an empty cell. Numbers are written with the
@@ -20,31 +20,16 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.files import check_output, write_atomic
+from omnidyn.logs.channels import components, si_suffix
 from omnidyn.logs.table import Table, read_table
-from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
+from omnidyn.run import CHANNELS, SCALAR, Run
 
 FloatArray = NDArray[np.float64]
-
-_WHEEL_COLUMNS = {
-    "voltage": "u{}_V",
-    "duty": "d{}_duty",
-    "current": "i{}_A",
-    "wheel_speed": "w{}_rad_s",
-    "wheel_speed_command": "w{}_cmd_rad_s",
-}
-_OTHER_COLUMNS = {
-    "twist": ("vx_m_s", "vy_m_s", "omega_rad_s"),
-    "twist_command": ("vx_cmd_m_s", "vy_cmd_m_s", "omega_cmd_rad_s"),
-    "pose": ("x_m", "y_m", "heading_rad"),
-    "supply": ("supply_V",),
-}
 
 
 def columns_of(channel: str, wheels: int) -> list[str]:
     """Names of the columns of a channel, such as u1_V, u2_V, u3_V."""
-    if CHANNELS[channel] == WHEEL:
-        return [_WHEEL_COLUMNS[channel].format(wheel + 1) for wheel in range(wheels)]
-    return list(_OTHER_COLUMNS[channel])
+    return [f"{component}_{si_suffix(component)}" for component in components(channel, wheels)]
 
 
 def write_run(run: Run, path: str | os.PathLike, force: bool = False) -> Path:
@@ -121,7 +106,7 @@ def read_run(path: str | os.PathLike) -> Run:
 
 def _wheel_count(names: Sequence[str]) -> int:
     """The highest number of a wheel in the names of the columns; no more than there are columns."""
-    numbered = (re.fullmatch(r"[udiw](\d{1,4})_\w+", name, re.ASCII) for name in names)
+    numbered = (re.fullmatch(r"[udiaw](\d{1,4})_\w+", name, re.ASCII) for name in names)
     return min(max((int(match[1]) for match in numbered if match), default=0), len(names))
 
 
