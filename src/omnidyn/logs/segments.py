@@ -1,0 +1,22 @@
+"""Where a log has gaps: no one may integrate, difference or average across one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+GAP = 3.5  # a step so many times the usual one is a gap: three samples or more are lost
+
+
+def segments(t: NDArray[np.float64], gap: float = GAP) -> list[slice]:
+    """The pieces of a log between its gaps, in order. t [s], shape (n,), increasing.
+
+    A gap is a step longer than `gap` times the median step, and than twice the step that 95 % of all stay below:
+    a log on change has long steps without a gap.
+    """
+    if len(t) < 3:
+        return [slice(0, len(t))]
+    steps = np.diff(t)
+    limit = max(gap * float(np.median(steps)), 2.0 * float(np.quantile(steps, 0.95)))
+    cuts = np.flatnonzero(steps > limit) + 1
+    return [slice(int(a), int(b)) for a, b in zip([0, *cuts], [*cuts, len(t)], strict=True)]
