@@ -36,7 +36,9 @@ _TABLE: dict[str, dict[str, float]] = {
     DUTY: {"duty": 1.0, "%": 0.01, "percent": 0.01, "pwm": 1.0 / 255.0},
     LENGTH: {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "inch": 0.0254},
     SPEED: {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1.0 / 3.6},
-    ANGLE: {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "°": DEGREE, "rev": TURN, "turn": TURN, "turns": TURN, "rot": TURN},
+    ANGLE: {
+        "rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "°": DEGREE, "rev": TURN, "turn": TURN, "turns": TURN, "rot": TURN,
+    },
     TURN_RATE: {
         "rad/s": 1.0, "mrad/s": 1e-3, "deg/s": DEGREE, "°/s": DEGREE, "dps": DEGREE, "rpm": TURN / 60.0,
         "1/min": TURN / 60.0, "rev/min": TURN / 60.0, "rot/min": TURN / 60.0, "rev/s": TURN, "rot/s": TURN,
@@ -50,12 +52,12 @@ _UNIT = re.compile(rf"(?:({_NUMBER})\s*\*?\s*)?([^\d\s].*?)(?:\s*/\s*({_NUMBER})
 
 # How people write them otherwise.
 _SPELLINGS = {
-    "rad/sec": "rad/s", "rad s^-1": "rad/s", "rad/s": "rad/s", "radians": "rad", "radian": "rad", "degrees": "deg",
-    "degree": "deg", "deg/sec": "deg/s", "m/sec": "m/s", "RPM": "rpm", "U/min": "rpm", "r/min": "rpm",
-    "seconds": "s", "second": "s", "milliseconds": "ms", "msec": "ms", "usec": "us", "meter": "m", "meters": "m",
-    "metre": "m", "metres": "m", "Volt": "V", "Volts": "V", "Ampere": "A", "Amps": "A", "Amp": "A", "ticks/rev": "ticks",
-    "v": "V", "a": "A", "S": "s", "MS": "ms", "Rad/s": "rad/s", "Deg": "deg", "Rad": "rad", "PWM": "pwm", "m s^-1": "m/s",
-    "rad_s": "rad/s", "m_s": "m/s", "deg_s": "deg/s", "rot_s": "rot/s", "mm_s": "mm/s", "rev_s": "rev/s",
+    "rad/sec": "rad/s", "rad s^-1": "rad/s", "Rad/s": "rad/s", "radians": "rad", "radian": "rad", "Rad": "rad",
+    "degrees": "deg", "degree": "deg", "Deg": "deg", "deg/sec": "deg/s", "m/sec": "m/s", "m s^-1": "m/s",
+    "RPM": "rpm", "U/min": "rpm", "r/min": "rpm", "seconds": "s", "second": "s", "S": "s", "milliseconds": "ms",
+    "msec": "ms", "MS": "ms", "usec": "us", "meter": "m", "meters": "m", "metre": "m", "metres": "m", "Volt": "V",
+    "Volts": "V", "v": "V", "Ampere": "A", "Amps": "A", "Amp": "A", "a": "A", "PWM": "pwm", "rad_s": "rad/s",
+    "m_s": "m/s", "deg_s": "deg/s", "rot_s": "rot/s", "mm_s": "mm/s", "rev_s": "rev/s",
 }  # fmt: skip
 
 
