@@ -22,7 +22,7 @@ ORDER = {
     "simulation": """inputs commands exact_step travel exact exact_inductance_step exact_inductance_travel
         exact_inductance implicit_step implicit simulate tangent_step tangent_events
         tangent_march tangent""",
-    "logs": """channels dialect table parquet tables run_file steady_table command_file mapping guess log read_log
+    "logs": """channels dialect table parquet tables run_file steady_table command_file words mapping guess log read_log
         segments plateaus findings check""",
     "comparison": "",
     "identification": "estimate line points doubts steady_state band",
@@ -34,7 +34,7 @@ ORDER = {
     "report/figures": "robot traces friction steps dead_zone dead_zone_map reconcile",
     "export": "",
     "interop": "",
-    "cli": """streams numbers session progress init check plan identify simulate friction deadzone compare
+    "cli": """streams numbers session progress log_options init check plan identify simulate friction deadzone compare
         track tune sweep export robots demo_folder claims_table demo app outcome""",
     "studio": "",
 }

@@ -6,18 +6,21 @@ A Run needs times that increase; a log may have any. `check` reads the Log, ever
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
+from omnidyn.logs.channels import components, place
 from omnidyn.logs.mapping import ColumnMap
-from omnidyn.run import Run
+from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 
 FloatArray = NDArray[np.float64]
 
 MAX_MISSING = 0.2  # share of rows without a time or without any number
+ON_CHANGE = 0.2  # a component with more blank cells than this share is recorded on change
+HELD = ("voltage", "duty", "wheel_speed_command", "twist_command")  # what is commanded holds until the next value
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +49,11 @@ class Log:
     @property
     def wheels(self) -> int | None:
         """Number of wheels or motors; None where no channel of wheels was recorded."""
-        counts = [values.shape[1] for name, values in self.channels.items() if name in WHEEL_CHANNELS]
+        counts = [values.shape[1] for name, values in self.channels.items() if CHANNELS[name] == WHEEL]
         return counts[0] if counts else None
 
     def rows(self, keep: NDArray) -> Log:
         """The log with some of its rows: a mask, indices or a slice."""
-        from dataclasses import replace
-
         channels = {name: values[keep] for name, values in self.channels.items()}
         return replace(self, t=self.t[keep], lines=self.lines[keep], channels=channels)
 
@@ -71,10 +72,35 @@ class Log:
             warnings.append(f"time goes back {int((np.diff(log.t) < 0.0).sum())} times: rows were sorted")
             log = log.rows(np.argsort(log.t, kind="stable"))
         log._refuse_backward()
-        log = log._without(
-            np.concatenate([[False], np.diff(log.t) == 0.0]), "repeat the time of the row before", warnings
-        )
-        return Run(t=log.t, **log.channels, source=self.source, warnings=tuple(warnings))
+        repeated = np.concatenate([[False], np.diff(log.t) == 0.0])
+        if len(log) > 1 and repeated.sum() == len(log) - 1:
+            raise InputError(
+                "time stands still", got=f"t = {log.t[0]:.9g} s in all {len(log)} rows", expected="times that increase",
+                where=self.source,
+            )  # fmt: skip
+        log = log._without(repeated, "repeat the time of the row before", warnings, bound=1.0)
+        channels = {name: log._aligned(name, values, warnings) for name, values in log.channels.items()}
+        return Run(t=log.t, **channels, source=self.source, warnings=tuple(warnings))
+
+    def _aligned(self, channel: str, values: FloatArray, warnings: list[str]) -> FloatArray:
+        """What was recorded on change: commands held, measurements interpolated, never matched by row. And the
+        latency of each component taken out.
+        """
+        columns = values.reshape(len(self), -1)
+        changed = columns.copy()
+        for k, component in enumerate(components(channel, columns.shape[1])):
+            blank = np.isnan(columns[:, k])
+            share = float(blank.mean())
+            if ON_CHANGE < share < 1.0:
+                hold = channel in HELD
+                changed[:, k] = _held(columns[:, k]) if hold else _interpolated(self.t, columns[:, k])
+                how = "held" if hold else "interpolated"
+                warnings.append(f"{component} is recorded on change ({share:.0%} of its cells are blank): {how}")
+            late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
+            if late:
+                changed[:, k] = np.interp(self.t + late, self.t, changed[:, k], right=np.nan)
+                warnings.append(f"{component} was moved back by its latency of {late:g} s")
+        return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
 
     def _empty(self) -> NDArray[np.bool_]:
         nothing = np.isnan(self.t)
@@ -121,4 +147,23 @@ class Log:
             )  # fmt: skip
 
 
-WHEEL_CHANNELS = ("voltage", "duty", "current", "wheel_angle", "wheel_speed", "wheel_speed_command")
+def _held(values: FloatArray) -> FloatArray:
+    """Each blank takes the last value before it; before the first there is none."""
+    last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
+    return np.where(last >= 0, values[last], np.nan)
+
+
+def _interpolated(t: FloatArray, values: FloatArray) -> FloatArray:
+    """Each blank between two values on the line between them; outside there is none."""
+    known = np.isfinite(values)
+    return np.interp(t, t[known], values[known], left=np.nan, right=np.nan)
+
+
+def component(log: Log, name: str) -> FloatArray | None:
+    """The values of one component, such as "u2" or "heading"; shape (rows,). None where it was not recorded."""
+    found = place(name)
+    values = log.channels.get(found[0]) if found else None
+    if found is None or values is None:
+        return None
+    column = values if values.ndim == 1 else values[:, found[1]] if found[1] < values.shape[1] else None
+    return None if column is None or np.isnan(column).all() else column

@@ -1,0 +1,155 @@
+"""Options that every command that reads logs has, and how they become Logs."""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from omnidyn.cli.streams import say
+
+if TYPE_CHECKING:
+    from omnidyn.logs.log import Log
+    from omnidyn.logs.mapping import ColumnMap
+    from omnidyn.logs.read_log import LogOptions
+    from omnidyn.model.robot import Robot
+
+ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".parquet", ".pq", ".log")  # what is taken from a folder
+MAX_FILES = 100_000
+
+LOGS = typer.Argument(metavar="LOG...", help="Logs (CSV, Parquet), or folders of them.")
+MAP = typer.Option("", "--map", metavar="FILE", help="Which column is what (TOML), instead of a guess.")
+COLUMN = typer.Option(
+    [], "--column", metavar="CH=COL:UNIT", help="One column: u1=motor_1_volts:V, w2=-m2vel:rpm@motor. Repeatable."
+)
+ASSUME = typer.Option([], "--assume", metavar="NAME=UNIT", help="Unit of a column, or of all u, w, vx, ... Repeatable.")
+LATENCY = typer.Option([], "--latency", metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.")
+SAVE_MAP = typer.Option("", "--save-map", metavar="FILE", help="Write the map that was used (TOML).")
+SORT = typer.Option(False, "--sort", help="Sort rows whose time goes back, instead of refusing them.")
+NO_HEADER = typer.Option(False, "--no-header", help="The file has no header: columns are c1, c2, ...")
+SKIP_BAD_ROWS = typer.Option(False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.")
+CURRENT_UNSIGNED = typer.Option(
+    False, "--current-unsigned", help="Currents are |i|: they get the sign of the commanded speed."
+)
+
+
+def log_options(
+    map_file: str = "",
+    column: Sequence[str] = (),
+    assume: Sequence[str] = (),
+    latency: Sequence[str] = (),
+    no_header: bool = False,
+    skip_bad_rows: bool = False,
+    current_unsigned: bool = False,
+) -> LogOptions:
+    """The options as the readers take them. Raises InputError for what cannot be read."""
+    from omnidyn.logs.mapping import load_map
+    from omnidyn.logs.read_log import LogOptions
+
+    return LogOptions(
+        columns=load_map(map_file) if map_file else None,
+        overrides=tuple(column),
+        assume=dict(_pair("--assume", text, "u=% or w1=rpm") for text in assume),
+        latency={name: _seconds(text) for name, text in (_pair("--latency", each, "w=0.02") for each in latency)},
+        header=not no_header,
+        skip_bad_rows=skip_bad_rows,
+        current_unsigned=current_unsigned,
+    )
+
+
+def _pair(option: str, text: str, example: str) -> tuple[str, str]:
+    from omnidyn.errors import InputError
+
+    name, equals, value = text.rpartition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise InputError("cannot read the option", got=text, expected=f"NAME=VALUE, such as {example}", where=option)
+    return name.strip(), value.strip()
+
+
+def _seconds(text: str) -> float:
+    from omnidyn.errors import InputError
+
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError("not a number of seconds", got=text, expected="w=0.02", where="--latency") from None
+
+
+def log_files(arguments: Sequence[str]) -> list[str]:
+    """The files of LOG...: a folder stands for the logs in it and below, in the order of their names.
+
+    Numbers in names count as numbers (exp2 before exp10). Raises InputError for a folder without logs.
+    """
+    from omnidyn.errors import InputError
+
+    files: list[str] = []
+    for argument in arguments:
+        if not os.path.isdir(argument):
+            files.append(argument)
+            continue
+        found = [str(path) for path in Path(argument).rglob("*") if path.suffix.lower() in ENDINGS and path.is_file()]
+        if not found:
+            raise InputError("no log in the folder", expected=f"files that end in {' '.join(ENDINGS)}", where=argument)
+        files += sorted(found, key=_natural)
+    if len(files) > MAX_FILES:
+        raise InputError("too many files", got=len(files), expected=f"at most {MAX_FILES}")
+    return list(dict.fromkeys(files))
+
+
+def _natural(path: str) -> list[Any]:
+    import re
+
+    return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", path)]
+
+
+def matches(path: str, pattern: str) -> bool:
+    """Whether a file belongs to a group: its path matches the glob, or lies in the folder of that name."""
+    plain = os.path.normpath(path)
+    folder = os.path.normpath(pattern)
+    if fnmatch.fnmatch(plain, folder) or fnmatch.fnmatch(os.path.basename(plain), pattern):
+        return True
+    parents = [str(parent) for parent in Path(plain).parents]
+    return any(fnmatch.fnmatch(parent, folder) or os.path.basename(parent) == folder for parent in parents)
+
+
+def load_logs(
+    files: Sequence[str], robot: Robot | None, options: LogOptions, now: Any = None
+) -> Iterator[tuple[str, Log]]:
+    """Each file as a Log, in order. `now` shows progress. Raises InputError at the first that cannot be read."""
+    from omnidyn.logs.read_log import load_log
+
+    for k, path in enumerate(files):
+        if now is not None and len(files) > 1:
+            now(f"reading {k + 1} of {len(files)}")
+        yield path, load_log(path, robot, options)
+
+
+class Maps:
+    """What the columns were taken for: said once for all files that agree."""
+
+    def __init__(self, save: str = "", force: bool = False) -> None:
+        self.save, self.force, self.said = save, force, set()
+        if save:
+            from omnidyn.files import check_output
+
+            check_output(save, force)
+
+    def show(self, path: str, columns: ColumnMap) -> None:
+        """Say a map on stderr, unless it was said before; write the first where --save-map asks."""
+        from omnidyn.logs.mapping import save_map
+
+        lines = (*columns.lines(), *(f"doubt: {words}" for words in columns.doubts))
+        if lines in self.said:
+            return
+        if self.save and not self.said:
+            save_map(columns, self.save, self.force)
+        self.said.add(lines)
+        say(f"omnidyn: columns of {path}:")
+        for line in lines:
+            say(f"omnidyn:   {line}")
+        if columns.unused:
+            say(f"omnidyn:   not used: {', '.join(columns.unused)}")

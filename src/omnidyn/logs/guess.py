@@ -1,0 +1,372 @@
+"""Guess which column is which component, from names and units. A doubtful column is not taken: it is named, with
+the words that would settle it. What was guessed is always shown.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.logs import words
+from omnidyn.logs.channels import TIME, place, si_suffix
+from omnidyn.logs.mapping import MOTOR_SIDE, SIDED, WHEEL_SIDE, Column, ColumnMap, component_channel, quantity_of
+from omnidyn.logs.table import Table
+from omnidyn.logs.words import Words, read_name
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel, wheel_speed
+from omnidyn.units import COUNT, Unit, known_unit, parse_unit
+from omnidyn.units import CURRENT as CURRENT_UNIT
+from omnidyn.units import DUTY as DUTY_UNIT
+from omnidyn.units import TIME as TIME_UNIT
+from omnidyn.units import TURN_RATE as TURN_RATE_UNIT
+from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
+
+FloatArray = NDArray[np.float64]
+
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0  # [s] between rows: what a log of a robot may have
+TIME_NAMES = ("s", "ms", "us", "ns")
+SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
+SI = {"rad_s": "rad/s", "m_s": "m/s"}
+
+# Kinds of columns that have a number: role -> letter of the component. The first that fits counts.
+_NUMBERED = (
+    (words.CURRENT, "i"), (words.DUTY, "d"), (words.VOLTAGE, "u"), (words.RATE, "w"), (words.ANGLE, "a"),
+)  # fmt: skip
+_BY_UNIT = {VOLTAGE_UNIT: "u", CURRENT_UNIT: "i", DUTY_UNIT: "d", TURN_RATE_UNIT: "w", "angle": "a", COUNT: "a"}
+_BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
+
+
+class _Doubt(NamedTuple):
+    """A column that was not taken: what it looks like, why not, and the unit that would settle it."""
+
+    name: str
+    component: str
+    why: str
+    units: tuple[str, ...] = ("UNIT",)
+
+
+@dataclass
+class _Guess:
+    """What is found so far. si: columns without a unit, and the SI unit they are taken in."""
+
+    columns: dict[str, Column] = field(default_factory=dict)
+    doubts: list[_Doubt] = field(default_factory=list)
+    si: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def doubt_words(self) -> tuple[str, ...]:
+        """The doubts, columns of one kind in one sentence."""
+        groups: dict[tuple, list[_Doubt]] = {}
+        for doubt in self.doubts:
+            groups.setdefault((_letter(doubt.component), doubt.why, doubt.units), []).append(doubt)
+        return tuple(_doubt_sentence(letter, why, units, each) for (letter, why, units), each in groups.items())
+
+    def note_words(self) -> tuple[str, ...]:
+        if not self.si:
+            return tuple(self.notes)
+        units = ", ".join(dict.fromkeys(self.si.values()))
+        return (*self.notes, f"no unit is given for {', '.join(self.si)}: taken as SI ({units})")
+
+
+def _letter(component: str) -> str:
+    """ "u" of "u2": what --assume takes for all of its kind."""
+    return re.sub(r"[0-9]+", "", component)
+
+
+def _doubt_sentence(letter: str, why: str, units: tuple[str, ...], doubts: list[_Doubt]) -> str:
+    names = ", ".join(doubt.name for doubt in doubts)
+    like = ", ".join(dict.fromkeys(doubt.component for doubt in doubts))
+    looks = "looks" if len(doubts) == 1 else "look"
+    if not units:
+        return f"{names} {looks} like {like}, {why}: not taken"
+    if len(doubts) == 1 and letter == doubts[0].component:
+        remedy = " or ".join(f'--column "{like}={names}:{unit}"' for unit in units)
+    else:
+        remedy = " or ".join(f"--assume {letter}={unit}" for unit in units)
+    return f"{names} {looks} like {like}, but {why}: not taken; say {remedy}"
+
+
+def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str, str] | None = None) -> ColumnMap:
+    """Guess the map of a table. robot: settles what a name leaves open (volts or duty, which side of the gear).
+
+    assume: name of a column or letter of a component ("u", "w1", "vx") -> unit, where the file gives none. A name that
+    a units row or its own ending gives a unit needs none. Raises InputError for an unknown unit in `assume`.
+    """
+    assumed = {name: parse_unit(text).text for name, text in (assume or {}).items()}
+    found = _Guess()
+    names = [name for name in table.names if not isinstance(table.columns[name], tuple)]
+    numbers = _wheel_numbers(names, found)
+    for name in names:
+        _take(table, name, numbers, assumed, robot, found)
+    _take_time(table, assumed, found)
+    if not numbers:
+        _take_bench(table, names, assumed, found)
+    _settle_side(table, robot, found)
+    used = {column.name for column in found.columns.values()}
+    unused = tuple(name for name in table.names if name not in used)
+    ordered = dict(sorted(found.columns.items(), key=lambda item: _order(item[0])))
+    return ColumnMap(ordered, unused, found.doubt_words(), found.note_words())
+
+
+def _order(component: str) -> tuple[int, str, int]:
+    found = place(component)
+    return (0, "", 0) if found is None else (1, found[0], found[1])
+
+
+def _wheel_numbers(names: list[str], found: _Guess) -> dict[int, int]:
+    """Number in a name -> number of the wheel from 1; a log that counts from 0 is shifted."""
+    numbers = {read_name(name).number for name in names if _numbered_kind(read_name(name), None) is not None}
+    plain = sorted(number for number in numbers if number is not None)
+    shift = 1 if plain[:1] == [0] else 0
+    if shift:
+        found.notes.append("wheels are numbered from 0 in the file: 0 is wheel 1")
+    return {number: number + shift for number in plain}
+
+
+def _numbered_kind(name: Words, unit: Unit | None) -> str | None:
+    """The letter of a component of a wheel, None where the words do not say. A unit outweighs a word."""
+    if name.number is None:
+        return None
+    unit = unit or name.unit
+    if unit is not None and unit.quantity in _BY_UNIT:
+        by_word = any(role in name.roles for role, _ in _NUMBERED)
+        if by_word or name.roles & {words.MOTOR, words.WHEEL} or not name.roles - {words.OTHER}:
+            return _BY_UNIT[unit.quantity]
+    return next((letter for role, letter in _NUMBERED if role in name.roles), None)
+
+
+def _take(
+    table: Table, name: str, numbers: Mapping[int, int], assumed: Mapping[str, str], robot: Robot | None, found: _Guess
+) -> None:
+    """One column: which component it is, in which unit; or a doubt."""
+    given = table.units.get(name, "")
+    unit = known_unit(assumed[name]) if name in assumed else known_unit(given) if given else None
+    parts = read_name(name)
+    component = _exact(name) or _component(parts, unit, numbers)
+    if component is None:
+        return
+    if component in found.columns:
+        found.doubts.append(_Doubt(name, component, f"which is {found.columns[component].name} already", ()))
+        return
+    assumption = assumed.get(component) or assumed.get(component.rstrip("0123456789"))
+    if assumption is not None:
+        unit = parse_unit(assumption)
+    unit = unit or parts.unit
+    if unit is None and given and given not in ("-", "SI"):
+        found.doubts.append(_Doubt(name, component, f"the unit {given} is unknown"))
+        return
+    if unit is None:
+        unit = _unit_of(table, name, component, robot, found)
+    if unit is not None:
+        _enter(name, component, unit, parts, found)
+
+
+def _exact(name: str) -> str | None:
+    """The component of a column named as in a run file, such as w1_cmd_rad_s."""
+    for size in (1, 2):
+        component, suffix = "_".join(name.split("_")[:-size]), "_".join(name.split("_")[-size:])
+        if component and (place(component) or component == TIME) and si_suffix(component) == suffix:
+            return component
+    return None
+
+
+def _component(name: Words, unit: Unit | None, numbers: Mapping[int, int]) -> str | None:
+    """The component that the words of a name say, None where they say none or too many."""
+    if words.OTHER in name.roles and not (name.number is not None and (unit or name.unit)):
+        return None
+    command = "_cmd" if words.COMMAND in name.roles else ""
+    letter = _numbered_kind(name, unit)
+    if name.number is not None:
+        if letter is None or name.number not in numbers or (command and letter in "ia"):
+            return None
+        return f"{letter}{numbers[name.number]}{command if letter == 'w' else ''}"
+    if words.SUPPLY in name.roles:
+        return None if words.CURRENT in name.roles else "supply"
+    return _body_component(name, unit or name.unit, command)
+
+
+def _body_component(name: Words, unit: Unit | None, command: str) -> str | None:
+    roles = name.roles
+    if roles & {words.CURRENT, words.VOLTAGE, words.DUTY, words.TIME, words.MOTOR}:
+        return None
+    for letter, (speed, position) in _BODY.items():
+        if speed in roles or (letter in roles and roles & {words.RATE, words.LINEAR}):
+            return speed + command
+        if letter in roles and not command:
+            return position
+    turning = unit is None or unit.quantity == TURN_RATE_UNIT
+    if words.RATE in roles and turning and (words.YAW in roles or words.BODY in roles or command):
+        return "omega" + command
+    if words.YAW in roles and words.RATE not in roles and not command:
+        return "heading"
+    if words.LINEAR in roles and words.RATE not in roles:
+        return "vx" + command  # the paper's v
+    if words.RATE in roles and not command and turning and words.ANGLE not in roles:
+        return "omega"
+    return "heading" if roles == {words.ANGLE} and unit is not None and unit.quantity == "angle" else None
+
+
+def _enter(name: str, component: str, unit: Unit, parts: Words, found: _Guess) -> None:
+    """Take a column, where its unit measures what the component is."""
+    wanted = quantity_of(component)
+    if unit.quantity == DUTY_UNIT and wanted == VOLTAGE_UNIT and component != "supply":
+        component = "d" + component[1:]
+    elif unit.quantity == VOLTAGE_UNIT and wanted == DUTY_UNIT:
+        component = "u" + component[1:]
+    elif unit.quantity == COUNT:
+        found.doubts.append(_Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
+        return
+    elif unit.quantity != wanted:
+        found.doubts.append(_Doubt(name, component, f"{unit.text} is no unit of a {wanted}"))
+        return
+    side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in parts.roles else WHEEL_SIDE
+    found.columns[component] = Column(name, unit.text, side)
+
+
+def _unit_of(table: Table, name: str, component: str, robot: Robot | None, found: _Guess) -> Unit | None:
+    """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
+    suffix = si_suffix(component)
+    if suffix in ("V", "duty") and component != "supply":
+        return _command_unit(table.columns[name], name, component, robot, found)
+    found.si[name] = SI.get(suffix, suffix)
+    return parse_unit(found.si[name])
+
+
+def _command_unit(values, name: str, component: str, robot: Robot | None, found: _Guess) -> Unit | None:
+    """Volts or duty? Volts where the largest lies between 1 and the robot's limit; nothing else is certain."""
+    finite = np.abs(values[np.isfinite(values)])
+    largest = float(finite.max()) if finite.size else 0.0
+    if component.startswith("d") and largest <= 1.0:
+        found.notes.append(f"{name} has no unit: taken as duty, -1..1")
+        return parse_unit("duty")
+    if component.startswith("u") and robot is not None and 1.0 < largest <= 1.05 * _limit(robot):
+        found.notes.append(f"{name} has no unit: taken as V (at most {largest:.3g})")
+        return parse_unit("V")
+    looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else "a PWM value of 0..255"
+    why = f"no unit is given, and up to {largest:.3g} may be volts or {looks}"
+    found.doubts.append(_Doubt(name, component, why, ("V", "duty", "%", "duty/255")))
+    return None
+
+
+def _limit(robot: Robot) -> float:
+    return float(np.max(per_wheel(robot.motor.voltage_limit, robot.wheels.count)))
+
+
+def _take_time(table: Table, assumed: Mapping[str, str], found: _Guess) -> None:
+    """The column of time and its unit, which must be given or unmistakable."""
+    candidates = [name for name in table.names if words.TIME in read_name(name).roles]
+    candidates = [name for name in candidates if not isinstance(table.columns[name], tuple)]
+    candidates = [name for name in candidates if not read_name(name).roles - {words.TIME, words.BODY, words.MEASURED}]
+    candidates.sort(key=lambda name: (_exact(name) != TIME, table.names.index(name)))
+    if not candidates:
+        increasing = [name for name in table.names if _increases(table.columns[name])]
+        if increasing:
+            found.doubts.append(_Doubt(increasing[0], TIME, "its name and unit do not say how long one count is"))
+        return
+    name = candidates[0]
+    text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
+    unit = known_unit(text) or read_name(name).unit
+    if unit is None:
+        unit = _plausible_time(table.numbers(name, missing=True), name, text, found)
+    if unit is not None and unit.quantity == TIME_UNIT:
+        found.columns[TIME] = Column(name, unit.text)
+    elif unit is not None:
+        found.doubts.append(_Doubt(name, TIME, f"{unit.text} is no unit of time"))
+
+
+def _increases(values: FloatArray | tuple[str, ...]) -> bool:
+    """Whether nearly every row is later than the one before: it may be a clock."""
+    if isinstance(values, tuple) or len(values) < 2:
+        return False
+    return float(np.mean(np.diff(values[np.isfinite(values)]) > 0.0)) > 0.9
+
+
+def _plausible_time(values: FloatArray, name: str, given: str, found: _Guess) -> Unit | None:
+    """The one unit under which rows are 0.1 ms to 1 s apart; None where there are two or none."""
+    finite = values[np.isfinite(values)]
+    steps = np.diff(finite)
+    steps = steps[steps > 0.0]
+    step = float(np.median(steps)) if steps.size else 0.0
+    units = [parse_unit(text) for text in TIME_NAMES]
+    possible = [unit for unit in units if SHORTEST_STEP <= step * unit.size <= LONGEST_STEP]
+    if given and given not in ("-", "SI"):
+        found.doubts.append(_Doubt(name, TIME, f"the unit {given} is unknown"))
+        return None
+    if len(possible) != 1:
+        texts = tuple(unit.text for unit in possible)
+        found.doubts.append(_Doubt(name, TIME, f"no unit is given and rows are {step:.4g} apart", texts or ("UNIT",)))
+        return None
+    found.notes.append(
+        f"{name} has no unit: taken as {possible[0].text}, rows are {step * possible[0].size:.4g} s apart"
+    )
+    return possible[0]
+
+
+def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], found: _Guess) -> None:
+    """A log of one motor, whose columns need no number: voltage, current, velocity, position."""
+    body = {component for component in found.columns if component not in (TIME, "supply")}
+    if body - {"omega", "heading"}:
+        return
+    for name in names:
+        parts = read_name(name)
+        letter = _numbered_kind(parts._replace(number=1), known_unit(table.units.get(name, "")))
+        if letter is None or parts.number is not None or parts.roles & {words.X, words.Y, words.SUPPLY, words.TIME}:
+            continue
+        for component in [key for key, column in found.columns.items() if column.name == name]:
+            del found.columns[component]
+        found.doubts = [doubt for doubt in found.doubts if doubt.name != name]
+        found.si.pop(name, None)
+        single = read_name(name)._replace(number=1)
+        unit = known_unit(assumed.get(name) or assumed.get(letter) or table.units.get(name, "")) or parts.unit
+        command = "_cmd" if words.COMMAND in single.roles and letter == "w" else ""
+        component = f"{letter}1{command}"
+        unit = unit or _unit_of(table, name, component, None, found)
+        if unit is not None and component not in found.columns:
+            _enter(name, component, unit, single, found)
+    if any(place(component) and component.endswith("1") for component in found.columns):
+        found.notes.append("no wheel has a number: taken as a log of one motor")
+
+
+def _settle_side(table: Table, robot: Robot | None, found: _Guess) -> None:
+    """Commands of body and of wheels tell the side of the gear: they differ by the gear ratio on the other one."""
+    if robot is None:
+        return
+    count = robot.wheels.count
+    body = [found.columns.get(name) for name in ("vx_cmd", "vy_cmd", "omega_cmd")]
+    mine = [found.columns.get(f"w{wheel + 1}_cmd") for wheel in range(count)]
+    gear = per_wheel(robot.motor.gear_ratio, count)
+    if None in body or None in mine or np.all(np.abs(gear - 1.0) < 2.0 * SAME_SIDE):
+        return
+    twist, speed = (_values(table, columns) for columns in (body, mine))
+    expected = wheel_speed(robot.wheels, twist)
+    size = float(np.nansum(np.abs(expected)))
+    if not size > 0.0:
+        return
+    ratio = float(np.nansum(np.abs(speed))) / size
+    for side, factor in ((WHEEL_SIDE, 1.0), (MOTOR_SIDE, float(np.mean(gear)))):
+        if abs(ratio / factor - 1.0) < SAME_SIDE and mine[0].side != side:  # type: ignore[union-attr]
+            for component, column in found.columns.items():
+                if component_channel(component) in SIDED:
+                    found.columns[component] = Column(column.name, column.unit, side)
+            found.notes.append(
+                f"speeds of wheels are on the {side} side: the commands are {ratio:.4g} times those of the body"
+            )
+
+
+def _values(table: Table, columns: list[Column | None]) -> FloatArray:
+    return np.column_stack([table.numbers(c.name, missing=True) * c.factor for c in columns if c is not None])
+
+
+def refuse_doubtful(columns: ColumnMap, where: str) -> None:
+    """Raises InputError where nothing tells the time: without it there is no log."""
+    if TIME not in columns.columns:
+        doubt = next((doubt for doubt in columns.doubts if f" {TIME}, " in doubt), "")
+        remedy = doubt.rpartition("; ")[2] or "say which column it is: --column t=COLUMN:s"
+        got = doubt.partition(": not taken")[0] or "no column that looks like a time"
+        raise InputError("cannot tell the time of the rows", got=got, remedy=remedy, where=where)

@@ -1,0 +1,210 @@
+"""Logs of any kind: a file, its columns guessed or given, in SI and by channel."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.logs.channels import TIME, components, place
+from omnidyn.logs.guess import guess_columns, refuse_doubtful
+from omnidyn.logs.log import Log
+from omnidyn.logs.mapping import MOTOR_SIDE, Column, ColumnMap, component_channel, load_map, parse_column
+from omnidyn.logs.table import Table, read_table
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel, wheel_speed
+from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
+
+FloatArray = NDArray[np.float64]
+
+EPOCH = 1e8  # [s]; a later time counts from 1970: the start of the log is taken off, so that no digits are lost
+STILL = 1e-6  # [rad/s] a commanded speed below counts as none
+
+
+@dataclass(frozen=True)
+class LogOptions:
+    """How to read a log.
+
+    columns: a map, used instead of a guess. overrides: component -> "COLUMN:UNIT[@motor]", on top of either.
+    assume: column or letter of a component -> unit, where the file gives none. latency: component, or its letter, ->
+    how late it was recorded [s]. header: whether there is one. skip_bad_rows: leave out rows that cannot be read.
+    current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage.
+    """
+
+    columns: ColumnMap | None = None
+    overrides: tuple[str, ...] = ()
+    assume: Mapping[str, str] = field(default_factory=dict)
+    latency: Mapping[str, float] = field(default_factory=dict)
+    header: bool = True
+    skip_bad_rows: bool = False
+    current_unsigned: bool = False
+
+
+def read_log(
+    path: str | os.PathLike,
+    robot: Robot | None = None,
+    *,
+    columns: ColumnMap | str | os.PathLike | Mapping[str, str] | None = None,
+    assume: Mapping[str, str] | None = None,
+    latency: Mapping[str, float] | None = None,
+    sort: bool = False,
+    header: bool = True,
+    skip_bad_rows: bool = False,
+    current_unsigned: bool = False,
+) -> Run:
+    """Read a log as a Run: columns are guessed from names and units, and what was guessed stands in its warnings.
+
+    robot: settles what names leave open, and is needed for speeds of the motor shaft. columns: a ColumnMap, the path of
+    one (TOML), or overrides such as {"u1": "motor_1_volts:V"}. sort: rows whose time goes back are sorted instead of
+    refused. The other options: see LogOptions.
+    Raises InputError for what cannot be read or is doubtful, with file, line and remedy.
+    """
+    given = columns if isinstance(columns, ColumnMap) else None
+    overrides: tuple[str, ...] = ()
+    if isinstance(columns, Mapping):
+        overrides = tuple(f"{component}={text}" for component, text in columns.items())
+    elif columns is not None and given is None:
+        given = load_map(columns)  # type: ignore[arg-type]
+    options = LogOptions(given, overrides, assume or {}, latency or {}, header, skip_bad_rows, current_unsigned)
+    log = load_log(path, robot, options)
+    run = log.to_run(sort=sort)
+    return run.replace(warnings=(*run.warnings, *log.columns.doubts))
+
+
+def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None) -> Log:
+    """Read a log as it was recorded: in SI, by channel, time not yet trusted. Raises InputError."""
+    options = options or LogOptions()
+    table = read_table(path)
+    return log_from_table(table, map_columns(table, robot, options), robot, options)
+
+
+def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> ColumnMap:
+    """The map of a table: given or guessed, with the overrides on top. Raises InputError for a column it lacks."""
+    columns = options.columns
+    if columns is None:
+        columns = guess_columns(table, robot, options.assume)
+    else:
+        used = {column.name for column in columns.columns.values()}
+        columns = replace(columns, unused=tuple(name for name in table.names if name not in used))
+    more = dict(parse_column(text, table.names) for text in options.overrides)
+    columns = _delayed(columns.with_columns(more), options.latency)
+    for component, column in columns.columns.items():
+        if column.name not in table.names:
+            raise InputError(
+                f"the log has no column for {component}", got=", ".join(table.names), expected=column.name,
+                where=table.source,
+            )  # fmt: skip
+    refuse_doubtful(columns, table.source)
+    return columns
+
+
+def _delayed(columns: ColumnMap, latency: Mapping[str, float]) -> ColumnMap:
+    """The map with latencies; "w" means every wheel's."""
+    late: dict[str, Column] = {}
+    for name, seconds in latency.items():
+        mine = [key for key in columns.columns if name in (key, key.rstrip("0123456789"), component_channel(key))]
+        if not mine or mine == [TIME]:
+            raise InputError("no such channel to delay", got=name, expected=", ".join(columns.columns))
+        late |= {key: replace(columns.columns[key], latency=seconds) for key in mine}
+    return replace(columns, columns={**columns.columns, **late}) if late else columns
+
+
+def log_from_table(table: Table, columns: ColumnMap, robot: Robot | None, options: LogOptions) -> Log:
+    """The Log of a table under a map. Raises InputError for text where numbers are needed, and for a robot with
+    another number of wheels.
+    """
+    notes = [*table.notes, *columns.notes]
+    counts = [found[1] + 1 for key in columns.columns if (found := place(key)) and CHANNELS[found[0]] == WHEEL]
+    wheels = max(counts, default=0)
+    if robot is not None and wheels > robot.wheels.count:
+        raise InputError(
+            "the log has more wheels than the robot", got=f"{wheels} wheels",
+            expected=f"{robot.wheels.count}, as {robot.name} has", where=table.source,
+        )  # fmt: skip
+    if robot is not None and wheels > 1:
+        wheels = robot.wheels.count
+    channels: dict[str, FloatArray] = {}
+    for key, column in columns.columns.items():
+        found = place(key)
+        if found is None:
+            continue
+        values = table.numbers(column.name, missing=True) * column.factor
+        if column.side == MOTOR_SIDE:
+            values = values / _gear(robot, found[1])
+        width = len(components(found[0], wheels))
+        channels.setdefault(found[0], np.full((len(table), width), np.nan))[:, found[1]] = values
+    if any(column.side == MOTOR_SIDE for column in columns.columns.values()) and robot is None:
+        notes.append("speeds and angles are those of the motor shaft: no robot is given, so no gear is known")
+    if "pose" in channels:
+        channels["pose"][:, 2] = _unwrapped(channels["pose"][:, 2])
+    for name in [name for name in channels if CHANNELS[name] == SCALAR]:
+        channels[name] = channels[name][:, 0]
+    t = _time(table, columns.columns[TIME], notes)
+    log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes))
+    return _signed(log, robot) if options.current_unsigned else log
+
+
+def _time(table: Table, column: Column, notes: list[str]) -> FloatArray:
+    t = table.numbers(column.name, missing=True) * column.factor
+    start = t[np.isfinite(t)][:1]
+    if start.size and abs(start[0]) > EPOCH:
+        first = table.numbers(column.name, missing=True)
+        t = (first - first[np.isfinite(first)][0]) * column.factor
+        notes.append(f"time starts at {start[0]:.6f} s, counted from an epoch: it begins at 0 here")
+    return t
+
+
+def _gear(robot: Robot | None, wheel: int) -> float:
+    return 1.0 if robot is None else float(per_wheel(robot.motor.gear_ratio, robot.wheels.count)[wheel])
+
+
+def _unwrapped(heading: FloatArray) -> FloatArray:
+    """Heading without jumps of a turn; missing values stay missing."""
+    known = np.isfinite(heading)
+    unwrapped = heading.copy()
+    unwrapped[known] = np.unwrap(heading[known])
+    return unwrapped
+
+
+def _signed(log: Log, robot: Robot | None) -> Log:
+    """Currents of a sensor without sign, with the sign of the commanded speed, else of the voltage or duty."""
+    if "current" not in log.channels:
+        return log
+    sign, origin = _direction(log, robot)
+    if sign is None or sign.shape != log.channels["current"].shape:
+        raise InputError(
+            "cannot give unsigned currents a sign", got=", ".join(log.channels),
+            expected="a commanded speed of the wheels or of the body, a voltage or a duty", where=log.source,
+        )  # fmt: skip
+    current = np.abs(log.channels["current"]) * sign
+    note = f"currents are taken as unsigned: they get the sign of the {origin}, and 0 where that is 0"
+    channels = {**log.channels, "current": current}
+    return replace(log, channels=channels, current_unsigned=True, notes=(*log.notes, note))
+
+
+def _direction(log: Log, robot: Robot | None) -> tuple[FloatArray | None, str]:
+    """Which way each motor is driven, -1, 0 or 1. Shape (rows, wheels)."""
+    speed = log.channels.get("wheel_speed_command")
+    if speed is None and robot is not None and "twist_command" in log.channels:
+        twist = log.channels["twist_command"]
+        if np.isfinite(twist).any(axis=0).all():
+            speed = wheel_speed(robot.wheels, twist)
+    if speed is not None:
+        return np.where(np.abs(speed) < STILL, 0.0, np.sign(speed)), "commanded speed"
+    for name in ("voltage", "duty"):
+        if name in log.channels:
+            return np.sign(log.channels[name]), name
+    return None, ""
+
+
+def iter_logs(tables: Iterator[Table], robot: Robot | None, options: LogOptions) -> Iterator[Log]:
+    """Logs of the pieces of a file too long for memory, all under the map of the first piece."""
+    columns: ColumnMap | None = None
+    for table in tables:
+        if columns is None:
+            columns = map_columns(table, robot, options)
+        yield log_from_table(table, columns, robot, options)

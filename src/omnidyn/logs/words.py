@@ -1,0 +1,98 @@
+"""What the name of a column says: its words, its number, its unit. "m1setvel" is motor, 1, set, velocity."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from typing import NamedTuple
+
+from omnidyn.units import Unit, known_unit
+
+TIME, SUPPLY, VOLTAGE, CURRENT, DUTY, RATE, ANGLE, COMMAND, MOTOR, WHEEL, BODY, X, Y, YAW, LINEAR, OTHER, MEASURED = (
+    "time", "supply", "voltage", "current", "duty", "rate", "angle", "command", "motor", "wheel", "body", "x", "y",
+    "yaw", "linear", "other", "measured",
+)  # fmt: skip
+
+_WORDS = {
+    TIME: "t time stamp timestamp clock zeit",
+    SUPPLY: "bat batt battery supply vbat vbatt vcc vin vbus bus akku",
+    VOLTAGE: "u volt volts voltage ua spannung",
+    CURRENT: "i cur curr current currents amp amps ia strom",
+    DUTY: "duty pwm throttle",
+    RATE: "w omega vel velocity speed spd rpm rate dps qd gyro drehzahl",
+    ANGLE: "pos position angle ang enc encoder tick ticks count counts pulses q winkel",
+    COMMAND: "set sp setpoint cmd command commanded ref reference desired des target goal req soll",
+    MOTOR: "m motor mot mtr",
+    WHEEL: "wheel wheels whl rad",
+    BODY: "b body base robot chassis odom ground cam camera imu world global",
+    X: "x vx",
+    Y: "y vy vn",
+    YAW: "theta yaw heading phi psi alpha th rot z wz gz",
+    LINEAR: "v lin linear",
+    MEASURED: "meas measured act actual fb feedback ist est filt filtered raw",
+    # Quantities that a log may hold and a Run does not, and differences from row to row.
+    OTHER: """ax ay az acc accel acceleration torque tau temp temperature power force f d dx dy dz dang dt delta error
+        err state mode id index row mag roll pitch integral index seq frame std var cov step timestep sample""",
+}  # fmt: skip
+_ROLE = {word: role for role, words in _WORDS.items() for word in words.split()}
+_ROLE |= {"vx": "vx", "vy": "vy", "vn": "vy"}
+_SHORT = ("x", "y", "z", "v", "b", "w", "m", "u", "i")  # single letters that compounds such as "vbx" are made of
+
+
+class Words(NamedTuple):
+    """A name taken apart: roles of its words, the number of the wheel or None, the unit in it or None."""
+
+    roles: frozenset[str]
+    number: int | None
+    unit: Unit | None
+
+
+@lru_cache(4096)
+def read_name(name: str) -> Words:
+    """The words of a column's name. A word that is not known counts as "other"."""
+    stem, unit = _split_unit(name.strip().replace("v_n", "vn"))
+    spread = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower()
+    numbers = re.findall(r"\d+", spread)
+    number = int(numbers[0]) if numbers and len(numbers[0]) <= 2 else None
+    words = re.findall(r"[^\W\d_]+", spread)
+    roles = {role for word in words for role in _roles(word)}
+    return Words(frozenset(roles), number, unit)
+
+
+def _split_unit(name: str) -> tuple[str, Unit | None]:
+    """A unit at the end of a name, as in w1_rad_s, i1_mA or motor_1_rpm; the longest that is one."""
+    parts = re.split(r"_", name)
+    for first in range(1, len(parts)):
+        tail = "_".join(parts[first:])
+        for text in (tail, tail.replace("_", "/")):
+            metre = text == "m" and not any(map(str.isdigit, name))  # x_m, but not 1_m
+            unit = known_unit(text) if len(text) > 1 or text in "sVAh%" or metre else None
+            if unit is not None:
+                return "_".join(parts[:first]), unit
+    return name, None
+
+
+def _roles(word: str) -> list[str]:
+    """Roles of a word, taken apart where it is a compound: "xsetspeed" is x, set, speed."""
+    if word in _ROLE:
+        return [_ROLE[word]]
+    found = _compound(word)
+    return [_ROLE[part] for part in found] if found else [OTHER]
+
+
+@lru_cache(4096)
+def _compound(word: str) -> tuple[str, ...]:
+    """The fewest known words that make up `word`, at most four; () where none do. Longest first."""
+    if len(word) > 24:
+        return ()
+    best: tuple[str, ...] = ()
+    for end in range(len(word), 0, -1):
+        head, rest = word[:end], word[end:]
+        if head not in _ROLE or (len(head) == 1 and head not in _SHORT):
+            continue
+        if not rest:
+            return (head,)
+        tail = _compound(rest)
+        if tail and len(tail) < 4 and (not best or 1 + len(tail) < len(best)):
+            best = (head, *tail)
+    return best
