@@ -67,6 +67,9 @@ def parse_unit(text: str) -> Unit:
     Counts of an encoder with a divisor are an angle: "ticks/2000". "pwm" is 0..255 unless a divisor says otherwise.
     """
     clean = text.strip()
+    whole = _SPELLINGS.get(clean, clean)
+    if whole in _NAMES:  # "1/min" too
+        return Unit(clean, *_NAMES[whole])
     match = _UNIT.fullmatch(clean)
     name = _SPELLINGS.get(match[2].strip(), match[2].strip()) if match else clean
     if match is None or name not in _NAMES:

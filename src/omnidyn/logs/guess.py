@@ -39,6 +39,7 @@ _NUMBERED = (
     (words.CURRENT, "i"), (words.DUTY, "d"), (words.VOLTAGE, "u"), (words.RATE, "w"), (words.ANGLE, "a"),
 )  # fmt: skip
 _BY_UNIT = {VOLTAGE_UNIT: "u", CURRENT_UNIT: "i", DUTY_UNIT: "d", TURN_RATE_UNIT: "w", "angle": "a", COUNT: "a"}
+NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPLY, words.TIME})
 _BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
 
 
@@ -316,7 +317,7 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
     for name in names:
         parts = read_name(name)
         letter = _numbered_kind(parts._replace(number=1), known_unit(table.units.get(name, "")))
-        if letter is None or parts.number is not None or parts.roles & {words.X, words.Y, words.SUPPLY, words.TIME}:
+        if letter is None or parts.number is not None or parts.roles & NOT_OF_A_MOTOR:
             continue
         for component in [key for key, column in found.columns.items() if column.name == name]:
             del found.columns[component]

@@ -26,7 +26,7 @@ _QUANTITIES = {
     "s": TIME_QUANTITY, "V": VOLTAGE, "duty": DUTY, "A": CURRENT, "rad": ANGLE, "rad_s": TURN_RATE, "m": LENGTH,
     "m_s": SPEED,
 }  # fmt: skip
-_SPEC = re.compile(r"(?P<invert>-)?(?P<name>.+?)(?::(?P<unit>[^:]*?)(?:@(?P<side>wheel|motor))?)?", re.DOTALL)
+_SPEC = re.compile(r"(?P<invert>-)?(?P<name>.+?)(?::(?P<unit>[^:@]*))?(?:@(?P<side>wheel|motor))?", re.DOTALL)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,257 @@
+"""Which column is what: names of real logs, doubts that are said, maps that come back equal."""
+
+import numpy as np
+import pytest
+
+from omnidyn import load_robot
+from omnidyn.errors import InputError
+from omnidyn.logs.guess import guess_columns
+from omnidyn.logs.mapping import Column, ColumnMap, load_map, map_to_toml, parse_column, save_map
+from omnidyn.logs.table import read_table
+from omnidyn.logs.words import read_name
+
+ROWS = 20
+
+
+def table_of(tmp_path, columns, units=None, name="log.csv"):
+    """A table with these columns; a number stands for a column of it."""
+    values = {key: np.broadcast_to(np.asarray(value, float), (ROWS,)) for key, value in columns.items()}
+    lines = [",".join(values)]
+    if units:
+        lines.append(",".join(units))
+    lines += [",".join(repr(float(column[k])) for column in values.values()) for k in range(ROWS)]
+    path = tmp_path / name
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    return read_table(path)
+
+
+def clock(step):
+    return np.arange(ROWS) * step
+
+
+def found(columns):
+    return {key: (column.name, column.unit, column.side) for key, column in columns.columns.items()}
+
+
+@pytest.mark.parametrize(
+    ("name", "component"),
+    [
+        ("u1_V", "u1"), ("w2_cmd_rad_s", "w2_cmd"), ("vx_cmd_m_s", "vx_cmd"), ("heading_rad", "heading"),
+        ("supply_V", "supply"), ("a3_rad", "a3"), ("d1_duty", "d1"), ("motor_1_volts", "u1"), ("motor1_rpm", "w1"),
+        ("Motor2Current_mA", "i2"), ("wheelSpeed3_rad_s", "w3"), ("vbx_sp_m_s", "vx_cmd"), ("wb_sp_rad_s", "omega_cmd"),
+        ("cmd_vel_x_m_s", "vx_cmd"), ("yaw_rate_deg_s", "omega"), ("gyro_z_deg_s", "omega"),
+        ("battery_voltage_V", "supply"),
+        ("phi_deg", "heading"), ("v_n_m_s", "vy"), ("x_mm", "x"), ("pwm1_duty", "d1"),
+    ],
+)  # fmt: skip
+def test_a_column_is_known_by_its_name_and_unit(tmp_path, name, component):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 0.5}))
+    assert list(columns.columns) == ["t", component]
+    assert columns.columns[component].name == name
+    assert columns.unused == ()
+
+
+@pytest.mark.parametrize("name", ["ax", "temperature1", "motor_1_temp", "dx", "torque2", "index", "foo", "err1"])
+def test_what_no_run_holds_is_left_alone(tmp_path, name):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 0.5}))
+    assert list(columns.columns) == ["t"]
+    assert columns.unused == (name,)
+
+
+def test_a_units_row_gives_the_units(tmp_path):
+    table = table_of(tmp_path, {"t": clock(10.0), "w1": 1, "i1": 2}, ["ms", "rpm", "mA"])
+    assert found(guess_columns(table)) == {
+        "t": ("t", "ms", "wheel"), "w1": ("w1", "rpm", "wheel"), "i1": ("i1", "mA", "wheel")
+    }  # fmt: skip
+
+
+def test_the_columns_of_the_robotino(tmp_path):
+    names = [
+        "t",
+        "xsetspeed",
+        "ysetspeed",
+        "setvel",
+        "m1setvel",
+        "m1pos",
+        "m1vel",
+        "m1cur",
+        "xcur",
+        "rotcur",
+        "xpos",
+        "ang",
+        "dx",
+        "dang",
+    ]
+    units = ["ms", "m/s", "m/s", "rad/s", "rad/s", "ticks", "rad/s", "A", "A", "A", "pix", "deg", "mm", "deg"]
+    columns = guess_columns(table_of(tmp_path, {name: clock(31.0) if name == "t" else 1.0 for name in names}, units))
+    assert {key: column.name for key, column in columns.columns.items()} == {
+        "t": "t", "i1": "m1cur", "heading": "ang", "vx_cmd": "xsetspeed", "vy_cmd": "ysetspeed", "omega_cmd": "setvel",
+        "w1": "m1vel", "w1_cmd": "m1setvel",
+    }  # fmt: skip
+    assert columns.columns["w1"].side == columns.columns["w1_cmd"].side == "motor"
+    doubts = " ".join(columns.doubts)
+    assert "m1pos looks like a1, but counts per turn are not known" in doubts
+    assert 'the unit pix is unknown: not taken; say --column "x=xpos:UNIT"' in doubts
+
+
+def test_counts_are_an_angle_once_their_counts_per_turn_are_said(tmp_path):
+    table = table_of(tmp_path, {"t_s": clock(0.01), "enc1": clock(5.0)})
+    assert "a1" not in guess_columns(table_of(tmp_path, {"t": clock(0.01), "m1pos": 3}, ["s", "ticks"])).columns
+    columns = guess_columns(table, assume={"a": "ticks/2000"})
+    assert columns.columns["a1"] == Column("enc1", "ticks/2000")
+
+
+@pytest.mark.parametrize(
+    ("step", "unit"), [(0.01, "s"), (10.0, "ms"), (0.002, "s"), (31.0, "ms"), (10_000.0, "us"), (1e7, "ns")]
+)
+def test_time_without_a_unit_is_taken_where_it_is_unmistakable(tmp_path, step, unit):
+    columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
+    assert columns.columns["t"].unit == unit
+    assert any("taken as " + unit in note for note in columns.notes)
+
+
+@pytest.mark.parametrize(("step", "units"), [(0.5, ("s", "ms")), (500.0, ("ms", "us")), (5e5, ("us", "ns"))])
+def test_time_that_may_be_two_units_is_not_taken(tmp_path, step, units):
+    columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
+    assert "t" not in columns.columns
+    assert all(f'--column "t=t:{unit}"' in columns.doubts[0] for unit in units)
+
+
+def test_a_counter_is_no_clock(tmp_path):
+    table = table_of(tmp_path, {"timestep (8Hz)": clock(45.0), "voltage": 1.0}, ["#", "V"])
+    columns = guess_columns(table)
+    assert "t" not in columns.columns
+    assert "timestep" in " ".join(columns.doubts)
+
+
+def test_volts_or_duty_is_not_guessed(tmp_path):
+    table = table_of(tmp_path, {"t_s": clock(0.01), "u1": 45.0})
+    columns = guess_columns(table)
+    assert "u1" not in columns.columns
+    assert "--assume u=V" in columns.doubts[0]
+    assert guess_columns(table, assume={"u": "%"}).columns["d1"] == Column("u1", "%")
+    assert guess_columns(table, assume={"u1": "V"}).columns["u1"] == Column("u1", "V")
+
+
+def test_volts_within_the_limit_of_the_robot_are_volts(tmp_path):
+    robot = load_robot("axebot")
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "u1": 5.5, "u2": 0.7}), robot)
+    assert columns.columns["u1"].unit == "V"
+    assert "u2" not in columns.columns  # 0.7 V, or a duty of 0.7
+
+
+def test_commands_tell_the_side_of_the_gear(tmp_path):
+    robot = load_robot("robotino")
+    vx = np.linspace(0.1, 0.3, ROWS)
+    rim = [-np.sin(np.radians(angle)) * vx for angle in (60.0, 180.0, 300.0)]
+    body = {"t_s": clock(0.01), "vx_cmd_m_s": vx, "vy_cmd_m_s": 0.0, "omega_cmd_rad_s": 0.0}
+    for factor, side in ((1.0, "wheel"), (16.0, "motor")):
+        speeds = {f"w{k + 1}_cmd_rad_s": factor * each / 0.040 for k, each in enumerate(rim)}
+        columns = guess_columns(table_of(tmp_path, {**body, **speeds}), robot)
+        assert columns.columns["w1_cmd"].side == side
+
+
+def test_wheels_may_be_counted_from_zero(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "w0_rpm": 1, "w1_rpm": 2, "w2_rpm": 3}))
+    assert [columns.columns[f"w{k}"].name for k in (1, 2, 3)] == ["w0_rpm", "w1_rpm", "w2_rpm"]
+    assert any("numbered from 0" in note for note in columns.notes)
+
+
+def test_a_log_of_one_motor_needs_no_numbers(tmp_path):
+    table = table_of(
+        tmp_path, {"time": clock(0.01), "voltage": 1, "position": 2, "velocity": 3}, ["s", "V", "turns", "turns/s"]
+    )
+    columns = guess_columns(table)
+    assert {key: column.name for key, column in columns.columns.items()} == {
+        "t": "time", "u1": "voltage", "a1": "position", "w1": "velocity"
+    }  # fmt: skip
+
+
+def test_two_columns_for_one_component_take_the_first_and_say_so(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "w1_rad_s": 1, "wheel_speed_1_rpm": 2}))
+    assert columns.columns["w1"].name == "w1_rad_s"
+    assert "wheel_speed_1_rpm looks like w1, which is w1_rad_s already: not taken" in columns.doubts
+
+
+@pytest.mark.parametrize(
+    ("text", "component", "column"),
+    [
+        ("u1=motor_1_volts:V", "u1", Column("motor_1_volts", "V")),
+        ("w2=-m2vel:rpm@motor", "w2", Column("m2vel", "rpm", "motor", True)),
+        ("w2=m2vel@motor", "w2", Column("m2vel", "rad/s", "motor")),
+        ("w2=m2vel", "w2", Column("m2vel", "rad/s")),
+        ("t=timestep (8Hz):0.125 ms", "t", Column("timestep (8Hz)", "0.125 ms")),
+        ("x=a:b", "x", Column("a:b", "m")),
+    ],
+)
+def test_a_column_on_the_command_line(text, component, column):
+    assert parse_column(text, ["a:b"]) == (component, column)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("u1", "cannot read the mapping"),
+        ("u1=", "cannot read the mapping"),
+        ("q7=a:V", "unknown channel"),
+        ("u1=a:parsec", "unknown unit"),
+    ],
+)
+def test_a_column_that_cannot_be_read_is_refused(text, words):
+    with pytest.raises(InputError, match=words):
+        parse_column(text)
+
+
+def test_a_unit_of_another_quantity_is_refused():
+    with pytest.raises(InputError, match=r"w1 cannot have this unit; got V \(voltage\); expected a turn rate"):
+        ColumnMap({"w1": Column("a", "V")})
+    with pytest.raises(InputError, match=r"say how many make a turn: ticks/2000"):
+        ColumnMap({"a1": Column("a", "ticks")})
+    with pytest.raises(InputError, match="only speeds and angles of wheels have a motor side"):
+        ColumnMap({"u1": Column("a", "V", "motor")})
+
+
+def test_a_map_comes_back_equal(tmp_path):
+    columns = ColumnMap(
+        {
+            "t": Column('odd "name"\t', "ms"),
+            "w1": Column("m1vel", "rpm", "motor", True, 0.02),
+            "x": Column("xpos", "1.84 mm"),
+        }
+    )
+    save_map(columns, tmp_path / "map.toml")
+    assert load_map(tmp_path / "map.toml") == columns
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[w1", "not a TOML file"),
+        ("schema = 7", "unknown schema"),
+        ("[w1]\ncolumn = 'a'", "a column is not described"),
+        ("[w1]\ncolumn = 'a'\nunit = 'rpm'\ncolour = 'red'", "unknown key; got colour"),
+        ("[w1]\ncolumn = 3\nunit = 'rpm'", "column has the wrong type"),
+        ("[w1]\ncolumn = 'a'\nunit = 'rpm'\nlatency_s = true", "latency_s has the wrong type"),
+        ("[w1]\ncolumn = 'a'\nunit = 'rpm'\nlatency_s = 1e400", "not a latency"),
+        ("[w1]\ncolumn = 'a'\nunit = 'rpm'\nside = 'left'", "unknown side"),
+        ("[nope]\ncolumn = 'a'\nunit = 'rpm'", "unknown channel"),
+        ("w1 = 3", "a column is not described"),
+    ],
+)
+def test_a_bad_map_is_refused_with_its_table(tmp_path, text, words):
+    path = tmp_path / "map.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words) as error:
+        load_map(path)
+    assert str(path) in str(error.value)
+
+
+def test_the_text_of_a_map_is_stable():
+    assert map_to_toml(ColumnMap({"t": Column("a", "s")})).splitlines()[1:] == [
+        "schema = 1", "", "[t]", 'column = "a"', 'unit = "s"'
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["", " ", "\x00", "ü" * 300, "1" * 50, "_" * 80, "a_b_c_d_e_f_g_h"])
+def test_any_name_can_be_read(name):
+    read_name(name)

@@ -1,0 +1,156 @@
+"""From a file to a Run: units, gears, signs, clocks, blanks and latencies, each against numbers worked out by hand."""
+
+import numpy as np
+import pytest
+
+from omnidyn import load_robot
+from omnidyn.errors import InputError
+from omnidyn.logs.log import component
+from omnidyn.logs.read_log import LogOptions, load_log, read_log
+from omnidyn.logs.run_file import write_run
+from omnidyn.run import Run
+
+
+def write(tmp_path, text, name="log.csv"):
+    path = tmp_path / name
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_units_are_converted(tmp_path):
+    path = write(tmp_path, "t,w1,i1,u1,yaw\nms,rpm,mA,V,deg\n0,60,1500,3,180\n10,-30,0,2,90\n")
+    run = read_log(path)
+    np.testing.assert_allclose(run.t, [0.0, 0.01])
+    np.testing.assert_allclose(run.wheel_speed, [[2 * np.pi], [-np.pi]])
+    np.testing.assert_allclose(run.current, [[1.5], [0.0]])
+    np.testing.assert_allclose(run.pose[:, 2], [np.pi, np.pi / 2])
+    assert np.isnan(run.pose[:, :2]).all()
+
+
+def test_speeds_of_the_motor_shaft_are_divided_by_the_gear(tmp_path):
+    path = write(tmp_path, "t_s,motor1_rpm,motor2_rpm,motor3_rpm\n0,600,0,-600\n0.1,600,0,-600\n")
+    run = read_log(path, load_robot("axebot"))
+    np.testing.assert_allclose(run.wheel_speed[0], np.array([600, 0, -600]) * 2 * np.pi / 60 / 19)
+    assert any("no robot is given" in words for words in read_log(path).warnings)
+
+
+def test_a_run_file_is_a_log(tmp_path):
+    """The same numbers as `read_run` gives."""
+    rng = np.random.default_rng(3)
+    run = Run(t=np.arange(50) * 0.01, voltage=rng.normal(size=(50, 3)), twist=rng.normal(size=(50, 3)))
+    write_run(run, tmp_path / "run.csv")
+    read = read_log(tmp_path / "run.csv")
+    assert (read.t == run.t).all()
+    assert (read.voltage == run.voltage).all()
+    assert (read.twist == run.twist).all()
+    assert read.warnings == ()
+
+
+def test_heading_is_unwrapped(tmp_path):
+    path = write(tmp_path, "t_s,heading_rad,x_m\n0,6.2,0\n0.1,0.1,0\n0.2,,0\n0.3,6.1,0\n0.4,6.1,0\n")
+    np.testing.assert_allclose(read_log(path).pose[:, 2], [6.2, 0.1 + 2 * np.pi, np.nan, 6.1, 6.1])
+
+
+def test_epoch_time_keeps_its_digits(tmp_path):
+    path = write(tmp_path, "t_ns,w1_rad_s\n1700000000000000000,1\n1700000000010000000,2\n1700000000020000000,3\n")
+    run = read_log(path)
+    np.testing.assert_allclose(run.t, [0.0, 0.01, 0.02], atol=1e-6)
+    assert any("counted from an epoch" in words for words in run.warnings)
+
+
+def test_time_that_goes_back_is_refused_or_sorted(tmp_path):
+    path = write(tmp_path, "t_s,w1_rad_s\n0,1\n0.2,3\n0.1,2\n0.3,4\n")
+    with pytest.raises(InputError, match=r"log.csv:4: time goes back; got 0.1 s after 0.2 s \(1 times\)"):
+        read_log(path)
+    run = read_log(path, sort=True)
+    np.testing.assert_array_equal(run.wheel_speed[:, 0], [1, 2, 3, 4])
+    assert any("rows were sorted" in words for words in run.warnings)
+
+
+def test_time_that_stands_still_is_refused(tmp_path):
+    path = write(tmp_path, "t_s,w1_rad_s\n1,1\n1,2\n1,3\n")
+    with pytest.raises(InputError, match=r"time stands still; got t = 1 s in all 3 rows"):
+        read_log(path)
+
+
+def test_repeated_stamps_and_padding_are_left_out_in_words(tmp_path):
+    path = write(tmp_path, "t_s,w1_rad_s\n0,1\n0.1,2\n0.1,9\n0.2,3\n0.3,4\n0,0\n0,0\n0,0\n")
+    run = read_log(path)
+    np.testing.assert_array_equal(run.wheel_speed[:, 0], [1, 2, 3, 4])
+    assert any("3 of 8 rows at the end repeat one row" in words for words in run.warnings)
+    assert any("1 of 5 rows repeat the time of the row before" in words for words in run.warnings)
+
+
+def test_rows_without_numbers_are_left_out_up_to_a_fifth(tmp_path):
+    rows = [f"{k * 0.1},{k},{k}" for k in range(10)]
+    rows[4] = "nan,nan,nan"
+    run = read_log(write(tmp_path, "t_s,w1_rad_s,w2_rad_s\n" + "\n".join(rows)))
+    assert len(run) == 9
+    rows[1:4] = ["nan,nan,nan"] * 3
+    with pytest.raises(InputError, match=r"4 of 10 rows hold no time or no number; got first in line 3"):
+        read_log(write(tmp_path, "t_s,w1_rad_s,w2_rad_s\n" + "\n".join(rows)))
+
+
+def test_a_log_on_change_holds_commands_and_interpolates_measurements(tmp_path):
+    text = "t_s,u1_V,w1_rad_s,supply_V\n0,1,,9\n0.1,,10,9\n0.2,,,9\n0.3,2,,9\n0.4,,40,9\n0.5,,,9\n"
+    run = read_log(write(tmp_path, text))
+    np.testing.assert_array_equal(run.voltage[:, 0], [1, 1, 1, 2, 2, 2])
+    np.testing.assert_allclose(run.wheel_speed[:, 0], [np.nan, 10, 20, 30, 40, np.nan])
+    assert any("u1 is recorded on change (67% of its cells are blank): held" in words for words in run.warnings)
+
+
+def test_a_latency_is_taken_out(tmp_path):
+    """A ramp recorded 0.1 s late: at its true time it stands one row earlier."""
+    rows = "\n".join(f"{0.1 * k:.1f},{k}" for k in range(6))
+    run = read_log(write(tmp_path, "t_s,w1_rad_s\n" + rows), latency={"w": 0.1})
+    np.testing.assert_allclose(run.wheel_speed[:, 0], [1, 2, 3, 4, 5, np.nan])
+    with pytest.raises(InputError, match="no such channel to delay; got i"):
+        read_log(write(tmp_path, "t_s,w1_rad_s\n" + rows), latency={"i": 0.1})
+
+
+def test_unsigned_currents_get_the_sign_of_the_command(tmp_path):
+    text = "t_s,i1_A,i2_A,i3_A,w1_cmd_rad_s,w2_cmd_rad_s,w3_cmd_rad_s\n0,1,2,3,5,-5,0\n0.1,1,2,3,-5,5,1\n"
+    run = read_log(write(tmp_path, text), current_unsigned=True)
+    np.testing.assert_array_equal(run.current, [[1, -2, 0], [-1, 2, 3]])
+    assert load_log(write(tmp_path, text), None, LogOptions(current_unsigned=True)).current_unsigned
+    alone = write(tmp_path, "t_s,i1_A\n0,1\n0.1,2\n", "alone.csv")
+    with pytest.raises(InputError, match="cannot give unsigned currents a sign"):
+        read_log(alone, current_unsigned=True)
+
+
+def test_overrides_and_maps(tmp_path):
+    path = write(tmp_path, "t_s,foo,bar\n0,1,2\n0.1,3,4\n")
+    run = read_log(path, columns={"u1": "foo:mV", "w1": "-bar:rad/s"})
+    np.testing.assert_allclose(run.voltage[:, 0], [1e-3, 3e-3])
+    np.testing.assert_allclose(run.wheel_speed[:, 0], [-2, -4])
+    (tmp_path / "map.toml").write_text('[t]\ncolumn = "t_s"\nunit = "s"\n[u1]\ncolumn = "nope"\nunit = "V"\n')
+    with pytest.raises(InputError, match=r"the log has no column for u1; got t_s, foo, bar; expected nope"):
+        read_log(path, columns=tmp_path / "map.toml")
+
+
+def test_a_log_without_a_clock_is_refused_with_a_remedy(tmp_path):
+    path = write(tmp_path, "step,w1_rad_s\n0,1\n1,2\n2,3\n")
+    with pytest.raises(InputError, match=r'cannot tell the time of the rows; .*--column "t=step:UNIT"'):
+        read_log(path)
+
+
+def test_words_where_numbers_are_needed_are_refused(tmp_path):
+    path = write(tmp_path, "t_s,w1_rad_s,mode\n0,1,auto\n0.1,2,auto\n")
+    assert len(read_log(path)) == 2  # a column of words that nobody needs
+    with pytest.raises(InputError, match=r"log.csv:3, column w1_rad_s: not a number; got x"):
+        read_log(write(tmp_path, "t_s,w1_rad_s\n0,1\n0.1,x\n"), columns={"w1": "w1_rad_s:rad/s"})
+
+
+def test_more_wheels_than_the_robot_has_are_refused(tmp_path):
+    path = write(tmp_path, "t_s,w1_rad_s,w2_rad_s,w3_rad_s,w4_rad_s\n0,1,2,3,4\n0.1,1,2,3,4\n")
+    with pytest.raises(InputError, match="the log has more wheels than the robot; got 4 wheels; expected 3"):
+        read_log(path, load_robot("axebot"))
+
+
+def test_a_component_of_a_log(tmp_path):
+    log = load_log(write(tmp_path, "t_s,w1_rad_s,yaw_rad\n0,1,2\n0.1,2,3\n"))
+    np.testing.assert_array_equal(component(log, "w1"), [1, 2])
+    np.testing.assert_array_equal(component(log, "heading"), [2, 3])
+    assert component(log, "x") is None
+    assert component(log, "u1") is None
+    assert component(log, "nonsense") is None

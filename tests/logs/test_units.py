@@ -1,0 +1,60 @@
+"""Units: what one is in SI, from outside: definitions of the units themselves."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnidyn.errors import InputError
+from omnidyn.units import known_unit, parse_unit
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "one_in_si"),
+    [
+        ("rpm", "turn rate", 2 * math.pi / 60),
+        ("1/min", "turn rate", 2 * math.pi / 60),
+        ("rot/s", "turn rate", 2 * math.pi),
+        ("turns/s", "turn rate", 2 * math.pi),
+        ("deg/s", "turn rate", math.pi / 180),
+        ("°/s", "turn rate", math.pi / 180),
+        ("rad_s", "turn rate", 1.0),
+        ("rad/s", "turn rate", 1.0),
+        ("mA", "current", 1e-3),
+        ("%", "duty", 0.01),
+        ("duty/255", "duty", 1 / 255),
+        ("pwm", "duty", 1 / 255),
+        ("pwm/1023", "duty", 1 / 1023),
+        ("ticks/2000", "angle", 2 * math.pi / 2000),
+        ("ticks", "count", 1.0),
+        ("1.84 mm", "length", 1.84e-3),
+        ("0.125 ms", "time", 1.25e-4),
+        ("µs", "time", 1e-6),
+        ("V", "voltage", 1.0),
+        ("Volt", "voltage", 1.0),
+        ("km/h", "speed", 1 / 3.6),
+    ],
+)
+def test_one_of_a_unit_in_si(text, quantity, one_in_si):
+    unit = parse_unit(text)
+    assert unit.quantity == quantity
+    assert unit.size == pytest.approx(one_in_si, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["", "furlong", "rad/", "ticks/0", "0 mm", "pix", "1e999 m", "m/s/s", "ticks/0.0"])
+def test_what_is_no_unit_is_refused(text):
+    assert known_unit(text) is None
+    with pytest.raises(InputError, match="unit"):
+        parse_unit(text)
+
+
+def test_the_nearest_unit_is_named():
+    with pytest.raises(InputError, match=r"unknown unit; got rads/s; expected .*; did you mean rad/s\?"):
+        parse_unit("rads/s")
+
+
+@given(st.text(max_size=20))
+def test_any_text_is_a_unit_or_refused(text):
+    unit = known_unit(text)
+    assert unit is None or (unit.size > 0.0 and math.isfinite(unit.size))
