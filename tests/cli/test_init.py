@@ -7,13 +7,16 @@ import os
 import re
 import sys
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from omnidyn import Run, write_run
 from omnidyn.cli import main
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+from omnidyn.model.starter import first_guess
 
 MINI = ["--azimuth", "60,180,300", "--wheel-radius", "0.04", "--robot-radius", "0.125", "--mass", "8"]
 
@@ -154,6 +157,28 @@ def test_like_one_s_own_file(call, here):
     call("init", "mini", *MINI)
     assert call("init", "maxi", "--like", "mini.toml", "--mass", "9")[0] == 0
     assert load_robot(here / "maxi.toml").priors["motor.gear_ratio"].source == "like mini"
+
+
+@pytest.mark.parametrize("gear", [1.0, 16.0])
+def test_a_log_shows_where_the_wheels_stand(call, here, gear):
+    """The log is made by hand: rim speed of wheel i is -sin(phi) vx + cos(phi) vy + b omega."""
+    twist = np.random.default_rng(4).normal(size=(50, 3)) * 0.2
+    phi = np.radians([60.0, 180.0, 300.0])
+    rim = np.outer(twist[:, 0], -np.sin(phi)) + np.outer(twist[:, 1], np.cos(phi)) + 0.125 * twist[:, 2:]
+    write_run(Run(t=np.arange(50) * 0.01, twist_command=twist, wheel_speed_command=gear * rim / 0.04), here / "log.csv")
+    code, out, err = call("init", "bot", "--log", "log.csv", "--wheel-radius", "0.04", "--mass", "8")
+    assert (code, out) == (0, "bot.toml\n")
+    assert "omnidyn: wheels at 60,180,300 degrees, from twist_command and wheel_speed_command" in err
+    robot = load_robot(here / "bot.toml")
+    assert robot.wheels.azimuth_deg == (60.0, 180.0, 300.0)
+    assert robot.wheels.robot_radius == 0.125
+    assert robot.priors["wheels.azimuth_deg"].source == "logs: twist_command and wheel_speed_command"
+    assert robot.priors["wheels.wheel_radius_m"].source == "given"
+    plain = first_guess("bot", robot.wheels, 8.0)
+    assert (robot.motor.gear_ratio == 16.0) == (gear == 16.0)
+    assert robot.motor.gear_ratio * robot.motor.emf_constant == pytest.approx(
+        plain.motor.gear_ratio * plain.motor.emf_constant, rel=1e-2
+    )
 
 
 def test_radii_in_millimetres_are_noticed(call):

@@ -25,7 +25,7 @@ ORDER = {
     "logs": """channels dialect table parquet tables run_file steady_table command_file words mapping guess log read_log
         segments plateaus findings check""",
     "comparison": "",
-    "identification": "estimate line points doubts steady_state band",
+    "identification": "estimate geometry line points doubts steady_state band",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch

@@ -13,10 +13,12 @@ import typer
 from omnidyn.cli.streams import say, show, show_json
 
 if TYPE_CHECKING:
+    from omnidyn.identification.geometry import Geometry
     from omnidyn.model.robot import Robot
     from omnidyn.model.wheels import Wheels
 
 MAX_NAME = 60
+GEARED = 1.5  # logged speeds so many times those of the wheels are speeds before a gear
 DEFAULTS = {"wheel_radius": 0.05, "robot_radius": 0.15, "mass": 3.0}  # [m], [m], [kg], shown at a terminal
 KEYS = {
     "azimuth": "wheels.azimuth_deg", "wheel_radius": "wheels.wheel_radius_m", "robot_radius": "wheels.robot_radius_m",
@@ -47,6 +49,9 @@ def init(
     robot_radius: float | None = typer.Option(None, help="Centre to wheel [m]; mecanum: half track + half wheelbase."),
     mass: float | None = typer.Option(None, help="Mass of the robot [kg]."),
     voltage_limit: float | None = typer.Option(None, help="Most the driver gives to a motor [V]; default: a guess."),
+    log: list[str] = typer.Option(
+        [], "--log", metavar="LOG", help="Logs that show where the wheels stand. Repeatable."
+    ),
     mecanum: bool = typer.Option(False, "--mecanum", help="Four mecanum wheels, in an X seen from above."),
     friction: str = typer.Option("", help="Where the guessed friction acts: direction (default) or axes."),
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File to write instead; - is stdout."),
@@ -66,8 +71,11 @@ def init(
     name = name.removesuffix(".toml")
     path = _checked_path(name, out, force)
     preset = _preset(like)
+    told = {key for key, value in given.items() if value is not None}
+    seen = _from_logs(given, log) if log else None
+    from_logs = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
     answers = _complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
-    robot = _robot(name, answers, preset, mecanum, friction)
+    robot = _as_seen(_robot(name, answers, preset, mecanum, friction), seen, from_logs)
     _write(robot, path, force, json, like)
 
 
@@ -84,6 +92,42 @@ def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str
         raise typer.BadParameter("--friction is for a guess; with --like friction comes from there.")
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
+
+
+def _from_logs(given: dict[str, Any], logs: list[str]) -> Geometry:
+    """Azimuths, and the radius of the robot where it turned, from logs; what is given on the command line stays."""
+    from omnidyn.cli.log_options import log_files
+    from omnidyn.identification.geometry import wheel_geometry
+    from omnidyn.logs.read_log import read_log
+
+    seen = wheel_geometry([read_log(path) for path in log_files(logs)])
+    azimuth = [round(angle, 2) for angle in seen.azimuth_deg]
+    say(f"omnidyn: wheels at {_words(tuple(azimuth))} degrees, from {seen.source} ({seen.residual:.1%} unexplained)")
+    if given["azimuth"] is None and given["wheels"] in (None, len(azimuth)):
+        given["azimuth"], given["wheels"] = azimuth, len(azimuth)
+    if given["robot_radius"] is None and seen.robot_radius is not None and seen.robot_radius > 0.0:
+        given["robot_radius"] = round(seen.robot_radius, 4)
+        say(f"omnidyn: centre to wheel {given['robot_radius']:g} m")
+    return seen
+
+
+def _as_seen(robot: Robot, seen: Geometry | None, from_logs: set[str]) -> Robot:
+    """The robot with the gear that the logged speeds show: those of the motor shaft are faster by it.
+
+    from_logs: keys of the robot file whose numbers the logs gave; their source says so.
+    """
+    from omnidyn.model.robot import Prior
+    from omnidyn.model.starter import with_gear
+
+    if seen is None:
+        return robot
+    told = Prior(source=f"logs: {seen.source}")
+    robot = robot.replace(priors=robot.priors | dict.fromkeys(from_logs, told))
+    ratio = seen.per_metre * float(robot.wheels.radii.mean())
+    if ratio < GEARED:
+        return robot
+    say(f"omnidyn: logged speeds are {ratio:.4g} times those of such wheels: taken as those of the motor, gear ratio")
+    return with_gear(robot, round(ratio, 3), "logs: speed of the motor shaft over that of the wheel")
 
 
 def _azimuths(text: str) -> list[float] | None:

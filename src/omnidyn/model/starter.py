@@ -110,6 +110,27 @@ def first_guess(
     return robot.replace(priors=priors)
 
 
+def with_gear(robot: Robot, gear_ratio: float, source: str) -> Robot:
+    """The robot with another gear ratio and the same wheels under the same voltage: K l stays what it was."""
+    share = float(np.mean(robot.motor.gear_ratio)) / gear_ratio
+    motor = robot.motor.replace(
+        gear_ratio=gear_ratio,
+        torque_constant=_times(robot.motor.torque_constant, share),
+        emf_constant=_times(robot.motor.emf_constant, share),
+    )
+    spreads = {
+        key: Prior(std=_round(prior.std * share), source=prior.source)
+        for key, prior in robot.priors.items()
+        if key.startswith(("motor.torque_constant", "motor.emf_constant")) and prior.std is not None
+    }
+    priors = {key: prior for key, prior in robot.priors.items() if not key.startswith("motor.gear_ratio")}
+    return robot.replace(motor=motor, priors=priors | spreads | {"motor.gear_ratio": Prior(source=source)})
+
+
+def _times(value: PerWheel, share: float) -> PerWheel:
+    return tuple(_round(one * share) for one in value) if isinstance(value, tuple) else _round(value * share)
+
+
 def default_prior(key: str, value: Any) -> Prior:
     """What is known of a number of `init` that its user took as it was offered: not much."""
     return Prior(std=None if key in EXACT else _round(LIKE_SPREAD * value), source="default of omnidyn init, accepted")

@@ -1,0 +1,106 @@
+"""Where the wheels stand, from logs in which the motion of the body and of the wheels are both known.
+
+Eq (3), G of an omni wheel at azimuth phi, with s = 1/r for speeds behind the gear, l/r for those of the motor shaft:
+
+    w_i = s (-sin phi_i v_x + cos phi_i v_y + b omega)
+
+is linear in (-s sin phi_i, s cos phi_i, s b): least squares per wheel gives phi_i, s and, where the robot turned, b.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.logs.read_log import STILL
+from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
+
+MAX_CONDITION = 50.0  # of the directions driven: beyond it, one of them is only noise
+MAX_RESIDUAL = 0.2  # share of the wheel speeds that the fit may leave: beyond it these are not omni wheels
+SOURCES = (("twist_command", "wheel_speed_command"), ("twist", "wheel_speed"))
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What logs say of the wheels.
+
+    azimuth_deg and its std: counter-clockwise from forward [degree], one per wheel. per_metre: wheel speed over rim
+    speed [rad/m]: 1/r behind the gear, l/r at the motor. robot_radius [m]: None where the robot never turned.
+    residual: rms of what the fit leaves over rms of the wheel speeds. source: which channels it is from.
+    """
+
+    azimuth_deg: tuple[float, ...]
+    azimuth_std: tuple[float, ...]
+    per_metre: float
+    robot_radius: float | None
+    residual: float
+    source: str
+
+
+def wheel_geometry(runs: Sequence[Run]) -> Geometry:
+    """Fit the geometry to commands of body and wheels where both are logged, else to what was measured.
+
+    Raises InputError where no run has such a pair of channels or wheels do not follow an omni wheel's law, and
+    InsufficientDataError where the runs go in one direction only.
+    """
+    for body, wheels in SOURCES:
+        pairs = [(getattr(run, body), getattr(run, wheels)) for run in runs]
+        usable = [_rows(twist, speed) for twist, speed in pairs if twist is not None and speed is not None]
+        usable = [pair for pair in usable if len(pair[0])]
+        if usable:
+            twist, speed = (np.concatenate(parts) for parts in zip(*usable, strict=True))
+            return _fit(twist, speed, f"{body} and {wheels}")
+    raise InputError(
+        "cannot tell where the wheels stand", got=", ".join(runs[0].channels) if runs else "no log",
+        expected="twist_command and wheel_speed_command, or twist and wheel_speed", remedy="give --azimuth",
+    )  # fmt: skip
+
+
+def _rows(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rows with all numbers, in motion; a turn rate that was never logged counts as none."""
+    if np.isnan(twist[:, 2]).all():
+        twist = np.column_stack([twist[:, :2], np.zeros(len(twist))])
+    keep = np.isfinite(twist).all(axis=1) & np.isfinite(speed).all(axis=1) & (np.abs(speed) > STILL).any(axis=1)
+    return twist[keep], speed[keep]
+
+
+def _fit(twist: FloatArray, speed: FloatArray, source: str) -> Geometry:
+    turned = bool(np.any(np.abs(twist[:, 2]) > STILL))
+    design = twist if turned else twist[:, :2]
+    size = np.sqrt(np.mean(design**2, axis=0))
+    if (size == 0.0).any() or np.linalg.cond(design / size) > MAX_CONDITION:
+        raise InsufficientDataError(
+            "the logs do not show where the wheels stand", got=f"{len(twist)} rows in motion, all alike",
+            expected="motion along x and along y", remedy="add logs in other directions, or give --azimuth",
+        )  # fmt: skip
+    rows, *_ = np.linalg.lstsq(design, speed, rcond=None)
+    rest = speed - design @ rows
+    residual = float(np.sqrt(np.mean(rest**2) / np.mean(speed**2)))
+    if residual > MAX_RESIDUAL:
+        raise InputError(
+            "the wheels do not follow the body as omni wheels do",
+            got=f"{residual:.0%} of the wheel speeds unexplained", expected=f"at most {MAX_RESIDUAL:.0%}",
+            remedy="check the columns with omnidyn check, or give --azimuth",
+        )  # fmt: skip
+    scale = np.hypot(rows[0], rows[1])
+    if (scale == 0.0).any():
+        raise InputError(
+            "a wheel never turned", got=f"wheel {int(np.argmin(scale)) + 1}", expected="all wheels in motion"
+        )
+    inverse = np.linalg.inv(design.T @ design)
+    spread = np.sqrt(np.mean(rest**2, axis=0) * max(inverse[0, 0], inverse[1, 1])) / scale
+    azimuth = np.degrees(np.arctan2(-rows[0], rows[1])) % 360.0
+    return Geometry(
+        azimuth_deg=tuple(azimuth.tolist()),
+        azimuth_std=tuple(np.degrees(spread).tolist()),
+        per_metre=float(np.mean(scale)),
+        robot_radius=float(np.mean(rows[2] / scale)) if turned else None,
+        residual=residual,
+        source=source,
+    )
