@@ -5,10 +5,13 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import stat
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
 from omnidyn.errors import InputError
 
@@ -16,35 +19,90 @@ MAX_TEXT_BYTES = 64 * 2**20
 STALE_TEMPORARY_S = 3600.0
 TEMPORARY_PREFIX = ".tmp-omnidyn-"
 
-# Files that people hand over by mistake, told by their first bytes.
+CSV_REMEDY = "export it as CSV or Parquet"
+NUMPY_REMEDY = "save it with numpy.savetxt(NAME, array, delimiter=',', header='t_s,...')"
+
+
+class Format(NamedTuple):
+    """A format of files that is no text: its name, and what to do about such a file."""
+
+    name: str
+    words: str
+    remedy: str = CSV_REMEDY
+
+
+# Told by their first bytes; the first that fits counts.
 _MAGIC = {
-    b"PAR1": "a Parquet file",
-    b"PK\x03\x04": "a zip archive (also .npz, .xlsx)",
-    b"\x93NUMPY": "a NumPy .npy file",
-    b"\x89MCAP0\r\n": "an MCAP recording",
-    b"SQLite format 3\x00": "an SQLite database (a ROS 2 .db3 bag)",
-    b"\x89HDF\r\n\x1a\n": "an HDF5 file (also MATLAB v7.3)",
-    b"MATLAB 5.0 MAT-file": "a MATLAB .mat file",
-    b"\x1f\x8b": "a gzip archive",
-    b"\x80\x04\x95": "a Python pickle",
-    b"#ROSBAG V": "a ROS 1 bag",
-    b"WPILOG": "a WPILib data log",
+    b"PAR1": Format("parquet", "a Parquet file", "give it to a command that reads logs, or save it as CSV"),
+    b"\x93NUMPY": Format("npy", "a NumPy .npy file", NUMPY_REMEDY),
+    b"\x89MCAP0\r\n": Format("mcap", "an MCAP recording"),
+    b"SQLite format 3\x00": Format("sqlite", "an SQLite database (a ROS 2 .db3 bag)"),
+    b"\x89HDF\r\n\x1a\n": Format("hdf5", "an HDF5 file (also MATLAB v7.3)"),
+    b"MATLAB 5.0 MAT-file": Format("mat", "a MATLAB .mat file", "in MATLAB: writetable(T, 'log.csv')"),
+    b"#ROSBAG V": Format("bag", "a ROS 1 bag", "rostopic echo -b BAG -p TOPIC > log.csv"),
+    b"WPILOG": Format("wpilog", "a WPILib data log", "export it as CSV with the Data Log Tool"),
+    b"\x1f\x8b": Format("gzip", "a gzip archive", "unpack it first: gunzip FILE"),
+    b"BZh": Format("bzip2", "a bzip2 archive", "unpack it first: bunzip2 FILE"),
+    b"\xfd7zXZ\x00": Format("xz", "an xz archive", "unpack it first: unxz FILE"),
+    b"\x28\xb5\x2f\xfd": Format("zstd", "a Zstandard archive", "unpack it first: unzstd FILE"),
+    b"7z\xbc\xaf\x27\x1c": Format("7z", "a 7z archive", "unpack it first"),
+    b"Rar!\x1a\x07": Format("rar", "a RAR archive", "unpack it first"),
+    b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1": Format("ole", "an old Excel (.xls) or Office file"),
+    b"ARROW1": Format("arrow", "an Arrow (Feather) file", "save it as Parquet"),
+    b"ULog\x01\x12\x35": Format("ulog", "a PX4 ULog file", "export it with ulog2csv"),
+    b"%PDF-": Format("pdf", "a PDF file"),
+    b"\x89PNG\r\n\x1a\n": Format("png", "a PNG picture"),
+    b"\x7fELF": Format("elf", "a program"),
 }
+# A zip archive is what the first file in it says.
+_ZIPPED = {
+    b"[Content_Types].xml": Format("xlsx", "an Excel workbook (.xlsx)", "save the sheet as CSV"),
+    b"_rels/": Format("xlsx", "an Excel workbook (.xlsx)", "save the sheet as CSV"),
+    b"xl/": Format("xlsx", "an Excel workbook (.xlsx)", "save the sheet as CSV"),
+    b"mimetype": Format("ods", "an OpenDocument file (.ods)", "save the sheet as CSV"),
+}
+_ZIP = Format("zip", "a zip archive", "unpack it first")
+_NPZ = Format("npz", "a zip archive of NumPy arrays (.npz)", NUMPY_REMEDY)
+_PICKLE = Format("pickle", "a Python pickle", "it is never opened, as it could run any program: export it as CSV")
+# Protocols 2 to 5 begin with their number; 0 and 1 with the opcode of what they hold.
+_PICKLE_START = re.compile(
+    rb"\x80[\x02-\x05]|\((?:lp|dp)\d+\n|c[A-Za-z_][\w.]*\n\w+\n[p(]|\(I-?\d+\n|[VF][^\n]*\np0\n|[\]}]q\x00|\(K[\x00-\x08]"
+)
 
 
-def read_bytes(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> bytes:
-    """The content of a regular file of at most `max_bytes`.
+def file_format(start: bytes) -> Format | None:
+    """The format of a file that begins with `start` (64 bytes or more of it); None where it may be text."""
+    for magic, kind in _MAGIC.items():
+        if start.startswith(magic):
+            return kind
+    if start.startswith((b"PK\x03\x04", b"PK\x05\x06")):
+        inside = start[30:90]
+        if b".npy" in inside:
+            return _NPZ
+        return next((kind for name, kind in _ZIPPED.items() if inside.startswith(name)), _ZIP)
+    return _PICKLE if _PICKLE_START.match(start) else None
 
-    Raises InputError when the path is missing, a folder, a pipe or device, unreadable, empty or too large.
+
+def format_of(path: str | os.PathLike) -> Format | None:
+    """The format of a file by its content; None where it may be text. Raises InputError as `open_regular`."""
+    with open_regular(path) as stream:
+        return file_format(stream.read(256))
+
+
+@contextlib.contextmanager
+def open_regular(path: str | os.PathLike) -> Iterator[BinaryIO]:
+    """A regular file, opened to read bytes.
+
+    Raises InputError when the path is missing, a folder, a pipe or device, or unreadable, now or while it is read.
     """
     path = Path(path)
     try:
-        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as stream:
-            mode = os.fstat(stream.fileno()).st_mode
+        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
+            mode = os.fstat(file.fileno()).st_mode
             if not stat.S_ISREG(mode):
                 kind = "a folder" if stat.S_ISDIR(mode) else "not a regular file (a pipe or a device)"
                 raise InputError("cannot read it", got=kind, expected="a file", where=str(path))
-            content = stream.read(max_bytes + 1)
+            yield file
     except FileNotFoundError:
         raise InputError("no such file", remedy="check the spelling and the folder", where=str(path)) from None
     except IsADirectoryError:
@@ -53,24 +111,49 @@ def read_bytes(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> byte
         raise InputError("cannot read it", got=error.strerror, where=str(path)) from None
     except (OSError, ValueError) as error:
         raise InputError("cannot open it", got=str(error), expected="a file name", where=str(path)[:80]) from None
+
+
+def read_bytes(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> bytes:
+    """The content of a regular file of at most `max_bytes`.
+
+    Raises InputError when the path is missing, a folder, a pipe or device, unreadable, empty or too large.
+    """
+    with open_regular(path) as stream:
+        content = stream.read(max_bytes + 1)
     if not content:
         raise InputError("the file is empty", got="0 bytes", where=str(path))
     if len(content) > max_bytes:
-        raise InputError(
-            "the file is too large",
-            got=f"more than {max_bytes} bytes",
-            expected=f"at most {max_bytes} bytes",
-            where=str(path),
-        )
+        raise too_large(path, max_bytes)
     return content
+
+
+def too_large(path: str | os.PathLike, max_bytes: int, remedy: str = "") -> InputError:
+    """The error of a file beyond a limit."""
+    return InputError(
+        "the file is too large",
+        got=f"more than {max_bytes} bytes",
+        expected=f"at most {max_bytes} bytes",
+        remedy=remedy,
+        where=str(path),
+    )
+
+
+def default_max_bytes() -> int:
+    """How much of a file may be held at once: a quarter of the memory that this process may use [bytes]."""
+    limits = [2**33]
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        limits = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
+    with contextlib.suppress(OSError, ValueError):  # of a container
+        limits.append(int(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return max(1, min(limits)) // 4
 
 
 def read_text(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> str:
     """The text of a UTF-8 (a byte order mark is fine) or Latin-1 file; refuses binary files by what they are."""
     content = read_bytes(path, max_bytes)
-    for magic, kind in _MAGIC.items():
-        if content.startswith(magic):
-            raise InputError("this is not a text file", got=kind, expected="text", where=str(path))
+    kind = file_format(content[:256])
+    if kind is not None:
+        raise InputError("this is not a text file", got=kind.words, expected="text", where=str(path))
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         encoding = "utf-16"
     elif b"\0" in content:

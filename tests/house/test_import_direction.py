@@ -22,8 +22,8 @@ ORDER = {
     "simulation": """inputs commands exact_step travel exact exact_inductance_step exact_inductance_travel
         exact_inductance implicit_step implicit simulate tangent_step tangent_events
         tangent_march tangent""",
-    "logs": """channels dialect table parquet tables run_file steady_table command_file words mapping guess log read_log
-        segments plateaus findings check""",
+    "logs": """channels dialect header rows text_file table parquet tables run_file steady_table command_file words
+        mapping guess log read_log segments plateaus findings check""",
     "comparison": "",
     "identification": "estimate geometry line points doubts steady_state band",
     "control": "",

@@ -70,7 +70,9 @@ def test_a_late_point_among_commas_is_refused(write):
 
 def test_a_latin_1_header_is_read(write):  # 8
     table = read_table(write("t_s,Drehmoment [N·m]\n0,1\n".encode("latin-1")))
-    assert table.names == ("t_s", "Drehmoment [N·m]")
+    assert table.names == ("t_s", "Drehmoment")
+    assert dict(table.units) == {"Drehmoment": "N·m"}
+    assert table.notes == ("line 1 is not UTF-8: read as Latin-1",)
 
 
 def test_what_it_decided_stands_in_the_notes(write):
@@ -122,6 +124,172 @@ def test_words_are_words(write):
         table.text("v", "x or y")
 
 
+# ---- logs as programs write them ------------------------------------------------------------------------
+
+
+def test_titles_units_and_names_in_three_lines(write):
+    content = "Time;Speed of wheel 1;\nms;rad/s;\nt;w1;\n0;1,5;\n10;2,5;\n"
+    table = read_table(write(content))
+    assert table.names == ("t", "w1")
+    assert dict(table.units) == {"t": "ms", "w1": "rad/s"}
+    assert dict(table.titles) == {"t": "Time", "w1": "Speed of wheel 1"}
+    assert table.numbers("w1").tolist() == [1.5, 2.5]
+    assert table.notes == (
+        "line 3 gives the names, line 2 the units, line 1 the titles",
+        "columns are separated by a semicolon",
+        "every row ends with a semicolon: the blank last column was left out",
+        "numbers have a decimal comma",
+    )
+
+
+def test_titles_above_names_above_units(write):
+    table = read_table(write("Time,Speed\nt,w1\ns,rpm\n0,1\n"))
+    assert table.names == ("t", "w1")
+    assert dict(table.units) == {"t": "s", "w1": "rpm"}
+    assert dict(table.titles) == {"t": "Time", "w1": "Speed"}
+
+
+@pytest.mark.parametrize("end", ["", ","])
+def test_rows_may_end_with_a_separator(write, end):
+    table = read_table(write(f"t,u{end}\n0,1,\n1,2,\n2,,\n3,4\n"))
+    assert table.names == ("t", "u")
+    assert np.array_equal(table.numbers("u", missing=True), [1.0, 2.0, np.nan, 4.0], equal_nan=True)
+
+
+def test_a_last_column_that_is_blank_is_kept_where_it_has_a_name(write):
+    table = read_table(write("t,u\n0,\n1,\n"))
+    assert table.names == ("t", "u")
+    assert np.isnan(table.numbers("u", missing=True)).all()
+
+
+def test_rows_may_end_with_another_separator(write):
+    table = read_table(write("t,u\n0,1;\n1,2;\n2,3"))
+    assert table.numbers("u").tolist() == [1.0, 2.0, 3.0]
+    assert table.notes == ("every row ends with a semicolon: it was left out",)
+
+
+def test_header_and_units_may_stand_in_percent_comments(write):
+    table = read_table(write("%Motor data\r\n\r\n%Date:,29/04/2021\r\n%t,u\r\n%[#],[V]\r\n0,1;\r\nnan,nan;\r\n"))
+    assert table.names == ("t", "u")
+    assert dict(table.units) == {"t": "#", "u": "V"}
+    assert table.lines.tolist() == [6, 7]
+
+
+def test_a_comment_above_a_header_is_no_header(write):
+    assert read_table(write("# one, two\nt,u\n0,1\n")).names == ("t", "u")
+
+
+def test_a_percent_sign_may_be_a_unit(write):
+    table = read_table(write("d1,u1\n%,V\n10,1\n"))
+    assert dict(table.units) == {"d1": "%", "u1": "V"}
+    assert len(table) == 1
+
+
+@pytest.mark.parametrize(
+    "cell, name, unit",
+    [
+        ("w1 [rad/s]", "w1", "rad/s"),
+        ("w1 (rpm)", "w1", "rpm"),
+        ("time(ms)", "time", "ms"),
+        ("Drehzahl [1/min]", "Drehzahl", "1/min"),
+        ("pos [ticks/2000]", "pos", "ticks/2000"),
+        ("yaw rate [°/s]", "yaw rate", "°/s"),
+        ("timestep (8Hz)", "timestep (8Hz)", None),
+        ("joint[0]", "joint[0]", None),
+        ("u1_V", "u1_V", None),
+        ("speed (measured)", "speed (measured)", None),
+    ],
+)
+def test_units_behind_names(write, cell, name, unit):
+    table = read_table(write(f"t;{cell}\n0;1\n"))
+    assert table.names == ("t", name)
+    assert table.units.get(name) == unit
+
+
+def test_names_stay_whole_where_units_alone_tell_them_apart(write):
+    table = read_table(write("w [rad/s],w [rpm]\n0,1\n"))
+    assert table.names == ("w [rad/s]", "w [rpm]")
+    assert dict(table.units) == {"w [rad/s]": "rad/s", "w [rpm]": "rpm"}
+
+
+def test_two_units_for_one_column_are_refused(write):
+    with pytest.raises(InputError, match=r"table\.csv:1, column w: name and row of units .*; got rad/s and rpm"):
+        read_table(write("t,w [rad/s]\ns,rpm\n0,1\n"))
+
+
+def test_the_first_line_of_excel_is_taken(write):
+    assert numbers(write("sep=;\nt_s;u1_V\n0;1,5\n0,1;-0,2\n")) == VALUES
+
+
+@pytest.mark.parametrize("cell", ["nan", "-nan", "NaN", "+nan", "nan(ind)", "-nan(ind)"])
+def test_every_nan_of_a_c_program_is_a_missing_value(write, cell):
+    assert np.isnan(numbers(write(f"a,b\n1,{cell}\n"), missing=True)["b"]).all()
+
+
+# ---- encodings ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "encoding, note",
+    [
+        ("utf-8", None),
+        ("utf-8-sig", "the encoding is UTF-8 with a byte order mark"),
+        ("utf-16", "the encoding is UTF-16"),
+        ("utf-16-le", "the encoding is UTF-16-LE"),
+        ("utf-16-be", "the encoding is UTF-16-BE"),
+        ("latin-1", "line 1 is not UTF-8: read as Latin-1"),
+    ],
+)
+def test_the_encoding_is_told_and_said(write, encoding, note):
+    table = read_table(write("time_s,µ [°/s]\n0,1\n".encode(encoding)))
+    assert table.names == ("time_s", "µ")
+    assert table.notes == ((note,) if note else ())
+
+
+def test_broken_utf_16_is_refused(write):
+    with pytest.raises(InputError, match=r"not a text file; got no valid UTF-16 .*; save it as UTF-8"):
+        read_table(write(b"\xff\xfet\x00,\x00u\x00\n\x00\x00\xd8\n\x00"))
+
+
+# ---- what one may ask for -------------------------------------------------------------------------------
+
+
+def test_no_header(write):  # 5
+    table = read_table(write("# made by hand\n0,1.5\n0.1,2\n"), header=False)
+    assert table.names == ("c1", "c2")
+    assert table.numbers("c2").tolist() == [1.5, 2.0]
+    assert table.notes == ("no header: the columns are called c1 to c2",)
+
+
+def test_no_header_and_a_separator_at_the_end(write):
+    table = read_table(write("0;1,5;\n0,1;2,5;\n"), header=False)
+    assert table.names == ("c1", "c2")
+    assert table.numbers("c2").tolist() == [1.5, 2.5]
+
+
+def test_bad_rows_are_left_out_and_counted(write):  # 10, 15, 16
+    rows = ["0,1", "1,2,3", "2", "3,fast", "4,1e400", '5,"6', "6,7", "inf,8", "8,"]
+    table = read_table(write("t,u\n" + "\n".join(rows) + "\n"), skip_bad_rows=True)
+    assert table.numbers("t").tolist() == [0.0, 6.0, 8.0]
+    assert table.lines.tolist() == [2, 8, 10]
+    assert table.notes == (
+        "2 rows were left out for another number of cells (lines 3, 4)",
+        "1 row was left out for a broken quote (line 7)",
+        "1 row was left out for no number where one is due (line 5)",
+        "2 rows were left out for an infinite number (lines 6, 9)",
+    )
+
+
+def test_words_are_no_bad_rows_where_a_column_holds_words(write):
+    table = read_table(write("axis,v\nx,1\n2,3\nyaw,2\n"), skip_bad_rows=True)
+    assert table.text("axis") == ("x", "2", "yaw")
+
+
+def test_nothing_left_is_refused(write):
+    with pytest.raises(InputError, match="no rows; got 0 samples"):
+        read_table(write("t,u\n0,inf\n"), skip_bad_rows=True)
+
+
 # ---- what it refuses ------------------------------------------------------------------------------------
 
 
@@ -139,7 +307,7 @@ def test_words_are_words(write):
         ("# 3,4\n0,1.5\n", r"table\.csv:2: the table has no header"),
         ("t_s,1.5\n0,1\n", r"table\.csv:1: the table has no header: a number stands.*; got 1\.5"),
         ("t_s,,u\n1,2,3\n", r"table\.csv:1: column 2 has no name"),
-        ("t_s,u,\n1,2,\n", r"table\.csv:1: column 3 has no name"),
+        ("t_s,u,\n1,2,3\n", r"table\.csv:1: column 3 has no name"),
         ("t,t\n1,2\n", r"table\.csv:1: two columns have the same name; got t"),
         (
             "t,u\n0,1\n1,2,3\n",
@@ -216,8 +384,8 @@ def test_an_error_value_at_the_start_of_a_row_is_no_comment(write):
 
 
 def test_a_row_under_the_header_that_is_not_clearly_units_is_data(write):
-    table = read_table(write("t,u\nsecond,volt\n0,1\n"))
-    with pytest.raises(InputError, match=r"table\.csv:2, column t: not a number; got second"):
+    table = read_table(write("t,u\nfirst,volt\n0,1\n"))
+    with pytest.raises(InputError, match=r"table\.csv:2, column t: not a number; got first"):
         table.numbers("t")
 
 

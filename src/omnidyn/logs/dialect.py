@@ -1,39 +1,48 @@
-"""How a text table is written: separator, decimal sign, header, units. Nothing is guessed in silence.
+"""How a text table is written: comments, separator, cells, numbers, units. Nothing is guessed in silence.
 
-A separator is taken when it is the only one under which header and rows have the same number of cells. A decimal
-comma is taken when at least one cell can be nothing else: 1,5 or 0,125, but not 1,500, which may be 1500.
+A separator is taken when it is the only one under which header and rows have the same number of cells; a blank last
+cell may be missing, since many loggers end every line with a separator. A decimal comma is taken when at least one
+cell can be nothing else: 1,5 or 0,125, but not 1,500, which may be 1500.
 """
 
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Iterable, Sequence
 
 from omnidyn.errors import InputError
+from omnidyn.units import known_unit
 
 SEPARATORS = (",", ";", "\t")
+SEPARATOR_WORDS = {",": "a comma", ";": "a semicolon", "\t": "a tab"}
 SAMPLE_ROWS = 50  # rows that vote on the separator; a later row that differs is refused as ragged
 
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE | re.ASCII)
+MISSING = re.compile(r"(?:[+-]?nan(?:\(\w*\))?)?", re.IGNORECASE | re.ASCII)  # C prints -nan and nan(ind) as well
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 GROUPED_NUMBER = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+", re.ASCII)  # 1,500: fifteen hundred or one and a half?
 
 # A spreadsheet's error values begin like a comment; to skip such a row would lose it in silence.
 _SPREADSHEET_ERROR = re.compile(r"#(?:N/A|REF!|VALUE!|NAME\?|NUM!|NULL!|DIV/0!)", re.IGNORECASE)
 
-_UNIT_WORDS = (
-    "s ms us µs μs ns min V mV A mA m mm cm km m/s mm/s cm/s km/h rad deg ° rad/s deg/s °/s rpm 1/min rev/s rot/s "
-    "N mN kN N·m N⋅m N*m Nm mNm N.m W kg Hz ticks counts % - SI"
-)
-UNITS = frozenset([*_UNIT_WORDS.split(), "N m"])
+# Words of units that units.py has no size for, or writes otherwise.
+_UNIT_WORDS = "N mN kN N·m N⋅m N*m Nm mNm N.m W kg g % - SI # pix pixel px m/s2 m/s^2 m/s² rad/s2 rad/s^2 rad/s² °C"
+_UNITS = frozenset([*_UNIT_WORDS.split(), "N m"])
+_NAME_AND_UNIT = re.compile(r"(.*[^\s\[(])\s*(?:\[\s*([^\[\]]+?)\s*\]|\(\s*([^()]+?)\s*\))")
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is a comment: its first visible character is #, and it is no error value such as #N/A."""
+    """Whether a line is a comment: it begins with # or %, and with no error value such as #N/A.
+
+    A cell that is only % or # is a unit: `%,V` is no comment.
+    """
     start = line.lstrip()
-    return start.startswith("#") and not _SPREADSHEET_ERROR.match(start)
+    if not start.startswith(("#", "%")) or _SPREADSHEET_ERROR.match(start):
+        return False
+    return start[1:].lstrip(" ")[:1] not in SEPARATORS or not start[1:].strip()
 
 
 def split_cells(line: str, separator: str, where: str) -> list[str]:
@@ -53,11 +62,19 @@ def split_cells(line: str, separator: str, where: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
+def is_number_or_missing(cell: str) -> bool:
+    """Whether a cell (without decimal comma) can stand in a column of numbers: a number, infinite, nan or blank."""
+    return bool(NUMBER.fullmatch(cell) or MISSING.fullmatch(cell) or INFINITE.fullmatch(cell))
+
+
+def to_float(cell: str) -> float:
+    """The number in a cell for which `is_number_or_missing` holds; NaN where it is missing."""
+    return math.nan if MISSING.fullmatch(cell) else float(cell)
+
+
 def looks_like_number(cell: str) -> bool:
     """Whether a cell is a number in any notation, nan and inf included: such a cell is no column name."""
-    return bool(NUMBER.fullmatch(cell) or INFINITE.fullmatch(cell) or COMMA_NUMBER.fullmatch(cell)) or (
-        cell.lower() == "nan"
-    )
+    return bool(cell) and (is_number_or_missing(cell) or bool(COMMA_NUMBER.fullmatch(cell)))
 
 
 def looks_like_data(line: str) -> bool:
@@ -71,10 +88,10 @@ def find_separator(header: str, rows: Sequence[str], where: str) -> str:
 
     Returns "," for a single column. Raises InputError when two separators would do, or none is in sight.
     """
-    present = {separator: _count(header, separator) for separator in SEPARATORS}
+    present = {separator: min(counts(header, separator)) for separator in SEPARATORS}
     possible = [separator for separator, count in present.items() if count > 1]
     sample = rows[:SAMPLE_ROWS]
-    fitting = [s for s in possible if all(_count(row, s) == present[s] for row in sample)]
+    fitting = [s for s in possible if all(present[s] in counts(row, s) for row in sample)]
     choice = fitting if fitting else possible
     if len(choice) == 1:
         return choice[0]
@@ -103,18 +120,31 @@ def _check_single_column(rows: Iterable[str], where: str) -> None:
             )
 
 
-def _count(line: str, separator: str) -> int:
-    """Number of cells under a separator; -1 when a quote is broken."""
+def counts(line: str, separator: str) -> tuple[int, int]:
+    """Number of cells under a separator, and without a blank last one; -1 when a quote is broken."""
     try:
-        return len(split_cells(line, separator, ""))
+        cells = split_cells(line, separator, "")
     except InputError:
-        return -1
+        return -1, -1
+    return len(cells), len(cells) - (len(cells) > 1 and not cells[-1])
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit. A number in front, as in 8Hz or [0], makes it something else."""
+    return text in _UNITS or (known_unit(text) is not None and (text == "1/min" or not text[:1].isdigit()))
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
-    """Whether every cell of the row under the header is a known unit, in brackets or not, or blank."""
-    plain = [strip_brackets(cell) for cell in cells]
-    return any(plain) and all(cell in UNITS for cell in plain if cell)
+    """Whether the row under the header holds units: no number, and every cell a known unit or blank.
+
+    Where every cell stands in brackets, or where most of three or more are known, the others may be unknown.
+    """
+    plain = [strip_brackets(cell) for cell in cells if cell]
+    if not plain or any(map(looks_like_number, plain)):
+        return False
+    known = sum(map(is_unit, plain))
+    bracketed = all(strip_brackets(cell) != cell for cell in cells if cell)
+    return known == len(plain) or (known > 0 and bracketed) or (known > 2 and 2 * known > len(plain))
 
 
 def strip_brackets(cell: str) -> str:
@@ -122,43 +152,44 @@ def strip_brackets(cell: str) -> str:
     return cell[1:-1].strip() if cell[:1] + cell[-1:] in ("[]", "()") else cell
 
 
-def has_decimal_comma(cells: Iterable[str], where: str) -> bool:
-    """Whether the numbers have a decimal comma, unmistakably. `cells` must not come from a comma-separated table.
+def split_unit(name: str) -> tuple[str, str]:
+    """("w1", "rad/s") from "w1 [rad/s]" or "w1 (rad/s)"; no unit where the brackets hold none, as in "joint[0]"."""
+    match = _NAME_AND_UNIT.fullmatch(name)
+    unit = (match[2] or match[3]) if match else ""
+    return (match[1], unit) if match and is_unit(unit) else (name, "")
 
-    Raises InputError when points and commas are mixed, or when every comma could separate thousands.
-    """
-    commas, points = "", ""
-    certain = False
-    for cell in cells:
-        if "," in cell and (COMMA_NUMBER.fullmatch(cell) or GROUPED_NUMBER.fullmatch(cell)):
-            commas = cell
-            certain = certain or not GROUPED_NUMBER.fullmatch(cell)
-        elif "." in cell and NUMBER.fullmatch(cell):
-            points = cell
-    if commas and points:
-        raise InputError(
-            "decimal commas and decimal points are mixed",
-            got=f"{commas} and {points}",
-            expected="decimal points",
-            remedy="write the table with decimal points",
-            where=where,
-        )
-    if commas and not certain:
-        number = commas.replace(",", "")
-        raise InputError(
-            "a comma in a number is ambiguous",
-            got=commas,
-            expected=f"{number} or a decimal point",
-            remedy="write the table with decimal points",
-            where=where,
-        )
-    return bool(commas)
+
+def is_comma_number(cell: str) -> bool:
+    """Whether a cell is a number with commas, be they decimal or between thousands."""
+    return "," in cell and bool(COMMA_NUMBER.fullmatch(cell) or GROUPED_NUMBER.fullmatch(cell))
+
+
+def mixed(comma: str, point: str, where: str) -> InputError:
+    """The error of a table with decimal commas and decimal points."""
+    return InputError(
+        "decimal commas and decimal points are mixed",
+        got=f"{comma} and {point}",
+        expected="decimal points",
+        remedy="write the table with decimal points",
+        where=where,
+    )
+
+
+def ambiguous(number: str, where: str) -> InputError:
+    """The error of a table in which every comma could separate thousands."""
+    return InputError(
+        "a comma in a number is ambiguous",
+        got=number,
+        expected=f"{number.replace(',', '')} or a decimal point",
+        remedy="write the table with decimal points",
+        where=where,
+    )
 
 
 def is_decimal_comma_plain(rows: Sequence[str], separator: str) -> bool:
     """Whether a look in passing shows a decimal comma: no point anywhere, and one certain cell soon.
 
-    False only means that `has_decimal_comma` has to look at every cell.
+    False only means that every cell has to be looked at.
     """
     soon = (cell.strip() for row in rows[:SAMPLE_ROWS] for cell in row.split(separator))
     certain = any(COMMA_NUMBER.fullmatch(cell) and not GROUPED_NUMBER.fullmatch(cell) for cell in soon)

@@ -1,7 +1,8 @@
-"""One strict reader for every table of numbers in a text file (CSV): voltage files, steady tables, runs.
+"""One strict reader for every table of numbers in a text file (CSV): logs, voltage files, steady tables, runs.
 
-It takes a byte order mark, any end of line, comment lines (#), a row of units under the header, separators comma,
-semicolon and tab, and a decimal comma where it is unmistakable. What it had to decide stands in `Table.notes`.
+It takes a byte order mark, any end of line, comment lines (# or %), a header that stands in comments, a row of units
+under the header or a line of titles above it, separators comma, semicolon and tab, one at the end of every row too,
+and a decimal comma where it is unmistakable. What it had to decide stands in `Table.notes`.
 It refuses, with file, line and column, what other readers swallow: ragged rows, a missing header, a quote that is
 never closed, 1e400, 1_000, 0x10, #N/A, blank cells where a number is needed.
 """
@@ -10,24 +11,26 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.files import read_bytes, read_text, sha256
+from omnidyn.files import default_max_bytes, too_large
 from omnidyn.logs import dialect
+from omnidyn.logs.header import Layout, find_layout
+from omnidyn.logs.rows import Column, FloatArray, RowParser
+from omnidyn.logs.text_file import TOO_LARGE_REMEDY, Piece, Progress, TextFile
 
-FloatArray = NDArray[np.float64]
-Column = FloatArray | tuple[str, ...]
-
-MAX_TABLE_BYTES = 512 * 2**20
-MAX_COLUMNS = 1000
-COMMA_NOTE = "numbers have a decimal comma"
+ROWS = 500_000
+MAX_CELLS = 2**24  # in one piece: 128 MiB of floats
+HEAD_ROWS = 100  # the first rows are looked at together to tell how a file is written
+MAX_HEAD_LINES = 100_000  # without a row, it is no table
+MIN_HELD_BYTES = 64 * 2**20
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,8 @@ class Table:
 
     names: of the columns, in order. columns: name -> floats, shape (rows,), NaN where a cell is blank or nan; or a
     tuple of text where a cell is neither. Infinite numbers are never in it.
-    lines: line of each row in the file, counted from 1. Shape (rows,). units: name -> unit, where a row gave them.
+    lines: line of each row in the file, counted from 1; number of each row, in a Parquet file. Shape (rows,).
+    units: name -> unit, where a row or the header gave them. titles: name -> long name, where a line gave them.
     source: the path. sha256: of the file's bytes. notes: what the reader had to decide, in words.
     """
 
@@ -47,6 +51,7 @@ class Table:
     source: str
     sha256: str
     notes: tuple[str, ...] = ()
+    titles: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -58,7 +63,8 @@ class Table:
         """
         column = self.columns[name]
         if isinstance(column, tuple):
-            row = next(k for k, cell in enumerate(column) if not _is_number_or_missing(cell))
+            bad = (k for k, cell in enumerate(column) if not dialect.is_number_or_missing(cell))
+            row = next(bad, 0)  # all are numbers in a later piece of a column that began with words
             raise self.fault(
                 row, name, "not a number", column[row], "a number such as -1.5 or 2e-3", _hint(column[row])
             )
@@ -107,183 +113,138 @@ class Table:
             )
 
 
-class _Rows(NamedTuple):
-    """The lines of a file that hold cells: text and line number, header first."""
+def read_table(
+    path: str | os.PathLike,
+    *,
+    header: bool = True,
+    skip_bad_rows: bool = False,
+    max_bytes: int | None = None,
+    progress: Progress | None = None,
+) -> Table:
+    """Read a table of numbers (and words) from a text file. See the head of this file for what is taken and refused.
 
-    header: str
-    header_line: int
-    texts: list[str]
-    lines: NDArray[np.int64]
-    notes: list[str]
-
-
-def read_table(path: str | os.PathLike, max_bytes: int = MAX_TABLE_BYTES) -> Table:
-    """Read a table of numbers (and words) with a header. See the head of this file for what is taken and refused.
-
+    header: False where the first row is a row already; the columns are then called c1, c2, ...
+    skip_bad_rows: leave out rows with another number of cells, a broken quote, an infinite number, or text where the
+    column holds numbers; they are counted in `notes`. max_bytes: refuse a larger file; a quarter of the memory where
+    it is not given. progress(bytes_done, bytes_total) is called now and then.
     Raises InputError: `file:line, column NAME: what; got ...; expected ...; remedy`.
     """
-    source = str(path)
-    digest = sha256(read_bytes(path, max_bytes))
-    rows = _header_and_rows(read_text(path, max_bytes), source)
-    separator = dialect.find_separator(rows.header, rows.texts, f"{source}:{rows.header_line}")
-    names = _names(rows, separator, source)
-    notes, units = list(rows.notes), {}
-    if separator != ",":
-        notes.append(f"columns are separated by {'a tab' if separator == chr(9) else 'a semicolon'}")
-    if rows.texts:
-        cells = dialect.split_cells(rows.texts[0], separator, f"{source}:{rows.lines[0]}")
-        if len(cells) == len(names) and dialect.is_units_row(cells):
-            units = {name: dialect.strip_brackets(cell) for name, cell in zip(names, cells, strict=True) if cell}
-            rows = rows._replace(texts=rows.texts[1:], lines=rows.lines[1:])
-    if not rows.texts:
-        raise InputError("no rows", got="0 samples", expected="at least one row under the header", where=source)
-    columns, more = _fast_columns(rows, separator, names) or _careful_columns(rows, separator, names, source)
-    table = Table(tuple(names), columns, rows.lines, units, source, digest, (*notes, *more))
-    _refuse_infinite(table)
-    return table
+    limit = default_max_bytes() if max_bytes is None else max_bytes
+    file = TextFile(path, progress, limit)
+    return join(_tables(file, ROWS, header, skip_bad_rows), limit)
 
 
-def _header_and_rows(text: str, source: str) -> _Rows:
-    """Header and rows, without blank lines and comments; any end of line will do."""
-    if "\0" in text:
-        raise InputError("this is not a text file", got="zero bytes in it", expected="text", where=source)
-    if "\r" in text:
-        text = text.replace("\r\n", "\n").replace("\r", "\n")
-    lines = text.split("\n")
-    kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not _hash(line)]
-    if not kept:
-        raise InputError(
-            "no table in the file", got="only blank lines and comments", expected="a header and rows", where=source
-        )
-    first = kept[0]
-    if not dialect.looks_like_data(lines[first]):
-        body, notes, header, header_line = kept[1:], [], lines[first], first + 1
-    else:
-        header, header_line = _commented_header(lines, first, source), first
-        body, notes = kept, [f"line {first}, a comment, was read as the header"]
-    return _Rows(header, header_line, [lines[k] for k in body], np.array(body, dtype=np.int64) + 1, notes)
+def iter_text(
+    path: str | os.PathLike,
+    rows: int = ROWS,
+    *,
+    header: bool = True,
+    skip_bad_rows: bool = False,
+    progress: Progress | None = None,
+) -> Iterator[Table]:
+    """The tables of a text file of any size, at most `rows` rows each; joined they are what `read_table` reads.
 
-
-def _hash(line: str) -> bool:
-    return "#" in line and dialect.is_comment(line)
-
-
-def _commented_header(lines: list[str], first: int, source: str) -> str:
-    """The names that `numpy.savetxt` writes as a comment right above the first row; without them there is no header."""
-    above = lines[first - 1].lstrip()[1:].strip() if first else ""
-    for separator in dialect.SEPARATORS:
-        names = [name.strip() for name in above.split(separator)]
-        usual = len(set(names)) == len(names) and all(names) and not any(map(dialect.looks_like_number, names))
-        if usual and len(names) > 1 and len(names) == len(lines[first].split(separator)):
-            return above
-    raise InputError(
-        "the table has no header: its first row is numbers",
-        got=lines[first],
-        expected="column names such as t_s,u1_V",
-        remedy="add a first line with the column names",
-        where=f"{source}:{first + 1}",
-    )
-
-
-def _names(rows: _Rows, separator: str, source: str) -> list[str]:
-    """The column names: one each, none blank, none a number, none twice."""
-    where = f"{source}:{rows.header_line}"
-    if rows.header.count(separator) >= MAX_COLUMNS:
-        raise InputError(
-            "too many columns", got=rows.header.count(separator) + 1, expected=f"at most {MAX_COLUMNS}", where=where
-        )
-    names = dialect.split_cells(rows.header, separator, where)
-    for k, name in enumerate(names):
-        if not name:
-            raise InputError(
-                f"column {k + 1} has no name",
-                got=rows.header,
-                expected="a name for every column",
-                remedy="name it or remove it",
-                where=where,
-            )
-        if dialect.looks_like_number(name):
-            raise InputError(
-                "the table has no header: a number stands where a name should",
-                got=name,
-                expected="column names such as t_s,u1_V",
-                remedy="add a first line with the column names",
-                where=where,
-            )
-        if name in names[:k]:
-            raise InputError("two columns have the same name", got=name, expected="different names", where=where)
-    return names
-
-
-def _fast_columns(rows: _Rows, separator: str, names: list[str]) -> tuple[dict[str, Column], list[str]] | None:
-    """NumPy's own parser, for a table of plain numbers; None where it stumbles, to be looked at with care.
-
-    It takes no underscore, no hexadecimal and no ragged row; what it takes too gladly (1e400) is checked later.
+    The last of them has the sha256 of the file and all notes. A column that begins with numbers and goes on with words
+    is numbers in the first tables. The rest as `read_table`.
     """
-    comma = separator != "," and dialect.is_decimal_comma_plain(rows.texts, separator)
-    texts = [text.replace(",", ".") for text in rows.texts] if comma else rows.texts
-    try:
-        values = np.loadtxt(texts, delimiter=separator, comments=None, ndmin=2)
-    except (ValueError, OverflowError):
-        return None
-    if values.shape != (len(texts), len(names)):
-        return None
-    columns: dict[str, Column] = {name: _frozen(values[:, k].copy()) for k, name in enumerate(names)}
-    return columns, [COMMA_NOTE] if comma else []
+    return _tables(TextFile(path, progress), rows, header, skip_bad_rows)
 
 
-def _careful_columns(rows: _Rows, separator: str, names: list[str], source: str) -> tuple[dict[str, Column], list[str]]:
-    """Cell by cell: finds what is wrong and where, and reads words, blanks, quotes and decimal commas."""
-    table: list[list[str]] = []
-    for k, (line, text) in enumerate(zip(rows.lines, rows.texts, strict=True)):
-        cells = dialect.split_cells(text, separator, f"{source}:{line}")
-        if len(cells) != len(names):
-            raise InputError(
-                f"row {k + 1} has another number of cells than the header",
-                got=f"{len(cells)}: {text}",
-                expected=f"{len(names)} cells",
-                remedy=_ragged_hint(separator),
-                where=f"{source}:{line}",
-            )
-        table.append(cells)
-    comma = separator != "," and dialect.has_decimal_comma(chain.from_iterable(table), source)
-    columns = {name: _column([row[k] for row in table], comma) for k, name in enumerate(names)}
-    return columns, [COMMA_NOTE] if comma else []
+def join(tables: Iterable[Table], max_bytes: int | None = None) -> Table:
+    """One table from the pieces of a file. Raises InputError when their numbers take more than `max_bytes`."""
+    parts: list[Table] = []
+    held = 0
+    for table in tables:
+        parts.append(table)
+        held += 8 * len(table) * (len(table.names) + 1)
+        if max_bytes is not None and held > max(max_bytes, MIN_HELD_BYTES):
+            raise too_large(table.source, max_bytes, TOO_LARGE_REMEDY)
+    last = parts[-1]
+    if len(parts) == 1:
+        return last
+    columns = {name: _joined([part.columns[name] for part in parts]) for name in last.names}
+    return replace(last, columns=_frozen(columns), lines=_read_only(np.concatenate([part.lines for part in parts])))
 
 
-def _column(cells: list[str], decimal_comma: bool) -> Column:
-    """Floats where every cell is a number or missing, the words as they are otherwise."""
-    values = np.full(len(cells), np.nan)
-    for k, cell in enumerate(cells):
-        if decimal_comma and dialect.COMMA_NUMBER.fullmatch(cell):
-            cell = cell.replace(",", ".")
-        if not _is_number_or_missing(cell):
-            return tuple(cells)
-        if cell:
-            values[k] = float(cell)
-    return _frozen(values)
+def _joined(columns: Sequence[Column]) -> Column:
+    """A column of words, where any piece of it holds words."""
+    if not any(isinstance(column, tuple) for column in columns):
+        return np.concatenate(columns)
+    return tuple(chain.from_iterable(c if isinstance(c, tuple) else map(repr, c.tolist()) for c in columns))
 
 
-def _is_number_or_missing(cell: str) -> bool:
-    known = dialect.NUMBER.fullmatch(cell) or dialect.INFINITE.fullmatch(cell)
-    return bool(known) or cell == "" or cell.lower() == "nan"
+def _tables(file: TextFile, rows: int, header: bool, skip: bool) -> Iterator[Table]:
+    """The tables one after the other; the last one waits for the end of the file, to have its hash."""
+    if rows < 1:
+        raise InputError("no rows in a piece", got=rows, expected="1 or more")
+    head, pieces = _head(file.pieces(rows))
+    layout = find_layout(head, file.source, header)
+    sample = _kept(Piece(1, head), layout.first)[0][: dialect.SAMPLE_ROWS]
+    parser = RowParser(layout, file.source, skip, sample)
+    waiting: Table | None = None
+    for piece in _cut(pieces, max(1, min(rows, MAX_CELLS // len(layout.names)))):
+        texts, lines = _kept(piece, layout.first)
+        if not texts:
+            continue
+        columns, lines = parser.parse(texts, lines, partial(_texts_from, file, layout, piece.first + len(piece.lines)))
+        if not len(lines):
+            continue
+        if waiting is not None:
+            yield waiting
+        notes = (*layout.notes, *file.notes, *parser.notes)
+        columns = _frozen(columns)
+        waiting = Table(layout.names, columns, _read_only(lines), layout.units, file.source, "", notes, layout.titles)
+    if waiting is None:
+        raise InputError("no rows", got="0 samples", expected="at least one row under the header", where=file.source)
+    yield replace(waiting, sha256=file.sha256, notes=(*layout.notes, *file.notes, *parser.notes))
 
 
-def _refuse_infinite(table: Table) -> None:
-    for name, column in table.columns.items():
-        if not isinstance(column, tuple) and np.isinf(column).any():
-            row = int(np.flatnonzero(np.isinf(column))[0])
-            raise table.fault(
-                row,
-                name,
-                "not a finite number",
-                "inf, or a number beyond 1.8e308",
-                "a finite number",
-                "correct or remove the row",
-            )
+def _head(pieces: Iterator[Piece]) -> tuple[list[str], Iterator[Piece]]:
+    """The first lines of a file, enough to tell how it is written, and all its pieces."""
+    taken: list[Piece] = []
+    lines: list[str] = []
+    rows = 0
+    for piece in pieces:
+        taken.append(piece)
+        for line in piece.lines:
+            lines.append(line)
+            rows += bool(line) and not _is_comment(line)
+            if rows > HEAD_ROWS:
+                return lines, chain(taken, pieces)
+        if len(lines) > MAX_HEAD_LINES:
+            break
+    return lines, chain(taken, pieces)
 
 
-def _frozen(values: FloatArray) -> FloatArray:
+def _cut(pieces: Iterable[Piece], rows: int) -> Iterator[Piece]:
+    for first, lines in pieces:
+        yield from (Piece(first + k, lines[k : k + rows]) for k in range(0, len(lines), rows))
+
+
+def _kept(piece: Piece, first: int) -> tuple[list[str], NDArray[np.int64]]:
+    """The rows in a piece, without blank lines, comments and what stands above line `first`; and their lines."""
+    begin = max(0, first - piece.first)
+    lines = piece.lines[begin:]
+    kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not _is_comment(line)]
+    texts = lines if len(kept) == len(lines) else [lines[k] for k in kept]
+    return texts, np.array(kept, dtype=np.int64) + (piece.first + begin)
+
+
+def _is_comment(line: str) -> bool:
+    return ("#" in line or "%" in line) and dialect.is_comment(line)
+
+
+def _texts_from(file: TextFile, layout: Layout, line: int) -> Iterator[str]:
+    """The rows from a line on, read again from the file."""
+    for piece in TextFile(file.path).pieces(ROWS):
+        yield from _kept(piece, max(line, layout.first))[0]
+
+
+def _frozen(columns: Mapping[str, Column]) -> dict[str, Column]:
+    return {name: c if isinstance(c, tuple) else _read_only(c) for name, c in columns.items()}
+
+
+def _read_only(values: NDArray) -> NDArray:
     values.flags.writeable = False
     return values
 
@@ -296,10 +257,4 @@ def _hint(cell: str) -> str:
         return "write plain decimal digits"
     if "," in cell:
         return "write a decimal point, and no separator of thousands"
-    return "correct or remove the row"
-
-
-def _ragged_hint(separator: str) -> str:
-    if separator == ",":
-        return "a decimal comma? then separate the columns by semicolons; else correct or remove the row"
     return "correct or remove the row"

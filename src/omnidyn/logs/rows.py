@@ -1,0 +1,255 @@
+"""Lines of text into columns of numbers, piece after piece; a piece more or less never changes a number.
+
+Plain numbers go through NumPy's own parser. Where it stumbles, every cell is looked at: that finds what is wrong and
+where, and reads words, quotes and odd blanks. Both give the same numbers (a test holds them against each other).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.logs import dialect
+from omnidyn.logs.header import Layout
+
+FloatArray = NDArray[np.float64]
+Column = FloatArray | tuple[str, ...]
+Lines = NDArray[np.int64]
+
+RAGGED, NOT_A_NUMBER, INFINITE = "another number of cells", "no number where one is due", "an infinite number"
+BROKEN_QUOTE = "a broken quote"
+SHOWN_LINES = 5
+COMMA_NOTE = "numbers have a decimal comma"
+
+
+class RowParser:
+    """Reads the rows of one file in order, given to it in pieces.
+
+    layout: of the file. skip: leave out bad rows instead of refusing the file; `skipped` counts them, by reason, with
+    their lines. sample: the first rows, which then say what columns hold numbers.
+    What a piece shows holds for all later ones: whether numbers have a decimal comma, and which columns hold words.
+    """
+
+    def __init__(self, layout: Layout, source: str, skip: bool = False, sample: Sequence[str] = ()):
+        self.layout, self.source, self.skip = layout, source, skip
+        self.skipped: dict[str, list[int]] = {}
+        self._rows = 0
+        self._comma = self._point = ""  # the first number of each kind
+        self._words: set[str] = set()
+        count = len(layout.names)
+        first = [cells for text in sample if len(cells := self._cells_or_none(text)) == count]
+        self._numeric = tuple(_mostly_numbers([cells[k] for cells in first]) for k in range(count))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was decided so far, in words."""
+        comma = [COMMA_NOTE] if self._comma else []
+        return (*comma, *(_skip_note(reason, lines) for reason, lines in self.skipped.items()))
+
+    def parse(
+        self, texts: list[str], lines: Lines, later: Callable[[], Iterable[str]] = tuple
+    ) -> tuple[dict[str, Column], Lines]:
+        """The columns of some rows, and the lines of those that were kept.
+
+        texts: without blank lines and comments; `later` gives the texts of all rows that follow, where a decimal comma
+        is not certain yet. Raises InputError, at the first bad row of all.
+        """
+        values = self._plain(texts)
+        if values is not None:
+            columns: dict[str, Column] = {n: values[:, k].copy() for k, n in enumerate(self.layout.names)}
+        else:
+            columns, lines = self._careful(texts, lines, later)
+        self._rows += len(texts)
+        return columns, lines
+
+    # ---- plain numbers -----------------------------------------------------------------------------------
+
+    def _plain(self, texts: list[str]) -> FloatArray | None:
+        """The numbers of rows that hold nothing else, shape (rows, columns); None where a closer look is needed."""
+        if self._words or any('"' in text for text in texts):
+            return None
+        texts, separator, comma, first = self._unended(texts), self.layout.separator, False, ""
+        if separator != ",":
+            point = any("." in text for text in texts)
+            comma = any("," in text for text in texts)
+            certain = self._comma or dialect.is_decimal_comma_plain(texts, separator)
+            if (point and (comma or self._comma)) or (comma and (self._point or not certain)):
+                return None
+            first = _first_with("," if comma else ".", texts, separator)
+            texts = [text.replace(",", ".") for text in texts] if comma else texts
+        values = _loaded(texts, separator)
+        if values is None:
+            values = _loaded([_filled(text, separator) for text in texts], separator)
+        if values is None or values.shape != (len(texts), len(self.layout.names)) or np.isinf(values).any():
+            return None
+        if separator != ",":
+            self._comma = self._comma or (first if comma else "")
+            self._point = self._point or ("" if comma else first)
+        return values
+
+    def _unended(self, texts: list[str]) -> list[str]:
+        ending = self.layout.ending
+        return [text.rstrip().removesuffix(ending) for text in texts] if ending else texts
+
+    # ---- cell by cell ------------------------------------------------------------------------------------
+
+    def _careful(
+        self, texts: list[str], lines: Lines, later: Callable[[], Iterable[str]]
+    ) -> tuple[dict[str, Column], Lines]:
+        table, fault = self._split(texts, lines)
+        keep = np.array([cells is not None for cells in table], dtype=bool)
+        rows, lines = [cells for cells in table if cells is not None], lines[: len(table)][keep]
+        comma = self.layout.separator != "," and self._decide(rows, lines, later)
+        if comma:
+            rows = [[_pointed(cell) for cell in cells] for cells in rows]
+        if self.skip:
+            rows, lines = self._good(rows, lines)
+        columns = {name: self._column(name, [row[k] for row in rows]) for k, name in enumerate(self.layout.names)}
+        self._refuse_infinite(columns, lines)
+        if fault is not None:
+            raise fault
+        return columns, lines
+
+    def _split(self, texts: list[str], lines: Lines) -> tuple[list[list[str] | None], InputError | None]:
+        """The cells of each row up to the first fault; None for a row to leave out."""
+        table: list[list[str] | None] = []
+        for text, line in zip(texts, lines, strict=True):
+            try:
+                cells = self.layout.cells(text, f"{self.source}:{line}")
+                self._check_count(cells, text, line, self._rows + len(table) + 1)
+            except InputError as fault:
+                if not self.skip:
+                    return table, fault
+                self._leave_out(RAGGED if "cells" in fault.what else BROKEN_QUOTE, int(line))
+                cells = None
+            table.append(cells)
+        return table, None
+
+    def _check_count(self, cells: list[str], text: str, line: int, row: int) -> None:
+        if len(cells) != len(self.layout.names):
+            raise InputError(
+                f"row {row} has another number of cells than the header",
+                got=f"{len(cells)}: {text}",
+                expected=f"{len(self.layout.names)} cells",
+                remedy=_ragged_hint(self.layout.separator),
+                where=f"{self.source}:{line}",
+            )
+
+    def _leave_out(self, reason: str, line: int) -> None:
+        self.skipped.setdefault(reason, []).append(line)
+
+    def _decide(self, rows: list[list[str]], lines: Lines, later: Callable[[], Iterable[str]]) -> bool:
+        """Whether the numbers have a decimal comma. Raises InputError when points and commas are mixed."""
+        doubtful = ""
+        for row, line in zip(rows, lines, strict=True):
+            for cell in row:
+                comma = dialect.is_comma_number(cell)
+                if comma and dialect.GROUPED_NUMBER.fullmatch(cell) and not self._comma:
+                    doubtful = doubtful or cell
+                elif comma:
+                    self._comma = self._comma or cell
+                elif "." in cell and dialect.NUMBER.fullmatch(cell):
+                    self._point = self._point or cell
+                if (self._comma or doubtful) and self._point:
+                    raise dialect.mixed(self._comma or doubtful, self._point, f"{self.source}:{line}")
+        if doubtful and not self._comma:
+            self._comma = self._certain_later(doubtful, later)
+        return bool(self._comma)
+
+    def _certain_later(self, doubtful: str, later: Callable[[], Iterable[str]]) -> str:
+        """A later cell that shows what a comma means. Raises InputError where there is none, or one with a point."""
+        for text in later():
+            for cell in self._cells_or_none(text):
+                if dialect.is_comma_number(cell) and not dialect.GROUPED_NUMBER.fullmatch(cell):
+                    return cell
+                if "." in cell and dialect.NUMBER.fullmatch(cell):
+                    raise dialect.mixed(doubtful, cell, self.source)
+        raise dialect.ambiguous(doubtful, self.source)
+
+    def _cells_or_none(self, text: str) -> list[str]:
+        try:
+            return self.layout.cells(text, "")
+        except InputError:
+            return []
+
+    def _good(self, rows: list[list[str]], lines: Lines) -> tuple[list[list[str]], Lines]:
+        """The rows that have finite numbers in all columns of numbers."""
+        keep = np.ones(len(rows), dtype=bool)
+        for k, (row, line) in enumerate(zip(rows, lines, strict=True)):
+            cells = [cell for cell, numeric in zip(row, self._numeric, strict=True) if numeric]
+            reason = "" if all(map(dialect.is_number_or_missing, cells)) else NOT_A_NUMBER
+            if not reason and any(cell and np.isinf(dialect.to_float(cell)) for cell in cells):
+                reason = INFINITE
+            if reason:
+                self._leave_out(reason, int(line))
+                keep[k] = False
+        return [row for row, good in zip(rows, keep, strict=True) if good], lines[keep]
+
+    def _column(self, name: str, cells: list[str]) -> Column:
+        """Floats where every cell is a number or missing, the words as they are otherwise."""
+        if name in self._words or not all(map(dialect.is_number_or_missing, cells)):
+            self._words.add(name)
+            return tuple(cells)
+        return np.array([dialect.to_float(cell) for cell in cells], dtype=float)
+
+    def _refuse_infinite(self, columns: dict[str, Column], lines: Lines) -> None:
+        """Raises InputError at the first row that holds an infinite number."""
+        first: tuple[int, str] | None = None
+        for name, column in columns.items():
+            bad = [] if isinstance(column, tuple) else np.flatnonzero(np.isinf(column))
+            if len(bad) and (first is None or bad[0] < first[0]):
+                first = int(bad[0]), name
+        if first is not None:
+            raise InputError(
+                "not a finite number",
+                got="inf, or a number beyond 1.8e308",
+                expected="a finite number",
+                remedy="correct or remove the row",
+                where=f"{self.source}:{lines[first[0]]}, column {first[1]}",
+            )
+
+
+def _loaded(texts: list[str], separator: str) -> FloatArray | None:
+    """NumPy's parser takes no underscore, no hexadecimal and no ragged row. None where it stumbles."""
+    try:
+        return np.loadtxt(texts, delimiter=separator, comments=None, ndmin=2)
+    except (ValueError, OverflowError):
+        return None
+
+
+def _first_with(character: str, texts: list[str], separator: str) -> str:
+    row = next((text for text in texts if character in text), "")
+    return next((cell.strip() for cell in row.split(separator) if character in cell), "")
+
+
+def _filled(text: str, separator: str) -> str:
+    """The row with nan in its blank cells."""
+    double, nan = separator * 2, f"{separator}nan{separator}"
+    if double in text:
+        text = text.replace(double, nan).replace(double, nan)
+    text = f"nan{text}" if text.startswith(separator) else text
+    return f"{text}nan" if text.endswith(separator) else text
+
+
+def _pointed(cell: str) -> str:
+    return cell.replace(",", ".") if "," in cell and dialect.COMMA_NUMBER.fullmatch(cell) else cell
+
+
+def _mostly_numbers(cells: Sequence[str]) -> bool:
+    there = [cell for cell in cells if cell]
+    return 2 * sum(map(dialect.looks_like_number, there)) >= len(there)
+
+
+def _ragged_hint(separator: str) -> str:
+    if separator == ",":
+        return "a decimal comma? then separate the columns by semicolons; else correct or remove the row"
+    return "correct or remove the row"
+
+
+def _skip_note(reason: str, lines: list[int]) -> str:
+    shown = ", ".join(map(str, lines[:SHOWN_LINES])) + (", ..." if len(lines) > SHOWN_LINES else "")
+    rows = "1 row was" if len(lines) == 1 else f"{len(lines)} rows were"
+    return f"{rows} left out for {reason} (line{'s' if len(lines) > 1 else ''} {shown})"

@@ -1,0 +1,165 @@
+"""The lines of a text file in pieces: any end of line, UTF-8, UTF-16 or Latin-1, hashed on the way.
+
+Memory is bounded by the piece, never by the file. A line is UTF-8, or Latin-1 where it cannot be UTF-8.
+"""
+
+from __future__ import annotations
+
+import codecs
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from omnidyn.errors import InputError
+from omnidyn.files import file_format, open_regular, too_large
+
+BLOCK_BYTES = 2**20
+MAX_LINE_BYTES = 4 * 2**20
+TOO_LARGE_REMEDY = "cut it, allow more with --max-bytes, or read it in pieces with iter_tables"
+
+Progress = Callable[[int, int], None]
+
+
+class Piece(NamedTuple):
+    """Lines of a file, without their ends; `first` is the number of the first one, counted from 1."""
+
+    first: int
+    lines: list[str]
+
+
+class TextFile:
+    """A text file, read once, in order, by `pieces`. Afterwards `sha256` and `notes` are complete.
+
+    progress(bytes_done, bytes_total) is called after every block. max_bytes: refuse a longer file.
+    Raises InputError when the file is missing, no file, empty, too large or not text.
+    """
+
+    def __init__(self, path: str | os.PathLike, progress: Progress | None = None, max_bytes: int | None = None):
+        self.path, self.source = path, str(path)
+        self.notes: list[str] = []
+        self._progress, self._max_bytes, self._hash = progress, max_bytes, hashlib.sha256()
+        self._latin_line = 0
+
+    @property
+    def sha256(self) -> str:
+        """Hexadecimal SHA-256 of what was read so far."""
+        return self._hash.hexdigest()
+
+    def pieces(self, rows: int) -> Iterator[Piece]:
+        """All lines, at most `rows` of them at once."""
+        first, pending = 1, []
+        for block in self._whole_lines():
+            pending += self._decoded(block, first + len(pending)).split("\n")
+            while len(pending) > rows:
+                yield Piece(first, pending[:rows])
+                first, pending = first + rows, pending[rows:]
+        if pending:
+            yield Piece(first, pending)
+
+    def _whole_lines(self) -> Iterator[bytes]:
+        """Blocks that end where a line ends, the last line end of each cut off."""
+        rest = b""
+        for block in self._unix(self._utf8(self._blocks())):
+            rest += block
+            end = rest.rfind(b"\n")
+            if end >= 0:
+                yield rest[:end]
+                rest = rest[end + 1 :]
+            if len(rest) > MAX_LINE_BYTES:
+                raise InputError(
+                    "this is not a table", got=f"a line of more than {MAX_LINE_BYTES} bytes",
+                    expected="lines of cells", where=self.source,
+                )  # fmt: skip
+        if rest:
+            yield rest
+
+    def _blocks(self) -> Iterator[bytes]:
+        with open_regular(self.path) as stream:
+            total = os.fstat(stream.fileno()).st_size
+            done = 0
+            if self._max_bytes is not None and total > self._max_bytes:
+                raise too_large(self.path, self._max_bytes, TOO_LARGE_REMEDY)
+            while block := stream.read(BLOCK_BYTES):
+                if not done:
+                    self._refuse_format(block)
+                self._hash.update(block)
+                done += len(block)
+                yield block
+                if self._progress is not None:
+                    self._progress(done, total)
+        if not done:
+            raise InputError("the file is empty", got="0 bytes", where=self.source)
+
+    def _refuse_format(self, start: bytes) -> None:
+        kind = file_format(start)
+        if kind is not None:
+            raise InputError(
+                "this is not a text file", got=kind.words, expected="text", remedy=kind.remedy, where=self.source
+            )
+
+    def _utf8(self, blocks: Iterator[bytes]) -> Iterator[bytes]:
+        """The same text without a byte order mark, UTF-16 turned into UTF-8. Raises InputError for zero bytes."""
+        decoder = None
+        for k, block in enumerate(blocks):
+            if k == 0:
+                block, encoding = _begin(block)
+                if encoding:
+                    self.notes.append(f"the encoding is {encoding}")
+                    decoder = codecs.getincrementaldecoder(encoding)() if encoding.startswith("UTF-16") else None
+            if decoder is not None:
+                block = self._from_utf16(decoder, block)
+            if b"\0" in block:
+                raise InputError("this is not a text file", got="zero bytes in it", expected="text", where=self.source)
+            yield block
+        if decoder is not None:
+            self._from_utf16(decoder, b"", final=True)
+
+    def _from_utf16(self, decoder: codecs.IncrementalDecoder, block: bytes, final: bool = False) -> bytes:
+        try:
+            return decoder.decode(block, final).encode()
+        except UnicodeError:
+            raise InputError(
+                "this is not a text file", got="no valid UTF-16 after its byte order mark", expected="text",
+                remedy="save it as UTF-8", where=self.source,
+            ) from None  # fmt: skip
+
+    @staticmethod
+    def _unix(blocks: Iterator[bytes]) -> Iterator[bytes]:
+        """The same text with \\n at the end of lines; a \\r\\n may be cut by the end of a block."""
+        held = b""
+        for block in blocks:
+            block, held = held + block, b""
+            if block.endswith(b"\r"):
+                block, held = block[:-1], b"\r"
+            yield block.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in block else block
+        yield held.replace(b"\r", b"\n")
+
+    def _decoded(self, block: bytes, first: int) -> str:
+        try:
+            return block.decode()
+        except UnicodeDecodeError:
+            return "\n".join(self._line(line, first + k) for k, line in enumerate(block.split(b"\n")))
+
+    def _line(self, line: bytes, number: int) -> str:
+        try:
+            return line.decode()
+        except UnicodeDecodeError:
+            if not self._latin_line:
+                self._latin_line = number
+                self.notes.append(f"line {number} is not UTF-8: read as Latin-1")
+            return line.decode("latin-1")
+
+
+def _begin(block: bytes) -> tuple[bytes, str]:
+    """The first block without its byte order mark, and the encoding where it is not plain UTF-8."""
+    if block.startswith(codecs.BOM_UTF8):
+        return block[len(codecs.BOM_UTF8) :], "UTF-8 with a byte order mark"
+    if block.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return block, "UTF-16"
+    start = block[:64]
+    if len(start) > 7 and not any(start[1::2]) and all(start[::2]):
+        return block, "UTF-16-LE"
+    if len(start) > 7 and not any(start[::2]) and all(start[1::2]):
+        return block, "UTF-16-BE"
+    return block, ""
