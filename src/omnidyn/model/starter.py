@@ -127,10 +127,6 @@ def with_gear(robot: Robot, gear_ratio: float, source: str) -> Robot:
     return robot.replace(motor=motor, priors=priors | spreads | {"motor.gear_ratio": Prior(source=source)})
 
 
-def _times(value: PerWheel, share: float) -> PerWheel:
-    return tuple(_round(one * share) for one in value) if isinstance(value, tuple) else _round(value * share)
-
-
 def default_prior(key: str, value: Any) -> Prior:
     """What is known of a number of `init` that its user took as it was offered: not much."""
     return Prior(std=None if key in EXACT else _round(LIKE_SPREAD * value), source="default of omnidyn init, accepted")
