@@ -29,6 +29,7 @@ _HOME = {
     "moves": "omnidyn.model.deadzone",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
+    "read_log": "omnidyn.logs.read_log",
     "read_steady_table": "omnidyn.logs.steady_table",
     "read_voltages": "omnidyn.logs.command_file",
     "save_robot": "omnidyn.model.robot_file",
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.steady_state import fit_steady_state
     from omnidyn.logs.command_file import read_commands, read_voltages
+    from omnidyn.logs.read_log import read_log
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
     from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves

@@ -19,6 +19,7 @@ PUBLIC = [
     "moves",
     "preset_names",
     "read_commands",
+    "read_log",
     "read_steady_table",
     "read_voltages",
     "save_robot",

@@ -91,7 +91,8 @@ class ColumnMap:
         taken = {column.name for column in more.values()}
         kept = {name: column for name, column in self.columns.items() if column.name not in taken}
         unused = tuple(name for name in self.unused if name not in taken)
-        return replace(self, columns={**kept, **more}, unused=unused)
+        doubts = tuple(words for words in self.doubts if not any(words.startswith(f"{name} ") for name in taken))
+        return replace(self, columns={**kept, **more}, unused=unused, doubts=doubts)
 
     def lines(self) -> list[str]:
         """The map for people, a line per channel: "wheel_speed: w1 <- m1vel [rad/s at the motor], ..."."""
