@@ -58,6 +58,16 @@ def test_epoch_time_keeps_its_digits(tmp_path):
     assert any("counted from an epoch" in words for words in run.warnings)
 
 
+@pytest.mark.parametrize("form", ["2026-11-20T10:00:{}", "2026-11-20 10:00:{}+02:00", "2026-11-20T10:00:{}Z"])
+def test_dates_are_a_clock(tmp_path, form):
+    rows = "".join(f"{form.format(s)},{k}\n" for k, s in enumerate(("00.500", "00.750", "01.000")))
+    run = read_log(write(tmp_path, "timestamp,w1_rad_s\n" + rows))
+    np.testing.assert_allclose(run.t, [0.0, 0.25, 0.5], atol=1e-9)
+    assert any("timestamp holds dates" in words for words in run.warnings)
+    with pytest.raises(InputError, match=r"log.csv:5, column timestamp: not a date; got noon"):
+        read_log(write(tmp_path, "timestamp,w1_rad_s\n" + rows + "noon,4\n"))
+
+
 def test_time_that_goes_back_is_refused_or_sorted(tmp_path):
     path = write(tmp_path, "t_s,w1_rad_s\n0,1\n0.2,3\n0.1,2\n0.3,4\n")
     with pytest.raises(InputError, match=r"log.csv:4: time goes back; got 0.1 s after 0.2 s \(1 times\)"):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError
 from omnidyn.logs import words
 from omnidyn.logs.channels import TIME, place, si_suffix
+from omnidyn.logs.clock import is_dates
 from omnidyn.logs.mapping import MOTOR_SIDE, SIDED, WHEEL_SIDE, Column, ColumnMap, component_channel, quantity_of
 from omnidyn.logs.table import Table
 from omnidyn.logs.words import Words, read_name
@@ -262,9 +263,14 @@ def _limit(robot: Robot) -> float:
 def _take_time(table: Table, assumed: Mapping[str, str], found: _Guess) -> None:
     """The column of time and its unit, which must be given or unmistakable."""
     candidates = [name for name in table.names if words.TIME in read_name(name).roles]
+    dates = [name for name in candidates if is_dates(table.columns[name])]
     candidates = [name for name in candidates if not isinstance(table.columns[name], tuple)]
     candidates = [name for name in candidates if not read_name(name).roles - {words.TIME, words.BODY, words.MEASURED}]
     candidates.sort(key=lambda name: (_exact(name) != TIME, table.names.index(name)))
+    if dates and not candidates:
+        found.columns[TIME] = Column(dates[0], "s")
+        found.notes.append(f"{dates[0]} holds dates: time begins at 0 with the first")
+        return
     if not candidates:
         increasing = [name for name in table.names if _increases(table.columns[name])]
         if increasing:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
+from omnidyn.logs.clock import clock
 from omnidyn.logs.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.log import Log
 from omnidyn.logs.mapping import MOTOR_SIDE, Column, ColumnMap, component_channel, load_map, parse_column
@@ -21,7 +22,6 @@ from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 
 FloatArray = NDArray[np.float64]
 
-EPOCH = 1e8  # [s]; a later time counts from 1970: the start of the log is taken off, so that no digits are lost
 STILL = 1e-6  # [rad/s] a commanded speed below counts as none
 
 
@@ -143,19 +143,9 @@ def log_from_table(table: Table, columns: ColumnMap, robot: Robot | None, option
         channels["pose"][:, 2] = _unwrapped(channels["pose"][:, 2])
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
-    t = _time(table, columns.columns[TIME], notes)
+    t = clock(table, columns.columns[TIME], notes)
     log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes))
     return _signed(log, robot) if options.current_unsigned else log
-
-
-def _time(table: Table, column: Column, notes: list[str]) -> FloatArray:
-    t = table.numbers(column.name, missing=True) * column.factor
-    start = t[np.isfinite(t)][:1]
-    if start.size and abs(start[0]) > EPOCH:
-        first = table.numbers(column.name, missing=True)
-        t = (first - first[np.isfinite(first)][0]) * column.factor
-        notes.append(f"time starts at {start[0]:.6f} s, counted from an epoch: it begins at 0 here")
-    return t
 
 
 def _gear(robot: Robot | None, wheel: int) -> float:
