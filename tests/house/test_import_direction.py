@@ -23,7 +23,7 @@ ORDER = {
         exact_inductance implicit_step implicit simulate tangent_step tangent_events
         tangent_march tangent""",
     "logs": """channels dialect header rows text_file table parquet tables run_file steady_table command_file words
-        mapping guess log read_log segments plateaus findings check""",
+        mapping clock guess log read_log segments plateaus findings check""",
     "comparison": "",
     "identification": "estimate geometry line points doubts steady_state band",
     "control": "",
