@@ -289,9 +289,10 @@ def _take_time(table: Table, assumed: Mapping[str, str], found: _Guess) -> None:
 
 def _increases(values: FloatArray | tuple[str, ...]) -> bool:
     """Whether nearly every row is later than the one before: it may be a clock."""
-    if isinstance(values, tuple) or len(values) < 2:
+    if isinstance(values, tuple):
         return False
-    return float(np.mean(np.diff(values[np.isfinite(values)]) > 0.0)) > 0.9
+    known = values[np.isfinite(values)]
+    return len(known) > 1 and float(np.mean(known[1:] > known[:-1])) > 0.9
 
 
 def _plausible_time(values: FloatArray, name: str, given: str, found: _Guess) -> Unit | None:

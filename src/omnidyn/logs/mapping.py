@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import tomllib
@@ -14,6 +13,7 @@ from typing import Any
 from omnidyn.errors import InputError
 from omnidyn.files import read_text, write_atomic
 from omnidyn.logs.channels import TIME, place, si_suffix
+from omnidyn.model.robot_file import toml_literal
 from omnidyn.units import ANGLE, CURRENT, DUTY, LENGTH, SPEED, TURN_RATE, VOLTAGE, Unit, parse_unit
 from omnidyn.units import TIME as TIME_QUANTITY
 
@@ -164,13 +164,11 @@ def map_to_toml(columns: ColumnMap) -> str:
     """The map as TOML, one table per component."""
     lines = ["# Columns of a log: which is what, and in which unit. For --map.", f"schema = {SCHEMA}"]
     for component, column in columns.columns.items():
-        lines += ["", f"[{component}]", f"column = {json.dumps(column.name)}", f"unit = {json.dumps(column.unit)}"]
-        if column.side != WHEEL_SIDE:
-            lines.append(f'side = "{column.side}"')
-        if column.invert:
-            lines.append("invert = true")
-        if column.latency:
-            lines.append(f"latency_s = {column.latency!r}")
+        keys = {"column": column.name, "unit": column.unit}
+        keys |= {"side": column.side} if column.side != WHEEL_SIDE else {}
+        keys |= {"invert": True} if column.invert else {}
+        keys |= {"latency_s": float(column.latency)} if column.latency else {}
+        lines += ["", f"[{component}]", *(f"{key} = {toml_literal(value)}" for key, value in keys.items())]
     return "\n".join(lines) + "\n"
 
 

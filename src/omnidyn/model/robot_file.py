@@ -124,9 +124,9 @@ def save_robot(robot: Robot, path: str | os.PathLike, force: bool = False) -> Pa
 
 def robot_to_toml(robot: Robot) -> str:
     """The robot as the text of a robot file; `parse_robot` gives the same robot back, to the last bit."""
-    head = [f"schema = {SCHEMA}", f"name = {_literal(robot.name)}"]
+    head = [f"schema = {SCHEMA}", f"name = {toml_literal(robot.name)}"]
     if robot.source:
-        head.append(f"source = {_literal(robot.source)}")
+        head.append(f"source = {toml_literal(robot.source)}")
     parts = ("body", "wheels", "motor", "drive", "friction")
     tables = [_table(name, getattr(robot, name), robot.priors) for name in parts]
     return "\n".join(head) + "\n" + "".join(tables)
@@ -153,22 +153,22 @@ def _with_prior(content: Any, path: str, priors: dict[str, Prior]) -> str:
     if isinstance(content, tuple) and path not in priors:
         return "[" + ", ".join(_with_prior(item, f"{path}[{i}]", priors) for i, item in enumerate(content)) + "]"
     if path not in priors:
-        return _literal(content)
+        return toml_literal(content)
     prior = priors[path]
-    parts = [f"value = {_literal(content)}"]
+    parts = [f"value = {toml_literal(content)}"]
     if prior.std is not None:
-        parts.append(f"std = {_literal(prior.std)}")
+        parts.append(f"std = {toml_literal(prior.std)}")
     if prior.source:
-        parts.append(f"source = {_literal(prior.source)}")
+        parts.append(f"source = {toml_literal(prior.source)}")
     return "{ " + ", ".join(parts) + " }"
 
 
-def _literal(value: Any) -> str:
+def toml_literal(value: Any) -> str:
     """A TOML literal. Floats keep every bit; JSON's string escapes are a subset of TOML's."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, tuple):
-        return "[" + ", ".join(map(_literal, value)) + "]"
+        return "[" + ", ".join(map(toml_literal, value)) + "]"
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
