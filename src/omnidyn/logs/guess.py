@@ -20,7 +20,7 @@ from omnidyn.logs.mapping import MOTOR_SIDE, SIDED, WHEEL_SIDE, Column, ColumnMa
 from omnidyn.logs.table import Table
 from omnidyn.logs.words import Words, read_name
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import per_wheel, wheel_speed
+from omnidyn.model.wheels import MAX_WHEELS, per_wheel, wheel_speed
 from omnidyn.units import COUNT, Unit, known_unit, parse_unit
 from omnidyn.units import CURRENT as CURRENT_UNIT
 from omnidyn.units import DUTY as DUTY_UNIT
@@ -128,7 +128,7 @@ def _wheel_numbers(names: list[str], found: _Guess) -> dict[int, int]:
     shift = 1 if plain[:1] == [0] else 0
     if shift:
         found.notes.append("wheels are numbered from 0 in the file: 0 is wheel 1")
-    return {number: number + shift for number in plain}
+    return {number: number + shift for number in plain if number + shift <= MAX_WHEELS}
 
 
 def _numbered_kind(name: Words, unit: Unit | None) -> str | None:
