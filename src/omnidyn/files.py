@@ -34,11 +34,13 @@ class Format(NamedTuple):
 # Told by their first bytes; the first that fits counts.
 _MAGIC = {
     b"PAR1": Format("parquet", "a Parquet file", "give it to a command that reads logs, or save it as CSV"),
+    b"PARE": Format("parquet-encrypted", "an encrypted Parquet file", "decrypt it first"),
     b"\x93NUMPY": Format("npy", "a NumPy .npy file", NUMPY_REMEDY),
     b"\x89MCAP0\r\n": Format("mcap", "an MCAP recording"),
     b"SQLite format 3\x00": Format("sqlite", "an SQLite database (a ROS 2 .db3 bag)"),
     b"\x89HDF\r\n\x1a\n": Format("hdf5", "an HDF5 file (also MATLAB v7.3)"),
     b"MATLAB 5.0 MAT-file": Format("mat", "a MATLAB .mat file", "in MATLAB: writetable(T, 'log.csv')"),
+    b"MATLAB 7.3 MAT-file": Format("mat", "a MATLAB .mat file (7.3)", "in MATLAB: writetable(T, 'log.csv')"),
     b"#ROSBAG V": Format("bag", "a ROS 1 bag", "rostopic echo -b BAG -p TOPIC > log.csv"),
     b"WPILOG": Format("wpilog", "a WPILib data log", "export it as CSV with the Data Log Tool"),
     b"\x1f\x8b": Format("gzip", "a gzip archive", "unpack it first: gunzip FILE"),
@@ -61,6 +63,10 @@ _ZIPPED = {
     b"xl/": Format("xlsx", "an Excel workbook (.xlsx)", "save the sheet as CSV"),
     b"mimetype": Format("ods", "an OpenDocument file (.ods)", "save the sheet as CSV"),
 }
+_TEXT_FORMATS = {
+    re.compile(rb"\s*(?:\{\s*\"|\[\s*[\[{])"): Format("json", "a JSON file"),
+    re.compile(rb"\s*<(?:\?xml|!doctype|html)", re.IGNORECASE): Format("xml", "an XML or HTML page"),
+}
 _ZIP = Format("zip", "a zip archive", "unpack it first")
 _NPZ = Format("npz", "a zip archive of NumPy arrays (.npz)", NUMPY_REMEDY)
 _PICKLE = Format("pickle", "a Python pickle", "it is never opened, as it could run any program: export it as CSV")
@@ -81,6 +87,11 @@ def file_format(start: bytes) -> Format | None:
             return _NPZ
         return next((kind for name, kind in _ZIPPED.items() if inside.startswith(name)), _ZIP)
     return _PICKLE if _PICKLE_START.match(start) else None
+
+
+def text_format(start: bytes) -> Format | None:
+    """The format of a text file that is no table: JSON, XML or HTML; None where it may be one."""
+    return next((kind for pattern, kind in _TEXT_FORMATS.items() if pattern.match(start)), None)
 
 
 def format_of(path: str | os.PathLike) -> Format | None:

@@ -241,7 +241,6 @@ def test_a_bad_voltage_file_is_refused_with_its_place(call, here, text, words):
         (["--duration", "nan"], "duration"),
         (["--duration", "-1"], "duration"),
         (["--max-steps", "2"], "too many rows"),
-        (["-o", "run.parquet"], "no Parquet yet"),
         (["-o", "none/run.csv"], "mkdir -p none"),
         (["-o", "u.csv"], "the file exists already"),
         (["-o", "."], "a folder"),

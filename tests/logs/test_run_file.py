@@ -1,6 +1,6 @@
 """Run files: to the last bit and back, and nothing half-written."""
 
-import os
+import sys
 from dataclasses import fields
 
 import numpy as np
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from omnidyn import load_robot, simulate, write_run
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.logs.run_file import read_run, run_to_csv
 from omnidyn.run import CHANNELS, Run
 
@@ -100,10 +100,48 @@ def test_an_existing_file_stays_unless_forced(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["run.parquet", "run.PQ"])
-def test_parquet_is_refused_by_name(tmp_path, name):
-    for refused in (lambda path: write_run(full_run(), path), read_run):
-        with pytest.raises(UnsupportedError, match=f"no Parquet yet; got {os.path.splitext(name)[1]}"):
-            refused(tmp_path / name)
+def test_parquet_reads_back_to_the_last_bit(tmp_path, name):
+    pytest.importorskip("pyarrow")
+    run = full_run(200)
+    write_run(run, tmp_path / name)
+    assert (tmp_path / name).read_bytes()[:4] == b"PAR1"
+    assert bits(read_run(tmp_path / name)) == bits(run)
+
+
+def test_parquet_keeps_every_kind_of_float(tmp_path):
+    pytest.importorskip("pyarrow")
+    odd = np.array([np.nan, -0.0, 5e-324, 1.7976931348623157e308, 0.1]).view(np.int64)
+    odd[0] |= 7  # a NaN with a payload
+    run = Run(t=np.arange(5.0), supply=odd.view(float))
+    write_run(run, tmp_path / "run.parquet")
+    assert bits(read_run(tmp_path / "run.parquet")) == bits(run)
+
+
+def test_parquet_has_nan_and_no_null_and_the_units(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    write_run(Run(t=[0.0, 1.0], twist=[[1.0, np.nan, -0.0]] * 2), tmp_path / "run.parquet")
+    table = parquet.read_table(tmp_path / "run.parquet")
+    assert [column.null_count for column in table.columns] == [0, 0, 0, 0]
+    assert [field.metadata[b"unit"] for field in table.schema] == [b"s", b"m/s", b"m/s", b"rad/s"]
+
+
+def test_parquet_without_pyarrow_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingExtraError, match=r"need pyarrow; pip install \"omnidyn\[logs\]\""):
+        write_run(full_run(), tmp_path / "run.parquet")
+    (tmp_path / "there.parquet").write_bytes(b"PAR1 and so on")
+    with pytest.raises(MissingExtraError, match=r"there\.parquet: .*pip install \"omnidyn\[logs\]\""):
+        read_run(tmp_path / "there.parquet")
+
+
+@pytest.mark.parametrize("unit", ["rpm", "deg/s", "m/s", "N"])
+def test_a_unit_that_contradicts_the_name_is_refused(tmp_path, unit):
+    path = tmp_path / "run.csv"
+    path.write_text(f"t_s,w1_rad_s\ns,[{unit}]\n0,1\n")
+    with pytest.raises(
+        InputError, match=rf"run\.csv, column w1_rad_s: .* contradicts the name; got {unit}; expected rad/s"
+    ):
+        read_run(path)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ def simulate(
         metavar="VOLTAGES",
         help="CSV file t_s,u1_V,.. (or d1_duty, w1_cmd_rad_s, vx_cmd_m_s); a row holds until the next.",
     ),
-    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Run file to write (CSV); - is stdout."),
+    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Run file to write, CSV or .parquet; - is stdout."),
     duration: float | None = typer.Option(None, help="End of the run [s]; default: the last interval repeats."),
     max_steps: int = typer.Option(DEFAULT_MAX_STEPS, min=1, help="Refuse more steps than this."),
     twist: str = typer.Option("0,0,0", metavar="VX,VY,W", help="Where it starts [m/s, m/s, rad/s]."),
@@ -59,9 +59,9 @@ def simulate(
 def _refuse_early(out: str, force: bool) -> None:
     """Before any work: a place where the run could not be written in the end."""
     from omnidyn.files import check_output
-    from omnidyn.logs.run_file import refuse_format
+    from omnidyn.logs.run_file import check_format
 
-    refuse_format(out)
+    check_format(out)
     check_output(out, force)
 
 

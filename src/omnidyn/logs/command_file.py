@@ -1,4 +1,4 @@
-"""Command files: CSV `t_s,u1_V,u2_V,...`, each row holding until the next. The input of a simulation.
+"""Command files: CSV (or Parquet) `t_s,u1_V,u2_V,...`, each row holding until the next. The input of a simulation.
 
 Volts, or in their place a duty `d1_duty,...` (with or without `supply_V`), wheel speeds `w1_cmd_rad_s,...` or a twist
 `vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s` for drives that take them: the columns of a run file.
@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.logs.run_file import columns_of
-from omnidyn.logs.table import Table, read_table
+from omnidyn.logs.run_file import columns_of, refuse_other_units
+from omnidyn.logs.table import Table
+from omnidyn.logs.tables import read_any
 
 FloatArray = NDArray[np.float64]
 MAX_STEPS = 10_000_000
@@ -78,7 +79,7 @@ def _read(
 ) -> HeldCommands:
     if duration is not None and not (0.0 < duration < np.inf):
         raise InputError("cannot simulate for that long", got=duration, expected="a duration above 0 s")
-    table = read_table(path)
+    table = read_any(path)
     kind = next((kind for kind in kinds if _numbered(table, kind)), kinds[0])
     _check_columns(table, kind, wheels)
     if len(table) > max_steps:
@@ -123,23 +124,7 @@ def _check_columns(table: Table, kind: str, wheels: int) -> None:
             where=table.source,
         )
     table.check_names(expected, optional)
-    for name, unit in table.units.items():
-        if unit.lower() != _unit(name).lower():
-            raise InputError(
-                "the row of units contradicts the name",
-                got=unit,
-                expected=_unit(name) or "no unit",
-                remedy="convert the column",
-                where=f"{table.source}, column {name}",
-            )
-
-
-def _unit(name: str) -> str:
-    """The unit that stands in the name of a column."""
-    for ending, unit in (("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_duty", ""), ("_V", "V"), ("_s", "s")):
-        if name.endswith(ending):
-            return unit
-    return ""
+    refuse_other_units(table)
 
 
 def _check_time(table: Table, t: FloatArray) -> None:

@@ -218,12 +218,17 @@ def _refuse_width(columns: int, where: str) -> None:
         raise InputError("too many columns", got=columns, expected=f"at most {MAX_COLUMNS}", where=where)
 
 
-def _units(names: list[str], head: _Head, where: str) -> tuple[list[str], dict[str, str]]:
+def split_units(names: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     """Names without the units in their brackets, and the units. Names stay whole where two would become one."""
     parts = [dialect.split_unit(name) for name in names]
     short = [name for name, _ in parts]
     plain = [name if short.count(name) == 1 else names[k] for k, name in enumerate(short)]
-    units = {name: unit for name, (_, unit) in zip(plain, parts, strict=True) if unit}
+    return plain, {name: unit for name, (_, unit) in zip(plain, parts, strict=True) if unit}
+
+
+def _units(names: list[str], head: _Head, where: str) -> tuple[list[str], dict[str, str]]:
+    """The same with the row of units. Raises InputError where the two contradict each other."""
+    plain, units = split_units(names)
     for name, cell in zip(plain, head.cells_of(head.units), strict=False):
         unit = dialect.strip_brackets(cell)
         if unit and units.get(name, unit) != unit:

@@ -6,7 +6,7 @@ where, and reads words, quotes and odd blanks. Both give the same numbers (a tes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ class RowParser:
     def notes(self) -> tuple[str, ...]:
         """What was decided so far, in words."""
         comma = [COMMA_NOTE] if self._comma else []
-        return (*comma, *(_skip_note(reason, lines) for reason, lines in self.skipped.items()))
+        return (*comma, *(skip_note(reason, lines) for reason, lines in self.skipped.items()))
 
     def parse(
         self, texts: list[str], lines: Lines, later: Callable[[], Iterable[str]] = tuple
@@ -108,7 +108,7 @@ class RowParser:
         if self.skip:
             rows, lines = self._good(rows, lines)
         columns = {name: self._column(name, [row[k] for row in rows]) for k, name in enumerate(self.layout.names)}
-        self._refuse_infinite(columns, lines)
+        refuse_infinite(columns, lines, self.source)
         if fault is not None:
             raise fault
         return columns, lines
@@ -189,27 +189,34 @@ class RowParser:
         return [row for row, good in zip(rows, keep, strict=True) if good], lines[keep]
 
     def _column(self, name: str, cells: list[str]) -> Column:
-        """Floats where every cell is a number or missing, the words as they are otherwise."""
-        if name in self._words or not all(map(dialect.is_number_or_missing, cells)):
+        column = tuple(cells) if name in self._words else column_of(cells)
+        if isinstance(column, tuple):
             self._words.add(name)
-            return tuple(cells)
-        return np.array([dialect.to_float(cell) for cell in cells], dtype=float)
+        return column
 
-    def _refuse_infinite(self, columns: dict[str, Column], lines: Lines) -> None:
-        """Raises InputError at the first row that holds an infinite number."""
-        first: tuple[int, str] | None = None
-        for name, column in columns.items():
-            bad = [] if isinstance(column, tuple) else np.flatnonzero(np.isinf(column))
-            if len(bad) and (first is None or bad[0] < first[0]):
-                first = int(bad[0]), name
-        if first is not None:
-            raise InputError(
-                "not a finite number",
-                got="inf, or a number beyond 1.8e308",
-                expected="a finite number",
-                remedy="correct or remove the row",
-                where=f"{self.source}:{lines[first[0]]}, column {first[1]}",
-            )
+
+def column_of(cells: list[str]) -> Column:
+    """Floats where every cell is a number or missing, the words as they are otherwise."""
+    if not all(map(dialect.is_number_or_missing, cells)):
+        return tuple(cells)
+    return np.array([dialect.to_float(cell) for cell in cells], dtype=float)
+
+
+def refuse_infinite(columns: Mapping[str, Column], lines: Lines, source: str) -> None:
+    """Raises InputError at the first row that holds an infinite number."""
+    first: tuple[int, str] | None = None
+    for name, column in columns.items():
+        bad = [] if isinstance(column, tuple) else np.flatnonzero(np.isinf(column))
+        if len(bad) and (first is None or bad[0] < first[0]):
+            first = int(bad[0]), name
+    if first is not None:
+        raise InputError(
+            "not a finite number",
+            got="inf, or a number beyond 1.8e308",
+            expected="a finite number",
+            remedy="correct or remove the row",
+            where=f"{source}:{lines[first[0]]}, column {first[1]}",
+        )
 
 
 def _loaded(texts: list[str], separator: str) -> FloatArray | None:
@@ -249,7 +256,8 @@ def _ragged_hint(separator: str) -> str:
     return "correct or remove the row"
 
 
-def _skip_note(reason: str, lines: list[int]) -> str:
+def skip_note(reason: str, lines: list[int]) -> str:
+    """How many rows were left out, why, and where the first of them stand."""
     shown = ", ".join(map(str, lines[:SHOWN_LINES])) + (", ..." if len(lines) > SHOWN_LINES else "")
     rows = "1 row was" if len(lines) == 1 else f"{len(lines)} rows were"
     return f"{rows} left out for {reason} (line{'s' if len(lines) > 1 else ''} {shown})"

@@ -1,10 +1,11 @@
-"""Run files: a Run as CSV, to the last bit.
+"""Run files: a Run as CSV or Parquet, to the last bit.
 
     t_s,u1_V..,d1_duty..,i1_A..,a1_rad..,w1_rad_s..,w1_cmd_rad_s..,vx_m_s,vy_m_s,omega_rad_s,
     vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V
 
-A channel that was not measured has no columns, a missing value is an empty cell. Numbers are written with the
-shortest digits that read back as the same float. Source and warnings of a Run are not in the file.
+A channel that was not measured has no columns. In CSV a missing value is an empty cell, and numbers are written with
+the shortest digits that read back as the same float. In Parquet a missing value is NaN, and each column has its unit.
+Source and warnings of a Run are not in the file.
 """
 
 from __future__ import annotations
@@ -18,13 +19,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
 from omnidyn.logs.channels import components, si_suffix
-from omnidyn.logs.table import Table, read_table
+from omnidyn.logs.parquet import SUFFIXES, import_pyarrow, parquet_bytes
+from omnidyn.logs.table import Table
+from omnidyn.logs.tables import read_any
 from omnidyn.run import CHANNELS, SCALAR, Run
+from omnidyn.units import DUTY, known_unit, parse_unit
 
 FloatArray = NDArray[np.float64]
+
+_SUFFIXES = ("rad_s", "m_s", "duty", "rad", "V", "A", "m", "s")  # as channels.si_suffix gives them, long before short
+_UNIT_OF_DUTY = ("duty", "-", "1")
 
 
 def columns_of(channel: str, wheels: int) -> list[str]:
@@ -33,21 +40,32 @@ def columns_of(channel: str, wheels: int) -> list[str]:
 
 
 def write_run(run: Run, path: str | os.PathLike, force: bool = False) -> Path:
-    """Write a run as CSV, whole or not at all.
+    """Write a run, whole or not at all: as Parquet where the name ends in .parquet or .pq, else as CSV.
 
     Raises InputError when the file exists (unless `force`) or cannot be written, or when a value is infinite, and
-    UnsupportedError for the name of a Parquet file.
+    MissingExtraError for Parquet without pyarrow.
     """
-    refuse_format(path)
+    check_format(path)
     check_output(path, force)
-    return write_atomic(path, run_to_csv(run), force)
+    return write_atomic(path, run_to_parquet(run) if _is_parquet(path) else run_to_csv(run), force)
 
 
-def refuse_format(path: str | os.PathLike) -> None:
-    """Raises UnsupportedError for the name of a Parquet file: this version reads and writes CSV."""
-    suffix = Path(path).suffix
-    if suffix.lower() in (".parquet", ".pq"):
-        raise UnsupportedError("no Parquet yet", got=suffix, expected="a name that ends in .csv", where=str(path))
+def check_format(path: str | os.PathLike) -> None:
+    """Raises MissingExtraError for the name of a Parquet file where pyarrow is not installed."""
+    if _is_parquet(path):
+        import_pyarrow(str(path))
+
+
+def _is_parquet(path: str | os.PathLike) -> bool:
+    return Path(path).suffix.lower() in SUFFIXES
+
+
+def run_to_parquet(run: Run) -> bytes:
+    """The run as a Parquet file. Raises InputError where a value is infinite, MissingExtraError without pyarrow."""
+    columns = dict(_columns(run))
+    for name, values in columns.items():
+        _refuse_infinite(name, values)
+    return parquet_bytes(columns, {name: _unit(name) for name in columns})
 
 
 def run_to_csv(run: Run) -> str:
@@ -70,6 +88,11 @@ def _cells(name: str, values: FloatArray) -> list[str]:
     finite = np.isfinite(values)
     if finite.all():
         return list(map(repr, values.tolist()))
+    _refuse_infinite(name, values)
+    return ["" if value != value else repr(value) for value in values.tolist()]
+
+
+def _refuse_infinite(name: str, values: FloatArray) -> None:
     infinite = np.flatnonzero(np.isinf(values))
     if infinite.size:
         row = int(infinite[0])
@@ -79,21 +102,20 @@ def _cells(name: str, values: FloatArray) -> list[str]:
             expected="a finite number, or NaN where missing",
             where=f"row {row}, column {name}",
         )
-    return ["" if value != value else repr(value) for value in values.tolist()]
 
 
 def read_run(path: str | os.PathLike) -> Run:
-    """Read a run file: the same numbers, to the last bit, that `write_run` wrote.
+    """Read a run file, CSV or Parquet: the same numbers, to the last bit, that `write_run` wrote.
 
     The order of the columns does not matter, a channel needs all of its columns, a blank cell is NaN. `source` of the
     Run is the path, its `warnings` say what the reader had to decide.
-    Raises InputError for any other column, a missing or decreasing time, and all that `read_table` refuses.
+    Raises InputError for any other column or unit, a missing or decreasing time, and all that `read_any` refuses.
     """
-    refuse_format(path)
-    table = read_table(path)
+    table = read_any(path)
     wheels = _wheel_count(table.names)
     known = {channel: columns_of(channel, wheels) for channel in CHANNELS}
     table.check_names(["t_s"], [name for names in known.values() for name in names])
+    refuse_other_units(table)
     channels = {channel: _channel(table, channel, names) for channel, names in known.items()}
     time = table.numbers("t_s")
     bad = np.flatnonzero(~(np.diff(time) > 0.0))
@@ -102,6 +124,25 @@ def read_run(path: str | os.PathLike) -> Run:
         got = f"{time[row]:.17g} after {time[row - 1]:.17g}"
         raise table.fault(row, "t_s", "time does not increase", got, "increasing times")
     return Run(t=time, **channels, source=str(path), warnings=table.notes)
+
+
+def refuse_other_units(table: Table) -> None:
+    """Raises InputError where a unit given in a row or a bracket is not the one in the name of the column."""
+    for name, text in table.units.items():
+        own, given = parse_unit(_unit(name)), known_unit(text)
+        if text not in _UNIT_OF_DUTY if own.quantity == DUTY else given is None or given[1:] != own[1:]:
+            raise InputError(
+                "the row of units contradicts the name",
+                got=text,
+                expected=own.text,
+                remedy="convert the column",
+                where=f"{table.source}, column {name}",
+            )
+
+
+def _unit(name: str) -> str:
+    """The unit in the name of a column: "rad/s" of w1_rad_s, w1_cmd_rad_s."""
+    return next(suffix for suffix in _SUFFIXES if name.endswith(f"_{suffix}")).replace("_", "/")
 
 
 def _wheel_count(names: Sequence[str]) -> int:

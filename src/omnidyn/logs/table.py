@@ -53,6 +53,11 @@ class Table:
     notes: tuple[str, ...] = ()
     titles: Mapping[str, str] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        for values in (self.lines, *self.columns.values()):
+            if not isinstance(values, tuple):
+                values.flags.writeable = False
+
     def __len__(self) -> int:
         return len(self.lines)
 
@@ -163,7 +168,7 @@ def join(tables: Iterable[Table], max_bytes: int | None = None) -> Table:
     if len(parts) == 1:
         return last
     columns = {name: _joined([part.columns[name] for part in parts]) for name in last.names}
-    return replace(last, columns=_frozen(columns), lines=_read_only(np.concatenate([part.lines for part in parts])))
+    return replace(last, columns=columns, lines=np.concatenate([part.lines for part in parts]))
 
 
 def _joined(columns: Sequence[Column]) -> Column:
@@ -192,8 +197,7 @@ def _tables(file: TextFile, rows: int, header: bool, skip: bool) -> Iterator[Tab
         if waiting is not None:
             yield waiting
         notes = (*layout.notes, *file.notes, *parser.notes)
-        columns = _frozen(columns)
-        waiting = Table(layout.names, columns, _read_only(lines), layout.units, file.source, "", notes, layout.titles)
+        waiting = Table(layout.names, columns, lines, layout.units, file.source, "", notes, layout.titles)
     if waiting is None:
         raise InputError("no rows", got="0 samples", expected="at least one row under the header", where=file.source)
     yield replace(waiting, sha256=file.sha256, notes=(*layout.notes, *file.notes, *parser.notes))
@@ -238,15 +242,6 @@ def _texts_from(file: TextFile, layout: Layout, line: int) -> Iterator[str]:
     """The rows from a line on, read again from the file."""
     for piece in TextFile(file.path).pieces(ROWS):
         yield from _kept(piece, max(line, layout.first))[0]
-
-
-def _frozen(columns: Mapping[str, Column]) -> dict[str, Column]:
-    return {name: c if isinstance(c, tuple) else _read_only(c) for name, c in columns.items()}
-
-
-def _read_only(values: NDArray) -> NDArray:
-    values.flags.writeable = False
-    return values
 
 
 def _hint(cell: str) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from omnidyn.errors import InputError
-from omnidyn.files import file_format, open_regular, too_large
+from omnidyn.files import file_format, open_regular, text_format, too_large
 
 BLOCK_BYTES = 2**20
 MAX_LINE_BYTES = 4 * 2**20
@@ -93,9 +93,11 @@ class TextFile:
 
     def _refuse_format(self, start: bytes) -> None:
         kind = file_format(start)
+        what = "this is not a text file" if kind else "this is not a table"
+        kind = kind or text_format(start)
         if kind is not None:
             raise InputError(
-                "this is not a text file", got=kind.words, expected="text", remedy=kind.remedy, where=self.source
+                what, got=kind.words, expected="text with a row for each moment", remedy=kind.remedy, where=self.source
             )
 
     def _utf8(self, blocks: Iterator[bytes]) -> Iterator[bytes]:
