@@ -24,12 +24,15 @@ BODY = ["body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.r
 MOTOR = ["motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad", "motor.resistance_ohm"]
 
 
-def differences(run: Callable, robot, key, width):
-    """(twist, pose, current) by key, of `run(robot)`; asserts that all four runs show the same events."""
+def differences(run: Callable, robot, key, width, watched=slice(None)):
+    """(twist, pose, current) by key, of `run(robot)`; asserts that all four runs show the same events.
+
+    watched: axes whose dry friction makes a change of sign an event.
+    """
     value, kept = parameter(robot, key), {}
     for steps in (-2, -1, 1, 2):
         kept[steps] = run(with_parameter(robot, key, value + steps * width * value))
-    pattern = [np.sign(one.twist).tolist() for one in kept.values()]
+    pattern = [np.sign(one.twist[:, watched]).tolist() for one in kept.values()]
     assert all(p == pattern[0] for p in pattern), f"events do not pair up: {key}"
     assert len({getattr(one, "events", 0) for one in kept.values()}) == 1
 
@@ -148,6 +151,21 @@ def test_against_simulate_itself(ellipse):
     """The implicit engine's own differences, at a tolerance that makes them sharp enough."""
     keys = ["body.mass_kg", "motor.resistance_ohm", "friction.wheels.coulomb[2]"]
     check(lambda r: simulate(r, TURNING, 0.01, tol=1e-9), ellipse, TURNING, keys, 2e-3, tol=1e-9)
+
+
+def test_a_wheel_without_current_brakes_what_the_parameter_sets_in_motion(axebot):
+    """u = (0, s, -s) leaves wheel 1 without current; an unequal motor makes the robot turn, against that wheel too."""
+    friction = Friction(axes=AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 0.0, 0.0)))
+    robot = axebot.replace(name="no current", friction=friction)
+    program = held((30, [0, 3, -3]))
+    key = "motor.resistance_ohm[1]"
+    found = derivatives(robot, program, 0.01, [key], tol=TIGHT)
+    expected = differences(lambda r: reference(r, program, 0.01), robot, key, 1e-4, watched=0)
+    for name, true in zip(CHANNELS, expected, strict=True):
+        print(name, error := worst(getattr(found, name)[..., 0], true))
+        assert error <= AGREES
+    assert (found.run.current[:, 0] == 0.0).all()
+    assert (found.current[1:, 0] != 0.0).all()
 
 
 def test_currents_that_pass_zero_against_a_voltage_drop(unequal):

@@ -50,7 +50,7 @@ def winding(speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
     """
     flux = inductance * now + tau * (voltage - emf * speed)
     lost, below = tau * drop, inductance + tau * resistance
-    if abs(flux) <= lost:
+    if abs(flux) <= lost and lost > 0.0:  # without a drop, no current is a point like any other
         return 0.0, 0.0
     i = (flux - math.copysign(lost, flux)) / below
     if abs(i) > bound:
