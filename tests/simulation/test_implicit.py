@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.plant import plant
+from omnidyn.model.rest import new_state
 from omnidyn.model.robot_file import load_robot
+from omnidyn.simulation.implicit import no_loop, run_implicit
 from omnidyn.simulation.simulate import simulate
 from tests.reference.make import FILE as TABLE_3_FILE
 from tests.reference.modes import reference
@@ -94,6 +97,27 @@ def test_the_error_follows_the_tolerance(seed):
     voltage, dt = random_voltages(robot, seed)
     for tol, share in ((1e-3, 1.0), (1e-4, 5.0), (1e-5, 1.0), (1e-6, 1.0)):
         assert worst(simulate(robot, voltage, dt, tol=tol), truth) <= share * tol, tol
+
+
+def test_a_release_inside_a_row_is_found_at_every_tolerance():
+    """Currents rise slowly and breakaway, above Coulomb, is met inside a row; judge: the exact engine.
+
+    The error falls with tol, and a tenth of tol costs less than four times the steps (second order: 10^(1/2)).
+    """
+    friction = AxesFriction(viscous=LEVELS["viscous"], coulomb=(1.5, 1.0, 0.05), breakaway=LEVELS["coulomb"])
+    motor = AXEBOT.motor.replace(electrical="dynamic", inductance=0.02)
+    robot = AXEBOT.replace(motor=motor, friction=Friction(axes=friction))
+    voltage = np.repeat([[1.0, 5.0, -3.0], [2.0, -4.0, 5.0], [0.0, 0.0, 0.0], [-3.0, 1.0, 4.0]], [20, 25, 15, 15], 0)
+    exact, steps = simulate(robot, voltage, 0.01), []
+    assert "exact engine" in exact.source
+    for tol in (1e-5, 1e-6, 1e-7, 1e-8):
+        assert worst(simulate(implicit(robot), voltage, 0.01, tol=tol), exact) <= tol
+        numbers = plant(implicit(robot))
+        bound, dt, pose = np.full(voltage.shape, np.inf), np.full(len(voltage), 0.01), np.zeros(3)
+        outcome = run_implicit(numbers, voltage.copy(), bound, dt, new_state(numbers), pose, no_loop(3), tol)
+        steps.append(int(outcome.steps.sum()))
+        print(f"tol {tol:g}: {steps[-1]} steps")
+    assert (np.diff(np.log(steps)) <= np.log(4.0)).all()
 
 
 # --- fixed step -------------------------------------------------------------------------------------------------------

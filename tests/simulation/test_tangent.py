@@ -224,8 +224,7 @@ def test_a_release_inside_a_row(axebot):
     keys += ["friction.axes.breakaway[0]", "friction.axes.breakaway[2]"]
     run = lambda r: simulate(r, program, 0.01)  # noqa: E731
     assert "exact" in run(robot).source
-    # The implicit engine finds the instant of a release less well at a smaller tolerance.
-    check(run, robot, program, keys, 3e-4, tol=1e-6, channels=("twist", "pose"), agrees=3e-5)
+    check(run, robot, program, keys, 3e-4, channels=("twist", "pose"))
 
 
 def test_a_disc_reverses_on_a_straight_line(axebot):

@@ -73,6 +73,15 @@ def take(body, element, state):
     state[SIGNS + len(element)] = body[ELLIPSE]
 
 
+@part
+def sticks(state, m):
+    """Whether anything is stuck in a state of m elements."""
+    found = False
+    for e in range(SIGNS, SIGNS + m + 1):
+        found |= state[e] == 0.0
+    return found
+
+
 def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> FloatArray:
     """The state of a robot that moves with `twist` [m/s, m/s, rad/s] under `current` [A]."""
     state = new_state(plant)

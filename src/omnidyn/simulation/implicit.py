@@ -18,7 +18,7 @@ from omnidyn.model.forces import forces_at_work
 from omnidyn.model.inclusion import CAP
 from omnidyn.model.layout import AXES, BOUND, GX, GY, GZ, INDUCTANCE, LENGTH, MASS, NOW, TAU, VOLTAGE
 from omnidyn.model.plant import Plant
-from omnidyn.model.rest import SIGNS, put, settle, with_given_currents
+from omnidyn.model.rest import SIGNS, put, settle, sticks, with_given_currents
 from omnidyn.model.scratch import scratch
 from omnidyn.simulation.implicit_step import GAMMA, step
 
@@ -175,6 +175,8 @@ def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, h, po
         _travel(pose, state, middle, two, body[LENGTH], h, SIMPSON)
         for j in range(len(state)):
             state[j] = two[j]
+        if sticks(state, m):  # a step so short sees no release within its rounding
+            counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
         left = left - h if h < left else 0.0
         h *= min(4.0, max(1.0, 0.9 / math.sqrt(ratio + 1e-12)))
     return h

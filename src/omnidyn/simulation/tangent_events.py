@@ -30,7 +30,7 @@ from omnidyn.model.layout import (
     TAU,
     VOLTAGE,
 )
-from omnidyn.model.rest import SIGNS, put, settle
+from omnidyn.model.rest import SIGNS, put, settle, sticks
 from omnidyn.model.scratch import NEWTON, WORST
 from omnidyn.simulation.implicit import SHORTEST
 from omnidyn.simulation.tangent_step import EPS, stage_tangent, step_tangent
@@ -204,15 +204,6 @@ def _later(body, element, ways, start, acceleration):
 
 
 @part
-def _sticks(state, m):
-    """Whether anything is stuck."""
-    found = False
-    for e in range(SIGNS, SIGNS + m + 1):
-        found |= state[e] == 0.0
-    return found
-
-
-@part
 def _bends(element, a, b):
     """Whether a current meets or leaves its limit or 0 between two states: the derivative bends there."""
     first = SIGNS + 1 + len(element)
@@ -263,12 +254,12 @@ def half_tangent(body, element, bare_body, bare_element, s, ways, start, end, mi
     """
     first, last, m = ways.state[0], ways.state[1], len(element)
     first[:], last[:], d1[:] = start, end, d0
-    if _sticks(start, m):
+    if sticks(start, m):
         settle(body, element, bare_body, bare_element, s, first, ways.gained)
-    if _sticks(end, m):
+    if sticks(end, m):
         settle(body, element, bare_body, bare_element, s, last, ways.gained)
     if _differ(start, end, m) or _differ(start, first, m) or _differ(end, last, m):
-        if not _sticks(end, m):
+        if not sticks(end, m):
             settle(body, element, bare_body, bare_element, s, last, ways.gained)
         _leap(body, element, s, ways, first, last, h, ways.gained, d1)
         return

@@ -8,7 +8,7 @@ import numpy as np
 
 from omnidyn.compiled import kernel, part
 from omnidyn.model.layout import AXES, LENGTH, VOLTAGE
-from omnidyn.model.rest import settle
+from omnidyn.model.rest import settle, sticks
 from omnidyn.simulation.implicit import (
     FLOOR,
     MEMORY,
@@ -27,22 +27,28 @@ from omnidyn.simulation.tangent_step import EPS, step_tangent
 
 @part
 def travel_tangent(ways, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
-    """Derivatives of the pose over a step, in place: differences of the quadrature itself."""
+    """Derivatives of the pose over a step, in place: differences of the path from the origin, turned by the heading.
+
+    From the origin, because a difference of what is small beside the pose is lost in rounding.
+    """
     place, a, b, c = ways.point[0], ways.point[1], ways.point[2], ways.point[3]
-    heading = pose[2] - 2.0 * math.pi * round(pose[2] / (2.0 * math.pi))
+    place[:] = 0.0
+    _travel(place, x0, xm, x1, ways.body[-1, LENGTH], h, rule)
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    x, y = cos * place[0] - sin * place[1], sin * place[0] + cos * place[1]
     for k in range(len(dpose)):
         for side in range(2):
             eps = EPS * (1 - 2 * side)
             for j in range(3):
                 a[j], b[j], c[j] = x0[j] + eps * d0[k, j], xm[j] + eps * dm[k, j], x1[j] + eps * d1[k, j]
-            place[0] = place[1] = 0.0
-            place[2] = heading + eps * dpose[k, 2]
+            place[:] = 0.0
             _travel(place, a, b, c, ways.body[2 * k + side, LENGTH], h, rule)
             for j in range(3):
-                ways.scratch[side, 0, j] = place[j]
-        for j in range(3):
-            change = (ways.scratch[0, 0, j] - ways.scratch[1, 0, j]) / (2.0 * EPS)
-            dpose[k, j] = dpose[k, j] + change if j < 2 else change
+                ways.scratch[side, 0, j] = place[j] / (2.0 * EPS)
+        dx, dy, turn = ways.scratch[0, 0, :3] - ways.scratch[1, 0, :3]
+        dpose[k, 0] += cos * dx - sin * dy - dpose[k, 2] * y
+        dpose[k, 1] += sin * dx + cos * dy + dpose[k, 2] * x
+        dpose[k, 2] += turn
 
 
 @part
@@ -69,7 +75,9 @@ def _row(body, element, bare_body, bare_element, s, spare, ways, state, dt, tol,
         half_tangent(body, element, bare_body, bare_element, s, ways, middle, two, inner, 0.5 * h, ways.half, dnext)
         travel_tangent(ways, pose, dpose, state, middle, two, d, ways.half, dnext, h, SIMPSON)
         _travel(pose, state, middle, two, body[LENGTH], h, SIMPSON)
-        state[:], d[:] = two, dnext
+        state[:], d[:] = two, dnext  # half_tangent has moved d past a release that settle finds here
+        if sticks(state, m):
+            counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
         left = left - h if h < left else 0.0
         h *= min(4.0, max(1.0, 0.9 / math.sqrt(ratio + 1e-12)))
     return h
