@@ -17,7 +17,7 @@ ORDER = {
     "": """errors files units compiled run model simulation logs comparison identification control campaigns
         paper report export interop __init__ cli studio __main__""",
     "model": """frames value layout wheels motor drive friction robot robot_file starter plant scratch
-        forces holding inclusion rest dynamics statespace deadzone""",
+        forces face holding inclusion rest dynamics statespace deadzone""",
     "model/friction": "law axes direction wheels",
     "simulation": """inputs commands exact_step travel exact exact_inductance_step exact_inductance_travel
         exact_inductance implicit_step implicit simulate tangent_step tangent_events

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.compiled import part
+from omnidyn.model.face import face, newton_direction
 from omnidyn.model.forces import forces_at_work, residual, set_losses, winding
 from omnidyn.model.holding import worst_direction
-from omnidyn.model.inclusion import _newton_direction, face
 from omnidyn.model.layout import (
     AXES,
     BOUND,
@@ -57,7 +57,7 @@ def _acceleration(body, element, s, state, x, out):
     """Acceleration at x [m/s^2] with the signs that the plant has: what is stuck stays."""
     _at_instant(body, element, state, x, SHORTEST)
     residual(body, element, x, s)
-    _newton_direction(s, face(body, element, s))
+    newton_direction(s, face(body, element, s))
     for a in range(3):
         out[a] = s[NEWTON, a] / SHORTEST
 

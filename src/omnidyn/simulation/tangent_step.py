@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled import part
+from omnidyn.model.face import FLAT, face, newton_direction
 from omnidyn.model.forces import gear, residual, winding
-from omnidyn.model.inclusion import FLAT, _newton_direction, face
 from omnidyn.model.layout import (
     AXES,
     BOUND,
@@ -177,7 +177,7 @@ def stage_tangent(body, element, s, ways, x, aim, out):
             for b in range(3):
                 total += s[JACOBIAN + a, b] * shift[b]
             s[RESIDUAL, a] = total
-        _newton_direction(s, rank)
+        newton_direction(s, rank)
         for a in range(3):
             out[k, a] = shift[a] + s[NEWTON, a]
         _current_tangent(element, ways, k, x, aim[k], out[k])
