@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.compiled import part
+
 RESIDUAL, NEWTON, TRIAL, WORST, SPARE, LINE = 0, 1, 2, 3, 4, 5
 BASIS, ROW, JACOBIAN, MATRIX = 6, 9, 12, 15  # three rows each
 PIVOT, ROWS = 18, 19
@@ -13,3 +15,18 @@ PIVOT, ROWS = 18, 19
 def scratch() -> NDArray[np.float64]:
     """A fresh scratch array."""
     return np.zeros((ROWS, 4))
+
+
+@part
+def copy_row(to, source):
+    """to[:] = source for vectors; numba would make an array on the way."""
+    for j in range(len(to)):
+        to[j] = source[j]
+
+
+@part
+def copy_table(to, source):
+    """to[:, :] = source for tables."""
+    for i in range(to.shape[0]):
+        for j in range(to.shape[1]):
+            to[i, j] = source[i, j]

@@ -19,7 +19,7 @@ from omnidyn.model.inclusion import CAP
 from omnidyn.model.layout import AXES, BOUND, GX, GY, GZ, INDUCTANCE, LENGTH, MASS, NOW, TAU, VOLTAGE
 from omnidyn.model.plant import Plant
 from omnidyn.model.rest import SIGNS, put, settle, sticks, with_given_currents
-from omnidyn.model.scratch import scratch
+from omnidyn.model.scratch import copy_row, scratch
 from omnidyn.simulation.implicit_step import GAMMA, step
 
 FloatArray = NDArray[np.float64]
@@ -61,6 +61,19 @@ class Outcome(NamedTuple):
     steps: NDArray[np.int64]  # (rows,) steps solved
 
 
+def begun(rows: int, state: FloatArray, pose: FloatArray) -> Outcome:
+    """An outcome of which only the start is filled in."""
+    counts = np.zeros((2, rows), np.int64)
+    out = Outcome(np.zeros((rows + 1, 3)), np.zeros((rows + 1, len(state))), counts[0], counts[1])
+    out.pose[0], out.state[0] = pose, state
+    return out
+
+
+def room(state: FloatArray) -> FloatArray:
+    """Room for the states inside a step: after the whole step, after one and two half steps, and within a step."""
+    return np.zeros((4, len(state)))
+
+
 def run_implicit(
     plant: Plant, voltage: FloatArray, bound: FloatArray, dt: FloatArray, state: FloatArray, pose: FloatArray,
     loop: Loop, tol: float,
@@ -69,13 +82,7 @@ def run_implicit(
 
     voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,).
     """
-    rows = len(dt)
-    plant, bare = plant.copy(), with_given_currents(plant)
-    out = Outcome(
-        np.zeros((rows + 1, 3)), np.zeros((rows + 1, len(state))), np.zeros(rows, np.int64), np.zeros(rows, np.int64)
-    )
-    out.pose[0], out.state[0] = pose, state
-    spare = np.zeros((4, len(state)))
+    plant, bare, out, spare = plant.copy(), with_given_currents(plant), begun(len(dt), state, pose), room(state)
     _march(
         *plant, *bare, scratch(), spare, voltage, bound, dt, *loop, tol, out.pose, out.state, out.iterations, out.steps
     )
@@ -100,7 +107,7 @@ def _close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick
 
 
 @part
-def _travel(pose, x0, xm, x1, length, h, rule):
+def advance_pose(pose, x0, xm, x1, length, h, rule):
     """Advance the pose over a step from velocities at its start, at a middle node and at its end.
 
     rule: weights of the three; then c, heading at the middle node = heading + h (c0 omega0 + cm omega_m + c1 omega1).
@@ -153,13 +160,13 @@ def _unresolved(body, element, state, h):
 
 
 @part
-def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, h, pose, counts):
-    """Advance over one row of held voltage with adaptive steps. Returns the step length to begin the next row with."""
+def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
+    """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
+
+    spare[1] and spare[2] receive the states in the middle and at the end. Returns its length and the one to try next.
+    """
     one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(element)
-    counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
-    left = dt
-    while left > 0.0:
-        h = min(h, left)
+    while True:
         if left - h < 1e-9 * dt:
             h = left
         first = step(body, element, s, state, one, inner, h)
@@ -169,16 +176,23 @@ def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, h, po
         ratio = _error(body, element, one, two) / (tol * max(h / MEMORY, FLOOR))
         if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
             ratio = max(ratio, 64.0) if _unresolved(body, element, state, h) > tol else 0.5
-        if ratio > 1.0 and h > SHORTEST:
-            h = max(SHORTEST, h * max(0.125, min(0.5, 0.9 / math.sqrt(ratio))))
-            continue
-        _travel(pose, state, middle, two, body[LENGTH], h, SIMPSON)
-        for j in range(len(state)):
-            state[j] = two[j]
+        if ratio <= 1.0 or h <= SHORTEST:
+            return h, h * min(4.0, max(1.0, 0.9 / math.sqrt(ratio + 1e-12)))
+        h = max(SHORTEST, h * max(0.125, min(0.5, 0.9 / math.sqrt(ratio))))
+
+
+@part
+def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, h, pose, counts):
+    """Advance over one row of held voltage with adaptive steps. Returns the step length to begin the next row with."""
+    middle, two, inner, m, left = spare[1], spare[2], spare[3], len(element), dt
+    counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
+    while left > 0.0:
+        taken, h = find_step(body, element, s, spare, state, h, left, dt, tol, counts)
+        advance_pose(pose, state, middle, two, body[LENGTH], taken, SIMPSON)
+        copy_row(state, two)
         if sticks(state, m):  # a step so short sees no release within its rounding
             counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
-        left = left - h if h < left else 0.0
-        h *= min(4.0, max(1.0, 0.9 / math.sqrt(ratio + 1e-12)))
+        left = left - taken if taken < left else 0.0
     return h
 
 
@@ -200,14 +214,11 @@ def _march(
             h = _row(body, element, bare_body, bare_element, s, spare, state, dt[k], tol, h, pose, counts)
         else:
             counts[0], counts[1] = step(body, element, s, state, spare[2], spare[3], dt[k]), 1
-            _travel(pose, state, spare[3], spare[2], body[LENGTH], dt[k], STAGES)
-            for j in range(len(state)):
-                state[j] = spare[2, j]
+            advance_pose(pose, state, spare[3], spare[2], body[LENGTH], dt[k], STAGES)
+            copy_row(state, spare[2])
         iterations[k], steps[k] = counts[0], counts[1]
-        for j in range(len(state)):
-            states[k + 1, j] = state[j]
-        for a in range(3):
-            poses[k + 1, a] = pose[a]
+        copy_row(states[k + 1], state)
+        copy_row(poses[k + 1], pose)
 
 
 def capped(outcome: Outcome) -> int:

@@ -117,26 +117,41 @@ def _begin(body, element, start, end, tau):
 
 
 @part
-def step(body, element, s, start, end, middle, h):
-    """One SDIRK2 step of length h from `start` to `end`; `middle` receives x at t + gamma h. Returns the iterations.
-
-    Where breakaway exceeds Coulomb and something stops or reverses, one implicit Euler stage takes its place: x* of
-    the second stage lies beyond the stop, and would tear loose what holds.
-    """
-    m = len(element)
+def first_stage(body, element, s, start, end, middle, h):
+    """Stage 1 of a step of length h from `start`, into `end`; `middle` receives x there. Returns the iterations."""
     _begin(body, element, start, end, GAMMA * h)
     count = _stage(body, element, s, start, end)
     for a in range(3):
         middle[a] = end[a]
-    stopped = _slips_back(body, element, start)
-    if not stopped:
+    return count
+
+
+@part
+def last_stage(body, element, s, start, end, h):
+    """The stage that ends a step whose first stage has just been solved, into `end`; the plant keeps its solution.
+
+    Where breakaway exceeds Coulomb and something stops or reverses, one implicit Euler stage takes the place of both:
+    x* of the second stage lies beyond the stop, and would tear loose what holds. So it does where something gives way
+    in a step too long for the currents.
+    Returns (iterations, b): x* = start + b (x of stage 1 - start), b = 0 for the Euler stage.
+    """
+    m, count, back = len(element), 0, BACK
+    euler = _slips_back(body, element, start)
+    if not euler:
         _aim(body, element, start, end, BACK)
-        count = max(count, _stage(body, element, s, start, end))
-        stopped = _slips_back(body, element, start) or _torn_loose(body, element, start)
-    if stopped:
+        count = _stage(body, element, s, start, end)
+        euler = _slips_back(body, element, start) or _torn_loose(body, element, start)
+    if euler:
         _begin(body, element, start, end, h)
-        count = max(count, _stage(body, element, s, start, end))
+        count, back = max(count, _stage(body, element, s, start, end)), 0.0
     take(body, element, end)
     for e in range(AXES, m):
         end[SIGNS + 1 + m + e - AXES] = element[e, CURRENT]
-    return count
+    return count, back
+
+
+@part
+def step(body, element, s, start, end, middle, h):
+    """One SDIRK2 step of length h from `start` to `end`; `middle` receives x at t + gamma h. Returns the iterations."""
+    first = first_stage(body, element, s, start, end, middle, h)
+    return max(first, last_stage(body, element, s, start, end, h)[0])

@@ -51,19 +51,19 @@ def simulate(
     Raises InputError for wrong shapes, NaN or infinite values, dt outside 1e-9..3600 s, or a missing supply.
     """
     given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
-    start = _start("twist", twist, 3), _start("pose", pose, 3)
-    amperes = _start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
+    start = as_start("twist", twist, 3), as_start("pose", pose, 3)
+    amperes = as_start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
     if given.set_point is None and given.open_circuit is None and not why_not_exact(robot):
         assert given.voltage is not None
         if robot.motor.electrical == DYNAMIC:
             twists, poses, currents = simulate_exact_inductance(robot, given.voltage, given.dt, *start, amperes)
         else:
             (twists, poses), currents = simulate_exact(robot, given.voltage, given.dt, *start), None
-        return _run(robot, given, given.voltage, twists, poses, None, "exact engine", (), currents)
-    return _implicit(robot, given, *start, amperes, _tolerance(tol))
+        return as_run(robot, given, given.voltage, twists, poses, None, "exact engine", (), currents)
+    return _implicit(robot, given, *start, amperes, as_tolerance(tol))
 
 
-def _tolerance(tol: float | None) -> float:
+def as_tolerance(tol: float | None) -> float:
     if tol is None:
         return 0.0
     if not 1e-10 <= tol <= 1.0:
@@ -71,7 +71,7 @@ def _tolerance(tol: float | None) -> float:
     return float(tol)
 
 
-def _start(name: str, value: ArrayLike, size: int) -> FloatArray:
+def as_start(name: str, value: ArrayLike, size: int) -> FloatArray:
     array = as_floats(name, value)
     if array.shape != (size,) or not np.isfinite(array).all():
         raise InputError("cannot start there", got=value, expected=f"{size} finite numbers", where=name)
@@ -94,12 +94,17 @@ def _implicit(
     if given.open_circuit is not None:
         bound[given.open_circuit] = 0.0
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
-    how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
-    stopped = capped(outcome)
-    doubts = (f"the friction solver hit its cap in {stopped} of {len(dt)} rows: look there",) if stopped else ()
     kept = Outcome(outcome.pose[keep], outcome.state[keep], outcome.iterations, outcome.steps)
-    twists = kept.state[:, :AXES] / [1.0, 1.0, numbers.body[LENGTH]]
-    return _run(robot, given, voltage[keep[:-1]], twists, kept.pose, kept, how, doubts)
+    return implicit_run(robot, given, voltage[keep[:-1]], kept, tol)
+
+
+def implicit_run(robot: Robot, given: Commands, voltage: FloatArray, outcome: Outcome, tol: float) -> Run:
+    """The Run of what the implicit engine found at the samples asked for, its doubts included."""
+    how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
+    stopped, rows = capped(outcome), len(outcome.iterations)
+    doubts = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
+    twists = outcome.state[:, :AXES] / [1.0, 1.0, plant(robot).body[LENGTH]]
+    return as_run(robot, given, voltage, twists, outcome.pose, outcome, how, doubts)
 
 
 def _limits(robot: Robot) -> FloatArray:
@@ -107,7 +112,7 @@ def _limits(robot: Robot) -> FloatArray:
     return per_wheel(np.inf if limit is None else limit, robot.wheels.count)
 
 
-def _run(
+def as_run(
     robot: Robot, given: Commands, voltage: FloatArray, twists: FloatArray, poses: FloatArray,
     outcome: Outcome | None, engine: str, doubts: tuple[str, ...], currents: FloatArray | None = None,
 ) -> Run:  # fmt: skip

@@ -25,9 +25,9 @@ from omnidyn.model.scratch import scratch
 from omnidyn.model.value import Value, keys_of
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands
-from omnidyn.simulation.implicit import Outcome, capped
-from omnidyn.simulation.simulate import TOLERANCE, _run, _start, _tolerance
-from omnidyn.simulation.tangent_march import _march
+from omnidyn.simulation.implicit import Outcome, begun, room
+from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, implicit_run
+from omnidyn.simulation.tangent_march import march_tangent
 from omnidyn.simulation.tangent_step import EPS, Ways
 
 FloatArray = NDArray[np.float64]
@@ -62,14 +62,14 @@ def derivatives(
     current has met its limit or passed 0 against a voltage drop.
     Raises InputError for what `simulate` refuses, for an unknown key, and for friction or a gear loss that is off.
     """
-    start = _start("twist", twist, 3), _start("pose", pose, 3)
+    start = as_start("twist", twist, 3), as_start("pose", pose, 3)
     given = commands(robot, voltage, dt, None, None, None, None)
     assert given.voltage is not None
     scale = np.array([_scale(robot, key) for key in keys])
     robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
     volts = [commands(r, voltage, dt, None, None, None, None).voltage for r in robots]
     rates = _difference(np.array(volts).reshape(-1, *given.voltage.shape))
-    return _derivatives(robot, robots, rates, given, tuple(keys), scale, start, _tolerance(tol))
+    return _derivatives(robot, robots, rates, given, tuple(keys), scale, start, as_tolerance(tol))
 
 
 def _derivatives(
@@ -89,14 +89,11 @@ def _derivatives(
     first = np.zeros((len(keys), AXES + numbers.wheels))
     first[:, 2] = start[0][2] * stretch
     outcome, ds, dposes = run_tangent(numbers, ways, given, start, first, tol)
-    how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
-    stopped = capped(outcome)
-    doubts = (f"the friction solver hit its cap in {stopped} of {len(given.dt)} rows: look there",) if stopped else ()
     assert given.voltage is not None
-    twists = outcome.state[:, :AXES] / [1.0, 1.0, length]
-    run = _run(robot, given, given.voltage, twists, outcome.pose, outcome, how, doubts)
+    run = implicit_run(robot, given, given.voltage, outcome, tol)
+    assert run.twist is not None
     slopes = ds[..., :AXES].copy()
-    slopes[..., 2] = (slopes[..., 2] - twists[:, 2, None] * stretch) / length
+    slopes[..., 2] = (slopes[..., 2] - run.twist[:, 2, None] * stretch) / length
     if robot.motor.electrical == DYNAMIC:
         currents = ds[..., AXES:]
     else:
@@ -110,17 +107,13 @@ def run_tangent(
 ) -> tuple[Outcome, FloatArray, FloatArray]:
     """The run of `run_implicit`, with derivatives of state (rows + 1, K, 3 + n) and pose (rows + 1, K, 3)."""
     assert given.voltage is not None
-    rows, n, bare = len(given.dt), numbers.wheels, with_given_currents(numbers)
-    state = start_state(numbers, start[0], np.zeros(n))
-    out = Outcome(
-        np.zeros((rows + 1, 3)), np.zeros((rows + 1, len(state))), np.zeros(rows, np.int64), np.zeros(rows, np.int64)
-    )
-    out.pose[0], out.state[0] = start[1], state
+    rows, bare = len(given.dt), with_given_currents(numbers)
+    state = start_state(numbers, start[0], np.zeros(numbers.wheels))
+    out = begun(rows, state, start[1])
     ds, dposes = np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, len(first), 3))
     ds[0] = first
-    spare = np.zeros((4, len(state)))
-    _march(
-        *numbers.copy(), *bare, scratch(), spare, ways, given.voltage, given.dt, tol, out.pose, out.state,
+    march_tangent(
+        *numbers.copy(), *bare, scratch(), room(state), ways, given.voltage, given.dt, tol, out.pose, out.state,
         out.iterations, out.steps, ds, dposes,
     )  # fmt: skip
     return out, ds, dposes

@@ -31,7 +31,7 @@ from omnidyn.model.layout import (
     VOLTAGE,
 )
 from omnidyn.model.rest import SIGNS, put, settle, sticks
-from omnidyn.model.scratch import NEWTON, WORST
+from omnidyn.model.scratch import NEWTON, WORST, copy_row, copy_table
 from omnidyn.simulation.implicit import SHORTEST
 from omnidyn.simulation.tangent_step import EPS, stage_tangent, step_tangent
 
@@ -95,7 +95,7 @@ def _leap(body, element, s, ways, start, end, h, gained, d):
     put(body, element, end)
     if body[ELLIPSE] != 1.0 or end[0] != 0.0 or end[1] != 0.0:
         _at_instant(body, element, start, start, h)
-        ways.aim[:] = d
+        copy_table(ways.aim, d)
         stage_tangent(body, element, s, ways, end, ways.aim, d)
 
 
@@ -148,8 +148,8 @@ def _weakest(body, element, ways, start, force):
     Found with levels that are a little too low. False where they hold all the same: there is no such direction.
     """
     b, el, s, push = ways.body[-1], ways.element[-1], ways.scratch[0], ways.point[4]
-    b[:] = body
-    el[:] = element
+    copy_row(b, body)
+    copy_table(el, element)
     put(b, el, start)
     b[HOLD_X], b[HOLD_Y] = b[HOLD_X] * (1.0 - MARGIN), b[HOLD_Y] * (1.0 - MARGIN)
     for e in range(len(el)):
@@ -187,8 +187,8 @@ def _gap(body, element, ways, start, d, eps):
 def _later(body, element, ways, start, acceleration):
     """Time derivative of phi while what is stuck in `start` still holds."""
     b, el, rate, m = ways.body[-1], ways.element[-1], ways.aim[0], len(element)
-    b[:] = body
-    el[:] = element
+    copy_row(b, body)
+    copy_table(el, element)
     put(b, el, start)
     for w in range(3 + m - AXES):
         rate[w] = acceleration[w] if w < 3 else 0.0
@@ -253,7 +253,9 @@ def half_tangent(body, element, bare_body, bare_element, s, ways, start, end, mi
     A reversal often comes to rest for one step and is released by the next: `settle` says what holds and what does not.
     """
     first, last, m = ways.state[0], ways.state[1], len(element)
-    first[:], last[:], d1[:] = start, end, d0
+    copy_row(first, start)
+    copy_row(last, end)
+    copy_table(d1, d0)
     if sticks(start, m):
         settle(body, element, bare_body, bare_element, s, first, ways.gained)
     if sticks(end, m):
@@ -263,11 +265,11 @@ def half_tangent(body, element, bare_body, bare_element, s, ways, start, end, mi
             settle(body, element, bare_body, bare_element, s, last, ways.gained)
         _leap(body, element, s, ways, first, last, h, ways.gained, d1)
         return
-    first[:] = start
+    copy_row(first, start)
     pieces = PIECES if _bends(element, start, end) else 1
     for piece in range(pieces):
-        ways.kept[:] = d1
+        copy_table(ways.kept, d1)
         step_tangent(body, element, s, ways, first, last, middle, h / pieces, d1, d1)
         if pieces > 1:
             _pass_zero(element, ways, start, end, first, last, piece == pieces - 1, d1)
-        first[:] = last
+        copy_row(first, last)

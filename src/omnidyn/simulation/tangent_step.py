@@ -39,9 +39,8 @@ from omnidyn.model.layout import (
     TAU,
     VOLTAGE,
 )
-from omnidyn.model.rest import SIGNS, take
 from omnidyn.model.scratch import JACOBIAN, NEWTON, RESIDUAL
-from omnidyn.simulation.implicit_step import BACK, GAMMA, _aim, _begin, _slips_back, _stage, _torn_loose
+from omnidyn.simulation.implicit_step import first_stage, last_stage
 
 FloatArray = NDArray[np.float64]
 EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10
@@ -203,27 +202,15 @@ def _current_tangent(element, ways, k, x, aim, out):
 
 @part
 def step_tangent(body, element, s, ways, start, end, middle, h, d0, d1):
-    """`implicit_step.step` with derivatives: d0 at its start; ways.middle at stage 1 and d1 at its end are filled."""
-    m = len(element)
-    _begin(body, element, start, end, GAMMA * h)
-    count = _stage(body, element, s, start, end)
+    """`implicit_step.step` with derivatives: d0 at its start; ways.middle at stage 1 and d1 at its end are filled.
+
+    d1 may be d0.
+    """
+    first = first_stage(body, element, s, start, end, middle, h)
     stage_tangent(body, element, s, ways, end, d0, ways.middle)
-    for a in range(3):
-        middle[a] = end[a]
-    stopped = _slips_back(body, element, start)
-    if not stopped:
-        _aim(body, element, start, end, BACK)
-        count = max(count, _stage(body, element, s, start, end))
-        stopped = _slips_back(body, element, start) or _torn_loose(body, element, start)
-        for k in range(len(d0)):
-            for j in range(d0.shape[1]):
-                ways.aim[k, j] = d0[k, j] + BACK * (ways.middle[k, j] - d0[k, j])
-        stage_tangent(body, element, s, ways, end, ways.aim, d1)
-    if stopped:
-        _begin(body, element, start, end, h)
-        count = max(count, _stage(body, element, s, start, end))
-        stage_tangent(body, element, s, ways, end, d0, d1)
-    take(body, element, end)
-    for e in range(AXES, m):
-        end[SIGNS + 1 + m + e - AXES] = element[e, CURRENT]
-    return count
+    last, back = last_stage(body, element, s, start, end, h)
+    for k in range(len(d0)):
+        for j in range(d0.shape[1]):
+            ways.aim[k, j] = d0[k, j] + back * (ways.middle[k, j] - d0[k, j])
+    stage_tangent(body, element, s, ways, end, ways.aim, d1)
+    return max(first, last)
