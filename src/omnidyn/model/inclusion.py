@@ -60,14 +60,10 @@ def _slope(s):
 @part
 def _kink_of_element(element, e, x, s):
     """Step along the Newton direction after which a sliding element's speed is 0; inf where it never is."""
-    sign = element[e, SIGN]
-    if sign != 1.0 and sign != -1.0:
-        return np.inf
-    g0, g1, g2 = element[e, GX], element[e, GY], element[e, GZ]
+    sign, g0, g1, g2 = element[e, SIGN], element[e, GX], element[e, GY], element[e, GZ]
+    speed = g0 * x[0] + g1 * x[1] + g2 * x[2]
     dw = g0 * s[NEWTON, 0] + g1 * s[NEWTON, 1] + g2 * s[NEWTON, 2]
-    if sign * dw >= 0.0:
-        return np.inf
-    return max(-(g0 * x[0] + g1 * x[1] + g2 * x[2]) / dw, 0.0)
+    return max(-speed / dw, 0.0) if abs(sign) == 1.0 and sign * dw < 0.0 else np.inf
 
 
 @part
@@ -141,19 +137,21 @@ def _at(x, s, t):
 
 
 @part
-def _not_too_far(body, element, x, s, t):
-    """1, or less where a full step past a sharp bend of the ellipse would climb again: secants on the slope."""
-    _at(x, s, t)
-    residual(body, element, s[TRIAL], s)
-    below, first, end = _slope(s), abs(_slope(s)), 1.0
+def _not_too_far(body, element, x, s, t, below):
+    """1, or less where a full step past a sharp bend of the ellipse would climb again: secants on the slope.
+
+    below: the slope at t. The residual that is left is that at the point found, except after the last secant.
+    Returns (step, whether it is).
+    """
+    first, end = abs(below), 1.0
     for _ in range(20):
         _at(x, s, end)
         residual(body, element, s[TRIAL], s)
         slope = _slope(s)
         if slope <= 0.9 * first or below >= 0.0:
-            return end
+            return end, True
         end = t + max(below / (below - slope), 0.1) * (end - t)
-    return end
+    return end, False
 
 
 @part
@@ -161,14 +159,17 @@ def _walk(body, element, x, s):
     """Go along the Newton direction from x to the end, past kinks that give way, up to one that holds.
 
     Changes x and the signs in place. The slope of the potential along the way rises; where it is 0, stop.
-    Returns whether an element got stuck.
+    Returns (whether an element got stuck, whether the residual is that at the new x).
     """
-    t, stuck = 0.0, False
+    t, stuck, known, passed = 0.0, False, False, False
     for _ in range(2 * len(element)):
         kink, met = _next_kink(body, element, x, s, t)
         if kink > 1.0:
             if body[ELLIPSE] == 1.0:
-                t = _not_too_far(body, element, x, s, t)
+                if passed:  # signs have changed: the residual is that of the other side
+                    _at(x, s, t)
+                    residual(body, element, s[TRIAL], s)
+                t, known = _not_too_far(body, element, x, s, t, _slope(s))
             else:
                 t = 1.0
             break
@@ -181,7 +182,7 @@ def _walk(body, element, x, s):
             below = min(_slope(s), 0.0)
             t += below / (below - slope) * (kink - t)
             break
-        t, stuck = kink, met or _holds_more(element) or slope + _jump(body, element, s, met) >= 0.0
+        t, stuck, passed = kink, met or _holds_more(element) or slope + _jump(body, element, s, met) >= 0.0, True
         for e in range(len(element)):
             if element[e, FOUND] == 1.0:
                 element[e, SIGN] = 0.0 if stuck else -element[e, SIGN]
@@ -196,7 +197,7 @@ def _walk(body, element, x, s):
         body[ELLIPSE] == 1.0 and cx * before0 * x[0] + cy * before1 * x[1] <= 0.0
     ):  # past the tip of its cone: stop there
         body[ELLIPSE], stuck = 0.0, True
-    return stuck
+    return stuck, known and not stuck
 
 
 @part
@@ -253,7 +254,7 @@ def solve(body, element, x, s):
     set_losses(body, element)
     inertia = body[MASS] / body[TAU] * max(abs(body[GOAL]), abs(body[GOAL + 1]), abs(body[GOAL + 2]))
     tight = TIGHT * (inertia + forces_at_work(body, element))
-    stale, rank = True, 0
+    stale, known, rank = True, False, 0
     for iteration in range(CAP):
         if iteration == AFRESH:
             _rest(body, element, x)
@@ -263,8 +264,9 @@ def solve(body, element, x, s):
             while rank > 0 and absorb(body, element, s, rank):
                 rank = face(body, element, s)
             onto_face(x, s, rank)
-            stale = False
-        residual(body, element, x, s)
+            stale = known = False
+        if not known:
+            residual(body, element, x, s)
         if newton_direction(s, rank) <= tight:
             found = worst_direction(body, element, s, rank) if rank > 0 else 0.0
             if found < -tight:
@@ -274,5 +276,5 @@ def solve(body, element, x, s):
                 return iteration
             stale = True
         else:
-            stale = _walk(body, element, x, s)
+            stale, known = _walk(body, element, x, s)
     return CAP
