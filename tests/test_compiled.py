@@ -16,9 +16,11 @@ import sys
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
 
 import omnidyn
 from omnidyn import compiled
@@ -174,6 +176,62 @@ def test_every_kernel_is_stamped_and_nothing_else_is_cached():
             assert function._cache._cache_file._source_stamp[1] == compiled.source_hash(), name
         else:
             assert isinstance(function._cache, NullCache), f"{name} is cached without a stamp"
+
+
+def test_parts_count_no_references():
+    """Counting costs three times as long as the arithmetic. If this fails, numba has changed `_nrt`: time it anew."""
+    assert compiled.UNCOUNTED == {"_nrt": False}
+    counted = decorated("kernel") | decorated("maker")
+    for name, function in dispatchers().items():
+        assert function.targetoptions.get("_nrt", True) == (name in counted), name
+
+
+@pytest.mark.parametrize("give", [lambda x: x.copy(), lambda x: x[1:]])
+def test_no_part_makes_an_array(give):
+    given = compiled.part(give)
+
+    def taker(x):
+        return given(x)[0]
+
+    with pytest.raises(NumbaError, match=r"NRT required|Only accept returning of array"):
+        compiled.kernel(taker)(np.zeros(3))
+
+
+def sources_of(names):
+    """(name, syntax tree) of the functions of the package that are called so."""
+    for file in PACKAGE.rglob("*.py"):
+        module = ".".join(("omnidyn", *file.relative_to(PACKAGE).with_suffix("").parts))
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and f"{module}.{node.name}" in names:
+                yield f"{module}.{node.name}", node
+
+
+def given_away(function):
+    """Names that a function returns and also indexes: arrays, as far as the text shows."""
+    nodes = list(ast.walk(function))
+    indexed = {node.value.id for node in nodes if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name)}
+    returned = [node.value for node in nodes if isinstance(node, ast.Return)]
+    parts = [part for value in returned for part in (value.elts if isinstance(value, ast.Tuple) else [value])]
+    return [part.id for part in parts if isinstance(part, ast.Name) and part.id in indexed]
+
+
+def test_no_part_gives_an_array_away():
+    """numba lets a part return an argument: its caller would take off a reference that nobody has put on."""
+    assert given_away(ast.parse("def f(x):\n    x[0] = 1.0\n    return 2.0, x")) == ["x"]
+    checked = 0
+    for name, node in sources_of(decorated("part")):
+        assert not given_away(node), name
+        checked += 1
+    assert checked > 50
+
+
+def test_no_part_calls_a_maker():
+    """Makers are private: whoever calls one stands in its module."""
+    makers = decorated("maker")
+    assert all(name.rpartition(".")[2].startswith("_") for name in makers)
+    for name, node in sources_of(decorated("part")):
+        calls = {getattr(call.func, "id", "") for call in ast.walk(node) if isinstance(call, ast.Call)}
+        assert not makers & {f"{name.rpartition('.')[0]}.{called}" for called in calls}, name
 
 
 def test_nobody_compiles_behind_our_back():

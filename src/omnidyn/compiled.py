@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.options import DefaultOptions
 
 PACKAGE = Path(__file__).resolve().parent
 ERROR_MODEL = "numpy"  # a division by zero gives inf or nan, as in NumPy, and needs no branch
@@ -29,9 +30,25 @@ def source_hash() -> str:
     return digest.hexdigest()
 
 
+# numba counts who holds an array: it adds and removes one, atomically, around nearly every call that has a branch. In
+# small functions of arithmetic that costs three times as much as the rest. `_nrt` is private to numba: a test watches.
+KNOWN = hasattr(DefaultOptions, "_nrt")
+COUNTED: dict[str, Any] = {"_nrt": True} if KNOWN else {}
+UNCOUNTED: dict[str, Any] = {"_nrt": False} if KNOWN else {}
+
+
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A piece of a kernel: compiled into the kernels that call it, never cached by itself."""
-    return numba.njit(error_model=ERROR_MODEL)(function)
+    """A piece of a kernel: compiled into the kernels that call it, never cached by itself.
+
+    It works in arrays that its kernel holds, and does not count who holds them: numba lets it neither make nor return
+    one.
+    """
+    return numba.njit(error_model=ERROR_MODEL, **UNCOUNTED)(function)
+
+
+def maker(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A piece of a kernel that makes arrays, for kernels and other makers: a part would never let go of them."""
+    return numba.njit(error_model=ERROR_MODEL, **COUNTED)(function)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled import kernel, maker, part
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.motor import DYNAMIC
@@ -127,7 +127,7 @@ def _fastest_rate(t, event, rate, spin):
     return fastest + spin
 
 
-@part
+@maker
 def _displacement(start, event, before, after, rate, left, right, nodes, weights):
     """Displacement between two times of a step that no event separates, in the body frame at its start [m]."""
     x = y = 0.0
@@ -143,7 +143,7 @@ def _displacement(start, event, before, after, rate, left, right, nodes, weights
     return x, y
 
 
-@part
+@maker
 def _travel(start, end, event, before, after, rate, dt, nodes, weights):
     """Displacement over a whole step in the body frame at its start: pieces between events, short where it is fast."""
     x = y = left = 0.0

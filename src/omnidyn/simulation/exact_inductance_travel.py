@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled import kernel, maker, part
 from omnidyn.simulation.exact import SETTLED
 from omnidyn.simulation.exact_inductance_step import forces, law_of, response, roots, segment
 from omnidyn.simulation.travel import put_next_pose, rotated
@@ -60,19 +60,19 @@ class Axes(NamedTuple):
     acceleration: np.ndarray
 
 
-@part
+@maker
 def _empty_nodes(columns):
     return Nodes(
         np.empty(columns), np.empty(columns), np.empty((3, columns)), np.empty((3, columns)), np.empty(columns)
     )
 
 
-@part
+@maker
 def _empty_axes():
     return Axes(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
 
-@part
+@maker
 def _rates(laws):
     """How fast each axis changes, and forgets that it does [1/s]: (fast, its decay, slow, its decay). Shape (3, 4)."""
     out = np.empty((3, 4))
