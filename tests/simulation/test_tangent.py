@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.tangent import derivatives, parameter, with_parameter
@@ -173,6 +173,48 @@ def test_currents_that_pass_zero_against_a_voltage_drop(unequal):
     robot = unequal.replace(name="drop", motor=unequal.motor.replace(voltage_drop=0.2))
     keys = [*BODY, "motor.emf_constant_Vs_rad", "motor.resistance_ohm[1]", "motor.voltage_drop_V"]
     check(lambda r: reference(r, FOUR, 0.01), robot, FOUR, keys, 1e-4, channels=("twist", "pose"))
+
+
+@pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
+def test_lossy_gears(axebot, electrical):
+    """Gears that lose while they drive and lose while they are driven, and hold what rests."""
+    motor = axebot.motor.replace(gear_efficiency=(0.75, 0.8, 0.7), electrical=electrical, inductance=0.004)
+    body = axebot.body.replace(rotating_frame=True)
+    robot = axebot.replace(name=f"gears {electrical}"[:12], body=body, motor=motor)
+    keys = [*BODY, *MOTOR, "motor.gear_efficiency[0]", "motor.gear_efficiency[2]", "friction.axes.coulomb[1]"]
+    check(lambda r: reference(r, TURNING, 0.01), robot, TURNING, keys, 1e-4, channels=("twist", "pose"))
+
+
+@pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
+@pytest.mark.parametrize("off", ["brake", "coast"])
+def test_duty_of_a_supply(axebot, off, electrical):
+    """voltage = duty * supply, by the chain rule; at a duty of 0 the motor brakes, or carries no current."""
+    motor = axebot.motor.replace(electrical=electrical, inductance=0.004)
+    drive = axebot.drive.replace(kind="duty", supply=5.0, off=off)
+    robot = axebot.replace(name=f"duty {off}", motor=motor, drive=drive)
+    duty = held((20, [0.2, 1.0, -0.6]), (12, [0.0, -0.8, 1.0]), (40, [0.0, 0.0, 0.0]), (20, [0.0, 0.9, -0.9]))
+    keys = [*BODY, *MOTOR, "drive.supply_V", "friction.axes.viscous[0]", "friction.axes.coulomb[2]"]
+
+    def run(r):
+        return reference(r, duty * r.drive.supply, 0.01, open_circuit=(duty == 0.0) & (off == "coast"))
+
+    found = check(run, robot, None, keys, 1e-4, channels=("twist", "pose"), duty=duty)
+    rest = found.run.twist == 0.0
+    assert rest[65:71].all()
+    assert (found.twist[rest] == 0.0).all()
+    by_key = dict(zip(keys, found.twist[-1, 0], strict=True))  # it drives along x again: no word of yaw in it
+    idle = (BODY[1], BODY[3], keys[-1])
+    assert all((abs(by_key[key]) > 1e-9) == (key not in idle) for key in keys), by_key
+    if off == "coast":
+        assert (found.run.current[:-1][duty == 0.0] == 0.0).all()
+        assert (found.current[:-1][duty == 0.0] == 0.0).all()
+
+
+@pytest.mark.parametrize("command", ["wheel_speed_command", "twist_command"])
+def test_the_speed_loop_is_refused_by_name(axebot, command):
+    drive = axebot.drive.replace(kind="speed", kp=1.0, rate=100.0)
+    with pytest.raises(UnsupportedError, match=f"no derivatives through the speed loop.*{command}"):
+        derivatives(axebot.replace(drive=drive), dt=0.01, keys=["body.mass_kg"], **{command: [[1.0, 2.0, 3.0]]})
 
 
 @pytest.mark.parametrize("wheels", [0.0, 0.2])

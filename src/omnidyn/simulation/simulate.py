@@ -90,9 +90,7 @@ def _implicit(
         dt, set_point, tick, keep = on_ticks(robot, given)
         voltage = np.zeros_like(set_point)
         loop = Loop(*loop_gains(robot), set_point, tick, 1.0 / (robot.drive.rate or np.inf), np.zeros(n))
-    bound = np.broadcast_to(_limits(robot), voltage.shape).copy()
-    if given.open_circuit is not None:
-        bound[given.open_circuit] = 0.0
+    bound = current_bounds(robot, given, len(dt))
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
     kept = Outcome(outcome.pose[keep], outcome.state[keep], outcome.iterations, outcome.steps)
     return implicit_run(robot, given, voltage[keep[:-1]], kept, tol)
@@ -107,9 +105,13 @@ def implicit_run(robot: Robot, given: Commands, voltage: FloatArray, outcome: Ou
     return as_run(robot, given, voltage, twists, outcome.pose, outcome, how, doubts)
 
 
-def _limits(robot: Robot) -> FloatArray:
-    limit = robot.motor.current_limit
-    return per_wheel(np.inf if limit is None else limit, robot.wheels.count)
+def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
+    """What the current of each motor may not exceed [A]: its limit, or 0 while it coasts. Shape (rows, wheels)."""
+    limit, n = robot.motor.current_limit, robot.wheels.count
+    bound = np.tile(per_wheel(np.inf if limit is None else limit, n), (rows, 1))
+    if given.open_circuit is not None:
+        bound[given.open_circuit] = 0.0
+    return bound
 
 
 def as_run(

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.layout import ACTIVE, AXES, EFFICIENCY, ELLIPSE, GX, GZ, HOLD, LENGTH, SLIDE, SLIDE_X, SLIDE_Y
 from omnidyn.model.motor import DYNAMIC
@@ -26,7 +26,7 @@ from omnidyn.model.value import Value, keys_of
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands
 from omnidyn.simulation.implicit import Outcome, begun, room
-from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, implicit_run
+from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, current_bounds, implicit_run
 from omnidyn.simulation.tangent_march import march_tangent
 from omnidyn.simulation.tangent_step import EPS, Ways
 
@@ -48,27 +48,39 @@ class Derivatives:
 
 
 def derivatives(
-    robot: Robot, voltage: ArrayLike, dt: ArrayLike, keys: Sequence[str], *, twist: ArrayLike = (0.0, 0.0, 0.0),
-    pose: ArrayLike = (0.0, 0.0, 0.0), tol: float | None = TOLERANCE,
+    robot: Robot, voltage: ArrayLike | None = None, dt: ArrayLike | None = None, keys: Sequence[str] = (), *,
+    duty: ArrayLike | None = None, wheel_speed_command: ArrayLike | None = None,
+    twist_command: ArrayLike | None = None, supply: ArrayLike | None = None,
+    twist: ArrayLike = (0.0, 0.0, 0.0), pose: ArrayLike = (0.0, 0.0, 0.0), tol: float | None = TOLERANCE,
 ) -> Derivatives:  # fmt: skip
     """Simulate and differentiate with respect to numbers of the robot file, such as "friction.axes.coulomb[1]".
 
-    robot, voltage, dt, twist, pose, tol: as for `simulate`; the implicit engine runs whatever the robot. keys: numbers
-    that the robot has; `with_parameter` says how they are named. tol None: derivatives of the fixed-step map itself.
+    robot, voltage or duty, dt, supply, twist, pose, tol: as for `simulate`; the implicit engine runs whatever the
+    robot. keys: numbers that the robot has; `with_parameter` says how they are named. tol None: derivatives of the
+    fixed-step map itself.
 
     They belong to the sequence of starts, stops and reversals that the run shows. Not differentiable, and not seen:
     whether something breaks away at all, a stop that only just happens, an ellipse crossing rest at an angle, a voltage
     exactly at its limit. At tol 1e-6 a derivative is within 1e-5 of its largest value in the run, within 2e-4 after a
     current has met its limit or passed 0 against a voltage drop.
-    Raises InputError for what `simulate` refuses, for an unknown key, and for friction or a gear loss that is off.
+    Raises InputError for what `simulate` refuses, for an unknown key, and for friction or a gear loss that is off;
+    UnsupportedError for set points of a speed loop.
     """
-    start = as_start("twist", twist, 3), as_start("pose", pose, 3)
-    given = commands(robot, voltage, dt, None, None, None, None)
+    for name, set_point in (("wheel_speed_command", wheel_speed_command), ("twist_command", twist_command)):
+        if set_point is not None:
+            raise UnsupportedError(
+                "no derivatives through the speed loop of the firmware", got=name, expected="voltage or duty",
+                remedy="differentiate under the voltages that simulate() recorded; the loop's answer is not in them",
+            )  # fmt: skip
+
+    def applied(robot: Robot) -> Commands:
+        return commands(robot, voltage, dt, duty, None, None, supply)
+
+    start, given = (as_start("twist", twist, 3), as_start("pose", pose, 3)), applied(robot)
     assert given.voltage is not None
     scale = np.array([_scale(robot, key) for key in keys])
     robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
-    volts = [commands(r, voltage, dt, None, None, None, None).voltage for r in robots]
-    rates = _difference(np.array(volts).reshape(-1, *given.voltage.shape))
+    rates = _difference(np.array([applied(r).voltage for r in robots]).reshape(-1, *given.voltage.shape))
     return _derivatives(robot, robots, rates, given, tuple(keys), scale, start, as_tolerance(tol))
 
 
@@ -88,7 +100,8 @@ def _derivatives(
     stretch = _difference(np.array([p.body[LENGTH] for p in plants]))
     first = np.zeros((len(keys), AXES + numbers.wheels))
     first[:, 2] = start[0][2] * stretch
-    outcome, ds, dposes = run_tangent(numbers, ways, given, start, first, tol)
+    bound = current_bounds(robot, given, len(given.dt))
+    outcome, ds, dposes = run_tangent(numbers, ways, given, bound, start, first, tol)
     assert given.voltage is not None
     run = implicit_run(robot, given, given.voltage, outcome, tol)
     assert run.twist is not None
@@ -98,13 +111,15 @@ def _derivatives(
         currents = ds[..., AXES:]
     else:
         currents = _settled(robots, run, slopes, ways.voltage)
+    currents = currents * (np.append(bound, bound[-1:], axis=0)[:, None] > 0.0)  # none while a motor coasts
     parts = (np.moveaxis(part, 1, 2) / scale for part in (slopes, dposes, currents))
     return Derivatives(run, keys, *parts)
 
 
 def run_tangent(
-    numbers: Plant, ways: Ways, given: Commands, start: tuple[FloatArray, FloatArray], first: FloatArray, tol: float
-) -> tuple[Outcome, FloatArray, FloatArray]:
+    numbers: Plant, ways: Ways, given: Commands, bound: FloatArray, start: tuple[FloatArray, FloatArray],
+    first: FloatArray, tol: float,
+) -> tuple[Outcome, FloatArray, FloatArray]:  # fmt: skip
     """The run of `run_implicit`, with derivatives of state (rows + 1, K, 3 + n) and pose (rows + 1, K, 3)."""
     assert given.voltage is not None
     rows, bare = len(given.dt), with_given_currents(numbers)
@@ -113,7 +128,7 @@ def run_tangent(
     ds, dposes = np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, len(first), 3))
     ds[0] = first
     march_tangent(
-        *numbers.copy(), *bare, scratch(), room(state), ways, given.voltage, given.dt, tol, out.pose, out.state,
+        *numbers.copy(), *bare, scratch(), room(state), ways, given.voltage, bound, given.dt, tol, out.pose, out.state,
         out.iterations, out.steps, ds, dposes,
     )  # fmt: skip
     return out, ds, dposes

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from omnidyn.compiled import kernel, part
-from omnidyn.model.layout import AXES, LENGTH, VOLTAGE
+from omnidyn.model.layout import AXES, BOUND, LENGTH, LIMIT, VOLTAGE
 from omnidyn.model.rest import settle, sticks
 from omnidyn.model.scratch import copy_row, copy_table
 from omnidyn.simulation.implicit import SIMPSON, STAGES, advance_pose, find_step
@@ -64,8 +64,8 @@ def _row(body, element, bare_body, bare_element, s, spare, ways, state, dt, tol,
 
 @kernel
 def march_tangent(
-    body, element, bare_body, bare_element, s, spare, ways, voltage, dt, tol, poses, states, iterations, steps, ds,
-    dposes,
+    body, element, bare_body, bare_element, s, spare, ways, voltage, bound, dt, tol, poses, states, iterations, steps,
+    ds, dposes,
 ):  # fmt: skip
     """All rows; see run_tangent."""
     state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(2, np.int64)
@@ -73,10 +73,13 @@ def march_tangent(
     for r in range(len(dt)):
         counts[0] = counts[1] = 0
         for w in range(voltage.shape[1]):
-            element[AXES + w, VOLTAGE] = voltage[r, w]
+            e = AXES + w
+            element[e, VOLTAGE], element[e, BOUND] = voltage[r, w], bound[r, w]
+            for j in range(2 * len(d)):
+                ways.element[j, e, BOUND] = ways.element[j, e, LIMIT] if bound[r, w] > 0.0 else 0.0
             for k in range(len(d)):
-                ways.element[2 * k, AXES + w, VOLTAGE] = voltage[r, w] + EPS * ways.voltage[k, r, w]
-                ways.element[2 * k + 1, AXES + w, VOLTAGE] = voltage[r, w] - EPS * ways.voltage[k, r, w]
+                ways.element[2 * k, e, VOLTAGE] = voltage[r, w] + EPS * ways.voltage[k, r, w]
+                ways.element[2 * k + 1, e, VOLTAGE] = voltage[r, w] - EPS * ways.voltage[k, r, w]
         if tol > 0.0:
             h = _row(
                 body, element, bare_body, bare_element, s, spare, ways, state, dt[r], tol, h, pose, d, dnext, dpose,
