@@ -157,7 +157,7 @@ NAN_ROW = np.array([[0.0, 0, 0], [0, 0, 0], [0, np.nan, 0], [np.nan, 0, 0]])
         ([[1.0, 2.0, 3.0], [1.0, 2.0]], 0.1, "voltage: not numbers"),
         ([["a", "b", "c"]], 0.1, "voltage: not numbers"),
         (NAN_ROW, 0.1, "voltage row 2: not a finite number"),
-        ([[np.inf, 0.0, 0.0]], 0.1, "voltage row 0: not a finite number"),
+        ([[np.inf, 0.0, 0.0]], 0.1, r"voltage row 0: not a finite number; got \[inf, 0\.0, 0\.0\]; expected numbers"),
     ],
 )
 def test_bad_inputs_are_refused_with_their_row(axebot, voltage, dt, words):

@@ -227,6 +227,6 @@ def _rows(name: str, value: ArrayLike, columns: int, rows: int | None = None) ->
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if bad.size:
         raise InputError(
-            "not a finite number", got=list(array[bad[0]]), expected="finite numbers", where=f"{name} row {bad[0]}"
+            "not a finite number", got=array[bad[0]].tolist(), expected="finite numbers", where=f"{name} row {bad[0]}"
         )
     return array

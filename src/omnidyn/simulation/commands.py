@@ -123,7 +123,7 @@ def _rows(name: str, value: ArrayLike | None, width: int) -> FloatArray:
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise InputError(
-            "not a finite number", got=list(rows[bad[0]]), expected="numbers", where=f"{name} row {bad[0]}"
+            "not a finite number", got=rows[bad[0]].tolist(), expected="numbers", where=f"{name} row {bad[0]}"
         )
     return rows
 
