@@ -12,6 +12,7 @@ NAMES = {
     "simulate": "one robot, 10 s at 1 kHz: time and error beside scipy's LSODA with tanh friction",
     "inductance": "what winding inductance costs: exact engine with L > 0 beside L = 0, 10 s at 1 kHz",
     "rest": "60 s inside the dead zone: the robot must not move at all",
+    "compare": "compare on simulated logs: rmse, false alarms of the test of white errors, which robot is better",
     "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
 }
 GOAL_MISSED = 5

@@ -16,6 +16,7 @@ __version__ = "0.1.0"
 
 # Public name -> where it is defined. The list is tested: a name added here is a promise.
 _HOME = {
+    "Comparison": "omnidyn.comparison.result",
     "Estimate": "omnidyn.identification.estimate",
     "OmnidynError": "omnidyn.errors",
     "Robot": "omnidyn.model.robot",
@@ -23,6 +24,7 @@ _HOME = {
     "acceleration": "omnidyn.model.dynamics",
     "axis_patterns": "omnidyn.model.deadzone",
     "breakaway_voltage": "omnidyn.model.deadzone",
+    "compare": "omnidyn.comparison.compare",
     "dead_zone_map": "omnidyn.model.deadzone",
     "fit_steady_state": "omnidyn.identification.steady_state",
     "load_robot": "omnidyn.model.robot_file",
@@ -41,6 +43,8 @@ _HOME = {
 __all__ = ["__version__", *_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 
 if TYPE_CHECKING:
+    from omnidyn.comparison.compare import compare
+    from omnidyn.comparison.result import Comparison
     from omnidyn.errors import OmnidynError
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.steady_state import fit_steady_state

@@ -24,14 +24,14 @@ ORDER = {
         tangent_march tangent""",
     "logs": """channels dialect header rows text_file table parquet tables run_file steady_table command_file words
         mapping clock guess log read_log segments plateaus findings check""",
-    "comparison": "",
+    "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
     "identification": "estimate geometry line points doubts steady_state band",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch
         claims""",
     "report": "style figures page",
-    "report/figures": "robot traces friction steps dead_zone dead_zone_map reconcile",
+    "report/figures": "robot traces friction steps dead_zone dead_zone_map reconcile overlay",
     "export": "",
     "interop": "",
     "cli": """streams numbers session progress log_options init check plan identify simulate friction deadzone compare

@@ -5,6 +5,7 @@ from types import ModuleType
 import omnidyn
 
 PUBLIC = [
+    "Comparison",
     "Estimate",
     "OmnidynError",
     "Robot",
@@ -13,6 +14,7 @@ PUBLIC = [
     "acceleration",
     "axis_patterns",
     "breakaway_voltage",
+    "compare",
     "dead_zone_map",
     "fit_steady_state",
     "load_robot",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import deadzone, demo, identify, init, robots, simulate
+from omnidyn.cli import compare, deadzone, demo, identify, init, robots, simulate
 from omnidyn.cli.streams import show
 
 app = typer.Typer(
@@ -29,12 +29,14 @@ def _omnidyn(
     """From the logs of an omnidirectional robot to a model that can be trusted.
 
     stdout is the result, stderr is talk. Exit codes: 0 ok, 1 a bug of omnidyn, 2 usage, 3 bad input,
-    4 the data cannot answer, 6 an extra is missing, 130 interrupted.
+    4 the data cannot answer, 5 a --fail-if holds, 6 an extra is missing, 130 interrupted.
     """
     if context.invoked_subcommand is None:
         typer.echo(context.get_help(), err=True)
         raise typer.Exit(2)
 
 
-for _command in (demo.demo, init.init, simulate.simulate, identify.identify, deadzone.deadzone, robots.robots):
+for _command in (
+    demo.demo, init.init, simulate.simulate, identify.identify, compare.compare, deadzone.deadzone, robots.robots
+):  # fmt: skip
     app.command()(_command)

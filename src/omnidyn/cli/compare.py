@@ -1,0 +1,146 @@
+"""omnidyn compare LOG... --robot A [--robot B]: what a model says against what the robot did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from omnidyn.cli import log_options
+from omnidyn.cli.progress import progress
+from omnidyn.cli.streams import say, show, show_json
+
+if TYPE_CHECKING:
+    from omnidyn.comparison.result import Comparison
+    from omnidyn.comparison.threshold import Threshold
+    from omnidyn.model.robot import Robot
+    from omnidyn.run import Run
+
+MOST_ROBOTS = 2
+
+
+def compare(
+    log: list[str] = log_options.LOGS,
+    robot: list[str] = typer.Option(..., "--robot", metavar="ROBOT", help="A preset or a robot file; at most twice."),
+    fail_if: list[str] = typer.Option(
+        [], "--fail-if", metavar="RULE", help='Exit 5 where it holds for the first robot: "vx.rmse>0.05". Repeatable.'
+    ),
+    picture: str = typer.Option("", "--picture", metavar="FILE", help="Measured and models, as .png or .svg."),
+    show_channels: str = typer.Option("", "--show", metavar="W1,I1", help="Channels of the picture; default: three."),
+    segments: bool = typer.Option(False, "--segments", help="Show every segment too."),
+    apply: str = typer.Option("", help="Input to replay: voltage, duty, wheel_speed_command or twist_command."),
+    hold: float = typer.Option(0.2, min=0.0, help="How long a missing input keeps its last value [s]."),
+    map_file: str = log_options.MAP,
+    column: list[str] = log_options.COLUMN,
+    assume: list[str] = log_options.ASSUME,
+    latency: list[str] = log_options.LATENCY,
+    save_map: str = log_options.SAVE_MAP,
+    sort: bool = log_options.SORT,
+    no_header: bool = log_options.NO_HEADER,
+    skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
+    current_unsigned: bool = typer.Option(False, "--current-unsigned", help="Currents are |i|: compare by size."),
+    force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+    json: bool = typer.Option(False, "--json", help="The comparison for machines."),
+) -> None:
+    """Compare a model, or two, with the logs of a robot.
+
+    The model runs free under the logged voltages (or duties, or set speeds through the speed loop of the robot file),
+    from gap to gap. Below: how far it ends up from what was measured.
+    """
+    from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
+
+    if len(robot) > MOST_ROBOTS:
+        raise typer.BadParameter(f"--robot may be given once or twice, not {len(robot)} times.")
+    _refuse_picture(picture, force)
+    rules = [parse_threshold(text) for text in fail_if]
+    options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows)
+    maps = log_options.Maps(save_map, force)
+    with progress("reading") as now:
+        files, robots = log_options.log_files(log), _robots(robot)
+        runs, hashes = _runs(files, robots[0], options, sort, maps, now)
+        channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
+        found = _compared(robots, runs, apply, hold, current_unsigned, now)
+        if picture:
+            now("drawing")
+            _draw(found, picture, channels, force)
+    _tell(found, segments, json, robot, files, hashes)
+    refuse_exceeded(found, rules)
+
+
+def _refuse_picture(path: str, force: bool) -> None:
+    """Before any work: a place where the picture could not be written in the end."""
+    from omnidyn.errors import InputError
+    from omnidyn.files import check_output
+
+    if path and (not path.endswith((".png", ".svg")) or "\0" in path):
+        raise InputError("cannot tell the kind of picture", got=path, expected="a name that ends in .png or .svg")
+    if path:
+        check_output(path, force)
+
+
+def _robots(names: Sequence[str]) -> list[Robot]:
+    from omnidyn.model.robot_file import load_robot
+
+    return [load_robot(name) for name in names]
+
+
+def _runs(
+    files: Sequence[str], robot: Robot, options: Any, sort: bool, maps: log_options.Maps, now: Any
+) -> tuple[list[Run], list[str]]:
+    """The logs as Runs, and the hashes of their files. Currents stay as recorded: they may be compared by size."""
+    runs, hashes = [], []
+    for path, each in log_options.load_logs(files, robot, options, now):
+        maps.show(path, each.columns)
+        run = each.to_run(sort=sort)
+        runs.append(run.replace(warnings=(*run.warnings, *each.columns.doubts)))
+        hashes.append(each.sha256)
+    return runs, hashes
+
+
+def _channels(
+    robots: Sequence[Robot], runs: Sequence[Run], apply: str, rules: Sequence[Threshold], shown: str
+) -> list[str]:
+    """The channels of the picture; refuses, before anything is simulated, rules and channels the logs cannot serve."""
+    from omnidyn.comparison.compare import what_is_compared
+    from omnidyn.comparison.threshold import refuse_absent
+
+    compared = what_is_compared(robots, runs, apply or None)
+    refuse_absent(rules, compared)
+    wanted = [name.strip() for name in shown.split(",") if name.strip()]
+    refuse_absent(wanted, compared, "--show")
+    return wanted
+
+
+def _compared(
+    robots: Sequence[Robot], runs: Sequence[Run], apply: str, hold: float, current_unsigned: bool, now: Any
+) -> Comparison:
+    from omnidyn.comparison.compare import compare as compare_robots
+
+    return compare_robots(
+        robots[0], runs, *robots[1:], apply=apply or None, hold=hold, current_unsigned=current_unsigned, progress=now
+    )
+
+
+def _draw(found: Comparison, path: str, channels: Sequence[str], force: bool) -> None:
+    from omnidyn.files import write_atomic
+    from omnidyn.report.figures.overlay import draw_overlay
+
+    drawn = draw_overlay(found, channels=channels)
+    write_atomic(path, drawn.svg if path.endswith(".svg") else drawn.png, force)
+    which = f", the first of {len(found.measured)} logs" if len(found.measured) > 1 else ""
+    say(f"omnidyn: wrote {path}{which}")
+
+
+def _tell(
+    found: Comparison, segments: bool, json: bool, robots: Sequence[str], files: Sequence[str], hashes: Sequence[str]
+) -> None:
+    if not json:
+        show(found.summary(segments).rstrip("\n"))
+        return
+    from omnidyn.cli.session import provenance, robot_input
+
+    for warning in found.warnings:
+        say(f"omnidyn: warning: {warning}")
+    logs = [{"role": "log", "name": path, "sha256": digest} for path, digest in zip(files, hashes, strict=True)]
+    show_json({**found.to_dict(), "provenance": provenance([*map(robot_input, robots), *logs])})

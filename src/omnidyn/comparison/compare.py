@@ -1,0 +1,177 @@
+"""compare: one or two models against the logs of a robot, as free runs under the logged inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from omnidyn.comparison.aligned import errors_for_whiteness
+from omnidyn.comparison.difference import Difference, difference
+from omnidyn.comparison.metrics import Metrics, metrics
+from omnidyn.comparison.replay import HOLD, Replay, choose_input, refuse_other_robot, replay
+from omnidyn.comparison.result import Comparison, Segment
+from omnidyn.comparison.traces import Trace, compared_components, trace_of
+from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
+from omnidyn.logs.channels import components
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import TOLERANCE
+
+POSE = components("pose", 0)
+ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))
+
+
+def compare(
+    robot: Robot, run: Run | Sequence[Run], other: Robot | None = None, *, apply: str | None = None,
+    hold: float = HOLD, current_unsigned: bool = False, tol: float | None = TOLERANCE, seed: int = 0,
+    progress: Callable[[str], object] | None = None,
+) -> Comparison:  # fmt: skip
+    """Replay logs against one robot, or two, and measure how near each comes.
+
+    The logged input drives the model: voltage, else duty times supply, else the speed loop of the robot file. Each
+    segment between gaps is a free run from the measured start; the model never sees what was measured after it.
+    run: one Run or several. other: a second robot under the same inputs. apply: another input than the first that was
+    logged. hold: how long a missing input keeps its value [s]. current_unsigned: compare currents by size, for a
+    sensor without sign. tol: as in `simulate`. seed: of the bootstrap. progress: is told what is being replayed.
+    Raises InputError when a log does not fit a robot, InsufficientDataError when there is nothing to compare.
+    """
+    runs = (run,) if isinstance(run, Run) else tuple(run)
+    robots = _named(robot, other)
+    channels = what_is_compared([*robots.values()], runs, apply)
+    replays: dict[str, list[Replay]] = {name: [] for name in robots}
+    for k, each in enumerate(runs):
+        if progress is not None:
+            progress(f"replaying {each.source or 'a run'}, {k + 1} of {len(runs)}")
+        for name, model in robots.items():
+            replays[name].append(replay(model, each, apply=apply, hold=hold, tol=tol))
+    segments = _segments(runs, next(iter(replays.values())))
+    traces = {name: _traces(runs, parts, segments, channels, current_unsigned) for name, parts in replays.items()}
+    overall = {name: _overall(by) for name, by in traces.items()}
+    kept = tuple(key for key in channels if all(key in found for found in overall.values()))
+    if not kept:
+        raise InsufficientDataError("no measured value falls into a replayed segment", expected="speeds or a pose")
+    return Comparison(
+        robots=tuple(robots),
+        measured=runs,
+        simulated={name: tuple(part.run for part in parts) for name, parts in replays.items()},
+        applied={name: _applied(parts) for name, parts in replays.items()},
+        channels=kept,
+        segments=segments,
+        overall=overall,
+        by_segment={name: _by_segment(by, kept) for name, by in traces.items()},
+        difference=_differences([*traces.values()], kept, seed) if len(robots) == 2 else {},
+        current_unsigned=current_unsigned,
+        warnings=tuple(_warnings(runs, replays)),
+    )
+
+
+def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | None = None) -> tuple[str, ...]:
+    """Components that a comparison will hold, before anything is simulated; refuses what cannot be replayed.
+
+    Raises InputError and InsufficientDataError as `compare` does.
+    """
+    if not runs:
+        raise InsufficientDataError("no log to compare with", got="0 runs", expected="at least one")
+    found: dict[str, None] = {}
+    for run in runs:
+        try:
+            for robot in robots:
+                refuse_other_robot(robot, run)
+                found |= dict.fromkeys(compared_components(run, choose_input(robot, run, apply)))
+        except OmnidynError as error:
+            raise error.at(run.source) if run.source else error from None
+    if not found:
+        raise InsufficientDataError(
+            "the logs hold nothing that a model predicts", got=", ".join(runs[0].channels),
+            expected="twist, wheel_speed, current or pose", remedy="map the columns of speeds, currents or the pose",
+        )  # fmt: skip
+    return in_order(found, robots[0].wheels.count)
+
+
+def in_order(names: Mapping[str, None], wheels: int) -> tuple[str, ...]:
+    """Components in the order they are shown in: speeds first."""
+    channels = ("twist", "wheel_speed", "current", "voltage", "pose")
+    return tuple(name for channel in channels for name in components(channel, wheels) if name in names)
+
+
+def _named(robot: Robot, other: Robot | None) -> dict[str, Robot]:
+    if other is None:
+        return {robot.name: robot}
+    if robot.wheels.count != other.wheels.count:
+        raise InputError(
+            "the two robots cannot both be that of the logs",
+            got=f"{robot.wheels.count} and {other.wheels.count} wheels",
+        )
+    if robot.name == other.name:
+        return {f"{robot.name} (A)": robot, f"{other.name} (B)": other}
+    return {robot.name: robot, other.name: other}
+
+
+def _segments(runs: Sequence[Run], replays: Sequence[Replay]) -> tuple[Segment, ...]:
+    return tuple(
+        Segment(k, rows.start, rows.stop, float(run.t[rows.start]), float(run.t[rows.stop - 1]))
+        for k, (run, each) in enumerate(zip(runs, replays, strict=True))
+        for rows in each.pieces
+    )
+
+
+def _traces(
+    runs: Sequence[Run], replays: Sequence[Replay], segments: Sequence[Segment], channels: Sequence[str], unsigned: bool
+) -> dict[str, list[Trace]]:
+    """Component -> a trace per segment, an empty one where its log does not hold the component."""
+    logged = [compared_components(run, each.applied) for run, each in zip(runs, replays, strict=True)]
+
+    def trace(name: str, at: Segment) -> Trace:
+        if name not in logged[at.log]:
+            return ABSENT
+        return trace_of(name, runs[at.log], replays[at.log].run, at.rows, unsigned)
+
+    return {name: [trace(name, at) for at in segments] for name in channels}
+
+
+def _overall(traces: Mapping[str, list[Trace]]) -> dict[str, Metrics]:
+    """Component -> metrics over all traces. A pose has no lag: it cannot be told from another speed."""
+    found = (
+        (key, metrics(rows, errors_for_whiteness(key, traces), with_lag=key not in POSE))
+        for key, rows in traces.items()
+    )
+    return {key: each for key, each in found if each is not None}
+
+
+def _by_segment(traces: Mapping[str, list[Trace]], channels: Sequence[str]) -> dict[str, tuple[Metrics | None, ...]]:
+    """Component -> metrics of each segment, without a lag."""
+    found = {}
+    for key in channels:
+        errors = errors_for_whiteness(key, traces)
+        pairs = zip(traces[key], errors, strict=True)
+        found[key] = tuple(metrics([trace], [error], with_lag=False) for trace, error in pairs)
+    return found
+
+
+def _differences(
+    traces: Sequence[Mapping[str, list[Trace]]], channels: Sequence[str], seed: int
+) -> dict[str, Difference]:
+    first, second = traces
+    found = ((key, difference(first[key], second[key], len(channels), seed)) for key in channels)
+    return {key: each for key, each in found if each is not None}
+
+
+def _applied(replays: Sequence[Replay]) -> str:
+    """What drove a robot; several ways are all named."""
+    return "; or ".join(dict.fromkeys(each.words for each in replays))
+
+
+def _warnings(runs: Sequence[Run], replays: Mapping[str, Sequence[Replay]]) -> Iterator[str]:
+    """What readers of the logs and the replays warned of, once each, with the log where there are several."""
+    words: dict[str, list[str]] = {}
+    for k, run in enumerate(runs):
+        told = [*run.warnings, *(text for parts in replays.values() for text in parts[k].warnings)]
+        for text in dict.fromkeys(told):
+            words.setdefault(text, []).append(run.source or f"log {k + 1}")
+    for text, where in words.items():
+        if len(runs) == 1:
+            yield text
+        else:
+            more = f" and {len(where) - 1} more logs" if len(where) > 1 else ""
+            yield f"{where[0]}{more}: {text}"

@@ -1,0 +1,264 @@
+"""Replay: what a model does under the inputs of a log. A free run, started once per piece, never set back.
+
+1. The input is the logged voltage; else the logged duty times the supply; else, where only set speeds were logged,
+   what the speed loop of the robot file makes of them. It holds from its row to the next.
+2. A log is replayed in pieces: nothing is integrated across a gap, nor where an input is missing for long. Each
+   piece starts from the measured state (start.py).
+3. Between the start and the end of a piece the model never sees what was measured.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.comparison.start import start_of
+from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
+from omnidyn.logs.channels import components
+from omnidyn.logs.segments import segments
+from omnidyn.model.drive import COAST, DUTY, SPEED
+from omnidyn.model.robot import Robot
+from omnidyn.run import CHANNELS, WHEEL, Run
+from omnidyn.simulation.simulate import TOLERANCE, simulate
+
+FloatArray = NDArray[np.float64]
+
+INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
+SET_SPEEDS = INPUTS[2:]
+SIMULATED = ("voltage", "current", "wheel_speed", "twist", "pose")
+HOLD = 0.2  # [s] a missing input keeps its last value for so long
+FEWEST = 3  # rows of a piece
+SHOWN = 3  # warnings of one kind
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A model under the inputs of a log.
+
+    run: what it does, at the times of the log; NaN in the rows that no piece covers. pieces: the rows of each free run.
+    applied: which channel drove it. words: the same for people. warnings: what a reader should know.
+    """
+
+    run: Run
+    pieces: tuple[slice, ...]
+    applied: str
+    words: str
+    warnings: tuple[str, ...] = ()
+
+
+def replay(
+    robot: Robot, run: Run, *, apply: str | None = None, hold: float = HOLD, tol: float | None = TOLERANCE
+) -> Replay:
+    """Simulate `robot` under what was applied in `run`, at the same times.
+
+    apply: the channel to apply (voltage, duty, wheel_speed_command, twist_command); by default the first of these that
+    was logged. hold: how long a missing input keeps its last value [s]; then the piece ends. tol: as in `simulate`.
+    Raises InputError when the log does not fit the robot (number of wheels, no input, set speeds but no speed loop),
+    InsufficientDataError when no stretch of it can be replayed.
+    """
+    try:
+        refuse_other_robot(robot, run)
+        applied = choose_input(robot, run, apply)
+        pieces, inputs, supply, doubts = _prepared(run, applied, hold)
+        parts = [_free_run(robot, run, rows, applied, inputs, supply, tol) for rows in pieces]
+    except OmnidynError as error:
+        raise error.at(run.source) if run.source else error from None
+    doubts += [*_from_simulation(parts), *_loop_doubts(robot, run, applied, parts)]
+    whole = _assembled(run, robot, pieces, [part for part, _ in parts])
+    words = _words(robot, applied, supply)
+    return Replay(whole, tuple(pieces), applied, words, tuple(doubts))
+
+
+def refuse_other_robot(robot: Robot, run: Run) -> None:
+    """Raises InputError when the log is of a robot with another number of wheels."""
+    for name, values in run.channels.items():
+        count = values.shape[1] if CHANNELS[name] == WHEEL else robot.wheels.count
+        if count == 1:
+            raise InputError(
+                "a log of one motor cannot be compared with a robot", got=f"{name} of 1 motor",
+                expected=f"{robot.wheels.count} wheels, as {robot.name} has",
+                remedy="this is a motor bench: compare the log of the whole robot",
+            )  # fmt: skip
+        if count != robot.wheels.count:
+            raise InputError(
+                "the log is of another robot", got=f"{name} of {count} wheels",
+                expected=f"{robot.wheels.count} wheels, as {robot.name} has",
+                remedy="choose the robot of this log, or map the columns of its wheels",
+            )  # fmt: skip
+
+
+def choose_input(robot: Robot, run: Run, apply: str | None = None) -> str:
+    """Which logged channel drives the model. Raises InputError when there is none that this robot takes."""
+    there = [name for name in INPUTS if (values := getattr(run, name)) is not None and np.isfinite(values).any()]
+    if apply is not None:
+        _refuse_apply(apply, there)
+    if not there:
+        raise InputError(
+            "the log has no input to replay", got=", ".join(run.channels) or "no channels",
+            expected=" or ".join(INPUTS), remedy="map the columns of the motor voltages, duties or set speeds",
+        )  # fmt: skip
+    whole = [name for name in there if not _blank_components(run, name)]
+    # A duty of 0 that coasts is an open circuit, which its voltage of 0 does not tell.
+    coasts = robot.drive.kind == DUTY and robot.drive.off == COAST and DUTY in whole
+    chosen = apply or (DUTY if coasts else [*whole, *there][0])
+    blank = _blank_components(run, chosen)
+    if blank:
+        raise InputError(
+            f"{', '.join(blank)} was not recorded", got=f"{chosen} without it",
+            expected=f"an input for all {robot.wheels.count} wheels and axes of {robot.name}",
+            remedy="choose the robot of this log, or map the columns that are missing",
+        )  # fmt: skip
+    if chosen in SET_SPEEDS and robot.drive.kind != SPEED:
+        raise InputError(
+            "the log has set speeds only, and the robot no speed loop to follow them",
+            got=f'[drive] kind = "{robot.drive.kind}" of {robot.name}',
+            expected="a logged voltage or duty, or the speed loop of the firmware",
+            remedy='map the voltages, or add [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz to the robot file',
+        )  # fmt: skip
+    return chosen
+
+
+def _refuse_apply(apply: str, there: list[str]) -> None:
+    if apply in there:
+        return
+    close = difflib.get_close_matches(apply, there or INPUTS, n=1, cutoff=0.4)
+    what = "the log does not hold this input" if apply in INPUTS else "no such input"
+    remedy = f"did you mean {close[0]}?" if close else ""
+    raise InputError(what, got=apply, expected=" or ".join(there or INPUTS), remedy=remedy, where="apply")
+
+
+def _blank_components(run: Run, channel: str) -> list[str]:
+    """The components of a channel that hold no number at all."""
+    values = np.asarray(getattr(run, channel))
+    names = components(channel, values.shape[1])
+    return [name for name, column in zip(names, values.T, strict=True) if not np.isfinite(column).any()]
+
+
+def _prepared(run: Run, applied: str, hold: float) -> tuple[list[slice], FloatArray, FloatArray | None, list[str]]:
+    """The pieces to run, the inputs and the supply with what is missing held, and what had to be left out."""
+    inputs, alone = np.asarray(getattr(run, applied)), applied != DUTY or run.supply is None
+    supply = None if alone or not np.isfinite(run.supply).any() else run.supply  # type: ignore[arg-type]
+    table = inputs if supply is None else np.column_stack([inputs, supply])
+    stretches = segments(run.t)
+    held, usable = np.empty_like(table), np.zeros(len(run), dtype=bool)
+    for rows in stretches:
+        held[rows], usable[rows] = held_inputs(run.t[rows], table[rows], hold)
+    pieces = [piece for rows in stretches for piece in _usable_pieces(rows, usable)]
+    kept = [piece for piece in pieces if piece.stop - piece.start >= FEWEST]
+    if not kept:
+        raise InsufficientDataError(
+            "nothing can be replayed", got=f"{len(pieces)} stretches with inputs, the longest too short",
+            expected=f"{FEWEST} rows in a row without a gap", remedy="look at the log with omnidyn check",
+        )  # fmt: skip
+    left = len(run) - sum(piece.stop - piece.start for piece in kept)
+    doubts = []
+    if len(stretches) > 1:
+        doubts.append(f"{len(stretches) - 1} gaps in time: each piece starts anew from the measured state")
+    if left:
+        doubts.append(f"{left} of {len(run)} rows are not replayed: inputs missing for more than {hold:g} s, or alone")
+    width = inputs.shape[1]
+    return kept, held[:, :width], held[:, width] if supply is not None else None, doubts
+
+
+def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Inputs with missing values (NaN) held, and which rows may be simulated from their start to the next row.
+
+    A value holds over its row, and after that for at most `hold` [s] until another is known. t [s], shape (n,);
+    values, shape (n, columns). Returns the same shape, and shape (n,); NaN stays where nothing is known.
+    """
+    rows = np.arange(len(t))
+    known = np.where(np.isfinite(values), rows[:, None], -1)
+    last = np.maximum.accumulate(known, axis=0)
+    filled = np.where(last >= 0, np.take_along_axis(values, np.maximum(last, 0), axis=0), np.nan)
+    ends = np.append(t[1:], t[-1])
+    age = ends[:, None] - ends[last]
+    return filled, ((last >= 0) & ((last == rows[:, None]) | (age <= hold))).all(axis=1)
+
+
+def _usable_pieces(rows: slice, usable: NDArray[np.bool_]) -> Iterator[slice]:
+    """The longest runs of rows whose inputs are known; the row after the last one belongs to it as its end."""
+    inside = usable[rows.start : max(rows.start, rows.stop - 1)]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
+    for first, end in edges.reshape(-1, 2) + rows.start:
+        yield slice(int(first), int(end) + 1)
+
+
+def _free_run(
+    robot: Robot, run: Run, rows: slice, applied: str, inputs: FloatArray, supply: FloatArray | None, tol: float | None
+) -> tuple[Run, str]:
+    """One piece: simulated from its measured start to its end. Also returns where the start came from."""
+    start = start_of(run, robot, rows)
+    held = slice(rows.start, rows.stop - 1)
+    extra = {} if supply is None else {"supply": supply[held]}
+    current = None
+    if run.current is not None and np.isfinite(run.current[rows.start]).all():
+        current = run.current[rows.start]
+    simulated = simulate(
+        robot, dt=np.diff(run.t[rows]), **{applied: inputs[held]}, **extra, twist=start.twist, pose=start.pose,
+        current=current, tol=tol,
+    )  # fmt: skip
+    return simulated, start.source
+
+
+def _assembled(run: Run, robot: Robot, pieces: list[slice], parts: list[Run]) -> Run:
+    """One Run at the times of the log, NaN between the pieces."""
+    channels: dict[str, Any] = {}
+    for name in SIMULATED:
+        width = robot.wheels.count if CHANNELS[name] == WHEEL else 3
+        whole = np.full((len(run), width), np.nan)
+        for rows, part in zip(pieces, parts, strict=True):
+            whole[rows] = getattr(part, name)
+        channels[name] = whole
+    return Run(t=run.t, **channels, source=f"replay of {run.source or 'a run'}: {parts[0].source}")
+
+
+def _from_simulation(parts: list[tuple[Run, str]]) -> list[str]:
+    """What the simulations warned of, by piece, and starts that were assumed."""
+    many = len(parts) > 1
+    words = [f"piece {k + 1}: {text}" if many else text for k, (part, _) in enumerate(parts) for text in part.warnings]
+    more = [f"and {len(words) - SHOWN} more warnings of the simulation"] if len(words) > SHOWN else []
+    assumed = sum(source.startswith("rest") for _, source in parts)
+    told = [f"no speed was logged: {assumed} of {len(parts)} pieces start from rest"] if assumed else []
+    return [*words[:SHOWN], *more, *told]
+
+
+def _loop_doubts(robot: Robot, run: Run, applied: str, parts: list[tuple[Run, str]]) -> list[str]:
+    """What a log does not tell about the speed loop in the firmware."""
+    doubts, drive = [], robot.drive
+    if drive.kind != SPEED:
+        return doubts
+    moving = sum(bool(np.any(part.twist[0])) for part, _ in parts if part.twist is not None)
+    if applied in SET_SPEEDS and moving and np.any(np.asarray(drive.ki) > 0.0):
+        doubts.append(
+            f"the integral of the speed loop was not logged: it starts at 0 in {moving} pieces that start moving"
+        )
+    usual = float(np.median(np.diff(run.t)))
+    if applied == "voltage" and usual * (drive.rate or 0.0) > 1.5:
+        doubts.append(
+            f"the speed loop sets the voltage every {1e3 / (drive.rate or 1.0):.3g} ms, the log has one every "
+            f"{1e3 * usual:.3g} ms: between its rows the voltage is taken as held"
+        )
+    return doubts
+
+
+def _words(robot: Robot, applied: str, supply: FloatArray | None) -> str:
+    """What was applied, for people."""
+    if applied == "voltage":
+        return "the logged voltage"
+    if applied == DUTY:
+        battery = f"the supply of the robot file, {robot.drive.supply:g} V" if supply is None else "the logged supply"
+        return f"the logged duty times {battery}"
+    speeds = "wheel speeds" if applied == "wheel_speed_command" else "body speeds"
+    return (
+        f"the logged set {speeds}, through the speed loop of the robot file (kp {_listed(robot.drive.kp)} V s/rad, "
+        f"ki {_listed(robot.drive.ki)} V/rad, {robot.drive.rate:g} Hz): no voltage was applied as logged"
+    )
+
+
+def _listed(value: float | tuple[float, ...]) -> str:
+    return "/".join(f"{each:g}" for each in np.atleast_1d(value))

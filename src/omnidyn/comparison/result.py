@@ -1,0 +1,137 @@
+"""Comparison: the answer of `compare`: numbers per robot, component and segment, and the runs behind them."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from omnidyn.comparison import text
+from omnidyn.comparison.difference import Difference
+from omnidyn.comparison.metrics import Metrics
+from omnidyn.comparison.traces import Trace, trace_of, unit
+from omnidyn.run import Run
+
+WIDTH = 100
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of a log that was one free run: log counts from 0, rows from `start` to before `stop`, times [s]."""
+
+    log: int
+    start: int
+    stop: int
+    begin: float
+    end: float
+
+    @property
+    def rows(self) -> slice:
+        """The rows in the Run of its log."""
+        return slice(self.start, self.stop)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How near one or two models come to the logs of a robot.
+
+    robots: their names, the first one being what `rmse`, `fit_percent` and `vaf` are about. measured: the logs.
+    simulated: robot -> what it does under the same inputs, one Run per log. applied: robot -> what drove it, in words.
+    channels: the components compared ("vx", "w1", "heading", ...). segments: the free runs.
+    overall: robot -> component -> Metrics over all samples. by_segment: robot -> component -> Metrics of each segment,
+    None where it has no sample. difference: component -> which of two robots is better; empty for one robot.
+    current_unsigned: whether currents were compared by size. warnings: what a reader must know, in words.
+    """
+
+    robots: tuple[str, ...]
+    measured: tuple[Run, ...]
+    simulated: Mapping[str, tuple[Run, ...]]
+    applied: Mapping[str, str]
+    channels: tuple[str, ...]
+    segments: tuple[Segment, ...]
+    overall: Mapping[str, Mapping[str, Metrics]]
+    by_segment: Mapping[str, Mapping[str, tuple[Metrics | None, ...]]]
+    difference: Mapping[str, Difference] = field(default_factory=dict)
+    current_unsigned: bool = False
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def rmse(self) -> dict[str, float]:
+        """Component -> rmse of the first robot, in SI units."""
+        return {name: each.rmse for name, each in self.overall[self.robots[0]].items()}
+
+    @property
+    def fit_percent(self) -> dict[str, float | None]:
+        """Component -> fit of the first robot [%], None where the measured signal never changes."""
+        return {name: each.fit_percent for name, each in self.overall[self.robots[0]].items()}
+
+    @property
+    def vaf(self) -> dict[str, float | None]:
+        """Component -> variance accounted for by the first robot [%], None where the measured signal never changes."""
+        return {name: each.vaf for name, each in self.overall[self.robots[0]].items()}
+
+    def better(self, component: str) -> str | None:
+        """Name of the robot that is surely nearer in a component; None where chance could have done it."""
+        found = self.difference[component].better
+        return None if found is None else self.robots[found]
+
+    def trace(self, robot: str, component: str, segment: Segment) -> Trace:
+        """Measured and model of one component over one segment."""
+        real, ours = self.measured[segment.log], self.simulated[robot][segment.log]
+        return trace_of(component, real, ours, segment.rows, self.current_unsigned)
+
+    def summary(self, segments: bool = False) -> str:
+        """The comparison as plain tables, for reading; with `segments`, each segment too. ASCII only."""
+        lines: list[str] = []
+        for robot in self.robots:
+            lines += [*self._title(robot), "", text.HEAD, *text.rows(self.channels, self.overall[robot]), ""]
+            if segments:
+                lines += [line for k in range(len(self.segments)) for line in self._segment(robot, k)]
+        if self.difference:
+            lines += [*text.differences(self.robots, self.difference), ""]
+        lines += text.legend([each for found in self.overall.values() for each in found.values()])
+        if self.current_unsigned:
+            lines.append("currents are compared by size, without sign.")
+        for warning in self.warnings:
+            lines += textwrap.wrap(f"warning: {warning}", WIDTH, subsequent_indent="  ")
+        return "\n".join(line.encode("ascii", "backslashreplace").decode().rstrip() for line in lines) + "\n"
+
+    def _title(self, robot: str) -> list[str]:
+        """Which robot met which logs, and what drove it."""
+        seconds = sum(segment.end - segment.begin for segment in self.segments)
+        logs, count = len(self.measured), len(self.segments)
+        where = self.measured[0].source or "one run"
+        where = where if logs == 1 else f"{logs} logs, first {where}"
+        title = f"{robot} against {where}: {count} free run{'s' * (count > 1)}, {seconds:.4g} s"
+        return [*textwrap.wrap(title, WIDTH), *textwrap.wrap(f"applied: {self.applied[robot]}", WIDTH)]
+
+    def _segment(self, robot: str, k: int) -> Iterator[str]:
+        at = self.segments[k]
+        log = f"log {at.log + 1}, " if len(self.measured) > 1 else ""
+        yield f"segment {k + 1}: {log}rows {at.start} to {at.stop - 1}, {at.begin:.4g} to {at.end:.4g} s"
+        yield from text.rows(self.channels, {name: found[k] for name, found in self.by_segment[robot].items()})
+        yield ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The comparison as JSON can hold it, without the runs."""
+        robots = {
+            name: {
+                "applied": self.applied[name],
+                "overall": {key: asdict(each) for key, each in self.overall[name].items()},
+                "by_segment": {
+                    key: [None if each is None else asdict(each) for each in row]
+                    for key, row in self.by_segment[name].items()
+                },
+            }
+            for name in self.robots
+        }
+        return {
+            "logs": [run.source for run in self.measured],
+            "segments": [asdict(segment) for segment in self.segments],
+            "units": {name: unit(name) for name in self.channels},
+            "robots": robots,
+            "difference": {key: {**asdict(each), "better": self.better(key)} for key, each in self.difference.items()},
+            "current_unsigned": self.current_unsigned,
+            "warnings": list(self.warnings),
+        }

@@ -1,0 +1,140 @@
+"""Where a free run starts: speed and pose at the first moment of a piece of a log, robustly from its first samples."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.model.frames import world_to_body
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
+
+WINDOW = 0.05  # [s] the first samples: well below the time constants of a robot, about 0.15 s
+FEWEST, MOST = 5, 65  # samples of a line through the first ones; each try doubles them
+SURE = 2.0  # standard errors beyond which a difference is believed
+END_OF_LINE = 2.2  # standard error of a Theil-Sen line at its end, times sqrt(n) over the noise
+TO_STD = 1.4826  # median absolute deviation to standard deviation, for normal noise
+FAR = 3.0  # a first sample so many ranges of the next ones away from them is a spike
+
+
+class Start(NamedTuple):
+    """twist [m/s, m/s, rad/s] and pose [m, m, rad], shapes (3,); where the twist comes from, in words."""
+
+    twist: FloatArray
+    pose: FloatArray
+    source: str
+
+
+def start_of(run: Run, robot: Robot, rows: slice) -> Start:
+    """The state at the first row of a piece of `run`, from its first samples.
+
+    The twist is that over the ground where it was logged, else that of the wheels, else the slope of the pose, else
+    rest. A pose that was not logged starts at 0.
+    """
+    t = run.t[rows]
+    pose = np.zeros(3) if run.pose is None else _levels(t, _continuous(run.pose[rows]))
+    if run.twist is not None and _seen(run.twist[rows]):
+        return Start(_levels(t, run.twist[rows], at_rest=True), pose, "the measured twist")
+    if run.wheel_speed is not None and _seen(run.wheel_speed[rows]):
+        speeds = _levels(t, run.wheel_speed[rows], at_rest=True)
+        return Start(twist_from_wheel_speed(robot.wheels, speeds), pose, "the wheel speeds")
+    if run.pose is not None and _seen(run.pose[rows]):
+        return Start(_twist_from_pose(t, _continuous(run.pose[rows])), pose, "the slope of the pose")
+    return Start(np.zeros(3), pose, "rest, as no speed was logged")
+
+
+def first_level(t: FloatArray, values: FloatArray, at_rest: bool = False) -> float:
+    """The value at t[0], robustly: the first sample, made surer by lines through more and more of the next ones.
+
+    A longer line is taken as long as it agrees with what is known to two standard errors: noise is averaged out, a
+    robot that sets off is not. A first sample far outside is a spike. `at_rest`: the value is a speed; within two
+    standard errors of 0 it is 0, and nearer to 0 than the next ones it is no spike. NaN are passed over; 0 where there
+    is nothing else. t [s] and values, shape (n,).
+    """
+    noise, start = scatter(t, values), float(t[0])
+    t, values = _first_samples(t, values)
+    if not len(t):
+        return 0.0
+    t = t - start
+    level, error, count = float(values[0]), noise, FEWEST
+    if len(t) >= FEWEST and _is_spike(t, values, noise, at_rest):
+        level, error = theil_sen(t[1:FEWEST], values[1:FEWEST])[1], END_OF_LINE * noise / np.sqrt(FEWEST - 1)
+        t, values = t[1:], values[1:]
+    while count <= len(t):
+        line, surer = theil_sen(t[:count], values[:count])[1], END_OF_LINE * noise / np.sqrt(count)
+        if abs(line - level) > SURE * error:
+            break
+        level, error, count = line, min(error, surer), 2 * count - 1
+    return 0.0 if at_rest and abs(level) <= SURE * error else level
+
+
+def scatter(t: FloatArray, values: FloatArray) -> float:
+    """Standard deviation of white noise on a smooth signal, robustly; 0 for fewer than three samples.
+
+    Each sample against the line between its neighbours: e_1 - w e_0 - (1 - w) e_2 has the variance of one error times
+    1 + w^2 + (1 - w)^2.
+    """
+    known = np.isfinite(values)
+    t, values = t[known], values[known]
+    if len(t) < 3:
+        return 0.0
+    w = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
+    bends = values[1:-1] - w * values[:-2] - (1.0 - w) * values[2:]
+    return float(TO_STD * np.median(np.abs(bends) / np.sqrt(1.0 + w**2 + (1.0 - w) ** 2)))
+
+
+def _is_spike(t: FloatArray, values: FloatArray, noise: float, at_rest: bool) -> bool:
+    """Whether the first sample has nothing to do with the next four."""
+    slope, level = theil_sen(t[1:FEWEST], values[1:FEWEST])
+    expected = level + slope * t[0]
+    far = abs(values[0] - expected) > FAR * (float(np.ptp(values[1:FEWEST])) + SURE * noise)
+    return bool(far and not (at_rest and abs(values[0]) < abs(expected)))
+
+
+def theil_sen(t: FloatArray, values: FloatArray) -> tuple[float, float]:
+    """(slope, value at t = 0) of the line of median slope (Theil 1950, Sen 1968); slope 0 for a single sample."""
+    if len(t) < 2:
+        return 0.0, float(values[0])
+    first, second = np.triu_indices(len(t), 1)
+    slope = float(np.median((values[second] - values[first]) / (t[second] - t[first])))
+    return slope, float(np.median(values - slope * t))
+
+
+def _levels(t: FloatArray, values: FloatArray, at_rest: bool = False) -> FloatArray:
+    return np.array([first_level(t, column, at_rest) for column in values.T])
+
+
+def _first_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What there is within WINDOW of the first sample, at least FEWEST rows, thinned out to MOST."""
+    rows = max(FEWEST, int(np.searchsorted(t, t[0] + WINDOW, side="right")))
+    t, values = t[:rows], values[:rows]
+    kept = np.flatnonzero(np.isfinite(values))
+    kept = kept[:: max(1, -(-len(kept) // MOST))]
+    return t[kept], values[kept]
+
+
+def _continuous(pose: FloatArray) -> FloatArray:
+    """The pose with a heading that does not jump by a turn."""
+    pose, known = pose.copy(), np.isfinite(pose[:, 2])
+    pose[known, 2] = np.unwrap(pose[known, 2])
+    return pose
+
+
+def _twist_from_pose(t: FloatArray, pose: FloatArray) -> FloatArray:
+    slopes, heading = np.zeros(3), 0.0
+    for axis in range(3):
+        times, values = _first_samples(t, pose[:, axis])
+        if len(times):
+            slopes[axis], level = theil_sen(times - t[0], values)
+            heading = level if axis == 2 else heading
+    return world_to_body(heading) @ slopes
+
+
+def _seen(values: FloatArray) -> bool:
+    """Whether every component has a number among the first samples."""
+    return bool(np.isfinite(values[:MOST]).any(axis=0).all())

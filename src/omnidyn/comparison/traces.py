@@ -1,0 +1,79 @@
+"""Traces: measured and model side by side, one per piece of a log and component of a channel."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.comparison.replay import SET_SPEEDS
+from omnidyn.logs.channels import components, place, si_suffix
+from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
+
+COMPARED = ("twist", "wheel_speed", "current", "pose")
+TURN = 2.0 * np.pi
+
+
+class Trace(NamedTuple):
+    """One component over one piece. t [s], measured and model in SI, shape (n,) each; NaN where missing."""
+
+    t: FloatArray
+    measured: FloatArray
+    model: FloatArray
+
+    @property
+    def error(self) -> FloatArray:
+        """Model minus measured. Shape (n,)."""
+        return self.model - self.measured
+
+
+def compared_components(run: Run, applied: str) -> tuple[str, ...]:
+    """Components of a log that a replay predicts and that hold a number: ("vx", ..., "w1", ..., "i1", ..., "x", ...).
+
+    The voltage counts where the speed loop of the model had to make it.
+    """
+    channels = (*COMPARED, "voltage") if applied in SET_SPEEDS else COMPARED
+    found = []
+    for channel in channels:
+        values = getattr(run, channel)
+        if values is not None:
+            names = components(channel, values.shape[1])
+            found += [name for name, column in zip(names, values.T, strict=True) if np.isfinite(column).any()]
+    return tuple(found)
+
+
+def trace_of(component: str, measured: Run, model: Run, rows: slice, current_unsigned: bool = False) -> Trace:
+    """One component over some rows. A heading is compared without its turns; currents by size where told so."""
+    found = place(component)
+    if found is None:
+        raise KeyError(component)
+    channel, column = found
+    ours = np.asarray(getattr(model, channel))[rows, column]
+    real = np.asarray(getattr(measured, channel))[rows, column]
+    if component == "heading":
+        real = unwrapped(real, ours)
+    if channel == "current" and current_unsigned:
+        real, ours = np.abs(real), np.abs(ours)
+    return Trace(measured.t[rows], real, ours)
+
+
+def unwrapped(measured: FloatArray, model: FloatArray) -> FloatArray:
+    """Measured headings [rad] with the turns that keep them nearest to the model's path, from row to row.
+
+    What is unwrapped is the difference: it changes slowly even where the robot turns fast or rows are missing.
+    Both shape (n,); NaN stays. Returns shape (n,).
+    """
+    result, known = measured.copy(), np.isfinite(measured) & np.isfinite(model)
+    if not known.any():
+        return result
+    error = np.unwrap(model[known] - measured[known])
+    result[known] = model[known] - (error - TURN * np.round(error[0] / TURN))
+    return result
+
+
+def unit(component: str) -> str:
+    """SI unit of a component, such as rad/s."""
+    return si_suffix(component).replace("_", "/")

@@ -1,0 +1,124 @@
+"""Measured and models over time, one panel per component, with the error below: what `omnidyn compare` draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from omnidyn.comparison.result import Comparison, Segment
+from omnidyn.comparison.traces import unit
+from omnidyn.report.style import BLUE, GREY, INK, MEASURED, PALE, VERMILLION, WIDTH, Picture, look, new_figure, picture
+
+FloatArray = NDArray[np.float64]
+
+MOST_PANELS = 6
+USUAL_PANELS = 3
+DOTS = 150  # fewer samples than this are dots as well
+COLOURS, LINES = (BLUE, VERMILLION), ("-", "--")
+HEIGHT, EXTRA = 2.0, 1.0  # inch: of a panel with its errors; of title, legend and time axis
+
+
+def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] = ()) -> Picture:
+    """One log of a comparison: measured (black) and each model in time, model minus measured below it.
+
+    log: which of the logs, from 0. channels: components to show, at most six; by default the first three compared.
+    Lines break where nothing was integrated; such gaps are grey. Raises ValueError for unknown or too many components.
+    """
+    shown = tuple(channels) or _usual(comparison, log)
+    unknown = [name for name in shown if name not in comparison.channels]
+    if unknown or not 1 <= len(shown) <= MOST_PANELS:
+        raise ValueError(f"cannot draw {unknown or shown}; expected up to {MOST_PANELS} of {comparison.channels}")
+    segments = [segment for segment in comparison.segments if segment.log == log]
+    height = HEIGHT * len(shown) + EXTRA
+    with look():
+        figure = new_figure(WIDTH, height)
+        grid = figure.add_gridspec(
+            3 * len(shown) - 1, 1, height_ratios=([2.0, 1.0, 0.14] * len(shown))[:-1], hspace=0.12,
+            left=0.105, right=0.965, top=1.0 - 0.45 / height, bottom=0.55 / height,
+        )  # fmt: skip
+        first = None
+        for k, name in enumerate(shown):
+            above = figure.add_subplot(grid[3 * k], sharex=first)
+            below = figure.add_subplot(grid[3 * k + 1], sharex=above)
+            first = first or above
+            _values(above, comparison, segments, name)
+            _errors(below, comparison, segments, name, last=k == len(shown) - 1)
+            for axes in (above, below):
+                _gaps(axes, segments)
+        assert first is not None
+        first.set_xlim(segments[0].begin, segments[-1].end)
+        handles, names = first.get_legend_handles_labels()
+        place = {"loc": "upper left", "bbox_to_anchor": (0.095, 0.995), "borderaxespad": 0.0}
+        figure.legend(handles, names, ncols=len(names), **place)
+        title = f"Measured and {' and '.join(comparison.robots)}"
+        return picture("overlay", title, _caption(comparison, log, len(segments)), figure)
+
+
+def _usual(comparison: Comparison, log: int) -> tuple[str, ...]:
+    """The first components that this log holds."""
+    indices = [k for k, segment in enumerate(comparison.segments) if segment.log == log]
+    found = comparison.by_segment[comparison.robots[0]]
+    there = [name for name in comparison.channels if any(found[name][k] is not None for k in indices)]
+    return tuple(there[:USUAL_PANELS])
+
+
+def _values(axes: Axes, comparison: Comparison, segments: Sequence[Segment], name: str) -> None:
+    traces = [comparison.trace(comparison.robots[0], name, segment) for segment in segments]
+    t, measured = _broken([(trace.t, trace.measured) for trace in traces])
+    dots = {"marker": ".", "markersize": 4.0} if len(t) <= DOTS else {}
+    axes.plot(t, measured, color=MEASURED, linewidth=1.0, label="measured", **dots)
+    for robot, colour, line in zip(comparison.robots, COLOURS, LINES, strict=False):
+        traces = [comparison.trace(robot, name, segment) for segment in segments]
+        t, model = _broken([(trace.t, trace.model) for trace in traces])
+        axes.plot(t, model, line, color=colour, label=robot)
+    axes.set_ylabel(f"{name}, {unit(name)}")
+    axes.tick_params(labelbottom=False)
+    axes.locator_params(axis="y", nbins=5)
+
+
+def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], name: str, last: bool) -> None:
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    for robot, colour, line in zip(comparison.robots, COLOURS, LINES, strict=False):
+        traces = [comparison.trace(robot, name, segment) for segment in segments]
+        t, error = _broken([(trace.t, trace.error) for trace in traces])
+        axes.plot(t, error, line, color=colour, linewidth=1.0)
+    axes.set_ylabel("error", color=INK)
+    axes.locator_params(axis="y", nbins=3)
+    axes.tick_params(labelbottom=last)
+    if last:
+        axes.set_xlabel("time, s")
+
+
+def _broken(pieces: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    """Pieces one after the other, with a break between them."""
+    gap = np.array([np.nan])
+    times = [part for t, _ in pieces for part in (t, gap)][:-1]
+    values = [part for _, value in pieces for part in (value, gap)][:-1]
+    return np.concatenate(times), np.concatenate(values)
+
+
+def _gaps(axes: Axes, segments: Sequence[Segment]) -> None:
+    for begin, end in _between(segments):
+        axes.axvspan(begin, end, color=PALE, linewidth=0.0, zorder=0)
+
+
+def _between(segments: Sequence[Segment]) -> Iterator[tuple[float, float]]:
+    for before, after in pairwise(segments):
+        yield before.end, after.begin
+
+
+def _caption(comparison: Comparison, log: int, count: int) -> str:
+    source = comparison.measured[log].source or "one run"
+    gaps = f" Grey: {count - 1} gaps, where every model starts anew from the measured state." if count > 1 else ""
+    errors = "; ".join(
+        f"{robot}: rmse " + ", ".join(f"{name} {each.rmse:.3g} {unit(name)}" for name, each in found.items())
+        for robot, found in comparison.overall.items()
+    )
+    return (
+        f"{source}: measured, and what each model does under {comparison.applied[comparison.robots[0]]}, as a free run "
+        f"that never sees the measurement. Below each: model minus measured.{gaps} Over all logs, {errors}."
+    )
