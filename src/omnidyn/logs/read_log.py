@@ -15,7 +15,9 @@ from omnidyn.logs.clock import clock
 from omnidyn.logs.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.log import Log
 from omnidyn.logs.mapping import MOTOR_SIDE, Column, ColumnMap, component_channel, load_map, parse_column
-from omnidyn.logs.table import Table, read_table
+from omnidyn.logs.table import ROWS, Table
+from omnidyn.logs.tables import iter_tables, read_any
+from omnidyn.logs.text_file import Progress
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
@@ -78,7 +80,7 @@ def read_log(
 def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None) -> Log:
     """Read a log as it was recorded: in SI, by channel, time not yet trusted. Raises InputError."""
     options = options or LogOptions()
-    table = read_table(path)
+    table = read_any(path, header=options.header, skip_bad_rows=options.skip_bad_rows)
     return log_from_table(table, map_columns(table, robot, options), robot, options)
 
 
@@ -191,10 +193,16 @@ def _direction(log: Log, robot: Robot | None) -> tuple[FloatArray | None, str]:
     return None, ""
 
 
-def iter_logs(tables: Iterator[Table], robot: Robot | None, options: LogOptions) -> Iterator[Log]:
-    """Logs of the pieces of a file too long for memory, all under the map of the first piece."""
-    columns: ColumnMap | None = None
-    for table in tables:
-        if columns is None:
-            columns = map_columns(table, robot, options)
+def iter_logs(
+    path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None, *,
+    rows: int = ROWS, progress: Progress | None = None,
+) -> Iterator[Log]:  # fmt: skip
+    """The pieces of a log too long for memory, at most `rows` rows each, all under the map of the first.
+
+    progress(bytes_done, bytes_total) is called now and then. Time counts from the first piece. Raises InputError.
+    """
+    options, columns = options or LogOptions(), None
+    how = {"header": options.header, "skip_bad_rows": options.skip_bad_rows}
+    for table in iter_tables(path, rows, progress=progress, **how):
+        columns = columns or map_columns(table, robot, options)
         yield log_from_table(table, columns, robot, options)
