@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import matplotlib
@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from omnidyn.paper.tables import PAPER_AXES
+from omnidyn.paper.tables import AXES, PAPER_AXES
 
 # Okabe & Ito 2008.
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
@@ -100,6 +100,22 @@ def _saved(figure: Figure, form: str) -> bytes:
     stream = io.BytesIO()
     figure.savefig(stream, format=form, dpi=DPI, metadata=metadata)
     return stream.getvalue()
+
+
+def axis_panels(height: float, top: float, bottom: float) -> tuple[Figure, Sequence[Axes]]:
+    """A figure of our width with one panel per body axis, side by side."""
+    figure = new_figure(WIDTH, height)
+    panels = figure.subplots(1, len(AXES))
+    figure.subplots_adjust(left=0.075, right=0.985, top=top, bottom=bottom, wspace=0.3)
+    return figure, panels
+
+
+def dress_panel(axes: Axes, title: str, across: str, end: float, steps: int = 6, pad: float | None = None) -> None:
+    """Words, range and ticks of such a panel: `across` runs from 0 to `end`."""
+    axes.set_title(title, pad=pad)
+    axes.set_xlabel(across)
+    axes.set_xlim(0.0, end)
+    thin_out(axes, 4, steps)
 
 
 def thin_out(axes: Axes, x: int | None = None, y: int | None = None) -> None:

@@ -12,14 +12,13 @@ from omnidyn.report.style import (
     AXIS_COLOUR,
     INK,
     PALE,
-    WIDTH,
     Picture,
+    axis_panels,
     axis_title,
+    dress_panel,
     look,
-    new_figure,
     note,
     picture,
-    thin_out,
 )
 
 EVERY = 10  # a ramp has far more samples than a page has dots
@@ -28,9 +27,7 @@ EVERY = 10  # a ramp has far more samples than a page has dots
 def draw_dead_zone(ramps: Mapping[str, Ramp]) -> Picture:
     """Speed against voltage; the stuck region shaded, its end in the model and in the paper's words."""
     with look():
-        figure = new_figure(WIDTH, 3.8)
-        panels = figure.subplots(1, len(AXES))
-        figure.subplots_adjust(left=0.075, right=0.985, top=0.85, bottom=0.17, wspace=0.3)
+        figure, panels = axis_panels(3.8, top=0.85, bottom=0.17)
         for axis, panel in zip(AXES, panels, strict=True):
             _panel(panel, axis, ramps[axis])
         return picture("fig5_dead_zone", "Fig. 5: the dead zone", _caption(ramps), figure)
@@ -55,8 +52,6 @@ def _panel(axes: Axes, axis: str, ramp: Ramp) -> None:
     axes.axvline(said, color=INK, linestyle=":", linewidth=1.6)
     note(axes, 0.5 * ours, 0.55 * top, f"at rest\nup to\n{ours:.3f} V", ha="center", va="center", bbox=None)
     note(axes, said, 1.01, f"paper: about {said:g} V", ha="center", va="bottom", transform=axes.get_xaxis_transform())
-    axes.set_title(f"{axis_title(axis)}: speed, {SPEED_UNIT[axis]}", pad=22)
-    axes.set_xlabel("voltage, V")
-    axes.set_xlim(0.0, float(ramp.scale.max()))
     axes.set_ylim(-0.02 * top, 1.05 * top)
-    thin_out(axes, 4, 5)
+    title = f"{axis_title(axis)}: speed, {SPEED_UNIT[axis]}"
+    dress_panel(axes, title, "voltage, V", float(ramp.scale.max()), steps=5, pad=22)

@@ -15,13 +15,12 @@ from omnidyn.report.style import (
     BLUE,
     INK,
     VERMILLION,
-    WIDTH,
     Picture,
+    axis_panels,
     axis_title,
+    dress_panel,
     look,
-    new_figure,
     picture,
-    thin_out,
 )
 
 FloatArray = NDArray[np.float64]
@@ -35,9 +34,7 @@ TREATMENTS = {
 def draw_friction(estimates: Mapping[str, Estimate]) -> Picture:
     """One panel per axis; `estimates` by the treatment of the row at rest, "line" and "bound"."""
     with look():
-        figure = new_figure(WIDTH, 4.6)
-        panels = figure.subplots(1, len(AXES))
-        figure.subplots_adjust(left=0.075, right=0.985, top=0.92, bottom=0.33, wspace=0.3)
+        figure, panels = axis_panels(4.6, top=0.92, bottom=0.33)
         for k, panel in enumerate(panels):
             _panel(panel, k, estimates)
         handles, labels = panels[0].get_legend_handles_labels()
@@ -66,11 +63,9 @@ def _panel(axes: Axes, axis: int, estimates: Mapping[str, Estimate]) -> None:
     axes.plot(speed[moving], force[moving], "o", color=INK, markersize=7, zorder=5, label="Table 1, moving")
     axes.plot(speed[~moving], force[~moving], "o", color="white", markeredgecolor=INK, markeredgewidth=1.6,
               markersize=8, zorder=5, clip_on=False, label="Table 1, at rest")  # fmt: skip
-    axes.set_title(f"{axis_title(AXES[axis])}: force, {FORCE_UNIT[AXES[axis]]}")
-    axes.set_xlabel(f"speed, {SPEED_UNIT[AXES[axis]]}")
-    axes.set_xlim(0.0, span[-1])
     axes.set_ylim(0.0, 1.35 * force.max())
-    thin_out(axes, 4, 6)
+    title = f"{axis_title(AXES[axis])}: force, {FORCE_UNIT[AXES[axis]]}"
+    dress_panel(axes, title, f"speed, {SPEED_UNIT[AXES[axis]]}", span[-1])
 
 
 def _fit(axes: Axes, axis: int, estimate: Estimate, span: FloatArray, colour: str, line: str, words: str) -> None:

@@ -12,14 +12,13 @@ from omnidyn.report.style import (
     LEVEL_COLOURS,
     LEVEL_LINES,
     MEASURED,
-    WIDTH,
     Picture,
+    axis_panels,
     axis_title,
+    dress_panel,
     look,
-    new_figure,
     note,
     picture,
-    thin_out,
 )
 
 SHOWN_S = 1.2  # of each response; the rest is steady
@@ -28,9 +27,7 @@ SHOWN_S = 1.2  # of each response; the rest is steady
 def draw_steps(responses: Mapping[str, Sequence[StepResponse]]) -> Picture:
     """One panel per axis, three steps each; a dot where Table 1 prints a speed for the same voltages."""
     with look():
-        figure = new_figure(WIDTH, 4.0)
-        panels = figure.subplots(1, len(AXES))
-        figure.subplots_adjust(left=0.075, right=0.985, top=0.9, bottom=0.24, wspace=0.3)
+        figure, panels = axis_panels(4.0, top=0.9, bottom=0.24)
         for axis, panel in zip(AXES, panels, strict=True):
             _panel(panel, axis, responses[axis])
         figure.text(0.075, 0.03, _words(), fontsize=10)
@@ -61,8 +58,5 @@ def _panel(axes: Axes, axis: str, responses: Sequence[StepResponse]) -> None:
                       clip_on=False)  # fmt: skip
             axes.plot([SHOWN_S], [response.measured_speed], "o", color=colour, markeredgecolor=MEASURED,
                       markersize=8, clip_on=False, zorder=5)  # fmt: skip
-    axes.set_title(f"{axis_title(axis)}: speed, {SPEED_UNIT[axis]}")
-    axes.set_xlabel("time, s")
-    axes.set_xlim(0.0, SHOWN_S)
     axes.set_ylim(bottom=0.0)
-    thin_out(axes, 4, 6)
+    dress_panel(axes, f"{axis_title(axis)}: speed, {SPEED_UNIT[axis]}", "time, s", SHOWN_S)
