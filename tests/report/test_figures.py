@@ -18,7 +18,7 @@ from omnidyn.identification.steady_state import fit_steady_state
 from omnidyn.model.robot_file import load_robot, preset_names
 from omnidyn.paper.friction import table_1_points
 from omnidyn.report.figures import paper_pictures
-from omnidyn.report.figures.robot import draw_robot
+from omnidyn.report.figures.robot import draw_robot, wheel_places
 from omnidyn.report.style import AXIS_COLOUR, LEVEL_COLOURS, LOOK, look, new_figure, picture
 
 NAMES = ["fig1_robot", "fig2_traces", "fig3_friction", "fig4_steps", "fig5_dead_zone", "fig6_reconcile"]
@@ -147,6 +147,28 @@ def test_no_pyplot_and_no_window(tmp_path):
 @pytest.mark.parametrize("name", preset_names())
 def test_every_preset_can_be_drawn(name):
     assert size_of(draw_robot(load_robot(name)).png)[0] > 500
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_wheels_are_drawn_apart_and_with_the_lever_arm_they_have(name):
+    """Place x push = the yaw entry of the wrench matrix, whatever the azimuths and rollers; a caption owns up."""
+    wheels = load_robot(name).wheels
+    places, push = wheel_places(wheels), wheels.wrench_matrix
+    assert min(np.linalg.norm(a - b) for a, b in combinations(places, 2)) > wheels.radii.max()
+    np.testing.assert_allclose(places[:, 0] * push[1] - places[:, 1] * push[0], push[2], rtol=1e-12)
+    assert ("as if track and wheelbase were alike" in draw_robot(load_robot(name)).caption) == (name == "mecanum")
+
+
+def test_the_mecanum_preset_stands_on_its_own_corners():
+    """Front left, front right, rear left, rear right: half track and half wheelbase 0.1 m, as its file says."""
+    places = wheel_places(load_robot("mecanum").wheels)
+    np.testing.assert_allclose(places, [[0.1, 0.1], [0.1, -0.1], [-0.1, 0.1], [-0.1, -0.1]], atol=1e-15)
+
+
+def test_wheels_that_nothing_tells_apart_stand_side_by_side(robot):
+    wheels = robot.wheels.replace(azimuth_deg=(0.0, 0.0, 120.0, 240.0))
+    places = wheel_places(wheels)
+    assert min(np.linalg.norm(a - b) for a, b in combinations(places, 2)) > 2.0 * wheels.radii.max()
 
 
 def test_a_failing_picture_leaves_the_settings_alone():

@@ -6,8 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, FancyBboxPatch
 from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
 
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import Wheels, per_wheel, sin_cos_deg
 from omnidyn.report.style import AXIS_COLOUR, GREY, INK, PALE, Picture, look, new_figure, note, picture
 
 WHEEL_WIDTH = 0.5  # of the wheel radius; the paper prints no width
@@ -21,12 +23,13 @@ def draw_robot(robot: Robot) -> Picture:
         axes = figure.add_axes((0.01, 0.01, 0.98, 0.98))
         axes.set_axis_off()
         axes.set_aspect("equal")
-        reach = float(np.max(robot.wheels.robot_radius)) + 2.3 * float(robot.wheels.radii.max())
+        places = wheel_places(robot.wheels)
+        reach = float(np.linalg.norm(places, axis=1).max()) + 2.3 * float(robot.wheels.radii.max())
         axes.set_xlim(-reach, reach)
         axes.set_ylim(-reach, reach)
-        _body(axes, robot)
+        _body(axes, places)
         for wheel in range(robot.wheels.count):
-            _wheel(axes, robot, wheel)
+            _wheel(axes, robot, wheel, places[wheel])
         _body_axes(axes, reach)
         _dimensions(axes, robot, reach)
         return picture("fig1_robot", f"Fig. 1: {robot.name} from above", _caption(robot), figure)
@@ -34,7 +37,40 @@ def draw_robot(robot: Robot) -> Picture:
 
 def _caption(robot: Robot) -> str:
     words = "an arrow at a wheel shows the way it pushes the robot when its voltage is positive"
-    return f"To scale, forward is up; {words}. The width of the wheels is not printed and only drawn."
+    text = f"To scale, forward is up; {words}. The width of the wheels is not printed and only drawn."
+    if _shared(robot.wheels).any():
+        text += (
+            " The robot file gives wheels on parallel axles one distance, not two: those wheels are drawn where they "
+            "push and turn the robot as the file says, as if track and wheelbase were alike."
+        )
+    return text
+
+
+def _shared(wheels: Wheels) -> NDArray[np.bool_]:
+    """Which wheels have the azimuth and the distance of another one: the file does not say where each stands."""
+    sin, cos = sin_cos_deg(wheels.azimuth_deg)
+    place = per_wheel(wheels.robot_radius, wheels.count) * np.stack([cos, sin])
+    apart = np.linalg.norm(place[:, :, None] - place[:, None, :], axis=0)
+    return (apart < 1e-9).sum(axis=0) > 1
+
+
+def wheel_places(wheels: Wheels) -> NDArray[np.float64]:
+    """Where each wheel is drawn in body coordinates [m]. Shape (wheels, 2).
+
+    At its distance b along its azimuth. A wheel that would stand on another one is moved along its rolling direction
+    by c, and to the distance a along its azimuth, so that its lever arm stays what it is: a + c tan(roller) = b, with
+    |c| = a. Wheels with equal rollers, which nothing tells apart, stand side by side.
+    """
+    sin, cos = sin_cos_deg(wheels.azimuth_deg)
+    roller_sin, roller_cos = sin_cos_deg(per_wheel(wheels.roller_angle_deg, wheels.count))
+    tan, shared = roller_sin / roller_cos, _shared(wheels)
+    along = per_wheel(wheels.robot_radius, wheels.count) / np.where(shared, 1.0 + np.abs(tan), 1.0)
+    across = np.where(shared, np.sign(tan), 0.0) * along
+    places = np.stack([along * cos - across * sin, along * sin + across * cos], axis=1)
+    for wheel in range(1, wheels.count):
+        while (np.linalg.norm(places[:wheel] - places[wheel], axis=1) < 1e-9).any():
+            places[wheel] += 2.2 * wheels.radii[wheel] * np.array([-sin[wheel], cos[wheel]])
+    return places
 
 
 def _seen(point: np.ndarray) -> tuple[float, float]:
@@ -42,24 +78,17 @@ def _seen(point: np.ndarray) -> tuple[float, float]:
     return -float(point[1]), float(point[0])
 
 
-def _place(robot: Robot, wheel: int) -> np.ndarray:
-    """Where the wheel touches the floor, in body coordinates [m]. Shape (2,)."""
-    azimuth = robot.wheels.azimuth[wheel]
-    distance = np.broadcast_to(robot.wheels.robot_radius, (robot.wheels.count,))[wheel]
-    return distance * np.array([np.cos(azimuth), np.sin(azimuth)])
-
-
-def _body(axes: Axes, robot: Robot) -> None:
-    distance = float(np.mean(robot.wheels.robot_radius))
+def _body(axes: Axes, places: NDArray[np.float64]) -> None:
+    distance = float(np.mean(np.linalg.norm(places, axis=1)))
     axes.add_patch(Circle((0.0, 0.0), distance, facecolor="#F6F6F6", edgecolor=GREY, linewidth=1.2, zorder=0))
-    for wheel in range(robot.wheels.count):
-        end = _seen(_place(robot, wheel))
+    for place in places:
+        end = _seen(place)
         axes.plot([0.0, end[0]], [0.0, end[1]], color=PALE, linewidth=1.5, zorder=0.5)
 
 
-def _wheel(axes: Axes, robot: Robot, wheel: int) -> None:
+def _wheel(axes: Axes, robot: Robot, wheel: int, place: NDArray[np.float64]) -> None:
     """The wheel as a box standing across its axle, its number, and the way it pushes."""
-    place, radius = _place(robot, wheel), robot.wheels.radii[wheel]
+    radius = robot.wheels.radii[wheel]
     left, bottom = -radius, -0.5 * WHEEL_WIDTH * radius
     box = FancyBboxPatch(
         (left, bottom), 2.0 * radius, WHEEL_WIDTH * radius, boxstyle=f"round,pad=0,rounding_size={0.2 * radius}",
@@ -68,7 +97,8 @@ def _wheel(axes: Axes, robot: Robot, wheel: int) -> None:
     turn = Affine2D().rotate_deg(robot.wheels.azimuth_deg[wheel] + 180.0).translate(*_seen(place))
     box.set_transform(turn + axes.transData)
     axes.add_patch(box)
-    outward = place / np.linalg.norm(place)
+    sin, cos = sin_cos_deg(robot.wheels.azimuth_deg)
+    outward = np.array([cos[wheel], sin[wheel]])
     axes.text(*_seen(place - 0.75 * radius * outward), str(wheel + 1), ha="center", va="center", fontsize=14,
               fontweight="bold", zorder=3)  # fmt: skip
     push = robot.wheels.wrench_matrix[:2, wheel]
