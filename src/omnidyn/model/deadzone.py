@@ -55,7 +55,8 @@ def dead_zone_map(robot: Robot, directions: ArrayLike) -> tuple[FloatArray, Floa
     """(breakaway voltage [V], shape (k,); voltage patterns, shape (k, wheels)) over directions of travel [rad], (k,).
 
     Each pattern pushes along its direction without a torque and has a largest entry of 1: the voltage is that of the
-    most loaded motor at which the robot starts to move.
+    most loaded motor at which the robot starts to move. With a voltage drop, a current limit or a lossy gear the push
+    is no longer proportional to the pattern: it is then not quite along the direction, and not free of torque.
     """
     directions = np.atleast_1d(np.asarray(directions, dtype=float))
     wrench = np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1)
