@@ -4,10 +4,13 @@ Sources: tests/reference/table_3.npz (50 digits), tests/reference/modes.npz and 
 mix all options), the exponential of one axis.
 """
 
+import time
+
 import numpy as np
 import pytest
 
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.layout import AXES, BOUND
 from omnidyn.model.plant import plant
 from omnidyn.model.rest import new_state
 from omnidyn.model.robot_file import load_robot
@@ -69,6 +72,18 @@ def truth_of(seed):
     return truth
 
 
+def cost(robot, voltage, dt, tol):
+    """What a run of the kernel takes, in words; it prices a solved step, of which an accepted one takes three."""
+    numbers = plant(robot)
+    bound = np.tile(numbers.element[AXES:, BOUND], (len(voltage), 1))
+    dt = np.broadcast_to(dt, len(voltage)).copy()
+    begin = time.process_time()
+    loop = no_loop(robot.wheels.count)
+    run = run_implicit(numbers, voltage.copy(), bound, dt, new_state(numbers), np.zeros(3), loop, tol)
+    steps = int(run.steps.sum())
+    return f"{steps} steps, {(time.process_time() - begin) / steps * 1e6:.2f} us each"
+
+
 def worst(run, truth):
     """Largest error of the twist, [m/s] or a tenth of [rad/s], whichever is larger."""
     return float((np.abs(run.twist - truth.twist) / [1.0, 1.0, 10.0]).max())
@@ -81,6 +96,7 @@ def test_adaptive_against_the_modes(seed):
     run = simulate(robot, *random_voltages(robot, seed), tol=1e-7)
     assert "implicit engine" in run.source
     assert not run.warnings
+    print(f"robot {seed}: {cost(robot, *random_voltages(robot, seed), 1e-7)}; error {worst(run, truth):.1e} m/s")
     assert np.abs(run.twist[:, :2] - truth.twist[:, :2]).max() <= 1e-6
     assert np.abs(run.twist[:, 2] - truth.twist[:, 2]).max() <= 1e-5
     assert np.abs(run.pose - truth.pose).max() <= 1e-6
