@@ -91,10 +91,11 @@ def _has_number(line: str) -> bool:
 def _without_header(kept: list[Line], separator: str, source: str) -> Layout:
     texts = [line.text for line in kept]
     separator = separator or dialect.find_separator(texts[0], texts, f"{source}:{kept[0].number}")
+    ending = _other_ending(texts[:SAMPLE_ROWS], separator)
     counts = [dialect.counts(text, separator) for text in texts[:SAMPLE_ROWS]]
     count = max(1, min(counts[0]) if all(trimmed < full for full, trimmed in counts) else counts[0][0])
     _refuse_width(count, f"{source}:{kept[0].number}")
-    layout = _with_ending(Layout(separator, _numbered(count), kept[0].number), kept[:SAMPLE_ROWS])
+    layout = _with_ending(Layout(separator, _numbered(count), kept[0].number), kept[:SAMPLE_ROWS], ending)
     names = f"no header: the columns are called c1 to c{count}"
     return replace(layout, notes=(names, *_separator_notes(separator), *layout.notes))
 
@@ -129,12 +130,15 @@ def _layout(kept: list[Line], commented: int, separator: str, source: str) -> La
     where = f"{source}:{kept[0].number}"
     rows = [line.text for line in kept[max(1, commented) :]]
     separator = separator or dialect.find_separator(kept[0].text, rows, where)
+    ending = _other_ending(rows[HEAD_ROWS if len(rows) > 2 * HEAD_ROWS else 0 :][:SAMPLE_ROWS], separator)
+    if ending:
+        kept = [Line(line.number, line.text.rstrip().removesuffix(ending)) for line in kept]
     head = _head(kept[: commented or HEAD_ROWS + 1], separator, source)
     body = kept[len(head.lines) :]
     if not body:
         raise InputError("no rows", got="0 samples", expected="at least one row under the header", where=source)
     names = _names(head, separator, body, source)
-    layout = _with_ending(Layout(separator, tuple(names), body[0].number), body[:SAMPLE_ROWS])
+    layout = _with_ending(Layout(separator, tuple(names), body[0].number), body[:SAMPLE_ROWS], ending)
     names, units = _units(names, head, f"{source}:{head.lines[head.names].number}")
     titles = {name: cell for name, cell in zip(names, head.cells_of(head.titles), strict=False) if cell}
     notes = [*_head_notes(head, commented), *_separator_notes(separator), *layout.notes]
@@ -241,19 +245,26 @@ def _units(names: list[str], head: _Head, where: str) -> tuple[list[str], dict[s
     return plain, units
 
 
-def _with_ending(layout: Layout, rows: list[Line]) -> Layout:
-    """The layout with what stands at the end of its rows and means nothing."""
+def _with_ending(layout: Layout, rows: list[Line], other: str) -> Layout:
+    """The layout with what stands at the end of its rows and means nothing: its own separator, or another."""
     count = len(layout.names)
     own = [dialect.counts(row.text, layout.separator) for row in rows]
     if any(full == count + 1 == trimmed + 1 for full, trimmed in own):
         note = f"every row ends with {SEPARATOR_WORDS[layout.separator]}: the blank last column was left out"
         return replace(layout, ending=layout.separator, notes=(note,))
-    for other in SEPARATORS:
-        ends = [row.text.rstrip().endswith(other) and row.text.count(other) == 1 for row in rows]
-        if other != layout.separator and all(ends[:-1] or ends) and (ends[-1] or other not in rows[-1].text):
-            note = f"every row ends with {SEPARATOR_WORDS[other]}: it was left out"
-            return replace(layout, ending=other, notes=(note,))
+    if other:
+        return replace(layout, ending=other, notes=(f"every row ends with {SEPARATOR_WORDS[other]}: it was left out",))
     return layout
+
+
+def _other_ending(rows: Sequence[str], separator: str) -> str:
+    """A separator that stands at the end of every row, the last one perhaps excepted, and nowhere else in it."""
+    for other in SEPARATORS:
+        ends = [row.rstrip().endswith(other) and row.count(other) == 1 for row in rows]
+        whole = ends and (ends[-1] or other not in rows[-1])
+        if other != separator and whole and all(ends[:-1] or ends):
+            return other
+    return ""
 
 
 def _head_notes(head: _Head, commented: int) -> list[str]:

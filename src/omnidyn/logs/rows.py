@@ -7,6 +7,7 @@ where, and reads words, quotes and odd blanks. Both give the same numbers (a tes
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ Lines = NDArray[np.int64]
 
 RAGGED, NOT_A_NUMBER, INFINITE = "another number of cells", "no number where one is due", "an infinite number"
 BROKEN_QUOTE = "a broken quote"
+REASONS = (RAGGED, BROKEN_QUOTE, NOT_A_NUMBER, INFINITE)
 SHOWN_LINES = 5
 COMMA_NOTE = "numbers have a decimal comma"
 
@@ -47,7 +49,7 @@ class RowParser:
     def notes(self) -> tuple[str, ...]:
         """What was decided so far, in words."""
         comma = [COMMA_NOTE] if self._comma else []
-        return (*comma, *(skip_note(reason, lines) for reason, lines in self.skipped.items()))
+        return (*comma, *(skip_note(reason, self.skipped[reason]) for reason in REASONS if reason in self.skipped))
 
     def parse(
         self, texts: list[str], lines: Lines, later: Callable[[], Iterable[str]] = tuple
@@ -78,7 +80,7 @@ class RowParser:
             certain = self._comma or dialect.is_decimal_comma_plain(texts, separator)
             if (point and (comma or self._comma)) or (comma and (self._point or not certain)):
                 return None
-            first = _first_with("," if comma else ".", texts, separator)
+            first = _first_comma(texts, separator) if comma else _first_point(texts, separator)
             texts = [text.replace(",", ".") for text in texts] if comma else texts
         values = _loaded(texts, separator)
         if values is None:
@@ -99,11 +101,14 @@ class RowParser:
     def _careful(
         self, texts: list[str], lines: Lines, later: Callable[[], Iterable[str]]
     ) -> tuple[dict[str, Column], Lines]:
+        """Rows before a fault are judged first: the error is that of the first bad row."""
         table, fault = self._split(texts, lines)
         keep = np.array([cells is not None for cells in table], dtype=bool)
         rows, lines = [cells for cells in table if cells is not None], lines[: len(table)][keep]
-        comma = self.layout.separator != "," and self._decide(rows, lines, later)
-        if comma:
+        if self.layout.separator != ",":
+            count, doubt = self._decide(rows, lines, lambda: chain(texts[len(table) :], later()))
+            rows, lines, fault = rows[:count], lines[:count], doubt or fault
+        if self._comma:
             rows = [[_pointed(cell) for cell in cells] for cells in rows]
         if self.skip:
             rows, lines = self._good(rows, lines)
@@ -141,33 +146,41 @@ class RowParser:
     def _leave_out(self, reason: str, line: int) -> None:
         self.skipped.setdefault(reason, []).append(line)
 
-    def _decide(self, rows: list[list[str]], lines: Lines, later: Callable[[], Iterable[str]]) -> bool:
-        """Whether the numbers have a decimal comma. Raises InputError when points and commas are mixed."""
-        doubtful = ""
-        for row, line in zip(rows, lines, strict=True):
+    def _decide(
+        self, rows: list[list[str]], lines: Lines, later: Callable[[], Iterable[str]]
+    ) -> tuple[int, InputError | None]:
+        """Settle whether the numbers have a decimal comma. How many rows may be read so, and why no more."""
+        doubtful, first = "", 0
+        for k, row in enumerate(rows):
             for cell in row:
                 comma = dialect.is_comma_number(cell)
-                if comma and dialect.GROUPED_NUMBER.fullmatch(cell) and not self._comma:
-                    doubtful = doubtful or cell
+                if comma and not self._comma and dialect.GROUPED_NUMBER.fullmatch(cell):
+                    doubtful, first = (doubtful, first) if doubtful else (cell, k)
                 elif comma:
                     self._comma = self._comma or cell
                 elif "." in cell and dialect.NUMBER.fullmatch(cell):
                     self._point = self._point or cell
                 if (self._comma or doubtful) and self._point:
-                    raise dialect.mixed(self._comma or doubtful, self._point, f"{self.source}:{line}")
+                    self._comma = self._comma or doubtful
+                    return k, dialect.mixed(self._comma, self._point, f"{self.source}:{lines[k]}")
         if doubtful and not self._comma:
             self._comma = self._certain_later(doubtful, later)
-        return bool(self._comma)
+            if not self._comma:
+                return first, dialect.ambiguous(doubtful, self.source)
+        return len(rows), None
 
     def _certain_later(self, doubtful: str, later: Callable[[], Iterable[str]]) -> str:
-        """A later cell that shows what a comma means. Raises InputError where there is none, or one with a point."""
+        """A later cell that shows what a comma means, "" where there is none.
+
+        Where a point comes first, commas are decimal until it is reached, and refused there.
+        """
         for text in later():
             for cell in self._cells_or_none(text):
                 if dialect.is_comma_number(cell) and not dialect.GROUPED_NUMBER.fullmatch(cell):
                     return cell
                 if "." in cell and dialect.NUMBER.fullmatch(cell):
-                    raise dialect.mixed(doubtful, cell, self.source)
-        raise dialect.ambiguous(doubtful, self.source)
+                    return doubtful
+        return ""
 
     def _cells_or_none(self, text: str) -> list[str]:
         try:
@@ -227,9 +240,15 @@ def _loaded(texts: list[str], separator: str) -> FloatArray | None:
         return None
 
 
-def _first_with(character: str, texts: list[str], separator: str) -> str:
-    row = next((text for text in texts if character in text), "")
-    return next((cell.strip() for cell in row.split(separator) if character in cell), "")
+def _first_point(texts: list[str], separator: str) -> str:
+    row = next((text for text in texts if "." in text), "")
+    return next((cell.strip() for cell in row.split(separator) if "." in cell), "")
+
+
+def _first_comma(texts: list[str], separator: str) -> str:
+    """The first cell whose comma can only be decimal."""
+    cells = (cell.strip() for text in texts for cell in text.split(separator) if "," in cell)
+    return next((cell for cell in cells if not dialect.GROUPED_NUMBER.fullmatch(cell)), "")
 
 
 def _filled(text: str, separator: str) -> str:

@@ -15,6 +15,7 @@ from omnidyn.errors import InputError
 from omnidyn.files import file_format, open_regular, text_format, too_large
 
 BLOCK_BYTES = 2**20
+START_BYTES = 256  # enough to tell a format and an encoding
 MAX_LINE_BYTES = 4 * 2**20
 TOO_LARGE_REMEDY = "cut it, allow more with --max-bytes, or read it in pieces with iter_tables"
 
@@ -80,7 +81,7 @@ class TextFile:
             done = 0
             if self._max_bytes is not None and total > self._max_bytes:
                 raise too_large(self.path, self._max_bytes, TOO_LARGE_REMEDY)
-            while block := stream.read(BLOCK_BYTES):
+            while block := stream.read(BLOCK_BYTES if done else max(BLOCK_BYTES, START_BYTES)):
                 if not done:
                     self._refuse_format(block)
                 self._hash.update(block)
