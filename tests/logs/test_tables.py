@@ -75,6 +75,10 @@ def tables(draw):
         row, column = draw(st.integers(0, len(rows) - 1)), draw(st.integers(0, columns - 1))
         odd = st.sampled_from(["", "nan", "-nan", f'"{rows[row][column]}"', " 1 ", "word", "inf", "1.5", "2,5", "#N/A"])
         rows[row][column] = draw(odd) if columns > 1 else "7"
+    if draw(st.booleans()):  # a column of words
+        rows = [[*row[:-1], draw(st.sampled_from(["go", "stop", '"go"', "1"]))] for row in rows]
+    if draw(st.booleans()):
+        rows = [[f'"{cell}"' if '"' not in cell else cell for cell in row] for row in rows]
     lines = [separator.join(row) for row in rows]
     end = draw(st.sampled_from(["", separator])) if columns > 1 else ""
     lines = [line + end for line in lines]

@@ -6,6 +6,7 @@ where, and reads words, quotes and odd blanks. Both give the same numbers (a tes
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
 
@@ -44,6 +45,8 @@ class RowParser:
         count = len(layout.names)
         first = [cells for text in sample if len(cells := self._cells_or_none(text)) == count]
         self._numeric = tuple(_mostly_numbers([cells[k] for cells in first]) for k in range(count))
+        wordy = [not self._numeric[k] if skip else _holds_words(cells[k] for cells in first) for k in range(count)]
+        self._maybe_words = {name for name, each in zip(layout.names, wordy, strict=True) if each}
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -59,38 +62,55 @@ class RowParser:
         texts: without blank lines and comments; `later` gives the texts of all rows that follow, where a decimal comma
         is not certain yet. Raises InputError, at the first bad row of all.
         """
-        values = self._plain(texts)
-        if values is not None:
-            columns: dict[str, Column] = {n: values[:, k].copy() for k, n in enumerate(self.layout.names)}
-        else:
+        columns = self._plain(texts)
+        if columns is None:
             columns, lines = self._careful(texts, lines, later)
         self._rows += len(texts)
         return columns, lines
 
     # ---- plain numbers -----------------------------------------------------------------------------------
 
-    def _plain(self, texts: list[str]) -> FloatArray | None:
-        """The numbers of rows that hold nothing else, shape (rows, columns); None where a closer look is needed."""
-        if self._words or any('"' in text for text in texts):
-            return None
+    def _plain(self, texts: list[str]) -> dict[str, Column] | None:
+        """The columns of rows in which nothing is odd; None where a closer look is needed."""
         texts, separator, comma, first = self._unended(texts), self.layout.separator, False, ""
+        if any('"' in text for text in texts):
+            texts = [_unquoted(text, separator) for text in texts]
         if separator != ",":
             point = any("." in text for text in texts)
             comma = any("," in text for text in texts)
             certain = self._comma or dialect.is_decimal_comma_plain(texts, separator)
-            if (point and (comma or self._comma)) or (comma and (self._point or not certain)):
+            if (point and (comma or self._comma)) or (comma and (self._point or not certain or self._maybe_words)):
                 return None
             first = _first_comma(texts, separator) if comma else _first_point(texts, separator)
             texts = [text.replace(",", ".") for text in texts] if comma else texts
-        values = _loaded(texts, separator)
-        if values is None:
-            values = _loaded([_filled(text, separator) for text in texts], separator)
-        if values is None or values.shape != (len(texts), len(self.layout.names)) or np.isinf(values).any():
-            return None
-        if separator != ",":
+        columns = self._columns(texts)
+        if columns is not None and separator != ",":
             self._comma = self._comma or (first if comma else "")
             self._point = self._point or ("" if comma else first)
-        return values
+        return columns
+
+    def _columns(self, texts: list[str]) -> dict[str, Column] | None:
+        """Numbers by NumPy's parser; the cells of columns that are known to hold words as they are."""
+        names, separator = self.layout.names, self.layout.separator
+        words = self._words | self._maybe_words
+        if words and any(text.count(separator) != len(names) - 1 or '"' in text for text in texts):
+            return None
+        split = {name: [text.split(separator)[names.index(name)].strip() for text in texts] for name in words}
+        for name, cells in split.items():
+            if name not in self._words and all(map(dialect.is_number_or_missing, cells)):
+                return None
+        numeric = [k for k, name in enumerate(names) if name not in words]
+        if not numeric:
+            return None
+        use = numeric if words else None
+        values = _loaded(texts, separator, use)
+        if values is None:
+            values = _loaded([_filled(text, separator) for text in texts], separator, use)
+        if values is None or values.shape != (len(texts), len(numeric)) or np.isinf(values).any():
+            return None
+        self._words |= words
+        floats = {names[k]: values[:, place].copy() for place, k in enumerate(numeric)}
+        return {name: tuple(split[name]) if name in split else floats[name] for name in names}
 
     def _unended(self, texts: list[str]) -> list[str]:
         ending = self.layout.ending
@@ -232,12 +252,25 @@ def refuse_infinite(columns: Mapping[str, Column], lines: Lines, source: str) ->
         )
 
 
-def _loaded(texts: list[str], separator: str) -> FloatArray | None:
-    """NumPy's parser takes no underscore, no hexadecimal and no ragged row. None where it stumbles."""
+def _loaded(texts: list[str], separator: str, columns: list[int] | None) -> FloatArray | None:
+    """NumPy's parser takes no underscore, no hexadecimal and, where it reads all columns, no ragged row.
+
+    None where it stumbles.
+    """
     try:
-        return np.loadtxt(texts, delimiter=separator, comments=None, ndmin=2)
+        return np.loadtxt(texts, delimiter=separator, comments=None, ndmin=2, usecols=columns)
     except (ValueError, OverflowError):
         return None
+
+
+def _unquoted(text: str, separator: str) -> str:
+    """The row without the quotes around its cells, where that is all there is about them."""
+    if '"' not in text:
+        return text
+    cells = text.strip().split(f'"{separator}"')
+    if len(cells) == text.count(separator) + 1 and 2 * len(cells) == text.count('"') and text[0] + text[-1] == '""':
+        return text.replace('"', "")
+    return re.sub(rf'(?<![^{separator}])"([^"{separator}]*)"(?![^{separator}])', r"\1", text)
 
 
 def _first_point(texts: list[str], separator: str) -> str:
@@ -262,6 +295,10 @@ def _filled(text: str, separator: str) -> str:
 
 def _pointed(cell: str) -> str:
     return cell.replace(",", ".") if "," in cell and dialect.COMMA_NUMBER.fullmatch(cell) else cell
+
+
+def _holds_words(cells: Iterable[str]) -> bool:
+    return not all(dialect.looks_like_number(cell) or dialect.is_number_or_missing(cell) for cell in cells)
 
 
 def _mostly_numbers(cells: Sequence[str]) -> bool:

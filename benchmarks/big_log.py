@@ -1,0 +1,103 @@
+"""A log of a gigabyte, read in pieces: seconds of processor time and memory, for CSV and Parquet.
+
+python -m benchmarks.big_log PATH      read one file in this process, and print what it took
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.table import Table, machine
+from omnidyn.logs.tables import iter_tables
+
+BYTES = int(float(os.environ.get("OMNIDYN_BIG_LOG_BYTES", "1e9")))
+WHEELS = (("u", "V"), ("i", "A"), ("w", "rad_s"))
+COLUMNS = ["t_s", *(f"{letter}{k}_{unit}" for letter, unit in WHEELS for k in (1, 2, 3)), "x_m", "y_m", "heading_rad"]
+BLOCK_ROWS = 100_000
+CPU_GOAL_S, MEMORY_GOAL_MB = 40.0, 1024.0
+
+
+def measure() -> Table:
+    """Write such files in a temporary folder, and read each in a process of its own."""
+    table = Table(
+        f"big_log: {BYTES / 1e9:g} GB of CSV, {len(COLUMNS)} columns, and the same rows as Parquet",
+        ["file", "MB", "rows", "cpu s", "wall s", "peak MB"],
+    )
+    table.notes.append(machine())
+    table.notes.append("peak MB: of the whole process, Python, NumPy and omnidyn (120 MB) included")
+    with tempfile.TemporaryDirectory(prefix="omnidyn-big-log-") as folder:
+        csv = Path(folder) / "log.csv"
+        _write_csv(csv)
+        _add(table, "CSV", csv)
+        parquet = csv.with_suffix(".parquet")
+        if _write_parquet(csv, parquet):
+            csv.unlink()
+            _add(table, "Parquet", parquet)
+        else:
+            table.notes.append("Parquet was not measured: pyarrow is not installed")
+    return table
+
+
+def _add(table: Table, name: str, path: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "benchmarks.big_log", str(path)], capture_output=True, text=True, check=True,
+        cwd=Path(__file__).resolve().parents[1],
+    )  # fmt: skip
+    told = json.loads(run.stdout)
+    met = told["cpu s"] <= CPU_GOAL_S and told["peak MB"] <= MEMORY_GOAL_MB
+    size = path.stat().st_size / 1e6
+    table.add(f"<= {CPU_GOAL_S:g} s, {MEMORY_GOAL_MB:g} MB", met, file=name, MB=round(size), **told)
+
+
+def _write_csv(path: Path) -> None:
+    """A drive of some hours at 1 kHz: about 100 bytes a row."""
+    rng, done = np.random.default_rng(1), 0
+    with open(path, "w", encoding="ascii") as stream:
+        stream.write(",".join(COLUMNS) + "\n")
+        while stream.tell() < BYTES:
+            t = (done + np.arange(BLOCK_ROWS)) * 1e-3
+            values = [t, *rng.normal(0.0, 3.0, (len(COLUMNS) - 1, BLOCK_ROWS))]
+            digits = [f"%.{4 if k else 3}f" for k in range(len(COLUMNS))]
+            columns = [np.char.mod(form, column).tolist() for form, column in zip(digits, values, strict=True)]
+            stream.write("\n".join(map(",".join, zip(*columns, strict=True))) + "\n")
+            done += BLOCK_ROWS
+
+
+def _write_parquet(csv: Path, path: Path) -> bool:
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        return False
+    schema = pa.schema([(name, pa.float64()) for name in COLUMNS])
+    with parquet.ParquetWriter(path, schema, use_dictionary=False) as writer:
+        for piece in iter_tables(csv):
+            writer.write_table(pa.table({name: piece.columns[name] for name in COLUMNS}, schema=schema))
+    return True
+
+
+def read(path: str) -> dict[str, float]:
+    """Read a file to its end, looking at every column once."""
+    wall, rows = time.perf_counter(), 0
+    for piece in iter_tables(path):
+        rows += len(piece)
+        assert all(np.isfinite(piece.columns[name]).all() for name in piece.names)
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    peak = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+    cpu = usage.ru_utime + usage.ru_stime
+    return {
+        "rows": rows, "cpu s": round(cpu, 1), "wall s": round(time.perf_counter() - wall, 1), "peak MB": round(peak),
+    }  # fmt: skip
+
+
+if __name__ == "__main__":
+    print(json.dumps(read(sys.argv[1])))
