@@ -72,7 +72,7 @@ _NPZ = Format("npz", "a zip archive of NumPy arrays (.npz)", NUMPY_REMEDY)
 _PICKLE = Format("pickle", "a Python pickle", "it is never opened, as it could run any program: export it as CSV")
 # Protocols 2 to 5 begin with their number; 0 and 1 with the opcode of what they hold.
 _PICKLE_START = re.compile(
-    rb"\x80[\x02-\x05]|\((?:lp|dp)\d+\n|c[A-Za-z_][\w.]*\n\w+\n[p(]|\(I-?\d+\n|[VF][^\n]*\np0\n|[\]}]q\x00|\(K[\x00-\x08]"
+    rb"\x80[\x02-\x05]|\((?:lp|dp)\d+\n|c[A-Za-z_][\w.]*\n\w+\n[pq(]|\(I-?\d+\n|[VF][^\n]*\np0\n|[\]}]q\x00|\(K[\x00-\x08]"
 )
 
 
