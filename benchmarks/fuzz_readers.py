@@ -41,8 +41,8 @@ SLOW_S, MAX_MB = 2.0, 2048
 MAX_SEED_BYTES = 6000
 
 PIECES = [
-    b",", b";", b"\t", b"\n", b"\r", b'"', b"#", b"%", b"nan", b"inf", b"1e400", b"-", b"0", b"1e308", b"1e-320", b"1,5",
-    b"1,500", b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff", b"\x00", b"\xb5", b"x", b"_", b" ", b"\x85", b"\x0b",
+    b",", b";", b"\t", b"\n", b"\r", b'"', b"#", b"%", b"nan", b"inf", b"1e400", b"-", b"0", b"1e308", b"1e-320",
+    b"1,5", b"1,500", b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff", b"\x00", b"\xb5", b"x", b"_", b" ", b"\x85", b"\x0b",
     b"\xe2\x80\xa8", b"[rad/s]", b"sep=;\n", b"9" * 400, b"PAR1", b"\x80\x04", b"PK\x03\x04", b"\xff\xff\xff\xff",
     b"\x7f\xff\xff\xff", b"\x00\x00\x00\x80",
 ]  # fmt: skip
