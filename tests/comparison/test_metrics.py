@@ -58,6 +58,16 @@ def test_several_pieces_are_one_sum():
     assert found.whiteness is None
 
 
+def test_how_far_apart_the_pieces_of_a_path_lie_is_no_merit():
+    """Two pieces at 0 and at 100, each a sine that the model has half of: 50 and 75 %, wherever they lie."""
+    cut = [trace(level + TURNS, level + 0.5 * TURNS) for level in (0.0, 100.0)]
+    assert metrics(cut).fit_percent > 99.0
+    found = metrics(cut, start_known=True)
+    assert found.fit_percent == pytest.approx(50.0)
+    assert found.vaf == pytest.approx(75.0)
+    assert found.rmse == metrics(cut).rmse
+
+
 @pytest.mark.parametrize("level", [0.0, 3.0, -1e6])
 def test_a_signal_that_never_changes_has_no_fit(level):
     found = metrics([trace(np.full(N, level), level + TURNS)])

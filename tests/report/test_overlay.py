@@ -12,8 +12,8 @@ from matplotlib.text import Text
 import omnidyn
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.overlay import draw_overlay
-from omnidyn.report.style import look
 from tests.comparison.logs import clean_log, coulomb_times, noisy
+from tests.report.test_figures import shown_texts
 
 AXEBOT = load_robot("axebot")
 
@@ -62,15 +62,11 @@ def test_the_same_comparison_is_the_same_file(found):
 @pytest.mark.parametrize("channels", [("vx",), ("vx", "vy", "omega"), ("vx", "w1", "w2", "w3", "x", "heading")])
 def test_no_text_is_cut_off_or_covers_another(found, channels):
     figure, _ = drawn(found, channels=channels)
-    with look():
-        figure.canvas.draw()
-        texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
-        boxes = {text: text.get_window_extent() for text in texts}
-    page = figure.bbox
-    for text, box in boxes.items():
+    texts, page = shown_texts(figure), figure.bbox
+    for text, box in texts:
         assert page.x0 <= box.x0 < box.x1 <= page.x1, text
         assert page.y0 <= box.y0 < box.y1 <= page.y1, text
-    covered = [(a.get_text(), b.get_text()) for a, b in combinations(texts, 2) if boxes[a].overlaps(boxes[b])]
+    covered = [(a, b) for (a, one), (b, two) in combinations(texts, 2) if one.overlaps(two)]
     assert not covered
 
 

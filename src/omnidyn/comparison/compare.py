@@ -132,19 +132,20 @@ def _traces(
 
 def _overall(traces: Mapping[str, list[Trace]]) -> dict[str, Metrics]:
     """Component -> metrics over all traces. A pose has no lag: it cannot be told from another speed."""
-    found = (
-        (key, metrics(rows, errors_for_whiteness(key, traces), with_lag=key not in POSE))
-        for key, rows in traces.items()
-    )
-    return {key: each for key, each in found if each is not None}
+    found: dict[str, Metrics] = {}
+    for key, rows in traces.items():
+        pose = key in POSE
+        each = metrics(rows, errors_for_whiteness(key, traces), with_lag=not pose, start_known=pose)
+        if each is not None:
+            found[key] = each
+    return found
 
 
 def _by_segment(traces: Mapping[str, list[Trace]], channels: Sequence[str]) -> dict[str, tuple[Metrics | None, ...]]:
     """Component -> metrics of each segment, without a lag."""
     found = {}
     for key in channels:
-        errors = errors_for_whiteness(key, traces)
-        pairs = zip(traces[key], errors, strict=True)
+        pairs = zip(traces[key], errors_for_whiteness(key, traces), strict=True)
         found[key] = tuple(metrics([trace], [error], with_lag=False) for trace, error in pairs)
     return found
 

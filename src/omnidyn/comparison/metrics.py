@@ -46,25 +46,30 @@ METRICS = tuple(Metrics.__dataclass_fields__)
 
 
 def metrics(
-    traces: Sequence[Trace], errors: Sequence[FloatArray] | None = None, with_lag: bool = True
+    traces: Sequence[Trace],
+    errors: Sequence[FloatArray] | None = None,
+    with_lag: bool = True,
+    start_known: bool = False,
 ) -> Metrics | None:
     """The metrics over some traces together; None where measured and model share no sample.
 
     Means are over all samples of all traces. errors: those to test for whiteness, an array per trace; by default all.
-    The lag takes longer than the rest and may be left out.
+    The lag takes longer than the rest and may be left out. start_known: the level of each trace was given to the model
+    (a pose): fit and VAF count changes about the mean of each trace, not how far apart the traces are.
     """
     measured, model = both_known(traces)
     if not len(measured):
         return None
     error = model - measured
+    levelled = both_known([_levelled(trace) for trace in traces]) if start_known else (measured, model)
     tested = whiteness([trace.error for trace in traces] if errors is None else errors)
     return Metrics(
         samples=len(error),
         rmse=float(np.sqrt(np.mean(error**2))),
         max=float(np.abs(error).max()),
         bias=float(error.mean()),
-        fit_percent=fit_percent(measured, model),
-        vaf=variance_accounted_for(measured, model),
+        fit_percent=fit_percent(*levelled),
+        vaf=variance_accounted_for(*levelled),
         whiteness=None if tested is None else tested.p_value,
         lag=lag_of(traces) if with_lag else None,
     )
@@ -79,6 +84,13 @@ def both_known(traces: Sequence[Trace]) -> tuple[FloatArray, FloatArray]:
     )
     known = np.isfinite(measured) & np.isfinite(model)
     return measured[known], model[known]
+
+
+def _levelled(trace: Trace) -> Trace:
+    """The trace about the mean of its measured values."""
+    known = np.isfinite(trace.error)
+    mean = float(trace.measured[known].mean()) if known.any() else 0.0
+    return Trace(trace.t, trace.measured - mean, trace.model - mean)
 
 
 def fit_percent(measured: FloatArray, model: FloatArray) -> float | None:
