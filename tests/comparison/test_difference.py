@@ -38,6 +38,20 @@ def test_of_two_equally_good_models_none_is_better(pieces, count, memory):
     assert {0, 1} >= set(told) - {None}
 
 
+def test_what_the_start_is_off_by_is_one_draw_for_the_whole_piece():
+    """Twelve pieces, each with an offset of its own besides little noise: whole pieces are the blocks."""
+    random = np.random.default_rng(7)
+    told = {True: 0, False: 0}
+    for _ in range(150):
+        pairs = [pair(random.normal() + 0.3 * random.normal(size=200), np.ones(200), -np.ones(200)) for _ in range(12)]
+        sides = [list(side) for side in zip(*pairs, strict=True)]
+        for whole in told:
+            told[whole] += difference(*sides, whole=whole).better is not None
+    assert told[True] <= 18  # 12 %: 4 standard deviations above 5 %
+    one = difference(*([each] for each in pairs[0]), whole=True)
+    assert (one.blocks, one.std_error, one.better) == (1, None, None)
+
+
 def test_many_components_judged_together_are_judged_harder():
     random = np.random.default_rng(4)
     logs = [both(random, 1, 400, 0.0) for _ in range(300)]

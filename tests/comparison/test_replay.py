@@ -99,7 +99,7 @@ def test_nothing_is_integrated_across_a_gap():
     cut = Run(t=run.t[kept], **{name: getattr(run, name)[kept] for name in SIMULATED})
     found = replay(AXEBOT, cut)
     assert found.pieces == (slice(0, 150), slice(150, 361))
-    assert found.warnings == ("1 gaps in time: each piece starts anew from the measured state",)
+    assert found.warnings == ("1 gap in time: each piece starts anew from the measured state",)
     np.testing.assert_allclose(found.run.twist[:150], run.twist[:150], atol=1e-9)
     assert np.abs(found.run.twist[150:160] - run.twist[190:200]).max() < 0.15
     np.testing.assert_allclose(found.run.twist[250:], run.twist[290:], atol=2e-4)

@@ -52,7 +52,7 @@ def test_the_lines_are_the_numbers(found):
     assert (shaded[0].get_x(), shaded[0].get_x() + shaded[0].get_width()) == (begin, pytest.approx(end))
     assert struct.unpack(">II", shown.png[16:24])[0] == 1200
     assert ElementTree.fromstring(shown.svg).tag == "{http://www.w3.org/2000/svg}svg"
-    assert "1 gaps" in shown.caption
+    assert "Grey: gaps" in shown.caption
 
 
 def test_the_same_comparison_is_the_same_file(found):

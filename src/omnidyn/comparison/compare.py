@@ -62,7 +62,7 @@ def compare(
         by_segment={name: _by_segment(by, kept) for name, by in traces.items()},
         difference=_differences([*traces.values()], kept, seed) if len(robots) == 2 else {},
         current_unsigned=current_unsigned,
-        warnings=tuple(_warnings(runs, replays)),
+        warnings=(*_warnings(runs, replays), *_sign_doubts(runs, traces, current_unsigned)),
     )
 
 
@@ -154,13 +154,26 @@ def _differences(
     traces: Sequence[Mapping[str, list[Trace]]], channels: Sequence[str], seed: int
 ) -> dict[str, Difference]:
     first, second = traces
-    found = ((key, difference(first[key], second[key], len(channels), seed)) for key in channels)
+    found = ((key, difference(first[key], second[key], len(channels), seed, whole=key in POSE)) for key in channels)
     return {key: each for key, each in found if each is not None}
 
 
 def _applied(replays: Sequence[Replay]) -> str:
     """What drove a robot; several ways are all named."""
     return "; or ".join(dict.fromkeys(each.words for each in replays))
+
+
+def _sign_doubts(
+    runs: Sequence[Run], traces: Mapping[str, Mapping[str, list[Trace]]], current_unsigned: bool
+) -> Iterator[str]:
+    """Currents that are never negative where a model has them both ways: the sensor may have no sign."""
+    logged = [run.current for run in runs if run.current is not None]
+    if current_unsigned or not logged or min(np.nanmin(each, initial=np.inf) for each in logged) < 0.0:
+        return
+    names = components("current", logged[0].shape[1])
+    models = [trace.model for by in traces.values() for name in names for trace in by.get(name, [])]
+    if any((each < 0.0).any() for each in models):
+        yield "no measured current is negative: has the sensor no sign? then say current_unsigned (--current-unsigned)"
 
 
 def _warnings(runs: Sequence[Run], replays: Mapping[str, Sequence[Replay]]) -> Iterator[str]:

@@ -36,14 +36,17 @@ class Difference:
     blocks: int
 
 
-def difference(first: Sequence[Trace], second: Sequence[Trace], tests: int = 1, seed: int = 0) -> Difference | None:
+def difference(
+    first: Sequence[Trace], second: Sequence[Trace], tests: int = 1, seed: int = 0, whole: bool = False
+) -> Difference | None:
     """Compare two models a, b on the same measured traces y.
 
     With the midpoint m = (a + b)/2 and the gap g = a - b, the difference of the squared errors is 2 g (m - y): what
     decides is on which side of the midpoint y lies. The part of y - m along g is signal; what is left, n, is noise and
     what both models miss, and the standard error is that of mean(2 g n)/(rmse a + rmse b). The inputs of the logs are
     taken as given. tests: how many components are judged together; the level of each is ALPHA / tests (Bonferroni),
-    with Student's t for the number of blocks. None where they share no sample.
+    with Student's t for the number of blocks. whole: every piece is one block, for a pose: what its start was off by
+    stays in all of the piece and is one draw of chance. None where they share no sample.
     """
     parts = [known for a, b in zip(first, second, strict=True) if len(known := _midpoint_and_gap(a, b))]
     if not parts:
@@ -55,13 +58,15 @@ def difference(first: Sequence[Trace], second: Sequence[Trace], tests: int = 1, 
         return Difference(0.0, 0.0, None, len(error))
     share = float(error @ apart) / power
     left = [2.0 * each[:, 1] * (each[:, 0] - share * each[:, 1]) for each in parts]
-    length = block_length(left)
+    length = max(map(len, left)) if whole else block_length(left)
     blocks = sum(max(1, len(each) // length) for each in left)
     gap = one - two
     if blocks < FEWEST:
         return Difference(gap, None, None, blocks)
-    spread = bootstrap_error(left, length, blocks, np.random.default_rng(seed)) / (one + two)
-    sure = float(student.ppf(1.0 - 0.5 * ALPHA / tests, blocks - 1)) * spread
+    # the mean and the share were fitted to the blocks: two degrees of freedom
+    loss = np.sqrt(blocks / (blocks - 2.0))
+    spread = loss * bootstrap_error(left, length, blocks, np.random.default_rng(seed)) / (one + two)
+    sure = float(student.ppf(1.0 - 0.5 * ALPHA / tests, blocks - 2)) * spread
     return Difference(gap, spread, (0 if gap < 0.0 else 1) if abs(gap) > sure else None, blocks)
 
 
@@ -77,7 +82,9 @@ def block_length(series: Sequence[FloatArray]) -> int:
     shortest = int(np.ceil(total ** (1.0 / 3.0)))
     if power <= 0.0:
         return min(shortest, longest)
-    correlation = np.sum([autocovariance(each, longest) for each in centred], axis=0) / power
+    correlation = np.zeros(longest)
+    for each in centred:
+        correlation[: len(each)] += autocovariance(each, len(each)) / power
     memory = -1.0
     for lag in range(0, longest - 1, 2):
         pair = float(correlation[lag] + correlation[lag + 1])

@@ -158,7 +158,8 @@ def _prepared(run: Run, applied: str, hold: float) -> tuple[list[slice], FloatAr
     left = len(run) - sum(piece.stop - piece.start for piece in kept)
     doubts = []
     if len(stretches) > 1:
-        doubts.append(f"{len(stretches) - 1} gaps in time: each piece starts anew from the measured state")
+        gaps = "1 gap" if len(stretches) == 2 else f"{len(stretches) - 1} gaps"
+        doubts.append(f"{gaps} in time: each piece starts anew from the measured state")
     if left:
         doubts.append(f"{left} of {len(run)} rows are not replayed: inputs missing for more than {hold:g} s, or alone")
     width = inputs.shape[1]

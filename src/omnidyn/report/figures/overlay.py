@@ -113,7 +113,7 @@ def _between(segments: Sequence[Segment]) -> Iterator[tuple[float, float]]:
 
 def _caption(comparison: Comparison, log: int, count: int) -> str:
     source = comparison.measured[log].source or "one run"
-    gaps = f" Grey: {count - 1} gaps, where every model starts anew from the measured state." if count > 1 else ""
+    gaps = " Grey: gaps, after which every model starts anew from the measured state." if count > 1 else ""
     errors = "; ".join(
         f"{robot}: rmse " + ", ".join(f"{name} {each.rmse:.3g} {unit(name)}" for name, each in found.items())
         for robot, found in comparison.overall.items()
