@@ -22,8 +22,8 @@ ORDER = {
     "simulation": """inputs commands exact_step travel exact exact_inductance_step exact_inductance_travel
         exact_inductance implicit_step implicit simulate tangent_step tangent_events
         tangent_march tangent""",
-    "logs": """channels dialect header rows text_file table parquet tables run_file steady_table command_file words
-        mapping clock guess log read_log segments plateaus findings check""",
+    "logs": """channels dialect header rows text_file table parquet_pages parquet tables run_file steady_table
+        command_file words mapping clock guess log read_log segments plateaus findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
     "identification": "estimate geometry line points doubts steady_state band",
     "control": "",

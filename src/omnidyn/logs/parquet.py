@@ -19,6 +19,7 @@ import numpy as np
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.files import default_max_bytes, open_regular, too_large
 from omnidyn.logs.header import MAX_COLUMNS, split_units
+from omnidyn.logs.parquet_pages import declared_bytes
 from omnidyn.logs.rows import INFINITE, Column, FloatArray, column_of, refuse_infinite, skip_note
 from omnidyn.logs.table import MAX_CELLS, ROWS, Table, join
 from omnidyn.logs.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY, Progress
@@ -105,7 +106,8 @@ def _tables(
         size, digest = os.fstat(stream.fileno()).st_size, _sha256(stream)
         with _damage(pyarrow, source):
             file, columns = _opened(pyarrow, parquet, stream, source)
-        _check_size(file.metadata, len(columns.names), size, max_bytes, source)
+            pages = declared_bytes(stream, file.metadata)
+        _check_size(file.metadata, pages, len(columns.names), size, max_bytes, source)
         reader = _Rows(columns, source, skip)
         waiting: Table | None = None
         for done, batch in _batches(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
@@ -134,10 +136,13 @@ def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[
     return parquet.ParquetFile(stream, read_dictionary=words, **options), columns
 
 
-def _check_size(metadata: Any, columns: int, size: int, max_bytes: int | None, source: str) -> None:
-    """Refuse what would take much more memory than the file says, before it is read."""
+def _check_size(metadata: Any, pages: int, columns: int, size: int, max_bytes: int | None, source: str) -> None:
+    """Refuse what would take much more memory than the file, before it is read.
+
+    A constant column packs to nothing: so the numbers in memory count as well, and not only what the pages declare.
+    """
     declared = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
-    expanded = max(declared, 8 * columns * metadata.num_rows)
+    expanded = max(declared, pages, 8 * columns * metadata.num_rows)
     if expanded > max(MAX_EXPANSION * size, MIN_EXPANDED_BYTES):
         raise InputError(
             "the file would grow too much",

@@ -1,0 +1,81 @@
+"""Sizes of pages from their headers, held against what pyarrow says, and files that lie about them."""
+
+import io
+
+import numpy as np
+import pytest
+
+from omnidyn.errors import InputError
+from omnidyn.logs.parquet_pages import declared_bytes, page_header
+from omnidyn.logs.tables import read_any
+
+pa = pytest.importorskip("pyarrow")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+TABLE = {"v": np.random.default_rng(0).normal(size=5000), "word": [f"w{k % 7}" for k in range(5000)]}
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"compression": "zstd", "row_group_size": 300},
+        {"use_dictionary": False, "compression": "none", "data_page_size": 1000},
+        {"data_page_version": "2.0", "compression": "gzip", "write_page_checksum": True},
+        {"use_dictionary": False, "compression": "snappy", "write_statistics": True, "write_page_index": True},
+    ],
+)
+def test_the_pages_add_up_to_what_the_metadata_say(options):
+    """The metadata count the headers of the pages too: some 50 bytes each."""
+    sink = io.BytesIO()
+    parquet.write_table(pa.table(TABLE), sink, **options)
+    metadata = parquet.ParquetFile(sink).metadata
+    groups = [metadata.row_group(k) for k in range(metadata.num_row_groups)]
+    said = sum(group.total_byte_size for group in groups)
+    pages = declared_bytes(sink, metadata)
+    assert 0.85 * said < pages <= said
+
+
+def zigzag(number):
+    number, out = 2 * number, bytearray()
+    while number >= 128:
+        out.append(number & 127 | 128)
+        number >>= 7
+    return bytes([*out, number])
+
+
+def test_a_header_made_by_hand():
+    inside = bytes([0x1C, 0x15, 0x02, 0x00])  # field 4: a struct with one number
+    header = page_header(b"\x15\x00\x15" + zigzag(123_456) + b"\x15" + zigzag(99) + inside + b"\x00rest")
+    assert header.unpacked == 123_456
+    assert header.packed == 99
+    assert header.length == 2 + 4 + 3 + 4 + 1
+
+
+@pytest.mark.parametrize(
+    "content, error",
+    [
+        (b"", IndexError),
+        (b"\x15", IndexError),
+        (b"\x00", ValueError),
+        (b"\x1c" * 50, ValueError),
+        (b"\x1f", ValueError),
+    ],
+)
+def test_a_broken_header(content, error):
+    with pytest.raises(error):
+        page_header(content)
+
+
+def test_a_page_that_claims_to_unpack_to_gigabytes_is_refused(tmp_path):
+    """The metadata say 80 kB, the header of the page 2 GB: pyarrow would take 2 GB before it looks."""
+    path = tmp_path / "liar.parquet"
+    parquet.write_table(pa.table({"v": TABLE["v"]}), path, use_dictionary=False, compression="zstd")
+    content = path.read_bytes()
+    size = page_header(content[4:]).unpacked
+    start = content.index(zigzag(size), 4)
+    path.write_bytes(content[:start] + zigzag(2**31 - 1) + content[start + len(zigzag(size)) :])
+    with pytest.raises(
+        InputError, match=r"liar\.parquet: the file would grow too much; got 2\d{9} bytes|damaged or cut"
+    ):
+        read_any(path)
