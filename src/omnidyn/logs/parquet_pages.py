@@ -11,6 +11,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 HEADER_BYTES, MAX_HEADER_BYTES = 4096, 2**20
 MAX_DEPTH = 16
+SLACK_BYTES = 100  # old writers left the header of the dictionary out of the size of a column (PARQUET-816)
 
 _STOP, _TRUE, _FALSE, _BYTE, _DOUBLE, _BINARY, _LIST, _SET, _STRUCT = 0, 1, 2, 3, 7, 8, 9, 10, 12
 _VARINTS = (4, 5, 6)
@@ -45,6 +46,8 @@ def _chunk_bytes(stream: BinaryIO, place: int, end: int) -> int:
             raise ValueError("a page of negative size")
         total += header.unpacked
         place += header.length + header.packed
+        if place > end + SLACK_BYTES:
+            raise ValueError("a page reaches beyond its column")
     return total
 
 
