@@ -1,6 +1,8 @@
 """Whatever the file holds, only an OmnidynError leaves the readers, and what they return is sound."""
 
+import io
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +13,10 @@ from hypothesis import strategies as st
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.steady_state import fit_steady_state
 from omnidyn.logs.command_file import read_voltages
+from omnidyn.logs.run_file import read_run
 from omnidyn.logs.steady_table import read_steady_table
 from omnidyn.logs.table import read_table
+from omnidyn.logs.tables import iter_tables, read_any
 from omnidyn.model.robot_file import load_robot
 
 STEADY = (
@@ -101,6 +105,47 @@ def test_read_table(path, content):
         values, error = outcome(table.numbers, name)
         assert error or np.isfinite(values).all()
         assert error is None or f"column {name}"[:20] in error.where
+
+
+LOGGED = b"%made by hand\r\nTime;Speed;mode;\r\nms;rad/s;;\r\nt;w1;m;\r\n0;1,5;go;\r\n10;2,500;stop;\r\n\r\n20;;go;\r\n"
+
+
+@settings(max_examples=400, deadline=None)
+@given(content=files(LOGGED), rows=st.integers(1, 5), header=st.booleans(), skip=st.booleans())
+def test_read_any_and_its_pieces(path, content, rows, header, skip):
+    path.write_bytes(content)
+    table, error = outcome(partial(read_any, path, header=header, skip_bad_rows=skip))
+    pieces, refused = outcome(lambda: list(iter_tables(path, rows, header=header, skip_bad_rows=skip)))
+    assert (error is None) == (refused is None)
+    assert error is not None or sum(map(len, pieces)) == len(table)
+
+
+@settings(max_examples=200, deadline=None)
+@given(content=files(b"t_s,vx_m_s,vy_m_s,omega_rad_s\n0,1,2,3\n0.1,,nan,-0.5\n0.2,1e-3,5,6\n"))
+def test_read_run(path, content):
+    path.write_bytes(content)
+    run, error = outcome(read_run, path)
+    assert error or (len(run) > 0 and not np.isinf(run.t).any())
+
+
+@pytest.fixture(scope="module")
+def parquet_seed():
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    sink = io.BytesIO()
+    columns = {"t_s": np.arange(20.0), "word": ["go", "stop"] * 10, "n": pa.array([None, 1] * 10)}
+    parquet.write_table(pa.table(columns), sink, row_group_size=7)
+    return sink.getvalue()
+
+
+@settings(max_examples=400, deadline=None)
+@given(edits=st.lists(st.tuples(st.floats(0, 1), st.integers(0, 255)), max_size=6), cut=st.floats(0, 1))
+def test_read_any_of_parquet(path, parquet_seed, edits, cut):
+    content = bytearray(parquet_seed)
+    for place, byte in edits:
+        content[min(int(place * len(content)), len(content) - 1)] = byte
+    path.write_bytes(content[: max(4, int(cut * len(content)))] if cut < 0.2 else content)
+    table, error = outcome(read_any, path)
+    assert error or set(table.columns) == set(table.names)
 
 
 @settings(max_examples=400, deadline=None)
