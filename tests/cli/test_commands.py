@@ -1,6 +1,7 @@
 """The commands, in process: what they print, write and refuse."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -198,6 +199,22 @@ def test_the_run_keeps_the_time_of_the_voltages(call, here):
 def test_the_duration_ends_the_run(call, here):
     call("simulate", "axebot", "u.csv", "-o", "run.csv", "--duration", "1.5")
     assert read_run(here / "run.csv").t.tolist() == [0.0, 1.0, 1.5]
+
+
+def test_a_run_is_written_as_parquet_by_its_name(call, here):
+    pytest.importorskip("pyarrow")
+    call("simulate", "axebot", "u.csv", "-o", "run.csv")
+    assert call("simulate", "axebot", "u.csv", "-o", "run.parquet")[0] == 0
+    csv, parquet = read_run(here / "run.csv"), read_run(here / "run.parquet")
+    assert all(np.array_equal(parquet.channels[name], csv.channels[name], equal_nan=True) for name in csv.channels)
+
+
+def test_parquet_without_pyarrow_ends_with_6_before_any_work(call, here, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    code, out, err = call("simulate", "axebot", "u.csv", "-o", "run.parquet")
+    assert (code, out) == (6, "")
+    assert 'pip install "omnidyn[logs]"' in err
+    assert not (here / "run.parquet").exists()
 
 
 def test_a_robot_that_never_moves_is_said(call, here):

@@ -189,6 +189,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs getrusage")
 @pytest.mark.parametrize("words", [False, True])
 def test_a_bomb_is_refused_before_memory_grows(tmp_path, words):  # 36
     """800 MB of zeros, or 40 GB of one long word, in a small file."""
