@@ -77,6 +77,22 @@ def test_a_robot_that_sets_off_at_once_starts_at_rest(rows):
     assert abs(first_level(t, speed + 0.05 * np.random.default_rng(0).normal(size=50), at_rest=True)) < 0.15
 
 
+def test_numbers_that_come_late_are_waited_for():
+    """The first 20 rows hold nothing: the first number counts, and the ones after it."""
+    values = np.where(np.arange(200) < 20, np.nan, 0.7)
+    assert first_level(T, values, at_rest=True) == pytest.approx(0.7)
+    assert first_level(T, np.full(200, np.nan)) == 0.0
+
+
+def test_of_rows_far_apart_only_the_first_counts():
+    """Half a second between rows: the next ones are another motion, and say nothing of noise."""
+    t = np.arange(8) * 0.5
+    assert first_level(t, np.array([0.02, 0.9, 0.1, -0.7, 0.5, 0.0, 0.3, 0.9]), at_rest=True) == 0.02
+    start = start_of(Run(t=t, twist=np.outer(np.arange(8) ** 2, TWIST), pose=np.outer(t**3, TWIST)), ROBOT, slice(0, 8))
+    assert not start.twist.any()
+    assert not start.pose.any()
+
+
 ROBOT = load_robot("axebot")
 TWIST = np.array([0.3, -0.2, 1.5])
 

@@ -1,6 +1,8 @@
 """--fail-if: what is read, what is refused with the nearest name, and what fails."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import omnidyn
 from omnidyn.comparison.threshold import exceeded, parse_threshold, refuse_absent, refuse_exceeded
@@ -82,3 +84,18 @@ def test_the_four_signs_at_equality(found, sign, fails):
 def test_a_number_that_the_data_do_not_tell_is_no_pass(found):
     with pytest.raises(InsufficientDataError, match=r"the data do not tell x.lag; got x.lag>1"):
         refuse_exceeded(found, [parse_threshold("x.lag>1")])
+
+
+LIKE_A_RULE = st.from_regex(r"[a-z]{1,5}\d?\.[a-z_]{1,12}[<>]=?[-+.e\d]{1,8}", fullmatch=True)
+
+
+@given(st.one_of(st.text(max_size=60), LIKE_A_RULE))
+def test_any_text_is_read_or_refused_in_words(text):
+    try:
+        rule = parse_threshold(text)
+    except InputError as refused:
+        where = refused.where
+    else:
+        where = "--fail-if"
+        assert parse_threshold(str(rule)) == rule._replace(number=float(f"{rule.number:g}"))
+    assert where == "--fail-if"

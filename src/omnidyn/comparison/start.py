@@ -16,6 +16,7 @@ FloatArray = NDArray[np.float64]
 
 WINDOW = 0.05  # [s] the first samples: well below the time constants of a robot, about 0.15 s
 FEWEST, MOST = 5, 65  # samples of a line through the first ones; each try doubles them
+LONGEST = 0.25  # [s] FEWEST samples that take longer are no neighbours: only the first one counts
 SURE = 2.0  # standard errors beyond which a difference is believed
 END_OF_LINE = 2.2  # standard error of a Theil-Sen line at its end, times sqrt(n) over the noise
 TO_STD = 1.4826  # median absolute deviation to standard deviation, for normal noise
@@ -56,11 +57,12 @@ def first_level(t: FloatArray, values: FloatArray, at_rest: bool = False) -> flo
     standard errors of 0 it is 0, and nearer to 0 than the next ones it is no spike. NaN are passed over; 0 where there
     is nothing else. t [s] and values, shape (n,).
     """
-    noise, start = scatter(t, values), float(t[0])
+    noise = scatter(t, values)
     t, values = _first_samples(t, values)
     if not len(t):
         return 0.0
-    t = t - start
+    t = t - t[0]
+    noise = noise if len(t) >= FEWEST else 0.0  # of rows so far apart, what scatters is motion
     level, error, count = float(values[0]), noise, FEWEST
     if len(t) >= FEWEST and _is_spike(t, values, noise, at_rest):
         level, error = theil_sen(t[1:FEWEST], values[1:FEWEST])[1], END_OF_LINE * noise / np.sqrt(FEWEST - 1)
@@ -110,8 +112,14 @@ def _levels(t: FloatArray, values: FloatArray, at_rest: bool = False) -> FloatAr
 
 
 def _first_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What there is within WINDOW of the first sample, at least FEWEST rows, thinned out to MOST."""
-    rows = max(FEWEST, int(np.searchsorted(t, t[0] + WINDOW, side="right")))
+    """What there is within WINDOW of the first number, at least FEWEST rows where these are near, thinned to MOST."""
+    known = np.flatnonzero(np.isfinite(values))
+    if not len(known):
+        return t[:0], values[:0]
+    t, values = t[known[0] :], values[known[0] :]
+    rows = int(np.searchsorted(t, t[0] + WINDOW, side="right"))
+    if len(t) >= FEWEST and t[FEWEST - 1] - t[0] <= LONGEST:
+        rows = max(FEWEST, rows)
     t, values = t[:rows], values[:rows]
     kept = np.flatnonzero(np.isfinite(values))
     kept = kept[:: max(1, -(-len(kept) // MOST))]
