@@ -22,7 +22,7 @@ DEGREE = math.pi / 180.0
 
 
 class Unit(NamedTuple):
-    """A unit: `text` as written, what it measures, and its size in SI (value in SI = size * value)."""
+    """A unit: `text` in its usual spelling, what it measures, and its size in SI (value in SI = size * value)."""
 
     text: str
     quantity: str
@@ -69,7 +69,7 @@ def parse_unit(text: str) -> Unit:
     clean = text.strip()
     whole = _SPELLINGS.get(clean, clean)
     if whole in _NAMES:  # "1/min" too
-        return Unit(clean, *_NAMES[whole])
+        return Unit(whole, *_NAMES[whole])
     match = _UNIT.fullmatch(clean)
     name = _SPELLINGS.get(match[2].strip(), match[2].strip()) if match else clean
     if match is None or name not in _NAMES:
