@@ -106,7 +106,7 @@ def _tables(
         size, digest = os.fstat(stream.fileno()).st_size, _sha256(stream)
         with _damage(pyarrow, source):
             file, columns = _opened(pyarrow, parquet, stream, source)
-            pages = declared_bytes(stream, file.metadata)
+            pages = declared_bytes(stream)
         _check_size(file.metadata, pages, len(columns.names), size, max_bytes, source)
         reader = _Rows(columns, source, skip)
         waiting: Table | None = None
@@ -141,8 +141,7 @@ def _check_size(metadata: Any, pages: int, columns: int, size: int, max_bytes: i
 
     A constant column packs to nothing: so the numbers in memory count as well, and not only what the pages declare.
     """
-    declared = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
-    expanded = max(declared, pages, 8 * columns * metadata.num_rows)
+    expanded = max(pages, 8 * columns * metadata.num_rows)
     if expanded > max(MAX_EXPANSION * size, MIN_EXPANDED_BYTES):
         raise InputError(
             "the file would grow too much",

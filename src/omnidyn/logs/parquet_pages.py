@@ -7,6 +7,7 @@ the sizes unpacked and packed (parquet-format, PageHeader).
 
 from __future__ import annotations
 
+import os
 from typing import Any, BinaryIO, NamedTuple
 
 HEADER_BYTES, MAX_HEADER_BYTES = 4096, 2**20
@@ -25,17 +26,39 @@ class PageHeader(NamedTuple):
     packed: int
 
 
-def declared_bytes(stream: BinaryIO, metadata: Any) -> int:
-    """The sum of what all pages declare to unpack to [bytes]. Raises ValueError for a header that cannot be right."""
-    total = 0
-    for k in range(metadata.num_row_groups):
-        group = metadata.row_group(k)
-        for j in range(group.num_columns):
-            column = group.column(j)
-            starts = [column.data_page_offset, column.dictionary_page_offset]
-            start = min(offset for offset in starts if offset)
-            total += _chunk_bytes(stream, start, start + column.total_compressed_size)
-    return total
+def declared_bytes(stream: BinaryIO) -> int:
+    """What all pages declare to unpack to, or the row groups where they declare more [bytes].
+
+    Raises ValueError for a footer or a header that cannot be right. The footer is parsed here, as pyarrow 26 ends the
+    process when it is asked for the places of the columns of some broken files.
+    """
+    groups = _footer(stream).get(4, [])
+    pages = sum(_column_bytes(stream, column) for group in groups for column in group.get(1, []))
+    return max(pages, sum(group.get(2, 0) for group in groups))
+
+
+def _footer(stream: BinaryIO) -> dict[int, Any]:
+    """FileMetaData: its fields by number."""
+    end = stream.seek(0, os.SEEK_END)
+    stream.seek(max(0, end - 8))
+    length = int.from_bytes(stream.read(4), "little")
+    if length > end - 12:
+        raise ValueError("the footer is longer than the file")
+    stream.seek(end - 8 - length)
+    try:
+        return _struct(stream.read(length), 0, 0)[0]
+    except (IndexError, AttributeError, TypeError):
+        raise ValueError("the footer cannot be read") from None
+
+
+def _column_bytes(stream: BinaryIO, column: Any) -> int:
+    """What the pages of a ColumnChunk declare: its field 3 is ColumnMetaData."""
+    try:
+        described = column[3]
+        starts = [place for place in (described[9], described.get(11, 0)) if place > 0]
+        return _chunk_bytes(stream, min(starts), min(starts) + described[7])
+    except (KeyError, TypeError, AttributeError, IndexError):
+        raise ValueError("a column without a place") from None
 
 
 def _chunk_bytes(stream: BinaryIO, place: int, end: int) -> int:
@@ -66,20 +89,21 @@ def _header(stream: BinaryIO, place: int) -> PageHeader:
 
 def page_header(content: bytes) -> PageHeader:
     """The header at the start of `content`. Raises IndexError when it does not end there, ValueError for nonsense."""
-    sizes: dict[int, int] = {}
-    place = field = 0
-    while True:
-        field, kind, place = _field(content, place, field)
-        if kind == _STOP:
-            break
-        if field in (2, 3) and kind in _VARINTS:
-            number, place = _varint(content, place)
-            sizes[field] = (number >> 1) ^ -(number & 1)
-        else:
-            place = _skip(content, place, kind, 0)
-    if sizes.keys() != {2, 3}:
+    fields, length = _struct(content, 0, 0)
+    if not isinstance(fields.get(2), int) or not isinstance(fields.get(3), int):
         raise ValueError("a page header without sizes")
-    return PageHeader(place, sizes[2], sizes[3])
+    return PageHeader(length, fields[2], fields[3])
+
+
+def _struct(content: bytes, place: int, depth: int) -> tuple[dict[int, Any], int]:
+    """The fields of a struct by number, and where it ends."""
+    fields: dict[int, Any] = {}
+    number = 0
+    while True:
+        number, kind, place = _field(content, place, number)
+        if kind == _STOP:
+            return fields, place
+        fields[number], place = _value(content, place, kind, depth + 1)
 
 
 def _field(content: bytes, place: int, before: int) -> tuple[int, int, int]:
@@ -105,36 +129,39 @@ def _varint(content: bytes, place: int) -> tuple[int, int]:
     raise ValueError("a number in a page header does not end")
 
 
-def _skip(content: bytes, place: int, kind: int, depth: int) -> int:
-    """Where the value of a kind ends."""
+def _value(content: bytes, place: int, kind: int, depth: int) -> tuple[Any, int]:
+    """The value of a kind, and where it ends; None for what nobody asks for here."""
     if depth > MAX_DEPTH:
-        raise ValueError("a page header is nested too deep")
+        raise ValueError("nested too deep")
     if kind in (_TRUE, _FALSE):
-        return place
-    if kind == _BYTE:
-        return place + 1
+        return None, place
     if kind in _VARINTS:
-        return _varint(content, place)[1]
-    if kind == _DOUBLE:
-        return place + 8
+        number, place = _varint(content, place)
+        return (number >> 1) ^ -(number & 1), place
+    if kind == _STRUCT:
+        return _struct(content, place, depth)
+    if kind in (_LIST, _SET):
+        return _list(content, place, depth)
     if kind == _BINARY:
         length, place = _varint(content, place)
-        return place + length
-    if kind in (_LIST, _SET):
-        count, item = content[place] >> 4, content[place] & 15
-        place += 1
-        if count == 15:
-            count, place = _varint(content, place)
-        for _ in range(count):
-            place = _skip(content, place, item if item not in (_TRUE, _FALSE) else _BYTE, depth + 1)
-            if place > len(content):
-                raise IndexError("beyond the end")
-        return place
-    if kind == _STRUCT:
-        field = 0
-        while True:
-            field, inner, place = _field(content, place, field)
-            if inner == _STOP:
-                return place
-            place = _skip(content, place, inner, depth + 1)
-    raise ValueError("an unknown kind of value in a page header")
+    elif kind in (_BYTE, _DOUBLE):
+        length = 1 if kind == _BYTE else 8
+    else:
+        raise ValueError("an unknown kind of value")
+    if place + length > len(content):
+        raise IndexError("beyond the end")
+    return None, place + length
+
+
+def _list(content: bytes, place: int, depth: int) -> tuple[list[Any], int]:
+    count, kind = content[place] >> 4, content[place] & 15
+    place += 1
+    if count == 15:
+        count, place = _varint(content, place)
+    if kind == _STOP or count > len(content):  # every item takes a byte or more
+        raise ValueError("a list that cannot be")
+    items = []
+    for _ in range(count):
+        item, place = _value(content, place, kind if kind not in (_TRUE, _FALSE) else _BYTE, depth + 1)
+        items.append(item)
+    return items, place
