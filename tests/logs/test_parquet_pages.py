@@ -1,6 +1,8 @@
 """Sizes of pages from their headers, held against what pyarrow says, and files that lie about them."""
 
 import io
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -97,3 +99,31 @@ def test_a_page_that_claims_gigabytes_is_refused(tmp_path, which, words):
     path.write_bytes(grown[:middle] + grown[middle + cut :])
     with pytest.raises(InputError, match=words):
         read_any(path)
+
+
+EVERY_BYTE = """
+import io, sys
+import pyarrow as pa, pyarrow.parquet
+from omnidyn.errors import OmnidynError
+from omnidyn.logs.tables import read_any
+sink = io.BytesIO()
+pyarrow.parquet.write_table(pa.table({"v": [1.0, None, 3.0], "w": ["a", "b", "a"]}), sink, store_schema=False)
+content = sink.getvalue()
+footer = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+for place in range(footer, len(content)):
+    for byte in (content[place] ^ 1, 255):
+        with open(sys.argv[1], "wb") as file:
+            file.write(content[:place] + bytes([byte]) + content[place + 1 :])
+        try:
+            read_any(sys.argv[1])
+        except OmnidynError:
+            pass
+print("alive")
+"""
+
+
+def test_no_byte_of_a_footer_ends_the_process(tmp_path):
+    """pyarrow ends it where it is asked for a column whose statistics make no sense."""
+    arguments = [sys.executable, "-c", EVERY_BYTE, str(tmp_path / "broken.parquet")]
+    run = subprocess.run(arguments, capture_output=True, text=True)
+    assert run.stdout == "alive\n", run.stderr[-1000:]
