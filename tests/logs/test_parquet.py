@@ -213,3 +213,14 @@ def test_bytes_of_columns_hold_every_bit():
     values = np.random.default_rng(3).normal(size=100) * 10.0 ** np.arange(-50, 50)
     back = parquet.read_table(pa.BufferReader(parquet_bytes({"v": values}, {"v": "m"})))
     assert back["v"].to_pylist() == values.tolist()
+
+
+def test_an_index_beyond_its_dictionary_is_refused(write):
+    """Indices 0, 1, 2 of two bits each, made 3 where the dictionary has three words."""
+    path = write({"word": ["a", "b", "c"] * 40}, compression="none")
+    content = path.read_bytes()
+    packed = b"\x24\x49\x92" * 4
+    assert content.count(packed) >= 1
+    path.write_bytes(content.replace(packed, b"\xff" * len(packed)))
+    with pytest.raises(InputError, match="damaged or cut short; got .*out of bounds"):
+        read_any(path)

@@ -291,6 +291,8 @@ class _Rows:
         return {name: _where(column, good) for name, column in columns.items()}, lines[good]
 
     def _column(self, name: str, kind: str, array: Any) -> Column:
+        if hasattr(array, "dictionary"):
+            array.validate(full=True)  # a broken file may point beyond its dictionary; nothing else checks that
         if kind == WORDS:
             column = _words(array, name in self.words)
             if isinstance(column, tuple):

@@ -32,9 +32,12 @@ def declared_bytes(stream: BinaryIO) -> int:
     Raises ValueError for a footer or a header that cannot be right. The footer is parsed here, as pyarrow 26 ends the
     process when it is asked for the places of the columns of some broken files.
     """
-    groups = _footer(stream).get(4, [])
-    pages = sum(_column_bytes(stream, column) for group in groups for column in group.get(1, []))
-    return max(pages, sum(group.get(2, 0) for group in groups))
+    try:
+        groups = _footer(stream).get(4, [])
+        pages = sum(_column_bytes(stream, column) for group in groups for column in group.get(1, []))
+        return max(pages, sum(group.get(2, 0) for group in groups))
+    except (IndexError, KeyError, AttributeError, TypeError):  # a field is missing, or of another kind
+        raise ValueError("the footer cannot be read") from None
 
 
 def _footer(stream: BinaryIO) -> dict[int, Any]:
@@ -45,20 +48,14 @@ def _footer(stream: BinaryIO) -> dict[int, Any]:
     if length > end - 12:
         raise ValueError("the footer is longer than the file")
     stream.seek(end - 8 - length)
-    try:
-        return _struct(stream.read(length), 0, 0)[0]
-    except (IndexError, AttributeError, TypeError):
-        raise ValueError("the footer cannot be read") from None
+    return _struct(stream.read(length), 0, 0)[0]
 
 
 def _column_bytes(stream: BinaryIO, column: Any) -> int:
     """What the pages of a ColumnChunk declare: its field 3 is ColumnMetaData."""
-    try:
-        described = column[3]
-        starts = [place for place in (described[9], described.get(11, 0)) if place > 0]
-        return _chunk_bytes(stream, min(starts), min(starts) + described[7])
-    except (KeyError, TypeError, AttributeError, IndexError):
-        raise ValueError("a column without a place") from None
+    described = column[3]
+    start = min(place for place in (described[9], described.get(11, 0)) if place > 0)
+    return _chunk_bytes(stream, start, start + described[7])
 
 
 def _chunk_bytes(stream: BinaryIO, place: int, end: int) -> int:
