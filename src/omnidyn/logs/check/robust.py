@@ -1,0 +1,160 @@
+"""Estimates that a few wild values cannot move: noise, steps of quantisation, slopes between two noisy channels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+MAD = 1.4826  # of a normal distribution: standard deviation / median absolute deviation
+SAMPLE = 40_000  # rows that are enough to learn a noise or a quantum from
+
+
+class Slope(NamedTuple):
+    """y = value * x: the estimate, its standard error (autocorrelation counted), and how many windows made it."""
+
+    value: float
+    error: float
+    windows: int
+
+    def differs(self, other: float, least: float, errors: float = 4.0) -> bool:
+        """Whether it is off `other` by more than `least` and by more than so many standard errors."""
+        away = abs(self.value - other)
+        return bool(np.isfinite(self.error) and away > least and away > errors * self.error)
+
+
+def sample(values: FloatArray) -> FloatArray:
+    """At most SAMPLE rows, in contiguous stretches spread over the log."""
+    n = len(values)
+    if n <= SAMPLE:
+        return values
+    pieces, length = 8, SAMPLE // 8
+    starts = np.linspace(0, n - length, pieces).astype(int)
+    return np.concatenate([values[a : a + length] for a in starts])
+
+
+def spread(values: FloatArray) -> float:
+    """Robust standard deviation about the median; 0 for nothing."""
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return 0.0
+    return float(MAD * np.median(np.abs(values - np.median(values))))
+
+
+def white_noise(values: FloatArray) -> float:
+    """Standard deviation of the noise between neighbouring rows: second differences, of which slow motion has none."""
+    values = sample(values)
+    values = values[np.isfinite(values)]
+    if len(values) < 5:
+        return 0.0
+    bend = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
+    return float(MAD * np.median(bend) / np.sqrt(6.0))
+
+
+def quantum(values: FloatArray) -> float:
+    """The step in which a channel counts, 0 where there is none: all differences of its values are multiples of it."""
+    values = sample(values)
+    values = values[np.isfinite(values)]
+    levels = np.unique(values)
+    if len(levels) < 3 or len(levels) > 0.5 * len(values):
+        return 0.0
+    steps = np.diff(levels)
+    scale = float(np.abs(levels[[0, -1]]).max())
+    steps = steps[steps > 1e-3 * np.median(steps)]  # the same level written twice, apart by rounding
+    if not steps.size:
+        return 0.0
+    step = float(np.median(steps[steps < 1.5 * steps.min()]))
+    off = np.abs(levels / step - np.round(levels / step)) if scale > 0.0 else np.zeros(1)
+    shift = np.abs((levels - levels[0]) / step - np.round((levels - levels[0]) / step))
+    return step if min(np.quantile(off, 0.95), np.quantile(shift, 0.95)) < 0.1 else 0.0
+
+
+def clusters(n: int, step: float, seconds: float = 0.2) -> tuple[NDArray[np.int64], int]:
+    """(window of each row, number of windows): at least 8 rows and `seconds` long, at most 400, for honest errors."""
+    length = max(8, round(seconds / step) if step > 0.0 else 8, -(-n // 400))
+    ids = np.arange(n) // length
+    return ids, int(ids[-1]) + 1 if n else 0
+
+
+def windowed(ids: NDArray[np.int64], count: int, values: FloatArray) -> FloatArray:
+    """Sum of `values` over each window; missing values count 0."""
+    return np.bincount(ids, weights=np.nan_to_num(values), minlength=count)
+
+
+def slope(y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int) -> Slope:
+    """y = a x where both are noisy, from means over windows.
+
+    In each window the mean of every second row of x is the instrument for the mean of the others: white noise of x
+    does not pull a down, and a lag of a row or two between x and y does not either. y, x: shape (rows,) or (rows, k),
+    k pairs with one slope. Errors from the scatter between windows; gross windows are left out once.
+    """
+    return ratio(*products(y, x, ids, count))
+
+
+def products(
+    y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int
+) -> tuple[FloatArray, FloatArray]:
+    """(sum of y x, sum of x x without the square of its noise) of each window. Shapes (count,)."""
+    y, x = y.reshape(len(y), -1), x.reshape(len(x), -1)
+    good = np.isfinite(y) & np.isfinite(x)
+    odd = (np.arange(len(x)) & 1).astype(bool)[:, None]
+    top, below = np.zeros(count), np.zeros(count)
+    for k in range(x.shape[1]):
+        number, all_y, one, other = (
+            np.bincount(ids, weights=np.where(mask, values, 0.0), minlength=count)
+            for mask, values in (
+                (good[:, k], np.ones(len(x))), (good[:, k], y[:, k]), (good[:, k] & odd[:, 0], x[:, k]),
+                (good[:, k] & ~odd[:, 0], x[:, k]),
+            )
+        )  # fmt: skip
+        odds = np.bincount(ids, weights=good[:, k] & odd[:, 0], minlength=count)
+        evens = number - odds
+        with np.errstate(divide="ignore", invalid="ignore"):
+            one, other, mean = one / odds, other / evens, all_y / number
+        full = (odds >= 2) & (evens >= 2)
+        top += np.where(full, number * mean * 0.5 * (one + other), 0.0)
+        below += np.where(full, number * one * other, 0.0)
+    return top, below
+
+
+def ratio(top: FloatArray, below: FloatArray) -> Slope:
+    """sum(top)/sum(below) over windows, with the standard error of their scatter; gross windows left out once."""
+    if below.sum() <= 0.0:
+        return Slope(np.nan, np.inf, 0)
+    value = top.sum() / below.sum()
+    weight = np.sqrt(np.maximum(below, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.where(weight > 0.0, (top - value * below) / weight, 0.0)
+    limit = 6.0 * spread(off)
+    keep = np.abs(off) <= limit if limit > 0.0 else np.ones(len(off), dtype=bool)
+    if keep.sum() > 0.7 * len(keep) and below[keep].sum() > 0.0:
+        top, below = top[keep], below[keep]
+        value = top.sum() / below.sum()
+    windows = len(top)
+    if windows < 4:
+        return Slope(float(value), np.inf, windows)
+    residual = top - value * below
+    error = np.sqrt((residual**2).sum() * windows / (windows - 1)) / below.sum()
+    return Slope(float(value), float(error), windows)
+
+
+def runs(bad: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(start, end) of each stretch where `bad` holds. Shape (stretches, 2)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
+    return edges.reshape(-1, 2)
+
+
+def smooth(values: FloatArray, width: int) -> FloatArray:
+    """Mean over `width` rows (odd), centred, along axis 0; shorter at the ends. Missing values are left out."""
+    if width <= 1 or len(values) < 2:
+        return values
+    half = width // 2
+    good = np.isfinite(values)
+    total = np.cumsum(np.concatenate([np.zeros_like(values[:1]), np.where(good, values, 0.0)]), axis=0)
+    number = np.cumsum(np.concatenate([np.zeros_like(good[:1], dtype=float), good.astype(float)]), axis=0)
+    n = len(values)
+    low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (total[high] - total[low]) / (number[high] - number[low])

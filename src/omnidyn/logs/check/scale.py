@@ -1,0 +1,432 @@
+"""Units and scales: what is proportional to something else, but not equal to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.logs.channels import components
+from omnidyn.logs.check.reference import Ground, electric_speed, emf, ground, volts, wheels_twist
+from omnidyn.logs.check.robust import Slope, slope, smooth, spread, windowed
+from omnidyn.logs.check.work import MIN_ROWS, Work
+from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
+from omnidyn.units import DEGREE, TURN
+
+FloatArray = NDArray[np.float64]
+
+LEAST = 0.02  # a scale that is off by less is not worth a word
+UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file is not exact either
+ALONE = 0.05  # of the signal: what is less is no motion
+
+# How many times too large a value is, if it is read in the unit before "read as".
+TURN_UNITS = {"rpm read as rad/s": 60.0 / TURN, "deg/s read as rad/s": 1.0 / DEGREE,
+              "turns/s read as rad/s": 1.0 / TURN, "rad/s read as rpm": TURN / 60.0,
+              "rad/s read as deg/s": DEGREE}  # fmt: skip
+ANGLE_UNITS = {"deg read as rad": 1.0 / DEGREE, "turns read as rad": 1.0 / TURN, "rad read as deg": DEGREE}
+LENGTH_UNITS = {"mm read as m": 1e3, "cm read as m": 1e2, "m read as mm": 1e-3, "m read as cm": 1e-2}
+CURRENT_UNITS = {"mA read as A": 1e3, "A read as mA": 1e-3}
+TIME_UNITS = {"ms read as s": 1e3, "us read as s": 1e6, "ns read as s": 1e9, "s read as ms": 1e-3}
+
+
+class Scales(NamedTuple):
+    """How the channels of speed compare. Each slope is (other channel)/(wheel speed), 1 where they agree.
+
+    linear, yaw: over the floor. electric: by voltage and current. wheels: by each wheel, against the best of them.
+    """
+
+    linear: Slope | None
+    yaw: Slope | None
+    electric: Slope | None
+
+
+def check_scale(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on units and scales; the work with the wheel speeds put right."""
+    if len(work) < MIN_ROWS:
+        return [], work
+    found: list[Finding] = []
+    found += _own_derivatives(work)
+    more, work = _current(work)
+    found += more
+    dead, work = _dead_wheels(work)
+    found += dead
+    more, work = _speeds(work)
+    found += more
+    more, work = _single_wheels(work)
+    found += more
+    return found + _duty_as_voltage(work), work
+
+
+def unit_of(factor: float, units: dict[str, float]) -> str:
+    """The unit mistake that makes values so many times too large; empty where none does."""
+    if not np.isfinite(factor) or factor <= 0.0:
+        return ""
+    off = {name: abs(np.log(factor / size)) for name, size in units.items()}
+    name = min(off, key=lambda each: off[each])
+    return name if off[name] < UNIT_OFF else ""
+
+
+# --- a channel and its own derivative: needs no robot ---
+
+
+def _own_derivatives(work: Work) -> list[Finding]:
+    """Position and speed of the same thing: their ratio is 1, or a unit is wrong."""
+    found = []
+    for name, against, rate, speed, units in _pairs(work):
+        ids, count = work.windows()
+        line = slope(rate, speed, ids, count)
+        if not line.differs(1.0, 0.03, 6.0) or line.windows < 6:
+            continue
+        # rate = line * speed: speed is 1/line too large, or the time is.
+        unit, clock = unit_of(1.0 / line.value, units), unit_of(1.0 / line.value, TIME_UNITS)
+        words = f"{against} changes {line.value:.4g} times as fast as {name} says"
+        if unit:
+            found.append(_unit_finding(name, f"{words}: {unit}?", 1.0 / line.value))
+        elif clock or (line.value < 0.02 or line.value > 50.0):
+            found.append(Finding(
+                "time_unit", FATAL, "t", f"{words}: the time is not in the unit given" + (f" ({clock}?)" if clock else ""),
+                "give the unit of the time column, such as --column t=NAME:ms", (), 0, {"ratio": line.value},
+            ))  # fmt: skip
+        else:
+            found.append(Finding(
+                "scale", WARN, name, words + f" (+-{line.error:.2g})",
+                "one of the two has a wrong scale, or they are not of the same thing", (), 0,
+                {"ratio": line.value, "error": line.error},
+            ))  # fmt: skip
+    return found
+
+
+def _pairs(work: Work) -> Iterator[tuple[str, str, FloatArray, FloatArray, dict[str, float]]]:
+    """(speed, position, derivative of the position, speed smoothed alike, units of the speed)."""
+    half = max(1, round(0.05 / work.step)) if work.step > 0.0 else 1
+    pose, twist = work.get("pose"), work.get("twist")
+    if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
+        heading = np.where(np.isfinite(pose[:, 2]), pose[:, 2], np.nan)
+        yield "omega", "heading", _rate(heading, work.t, half, TURN), smooth(twist[:, 2], 2 * half + 1), TURN_UNITS
+    angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
+    if angle is not None and speed is not None and angle.shape == speed.shape:
+        for name, a, w in zip(components("wheel_speed", speed.shape[1]), angle.T, speed.T, strict=True):
+            yield name, name.replace("w", "a"), _rate(a, work.t, half), smooth(w, 2 * half + 1), TURN_UNITS
+
+
+def _rate(values: FloatArray, t: FloatArray, half: int, period: float = 0.0) -> FloatArray:
+    out = np.full(len(values), np.nan)
+    if period:
+        good = np.isfinite(values)
+        values = values.copy()
+        values[good] = np.unwrap(values[good], period=period)
+    if len(values) > 2 * half:
+        out[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
+    return out
+
+
+def _unit_finding(where: str, words: str, factor: float) -> Finding:
+    return Finding(
+        "unit", FATAL, where, words, "give the unit of the column (--column NAME:UNIT) or its side of the gear",
+        (), 0, {"factor": factor},
+    )  # fmt: skip
+
+
+# --- speeds of the wheels against floor and motors ---
+
+
+def scales(work: Work) -> Scales | None:
+    """The slopes of what is known of the speeds; None without wheel speeds or a robot."""
+    speed = work.full("wheel_speed")
+    if speed is None or work.geometry is None:
+        return None
+    seen = ground(work)
+    ids, count = work.windows()
+    linear = yaw = electric = None
+    if seen is not None:
+        linear, yaw = _against_floor(work, seen, speed, ids, count)
+    implied = electric_speed(work)
+    if implied is not None:
+        # The noise of the speed is small beside that of the currents: it is the better regressor.
+        electric = slope(implied, speed, ids, count)
+    return Scales(linear, yaw, electric)
+
+
+def _against_floor(work: Work, seen: Ground, speed: FloatArray, ids, count: int) -> tuple[Slope | None, Slope | None]:
+    own = wheels_twist(work, speed, seen.width)
+    if own is None:
+        return None, None
+    robot = work.geometry
+    length = float(np.mean(robot.wheels.robot_radius)) if robot else 0.1
+    size = np.nanmean(own[:, :2] ** 2) + np.nanmean((own[:, 2] * length) ** 2)
+    axes = [k for k in seen.axes if k < 2]
+    linear = yaw = None
+    if axes and np.nanmean(own[:, axes] ** 2) > ALONE**2 * size:
+        linear = slope(seen.twist[:, axes], own[:, axes], ids, count)
+    if 2 in seen.axes and np.nanmean((own[:, 2] * length) ** 2) > ALONE**2 * size:
+        yaw = slope(seen.twist[:, 2], own[:, 2], ids, count)
+    return linear, yaw
+
+
+def _speeds(work: Work) -> tuple[list[Finding], Work]:
+    """The one scale of all wheel speeds, judged by floor and motors together."""
+    these = scales(work)
+    if these is None:
+        return [], work
+    floor = _joined([line for line in (these.linear, these.yaw) if line is not None])
+    electric = these.electric if these.electric is not None and these.electric.windows >= 6 else None
+    robot = work.geometry
+    assert robot is not None
+    factor = floor if floor is not None else electric
+    if factor is None:
+        return _emf_alone(work)
+    work = work.knowing(floor_ratio=floor, electric_ratio=electric)
+    units = {**TURN_UNITS, "the motor's speed read as the wheel's": float(np.mean(robot.motor.gear_ratio)),
+             "the motor's rpm read as the wheel's rad/s": float(np.mean(robot.motor.gear_ratio)) * 60.0 / TURN}  # fmt: skip
+    unit = unit_of(1.0 / factor.value, units) if abs(np.log(abs(factor.value) + 1e-12)) > 0.5 else ""
+    names = " ".join(components("wheel_speed", work.wheels))
+    if unit and (electric is None or floor is None or abs(np.log(max(electric.value, 1e-9) / factor.value)) < 0.5):
+        speed = work.channels["wheel_speed"]
+        source = "the motion over the floor" if floor is not None else "voltage and current"
+        found = [_unit_finding(names, f"the wheel speeds are {1 / factor.value:.4g} times what {source} says: {unit}?",
+                               1.0 / factor.value)]  # fmt: skip
+        return found, work.replace(wheel_speed=speed * factor.value)
+    return _ratio_findings(work, these, floor, electric, names)
+
+
+def _joined(lines: list[Slope]) -> Slope | None:
+    """The weighted mean of slopes, by their errors."""
+    lines = [line for line in lines if np.isfinite(line.error) and line.error > 0.0 and line.windows >= 6]
+    if not lines:
+        return None
+    weight = np.array([1.0 / max(line.error, 1e-4) ** 2 for line in lines])
+    value = float(np.dot(weight, [line.value for line in lines]) / weight.sum())
+    return Slope(value, float(weight.sum() ** -0.5), min(line.windows for line in lines))
+
+
+def _ratio_findings(
+    work: Work, these: Scales, floor: Slope | None, electric: Slope | None, names: str
+) -> tuple[list[Finding], Work]:
+    off_floor = floor is not None and floor.differs(1.0, LEAST)
+    off_motor = electric is not None and electric.differs(1.0, LEAST)
+    numbers = {}
+    for name, line in (("floor_ratio", floor), ("electric_ratio", electric)):
+        if line is not None:
+            numbers |= {name: line.value, name + "_error": line.error}
+    speed = work.channels["wheel_speed"]
+    if these.linear is not None and these.yaw is not None:
+        apart = _apart(these.linear, these.yaw)
+        if apart is not None and not these.linear.differs(1.0, LEAST):
+            return [_yaw_only(these.yaw)], work
+    if off_floor and floor is not None and off_motor and electric is not None and _same(floor, electric):
+        both = _joined([floor, electric]) or floor
+        return [Finding(
+            "gear", WARN, names,
+            f"floor and motors agree that the wheels turn {both.value:.4g} times (+-{both.error:.2g}) what wheel_speed says: "
+            "a wrong gear ratio or a wrong number of counts per turn in the log",
+            "divide by the right gear ratio, or give the right counts per turn", (), 0, {**numbers, "ratio": both.value},
+        )], work.replace(wheel_speed=speed * both.value).knowing(floor_ratio=None)  # fmt: skip
+    found = []
+    if off_floor and floor is not None:
+        found.append(_path_ratio(floor, electric, off_motor, names, numbers))
+    if off_motor and electric is not None:
+        found.append(_motor_constants(electric, floor, off_floor, names, numbers))
+    return found, work
+
+
+def _same(a: Slope, b: Slope) -> bool:
+    return abs(a.value - b.value) < max(0.4 * min(abs(a.value - 1.0), abs(b.value - 1.0)), 3.0 * np.hypot(a.error, b.error))
+
+
+def _apart(a: Slope, b: Slope) -> float | None:
+    away = b.value - a.value
+    return away if abs(away) > LEAST and abs(away) > 4.0 * np.hypot(a.error, b.error) else None
+
+
+def _yaw_only(yaw: Slope) -> Finding:
+    return Finding(
+        "robot_radius", WARN, "omega",
+        f"the robot turns {yaw.value:.4g} times (+-{yaw.error:.2g}) as fast as its wheels say, while it drives as far as "
+        "they say: the robot radius of the file is not that of the robot, or the gyro has a wrong scale",
+        f"try a robot radius {1.0 / yaw.value:.4g} times as large", (), 0, {"ratio": yaw.value, "error": yaw.error},
+    )  # fmt: skip
+
+
+def _path_ratio(
+    floor: Slope, electric: Slope | None, off_motor: bool, names: str, numbers: dict[str, float]
+) -> Finding:
+    """Floor and wheels disagree everywhere alike."""
+    words = f"the robot covers {floor.value:.4g} (+-{floor.error:.2g}) of the path that its wheels roll"
+    if electric is not None and not off_motor and floor.value < 1.0:
+        return Finding(
+            "slip", WARN, names, words + ", the whole log through, while voltage and current agree with the wheels: it "
+            "slips, or the wheel radius of the file is too large",
+            "take the motion over the floor for friction; measure the wheel radius by rolling slowly", (), 0, numbers,
+        )  # fmt: skip
+    if electric is not None and not off_motor:
+        return Finding(
+            "wheel_radius", WARN, names, words + ", while voltage and current agree with the wheels: the wheel radius of "
+            "the file is too small, or the ground speed has a wrong scale",
+            f"try a wheel radius {floor.value:.4g} times as large", (), 0, numbers,
+        )  # fmt: skip
+    slips = " it slips, or" if floor.value < 1.0 else ""
+    return Finding(
+        "path_ratio", WARN, names, words + f", the whole log through:{slips} the gear ratio (counts per turn) of the log "
+        "or the wheel radius of the file is wrong",
+        "roll the robot over a measured distance by hand: that tells slip from a wrong radius or gear", (), 0, numbers,
+    )  # fmt: skip
+
+
+def _motor_constants(
+    electric: Slope, floor: Slope | None, off_floor: bool, names: str, numbers: dict[str, float]
+) -> Finding:
+    words = f"by voltage and current the wheels turn {electric.value:.4g} times (+-{electric.error:.2g}) what wheel_speed says"
+    if floor is not None and not off_floor:
+        return Finding(
+            "motor_constants", NOTE, names, words + ", while the floor agrees with the wheels: K, R or the gear ratio of "
+            "the robot file, or the scale of voltage or current, is off",
+            "identify the motor from this log", (), 0, numbers,
+        )  # fmt: skip
+    return Finding(
+        "gear", WARN, names, words + ": the gear ratio, the counts per turn, or K and R of the robot file are off",
+        "check the gear ratio; roll the robot over a measured distance by hand", (), 0, numbers,
+    )  # fmt: skip
+
+
+def _emf_alone(work: Work) -> tuple[list[Finding], Work]:
+    """Without floor and current: speeds that no motor reaches at these voltages."""
+    speed, voltage = work.full("wheel_speed"), volts(work)
+    counter = None if speed is None else emf(work, speed)
+    if counter is None or voltage is None or speed is None or counter.shape != voltage.shape:
+        return [], work
+    good = np.isfinite(counter) & np.isfinite(voltage)
+    if not good.any():
+        return [], work
+    excess = float((np.abs(counter[good]) * np.abs(voltage[good])).sum() / max((voltage[good] ** 2).sum(), 1e-12))
+    if excess < 1.5:
+        return [], work
+    robot = work.geometry
+    assert robot is not None
+    gear = float(np.mean(robot.motor.gear_ratio))
+    # At the voltages given a motor turns at most 1, usually 0.5 to 1 times as fast as without load.
+    fits = {name: factor for name, factor in {**TURN_UNITS, "the motor's speed read as the wheel's": gear}.items()
+            if 0.2 < excess / factor < 1.15}  # fmt: skip
+    likely = max(fits, key=lambda name: -abs(np.log(excess / fits[name] / 0.7))) if fits else ""
+    words = f"the wheel speeds imply a back-EMF {excess:.3g} times the voltage applied"
+    names = " ".join(components("wheel_speed", work.wheels))
+    found = [_unit_finding(names, words + (f": {likely}?" if likely else ": the unit of speed or voltage is wrong"),
+                           excess)]  # fmt: skip
+    return found, work.replace(wheel_speed=speed * np.nan)
+
+
+def _dead_wheels(work: Work) -> tuple[list[Finding], Work]:
+    """A wheel whose speed is noise only, while floor or motor says that it turns."""
+    found: list[Finding] = []
+    line = _wheel_lines(work)
+    if line is None:
+        return found, work
+    source, slopes, sizes = line
+    for k, (a, size) in enumerate(zip(slopes, sizes, strict=True)):
+        name = components("wheel_speed", work.wheels)[k]
+        if np.isfinite(a.error) and a.windows >= 6 and size > 0.2 * max(sizes) and abs(a.value) < 0.1 and a.error < 0.05:
+            found.append(Finding(
+                "dead", FATAL, name, f"{name} is noise about 0, while {source} says that the wheel turns",
+                "look at its encoder, its cable and its column; leave it out otherwise",
+                work.lines(np.ones(len(work), dtype=bool)), len(work), {"slope": a.value, "error": a.error},
+            ))  # fmt: skip
+            work = work.masked("wheel_speed", k, np.ones(len(work), dtype=bool))
+    return found, work
+
+
+def _wheel_lines(work: Work) -> tuple[str, list[Slope], list[float]] | None:
+    """(source, slope of each wheel's speed on what it should be, how much that moves)."""
+    from omnidyn.logs.check.reference import expected_wheel_speed
+
+    speed, expected = work.get("wheel_speed"), expected_wheel_speed(work)
+    if speed is None or expected is None or expected[1].shape != speed.shape or work.geometry is None:
+        return None
+    seen = ground(work)
+    width = seen.width if seen is not None and expected[0].endswith(seen.name) else 1
+    w = smooth(speed, width)
+    ids, count = work.windows()
+    slopes = [slope(w[:, k], expected[1][:, k], ids, count) for k in range(speed.shape[1])]
+    sizes = [float(np.sqrt(np.nanmean(column**2))) if np.isfinite(column).any() else 0.0 for column in expected[1].T]
+    return expected[0], slopes, sizes
+
+
+def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
+    """One wheel that differs from the others: its own radius, gear or counter."""
+    line = _wheel_lines(work)
+    if line is None or work.known.get("floor_ratio") is None and not line[0].startswith("voltage"):
+        return [], work
+    source, slopes, sizes = line
+    good = [k for k, a in enumerate(slopes) if np.isfinite(a.error) and a.windows >= 6 and sizes[k] > 0.2 * max(sizes)]
+    if len(good) < 3:
+        return [], work
+    found = []
+    for k in good:
+        others = [slopes[j].value for j in good if j != k]
+        if np.ptp(others) > 0.02 or not slopes[k].differs(float(np.mean(others)), 0.03, 5.0):
+            continue
+        off = slopes[k].value / float(np.mean(others))
+        name = components("wheel_speed", work.wheels)[k]
+        found.append(Finding(
+            "wheel_scale", WARN, name, f"{name} reads {off:.4g} times what {source} says, measured by the other wheels",
+            "that wheel has another radius, gear or counter; give it its own in the mapping or the robot file", (), 0,
+            {"ratio": off, "error": slopes[k].error},
+        ))  # fmt: skip
+    return (found, work) if len(found) == 1 else ([], work)
+
+
+# --- currents and voltages ---
+
+
+def _current(work: Work) -> tuple[list[Finding], Work]:
+    """Currents in the wrong unit, by what voltage and speed leave for R i, or by the largest a motor can draw."""
+    current, voltage, robot = work.full("current"), volts(work), work.geometry
+    if current is None or robot is None:
+        return [], work
+    names = " ".join(components("current", work.wheels))
+    stall = float(np.max(robot.motor.voltage_limit)) / float(np.min(robot.motor.resistance))
+    high = float(np.nanquantile(np.abs(current), 0.95))
+    if high > 20.0 * stall:
+        unit = unit_of(high / (0.3 * stall), {"mA read as A": 1e3}) or "mA read as A" if high < 3e3 * stall else ""
+        words = f"currents of {high:.4g} A, where a blocked motor draws {stall:.3g} A" + (f": {unit}?" if unit else "")
+        return [_unit_finding(names, words, high / stall)], work.replace(current=current * (1e-3 if unit else np.nan))
+    speed = work.full("wheel_speed")
+    counter = None if speed is None else emf(work, speed)
+    if voltage is None or counter is None or work.log.current_unsigned:
+        return [], work
+    ids, count = work.windows()
+    ohm = current * np.mean(robot.motor.resistance)
+    line = slope(voltage - counter, ohm, ids, count)
+    unit = unit_of(1.0 / line.value, CURRENT_UNITS) if np.isfinite(line.error) and line.value > 0.0 else ""
+    if unit and line.differs(1.0, 0.5):
+        words = f"the currents are {1 / line.value:.3g} times what voltage and speed leave for them: {unit}?"
+        return [_unit_finding(names, words, 1.0 / line.value)], work.replace(current=current * line.value)
+    return [], work
+
+
+def _duty_as_voltage(work: Work) -> list[Finding]:
+    """A voltage that never leaves -1..1 while the speeds want more, or that counts to 255."""
+    voltage, robot = work.get("voltage"), work.geometry
+    if voltage is None or robot is None:
+        return []
+    limit = float(np.max(robot.motor.voltage_limit))
+    high = float(np.nanmax(np.abs(voltage)))
+    speed = work.get("wheel_speed")
+    counter = None if speed is None else emf(work, speed)
+    names = " ".join(components("voltage", work.wheels))
+    if high > 1.5 * limit:
+        unit = "pwm 0..255 read as volts" if 2.0 * limit < high <= 256.0 and limit < 100.0 else (
+            "mV read as V" if high > 100.0 * limit else "")  # fmt: skip
+        words = f"voltages up to {high:.4g} V, where the driver of the robot file gives {limit:.4g} V"
+        return [_unit_finding(names, words + (f": {unit}?" if unit else ""), high / limit)]
+    if counter is not None and high <= 1.0 and limit > 2.0 and float(np.nanquantile(np.abs(counter), 0.95)) > 1.5 * high:
+        return [_unit_finding(names, f"voltages within -1..1 ({high:.3g} at most), while the speeds need "
+                              f"{float(np.nanquantile(np.abs(counter), 0.95)):.3g} V: duty read as volts?", 1.0)]  # fmt: skip
+    return []
+
+
+def leftover(work: Work, values: FloatArray) -> float:
+    """Robust scatter of window means: what is left of a residual when noise is averaged out."""
+    ids, count = work.windows()
+    number = np.maximum(np.bincount(ids, weights=np.isfinite(values), minlength=count), 1.0)
+    return spread(windowed(ids, count, values) / number)

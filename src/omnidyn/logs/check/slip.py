@@ -1,0 +1,106 @@
+"""Slip in some stretch: where the robot covers less of the path that its wheels roll than it does elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.logs.channels import components
+from omnidyn.logs.check.reference import ground, wheels_twist
+from omnidyn.logs.check.robust import products, slope
+from omnidyn.logs.check.work import MIN_ROWS, Work
+from omnidyn.logs.findings import WARN, Finding
+
+FloatArray = NDArray[np.float64]
+
+WINDOW, SHORTEST = 0.15, 0.4  # [s]
+LEAST, SURE = 0.025, 6.0  # of the ratio; standard errors, over all stretches that are looked at
+STRETCHES = 3
+MAX_WINDOWS = 400
+
+
+def check_slip(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on stretches that slip; the motion over the floor is masked there."""
+    found: list[Finding] = []
+    for _ in range(STRETCHES):
+        stretch = _worst(work)
+        if stretch is None:
+            break
+        bad, inside, outside, error = stretch
+        seen = ground(work)
+        assert seen is not None
+        names = " ".join(components("wheel_speed", work.wheels))
+        rows = np.flatnonzero(bad)
+        found.append(Finding(
+            "slip", WARN, names,
+            f"from t = {work.t[rows[0]]:.5g} to {work.t[rows[-1]]:.5g} s the robot covers {inside / outside:.3g} "
+            f"(+-{error:.2g}) of the path its wheels roll, measured by the rest of the log ({inside:.3g} there, "
+            f"{outside:.3g} elsewhere): it slips, or was pushed",
+            "leave those rows out of fits of wheel speed against ground speed", work.lines(bad), int(bad.sum()),
+            {"ratio": inside / outside, "error": error, "from_s": float(work.t[rows[0]]), "to_s": float(work.t[rows[-1]])},
+        ))  # fmt: skip
+        values = work.channels[seen.name].copy()
+        values[bad] = np.nan
+        work = work.replace(**{seen.name: values})
+    return found, work
+
+
+def _worst(work: Work) -> tuple[NDArray[np.bool_], float, float, float] | None:
+    """(rows, ratio inside, ratio outside, error of their quotient) of the stretch that differs most, if it is sure."""
+    speed, seen = work.full("wheel_speed"), ground(work)
+    if speed is None or seen is None or work.geometry is None or len(work) < 3 * MIN_ROWS:
+        return None
+    own = wheels_twist(work, speed, seen.width)
+    assert own is not None
+    length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
+    for weights in (length, _levelled(work, seen.twist, own, length)):
+        # An axis with a scale of its own is no slip: the contrast has to be there without it as well.
+        stretch = _contrast(work, seen.twist * weights, own * length, seen.axes)
+        if stretch is None:
+            return None
+    return stretch
+
+
+def _levelled(work: Work, floor: FloatArray, own: FloatArray, length: FloatArray) -> FloatArray:
+    """Weights that give floor and wheels the same slope about yaw as along x and y."""
+    ids, count = work.windows()
+    linear, yaw = slope(floor[:, :2], own[:, :2], ids, count), slope(floor[:, 2], own[:, 2], ids, count)
+    apart = abs(linear.value - yaw.value)
+    if not (apart > 0.03 and apart > 5.0 * np.hypot(linear.error, yaw.error)) or min(linear.value, yaw.value) <= 0.1:
+        return length
+    return length * np.array([1.0, 1.0, linear.value / yaw.value])
+
+
+def _contrast(
+    work: Work, floor: FloatArray, own: FloatArray, axes: list[int]
+) -> tuple[NDArray[np.bool_], float, float, float] | None:
+    ids, count = work.windows(WINDOW)
+    top, below = products(floor[:, axes], own[:, axes], ids, count)
+    if count > MAX_WINDOWS or below.sum() <= 0.0:
+        return None
+    overall = top.sum() / below.sum()
+    weight = np.maximum(below, 1e-3 * below.mean())
+    residual = (top - overall * below) / np.sqrt(weight)
+    # From one window to the next slip does not change, noise does.
+    noise = 1.4826 * np.median(np.abs(np.diff(residual))) / np.sqrt(2.0)
+    noise = max(noise, 1e-6 * np.sqrt(below.mean()))
+    numbers = np.concatenate([[0.0], np.cumsum(top)]), np.concatenate([[0.0], np.cumsum(np.maximum(below, 0.0))])
+    shortest = max(2, round(SHORTEST / (work.step * max(1, (ids == 0).sum()))))
+    starts, ends = np.triu_indices(count + 1, shortest)
+    n_in, d_in = numbers[0][ends] - numbers[0][starts], numbers[1][ends] - numbers[1][starts]
+    n_out, d_out = numbers[0][-1] - n_in, numbers[1][-1] - d_in
+    good = (d_in > 0.02 * numbers[1][-1]) & (d_out > 0.02 * numbers[1][-1])
+    if not good.any():
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = n_in / d_in - n_out / d_out
+        error = noise * np.sqrt(1.0 / d_in + 1.0 / d_out)
+        sure = np.where(good, np.abs(away) / error, 0.0)
+    k = int(np.argmax(sure))
+    inside, outside = n_in[k] / d_in[k], n_out[k] / d_out[k]
+    rows = (ids >= starts[k]) & (ids < ends[k])
+    if inside > outside:  # then the rest is what slips
+        inside, outside, rows = outside, inside, ~rows
+    if sure[k] < SURE or outside <= 0.1 or (outside - inside) / outside < LEAST:
+        return None
+    return rows, float(inside), float(outside), float(error[k] / outside)

@@ -1,0 +1,295 @@
+"""Single channels: missing values, channels that never change, encoders that stick, steps of quantisation, spikes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.logs.channels import place
+from omnidyn.logs.check.reference import expected_wheel_speed
+from omnidyn.logs.check.robust import MAD, quantum, runs, sample, smooth, spread, white_noise
+from omnidyn.logs.check.work import INPUTS, MIN_ROWS, Work
+from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
+from omnidyn.logs.log import MAX_MISSING
+from omnidyn.logs.mapping import MOTOR_SIDE
+from omnidyn.units import known_unit
+
+FloatArray = NDArray[np.float64]
+
+MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
+SENSORS = ("current", "wheel_speed", "twist")
+SPIKE = 10.0  # a single value so many times the noise away from both its neighbours
+IMPOSSIBLE = 1e-6  # chance, over the whole log, below which repeated values are no chance
+
+
+def check_values(work: Work) -> tuple[list[Finding], Work]:
+    """All findings on single channels; what sticks or spikes is masked, what is dead taken out."""
+    found = _missing(work)
+    if len(work) < MIN_ROWS:
+        return found, work
+    found += _quantised(work)
+    for family in (_constant, _stuck, _spikes):
+        more, work = family(work)
+        found += more
+    return found, work
+
+
+def _missing(work: Work) -> list[Finding]:
+    found = []
+    for channel in work.channels:
+        for component, values in work.columns(channel):
+            bad = ~np.isfinite(values)
+            share = float(bad.mean())
+            if share > 0.0:
+                grave = share > MAX_MISSING and channel not in ("pose", "twist", "supply")
+                found.append(Finding(
+                    "missing", WARN if grave else NOTE, component, f"{100 * share:.3g} % of {component} is missing",
+                    "rows without it are not used where it is needed", work.lines(bad), int(bad.sum()),
+                    {"share": share},
+                ))  # fmt: skip
+    return found
+
+
+def _quantised(work: Work) -> list[Finding]:
+    """Steps of a sensor that matter: not hidden in its noise, and a tenth of what it usually reads or more."""
+    found = []
+    expected = expected_wheel_speed(work)
+    for channel in SENSORS:
+        for k, (component, values) in enumerate(work.columns(channel)):
+            step = quantum(values)
+            usual = float(np.median(np.abs(values[np.isfinite(values) & (values != 0.0)]))) if values.any() else 0.0
+            if not step or step < 0.02 * usual:
+                continue
+            words = f"{component} counts in steps of {step:.4g} {_unit_words(work, component, step)}".rstrip()
+            zero = values == 0.0
+            slow = np.zeros(len(work), dtype=bool)
+            if channel == "wheel_speed" and expected is not None and expected[1].shape[1] > k:
+                width = max(3, round(0.1 / work.step) | 1)
+                turning = np.abs(smooth(expected[1][:, k], width))
+                sure = 5.0 * white_noise(expected[1][:, k]) / np.sqrt(width)
+                slow = zero & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
+            if slow.mean() > 0.2:
+                found.append(Finding(
+                    "reads_zero", WARN, component,
+                    f"{component} reads 0 in {100 * slow.mean():.0f} % of the rows while {expected[0]} says it turns, "  # type: ignore[index]
+                    f"slower than two steps of its encoder ({step:.4g} rad/s)",
+                    "take its speed from counts over a longer time, or from the other wheels", work.lines(slow),
+                    int(slow.sum()), {"step": step, "share": float(slow.mean())},
+                ))  # fmt: skip
+            found.append(Finding(
+                "quantised", NOTE, component, words + f", {100 * step / usual:.0f} % of its usual size",
+                "average over longer windows; a sample alone says little", (), 0,
+                {"step": step, "usual": usual, "noise": white_noise(values)},
+            ))  # fmt: skip
+    return found
+
+
+def _unit_words(work: Work, component: str, step: float) -> str:
+    """The step as it stands in the file, where its unit is another."""
+    column = work.log.columns.columns.get(component)
+    si = {"c": "A", "w": "rad/s", "t": "in SI"}[place(component)[0][0]]  # type: ignore[index]
+    unit = known_unit(column.unit) if column is not None else None
+    if column is None or unit is None:
+        return si
+    size = unit.size
+    if column.side == MOTOR_SIDE and work.robot is not None:
+        size /= float(np.mean(work.robot.motor.gear_ratio))
+    return si if abs(size - 1.0) < 1e-9 else f"{si} ({step / size:.4g} {unit.text} in column {column.name})"
+
+
+def _constant(work: Work) -> tuple[list[Finding], Work]:
+    """Channels that never change, while something says they should."""
+    found = []
+    for channel in work.channels:
+        columns = work.columns(channel)
+        flat = {name: bool(np.nanmax(values) == np.nanmin(values)) for name, values in columns}
+        for component, values in columns:
+            if not flat[component] or channel in ("supply",):
+                continue
+            k = place(component)[1]  # type: ignore[index]
+            reason = _should_move(work, channel, k, all(flat.values()))
+            if reason:
+                found.append(Finding(
+                    "dead", FATAL if channel not in ("pose", "twist_command", "wheel_speed_command") else WARN,
+                    component, f"{component} is {np.nanmax(values):.4g} in every row, while {reason}",
+                    "look at its sensor, its cable and its column; leave it out otherwise",
+                    work.lines(np.ones(len(work), dtype=bool)), len(work), {"value": float(np.nanmax(values))},
+                ))  # fmt: skip
+                work = work.masked(channel, k, np.ones(len(work), dtype=bool))
+    return found, work
+
+
+def _should_move(work: Work, channel: str, k: int, all_flat: bool) -> str:
+    """Why a constant component should change: what else moves. Empty where nothing says so."""
+    if channel in ("voltage", "duty"):
+        current, speed = work.get("current"), work.get("wheel_speed")
+        driven = current is not None and k < current.shape[1] and _moves(current[:, k])
+        turned = speed is not None and k < speed.shape[1] and _moves(speed[:, k])
+        return f"current and speed of motor {k + 1} change" if driven and turned and not all_flat else ""
+    if channel == "current":
+        for other in ("voltage", "duty"):
+            values = work.get(other)
+            if values is not None and k < values.shape[1] and _moves(values[:, k]):
+                return f"its motor gets a changing {other}"
+        return "the other motors draw current" if not all_flat and _wheel_moves(work, k) else ""
+    if channel in ("wheel_speed", "wheel_angle"):
+        return _wheel_reason(work, channel, k)
+    if channel == "twist" and not all_flat:
+        speed, robot = work.full("wheel_speed"), work.geometry
+        if speed is None or robot is None:
+            return ""
+        from omnidyn.model.wheels import twist_from_wheel_speed
+
+        own = twist_from_wheel_speed(robot.wheels, speed)[:, k]
+        scale = float(np.nanstd(twist_from_wheel_speed(robot.wheels, speed), axis=0).max())
+        return "the wheels say it changes" if float(np.nanstd(own)) > 0.1 * scale and _moves(own) else ""
+    if channel == "pose" and k == 2:
+        twist = work.get("twist")
+        return "omega says it turns" if twist is not None and _moves(twist[:, 2]) else ""
+    return ""
+
+
+def _wheel_reason(work: Work, channel: str, k: int) -> str:
+    expected = expected_wheel_speed(work, without=channel)
+    if expected is None or k >= expected[1].shape[1]:
+        return ""
+    own = expected[1][:, k]
+    others = np.delete(expected[1], k, axis=1)
+    sizes = [spread_of_motion(column) for column in others.T]
+    usual = max(sizes) if sizes else 0.0
+    return f"{expected[0]} says that the wheel turns" if spread_of_motion(own) > 0.1 * usual and _moves(own) else ""
+
+
+def spread_of_motion(values: FloatArray) -> float:
+    """How far a channel gets from 0, without its wildest rows."""
+    values = values[np.isfinite(values)]
+    return float(np.quantile(np.abs(values), 0.95)) if values.size else 0.0
+
+
+def _wheel_moves(work: Work, k: int) -> bool:
+    speed = work.get("wheel_speed")
+    return speed is not None and k < speed.shape[1] and _moves(speed[:, k])
+
+
+def _moves(values: FloatArray) -> bool:
+    """Whether a channel does more than its noise and one step of quantisation."""
+    noise = max(white_noise(values), quantum(values))
+    return spread_of_motion(values) > 5.0 * noise and float(np.nanstd(values)) > 0.0
+
+
+def _stuck(work: Work) -> tuple[list[Finding], Work]:
+    """Stretches in which a sensor repeats one value to the last digit while it should not."""
+    found = []
+    expected = expected_wheel_speed(work, without="wheel_speed")
+    for channel in SENSORS:
+        for component, values in work.columns(channel):
+            k = place(component)[1]  # type: ignore[index]
+            reference = None
+            if channel == "wheel_speed" and expected is not None and k < expected[1].shape[1]:
+                reference = expected[1][:, k]
+            bad = _frozen(work, values, reference)
+            if not bad.any():
+                continue
+            stretches = runs(bad)
+            longest = max(work.t[b - 1] - work.t[a] for a, b in stretches)
+            found.append(Finding(
+                "stuck", WARN, component,
+                f"{component} repeats one value to the last digit {len(stretches)} time{'s' * (len(stretches) > 1)}, "
+                f"for up to {longest:.3g} s, while the robot moves",
+                "those rows of it are not used; look at the encoder and its cable", work.lines(bad), int(bad.sum()),
+                {"longest_s": float(longest), "share": float(bad.mean())},
+            ))  # fmt: skip
+            work = work.masked(channel, k, bad)
+    return found, work
+
+
+def _frozen(work: Work, values: FloatArray, reference: FloatArray | None) -> NDArray[np.bool_]:
+    """Rows of repeats that are too long for chance, or during which the reference is somewhere else."""
+    n = len(values)
+    bad = np.zeros(n, dtype=bool)
+    stretches = runs(np.diff(values) == 0.0) + [0, 1]
+    lengths = stretches[:, 1] - stretches[:, 0]
+    long = lengths >= 5
+    if not long.any():
+        return bad
+    chance, usual_length = _chance_of_a_repeat(lengths[values[stretches[:, 0]] != 0.0])
+    away = _Away(values, reference) if reference is not None else None
+    for (a, b), length in zip(stretches[long], lengths[long], strict=True):
+        unlikely = values[a] != 0.0 and length > 3 * usual_length and n * chance ** (length - 1) < IMPOSSIBLE
+        if unlikely or (away is not None and away.during(a, b)):
+            bad[a:b] = True
+    return bad
+
+
+class _Away:
+    """Whether a reference walks away from values that repeat, measured by how far it is from them at other times."""
+
+    def __init__(self, values: FloatArray, reference: FloatArray) -> None:
+        self.residual, self.reference = values - reference, reference
+        size = np.abs(self.residual[np.isfinite(self.residual)])
+        # Where the robot speeds up the two differ more, by a lag or by means: the larger of two measures.
+        usual = max(MAD * float(np.median(size)), float(np.quantile(size, 0.95)) / 1.6) if size.size else np.inf
+        self.usual = max(usual, quantum(values))
+
+    def during(self, a: int, b: int) -> bool:
+        """Over rows a to b."""
+        good = np.isfinite(self.residual[a:b])
+        if good.sum() < 5:
+            return False
+        part = self.residual[a:b][good]
+        far = float(np.median(np.abs(part))) > 3.0 * self.usual
+        moved = float(np.ptp(smooth(self.reference[a:b][good], 5))) > 6.0 * self.usual
+        return far or moved
+
+
+def _chance_of_a_repeat(lengths: NDArray[np.int64]) -> tuple[float, float]:
+    """(chance that a repeat is followed by another, length of the fourth longest stretch), the longest left out.
+
+    The chance is of repeats after repeats: on a plateau a coarse sensor repeats itself a lot.
+    """
+    rest = np.sort(lengths)[:-3] - 1  # number of repeats in each stretch
+    repeats, again = float(rest.sum()), float((rest - 1).sum())
+    return min(1.0, (again + 3.0) / (repeats + 6.0)), float(rest.max(initial=0) + 1)
+
+
+def _spikes(work: Work) -> tuple[list[Finding], Work]:
+    """Single values (or two) far away from both neighbours, which agree with each other."""
+    found = []
+    for channel in MEASURED:
+        for component, values in work.columns(channel):
+            if channel in INPUTS:
+                continue
+            k = place(component)[1]  # type: ignore[index]
+            bad = _isolated(values)
+            if not bad.any() or bad.mean() > 0.2:
+                continue
+            worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
+            found.append(Finding(
+                "spike", WARN, component,
+                f"{int(bad.sum())} single value{'s' * (int(bad.sum()) > 1)} of {component} far from their neighbours, "
+                f"the farthest {values[worst]:.4g} at t = {work.t[worst]:.6g} s",
+                "they are left out where a mean is taken", work.lines(bad), int(bad.sum()),
+                {"farthest": float(values[worst]), "share": float(bad.mean())},
+            ))  # fmt: skip
+            work = work.masked(channel, k, bad)
+    return found, work
+
+
+def _isolated(values: FloatArray) -> NDArray[np.bool_]:
+    n = len(values)
+    bad = np.zeros(n, dtype=bool)
+    if n < MIN_ROWS:
+        return bad
+    before, after = values[:-2], values[2:]
+    jump = np.abs(values[1:-1] - 0.5 * (before + after))
+    apart = np.abs(after - before)
+    small = sample(jump)
+    small = small[np.isfinite(small)]
+    if not small.size:
+        return bad
+    scale = max(MAD * float(np.median(small)), quantum(values), 1e-3 * spread(values), 1e-12)
+    # Heavy tails are no spikes: what is far must be far beyond the usual largest as well.
+    scale = max(scale, float(np.quantile(small, 0.99)) / 3.0)
+    with np.errstate(invalid="ignore"):
+        bad[1:-1] = (jump > SPIKE * scale) & (apart < 0.25 * jump)
+    return bad
