@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from omnidyn.logs.channels import components
 from omnidyn.logs.check.reference import ground, wheels_twist
-from omnidyn.logs.check.robust import products, slope
+from omnidyn.logs.check.robust import MAD, products, slope, smooth
 from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import WARN, Finding
 
@@ -16,6 +16,7 @@ FloatArray = NDArray[np.float64]
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
 LEAST, SURE = 0.025, 6.0  # of the ratio; standard errors, over all stretches that are looked at
 STRETCHES = 3
+LAG = 1.5  # rows by which the channels may lag each other
 MAX_WINDOWS = 400
 
 
@@ -79,11 +80,13 @@ def _contrast(
     if count > MAX_WINDOWS or below.sum() <= 0.0:
         return None
     overall = top.sum() / below.sum()
-    weight = np.maximum(below, 1e-3 * below.mean())
-    residual = (top - overall * below) / np.sqrt(weight)
-    # From one window to the next slip does not change, noise does.
-    noise = 1.4826 * np.median(np.abs(np.diff(residual))) / np.sqrt(2.0)
-    noise = max(noise, 1e-6 * np.sqrt(below.mean()))
+    moving = below > 1e-2 * below.mean()
+    if moving.sum() < 12:
+        return None
+    # From one window to the next slip does not change, noise does; where the robot speeds up there is more of it.
+    residual = ((top - overall * below) / np.sqrt(np.where(moving, below, 1.0)))[moving]
+    changes = np.abs(np.diff(residual)) / np.sqrt(2.0)
+    noise = max(MAD * float(np.median(changes)), float(np.quantile(changes, 0.9)) / 2.0)
     numbers = np.concatenate([[0.0], np.cumsum(top)]), np.concatenate([[0.0], np.cumsum(np.maximum(below, 0.0))])
     shortest = max(2, round(SHORTEST / (work.step * max(1, (ids == 0).sum()))))
     starts, ends = np.triu_indices(count + 1, shortest)
@@ -92,10 +95,13 @@ def _contrast(
     good = (d_in > 0.02 * numbers[1][-1]) & (d_out > 0.02 * numbers[1][-1])
     if not good.any():
         return None
+    # A lag of so many rows adds lag/2 times the change of x^2 over the stretch.
+    square = _at_edges(np.nansum(own[:, axes] ** 2, axis=1), ids, count)
+    lagged = 0.5 * LAG * np.abs(square[ends] - square[starts])
     with np.errstate(divide="ignore", invalid="ignore"):
         away = n_in / d_in - n_out / d_out
         error = noise * np.sqrt(1.0 / d_in + 1.0 / d_out)
-        sure = np.where(good, np.abs(away) / error, 0.0)
+        sure = np.where(good, (np.abs(away) - lagged * (1.0 / d_in + 1.0 / d_out)) / error, 0.0)
     k = int(np.argmax(sure))
     inside, outside = n_in[k] / d_in[k], n_out[k] / d_out[k]
     rows = (ids >= starts[k]) & (ids < ends[k])
@@ -104,3 +110,9 @@ def _contrast(
     if sure[k] < SURE or outside <= 0.1 or (outside - inside) / outside < LEAST:
         return None
     return rows, float(inside), float(outside), float(error[k] / outside)
+
+
+def _at_edges(values: FloatArray, ids: NDArray[np.int64], count: int) -> FloatArray:
+    """Values where the windows begin, and at the end. Shape (count + 1,)."""
+    first = np.searchsorted(ids, np.arange(count))
+    return smooth(values[:, None], 3)[np.append(first, len(values) - 1), 0]

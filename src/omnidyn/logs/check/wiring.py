@@ -75,13 +75,14 @@ class Wiring(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """best: the right wiring with fewest changes. others: as good ones. left, logged: what best and log leave."""
+    """best: the right wiring with fewest changes. others: as good ones. left, logged: share that best and log leave."""
 
     best: Wiring
     others: int
     second: Wiring | None
     left: float
     logged: float
+    rival: str = ""  # the same seen from the floor
 
 
 def wirings(n: int) -> Iterator[Wiring]:
@@ -198,8 +199,11 @@ def _by_floor(work: Work) -> tuple[str, Answer] | None:
     answer = choose(tried, costs, total)
     if axes and name in ("twist", "pose") and answer is not None:
         turned = _by_axes(work, rows, moments, axes, total)
-        if turned is not None and (turned.best.changes < answer.best.changes or turned.left < BETTER * answer.left):
+        # One axis of the floor turned about is rarer than two motors exchanged, which may look the same.
+        if turned is not None and (turned.best.changes + 1 < answer.best.changes or turned.left < BETTER * answer.left):
             return "axes", turned
+        if turned is not None and turned.left < 2.0 * answer.left + 0.02:
+            answer = answer._replace(rival=turned.best.words(_axes_names(work)[1]))
     return None if answer is None else ("wheels", answer)
 
 
@@ -304,7 +308,7 @@ def _code(wiring: Wiring) -> str:
 
 def _rivals(answer: Answer, names: tuple[str, ...]) -> str:
     if answer.second is None:
-        return ""
+        return f" (or, which this log cannot tell apart, {answer.rival})" if answer.rival else ""
     more = f", or {answer.others - 1} more" if answer.others > 1 else ""
     return f" (or, which this log cannot tell apart, {answer.second.words(names)}{more})"
 
