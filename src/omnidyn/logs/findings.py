@@ -155,7 +155,8 @@ def _lines(finding: Finding) -> str:
 def _excited(excitation: Mapping[str, float], width: int) -> list[str]:
     if not excitation:
         return []
-    words = "excites " + ", ".join(f"{name} {value:.3g}" for name, value in excitation.items() if math.isfinite(value))
+    shown = {name: value for name, value in excitation.items() if not name.startswith(("forward_", "backward_"))}
+    words = "excites " + ", ".join(f"{name} {value:.3g}" for name, value in shown.items() if math.isfinite(value))
     return textwrap.wrap(words, max(40, width), initial_indent="  ", subsequent_indent=" " * 9)
 
 

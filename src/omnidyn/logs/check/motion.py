@@ -9,7 +9,7 @@ from omnidyn.logs.channels import components
 from omnidyn.logs.check.reference import ground, volts
 from omnidyn.logs.check.robust import quantum, runs, slope, smooth, white_noise
 from omnidyn.logs.check.work import MIN_ROWS, Work
-from omnidyn.logs.findings import FATAL, WARN, Finding
+from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
 from omnidyn.model.deadzone import moves
 from omnidyn.model.wheels import wheel_speed
 
@@ -29,7 +29,25 @@ def check_motion(work: Work) -> tuple[list[Finding], Work]:
         return [], work
     if still.all():
         return [_never_moved(work)], work
-    return _blocked(work, still) + _droop(work), work
+    return _start_up(work, still) + _blocked(work, still) + _droop(work), work
+
+
+def _start_up(work: Work, still: NDArray[np.bool_]) -> list[Finding]:
+    """A log that begins with its command already set: the first rows are the start, not the motion asked for."""
+    rows = int(np.argmin(still))
+    if rows < 2:
+        return []
+    for channel in ("wheel_speed_command", "twist_command"):
+        command = work.get(channel)
+        if command is not None and np.nanmax(np.abs(command[0])) > 0.0 and not np.diff(command[:rows], axis=0).any():
+            first = np.arange(len(work)) < rows
+            return [Finding(
+                "start_up", NOTE, channel, f"the command is set from the first row, the wheels rest for {rows} rows "
+                f"({work.t[rows] - work.t[0]:.2g} s) and then speed up",
+                "leave the first half second out of steady values", work.lines(first), rows,
+                {"seconds": float(work.t[rows] - work.t[0])},
+            )]  # fmt: skip
+    return []
 
 
 def _still(work: Work) -> NDArray[np.bool_] | None:

@@ -58,17 +58,17 @@ def quantum(values: FloatArray) -> float:
     values = sample(values)
     values = values[np.isfinite(values)]
     levels = np.unique(values)
+    if len(levels) < 3:
+        return 0.0
+    # The same level written twice, apart by rounding, counts once.
+    levels = levels[np.concatenate([[True], np.diff(levels) > 1e-4 * float(np.abs(levels[[0, -1]]).max())])]
     if len(levels) < 3 or len(levels) > 0.5 * len(values):
         return 0.0
     steps = np.diff(levels)
-    scale = float(np.abs(levels[[0, -1]]).max())
-    steps = steps[steps > 1e-3 * np.median(steps)]  # the same level written twice, apart by rounding
-    if not steps.size:
-        return 0.0
     step = float(np.median(steps[steps < 1.5 * steps.min()]))
-    off = np.abs(levels / step - np.round(levels / step)) if scale > 0.0 else np.zeros(1)
-    shift = np.abs((levels - levels[0]) / step - np.round((levels - levels[0]) / step))
-    return step if min(np.quantile(off, 0.95), np.quantile(shift, 0.95)) < 0.1 else 0.0
+    places = np.stack([levels, levels - levels[0]]) / step
+    off = np.quantile(np.abs(places - np.round(places)), 0.95, axis=1)
+    return step if off.min() < 0.1 else 0.0
 
 
 def clusters(n: int, step: float, seconds: float = 0.2) -> tuple[NDArray[np.int64], int]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from omnidyn.logs.channels import components
 from omnidyn.logs.check.reference import Ground, electric_speed, emf, ground, volts, wheels_twist
-from omnidyn.logs.check.robust import Slope, slope, smooth, spread, windowed
+from omnidyn.logs.check.robust import Slope, quantum, slope, smooth, windowed
 from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
 from omnidyn.units import DEGREE, TURN
@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 LEAST = 0.02  # a scale that is off by less is not worth a word
 UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file is not exact either
-ALONE = 0.05  # of the signal: what is less is no motion
+ALONE = 0.15  # of the motion: an axis that moves less is no witness
 
 # How many times too large a value is, if it is read in the unit before "read as".
 TURN_UNITS = {"rpm read as rad/s": 60.0 / TURN, "deg/s read as rad/s": 1.0 / DEGREE,
@@ -77,7 +77,7 @@ def _own_derivatives(work: Work) -> list[Finding]:
     for name, against, rate, speed, units in _pairs(work):
         ids, count = work.windows()
         line = slope(rate, speed, ids, count)
-        if not line.differs(1.0, 0.03, 6.0) or line.windows < 6:
+        if not line.differs(1.0, 0.03, 6.0) or line.windows < 6 or _likeness(rate, speed, ids, count) < 0.95:
             continue
         # rate = line * speed: speed is 1/line too large, or the time is.
         unit, clock = unit_of(1.0 / line.value, units), unit_of(1.0 / line.value, TIME_UNITS)
@@ -92,10 +92,17 @@ def _own_derivatives(work: Work) -> list[Finding]:
         else:
             found.append(Finding(
                 "scale", WARN, name, words + f" (+-{line.error:.2g})",
-                "one of the two has a wrong scale, or they are not of the same thing", (), 0,
+                "one of the two has a wrong scale, or the rows are too far apart to see how it moves", (), 0,
                 {"ratio": line.value, "error": line.error},
             ))  # fmt: skip
     return found
+
+
+def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
+    """Correlation, about 0, of window means: 1 where one is the other times a number."""
+    good = np.isfinite(y) & np.isfinite(x)
+    a, b = (windowed(ids, count, np.where(good, each, 0.0)) for each in (y, x))
+    return float(abs(a @ b) / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
 
 
 def _pairs(work: Work) -> Iterator[tuple[str, str, FloatArray, FloatArray, dict[str, float]]]:
@@ -177,6 +184,8 @@ def _speeds(work: Work) -> tuple[list[Finding], Work]:
     factor = floor if floor is not None else electric
     if factor is None:
         return _emf_alone(work)
+    if floor is not None and not floor.value > 0.1:
+        return _against(work, floor), work
     work = work.knowing(floor_ratio=floor, electric_ratio=electric)
     units = {**TURN_UNITS, "the motor's speed read as the wheel's": float(np.mean(robot.motor.gear_ratio)),
              "the motor's rpm read as the wheel's rad/s": float(np.mean(robot.motor.gear_ratio)) * 60.0 / TURN}  # fmt: skip
@@ -189,6 +198,29 @@ def _speeds(work: Work) -> tuple[list[Finding], Work]:
                                1.0 / factor.value)]  # fmt: skip
         return found, work.replace(wheel_speed=speed * factor.value)
     return _ratio_findings(work, these, floor, electric, names)
+
+
+def _against(work: Work, floor: Slope) -> list[Finding]:
+    """A motion over the floor that goes the other way, or not at all."""
+    seen = ground(work)
+    if seen is None:
+        return []
+    names = {"twist": ("vx", "vy", "omega"), "pose": ("x", "y", "heading")}[seen.name]
+    where = " ".join(names[k] for k in seen.axes)
+    if floor.value > -4.0 * floor.error:
+        if abs(floor.value) > 0.1 or floor.error > 0.03:
+            return []
+        return [Finding(
+            "dead", WARN, where, f"{where} stays as it is while the wheels say that the robot moves: it was not recorded, "
+            "or the wheels ran in the air", "leave it out of the mapping", (), 0,
+            {"ratio": floor.value, "error": floor.error},
+        )]  # fmt: skip
+    return [Finding(
+        "inverted", FATAL, where, f"{where} goes the other way than the wheels say ({floor.value:.3g} +-{floor.error:.2g} of "
+        "it): it has the opposite sign, or all wheels have",
+        "set `invert` for that column in the mapping, or turn the wheels' signs", (), 0,
+        {"ratio": floor.value, "error": floor.error},
+    )]  # fmt: skip
 
 
 def _joined(lines: list[Slope]) -> Slope | None:
@@ -325,7 +357,9 @@ def _dead_wheels(work: Work) -> tuple[list[Finding], Work]:
     source, slopes, sizes = line
     for k, (a, size) in enumerate(zip(slopes, sizes, strict=True)):
         name = components("wheel_speed", work.wheels)[k]
-        if np.isfinite(a.error) and a.windows >= 6 and size > 0.2 * max(sizes) and abs(a.value) < 0.1 and a.error < 0.05:
+        coarse = 4.0 * quantum(work.channels["wheel_speed"][:, k])
+        sure = np.isfinite(a.error) and a.windows >= 6 and abs(a.value) < 0.1 and a.error < 0.05
+        if sure and size > max(0.2 * max(sizes), coarse) and not _told_to_rest(work, k):
             found.append(Finding(
                 "dead", FATAL, name, f"{name} is noise about 0, while {source} says that the wheel turns",
                 "look at its encoder, its cable and its column; leave it out otherwise",
@@ -333,6 +367,15 @@ def _dead_wheels(work: Work) -> tuple[list[Finding], Work]:
             ))  # fmt: skip
             work = work.masked("wheel_speed", k, np.ones(len(work), dtype=bool))
     return found, work
+
+
+def _told_to_rest(work: Work, k: int) -> bool:
+    """Whether a wheel is commanded to stand while others turn."""
+    command = work.get("wheel_speed_command")
+    if command is None:
+        return False
+    sizes = np.sqrt(np.nanmean(command**2, axis=0))
+    return bool(sizes[k] < 0.25 * sizes.max())
 
 
 def _wheel_lines(work: Work) -> tuple[str, list[Slope], list[float]] | None:
@@ -357,7 +400,12 @@ def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
     if line is None or work.known.get("floor_ratio") is None and not line[0].startswith("voltage"):
         return [], work
     source, slopes, sizes = line
-    good = [k for k, a in enumerate(slopes) if np.isfinite(a.error) and a.windows >= 6 and sizes[k] > 0.2 * max(sizes)]
+    ratio = work.known.get("floor_ratio")
+    if ratio is not None and abs(ratio.value - 1.0) > 0.1:
+        return [], work  # a robot that slips does so more in one direction than in another
+    coarse = [10.0 * quantum(column) for column in work.channels["wheel_speed"].T]
+    good = [k for k, a in enumerate(slopes)
+            if np.isfinite(a.error) and a.windows >= 6 and sizes[k] > max(0.2 * max(sizes), coarse[k])]  # fmt: skip
     if len(good) < 3:
         return [], work
     found = []
@@ -423,10 +471,3 @@ def _duty_as_voltage(work: Work) -> list[Finding]:
         return [_unit_finding(names, f"voltages within -1..1 ({high:.3g} at most), while the speeds need "
                               f"{float(np.nanquantile(np.abs(counter), 0.95)):.3g} V: duty read as volts?", 1.0)]  # fmt: skip
     return []
-
-
-def leftover(work: Work, values: FloatArray) -> float:
-    """Robust scatter of window means: what is left of a residual when noise is averaged out."""
-    ids, count = work.windows()
-    number = np.maximum(np.bincount(ids, weights=np.isfinite(values), minlength=count), 1.0)
-    return spread(windowed(ids, count, values) / number)

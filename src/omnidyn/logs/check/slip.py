@@ -16,6 +16,8 @@ FloatArray = NDArray[np.float64]
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
 LEAST, SURE = 0.025, 6.0  # of the ratio; standard errors, over all stretches that are looked at
 STRETCHES = 3
+FASTER = 12.0  # mean square of the speed in one part of the log over that in the other, at most
+SPINS = 0.25  # of the path: less is no slip but a wheel that spins
 LAG = 1.5  # rows by which the channels may lag each other
 MAX_WINDOWS = 400
 
@@ -92,7 +94,12 @@ def _contrast(
     starts, ends = np.triu_indices(count + 1, shortest)
     n_in, d_in = numbers[0][ends] - numbers[0][starts], numbers[1][ends] - numbers[1][starts]
     n_out, d_out = numbers[0][-1] - n_in, numbers[1][-1] - d_in
-    good = (d_in > 0.02 * numbers[1][-1]) & (d_out > 0.02 * numbers[1][-1])
+    # Both parts have to move, and about as fast as each other: what is left of noise is no motion.
+    busy = np.concatenate([[0.0], np.cumsum(moving)])
+    b_in = np.maximum(busy[ends] - busy[starts], 1.0)
+    b_out = np.maximum(busy[-1] - b_in, 1.0)
+    alike = np.abs(np.log(np.maximum(d_in / b_in, 1e-300) / np.maximum(d_out / b_out, 1e-300))) < np.log(FASTER)
+    good = (d_in > 0.02 * numbers[1][-1]) & (d_out > 0.02 * numbers[1][-1]) & alike
     if not good.any():
         return None
     # A lag of so many rows adds lag/2 times the change of x^2 over the stretch.
@@ -109,6 +116,8 @@ def _contrast(
         inside, outside, rows = outside, inside, ~rows
     if sure[k] < SURE or outside <= 0.1 or (outside - inside) / outside < LEAST:
         return None
+    if inside < SPINS * outside and not 0.5 < (d_in[k] / b_in[k]) / (d_out[k] / b_out[k]) < 2.0:
+        return None  # wheels that are said to spin while the robot stands: then as fast as they turn elsewhere
     return rows, float(inside), float(outside), float(error[k] / outside)
 
 

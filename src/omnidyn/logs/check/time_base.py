@@ -35,7 +35,9 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], Work]:
     steps = np.diff(t)
     step = float(np.median(steps)) if steps.size else 0.0
     pieces = tuple(segments(t)) if len(t) else ()
-    channels = {name: values[rows] for name, values in log.channels.items()}
+    chosen = log.rows(rows)
+    # As in a Run: what is recorded on change is filled in, latencies that are known are taken out.
+    channels = {name: chosen._aligned(name, values, []) for name, values in chosen.channels.items()} if len(t) else {}
     work = Work(log, robot, rows, t, step, pieces, channels)
     return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
 

@@ -12,12 +12,15 @@ from omnidyn.logs.check.work import INPUTS, MIN_ROWS, Work
 from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
 from omnidyn.logs.log import MAX_MISSING
 from omnidyn.logs.mapping import MOTOR_SIDE
+from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.units import known_unit
 
 FloatArray = NDArray[np.float64]
 
 MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
 SENSORS = ("current", "wheel_speed", "twist")
+MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # references that say what a wheel did
+FOLLOWS = 0.5  # [s] after which a wheel follows its command
 SPIKE = 10.0  # a single value so many times the noise away from both its neighbours
 IMPOSSIBLE = 1e-6  # chance, over the whole log, below which repeated values are no chance
 
@@ -51,37 +54,51 @@ def _missing(work: Work) -> list[Finding]:
 
 
 def _quantised(work: Work) -> list[Finding]:
-    """Steps of a sensor that matter: not hidden in its noise, and a tenth of what it usually reads or more."""
-    found = []
+    """Steps of a sensor that matter: 2 % of what it usually reads, or more; sensors of one step in one finding."""
+    found: list[Finding] = []
     expected = expected_wheel_speed(work)
+    groups: dict[tuple[str, float], list[tuple[str, float, float]]] = {}
     for channel in SENSORS:
         for k, (component, values) in enumerate(work.columns(channel)):
             step = quantum(values)
             usual = float(np.median(np.abs(values[np.isfinite(values) & (values != 0.0)]))) if values.any() else 0.0
             if not step or step < 0.02 * usual:
                 continue
-            words = f"{component} counts in steps of {step:.4g} {_unit_words(work, component, step)}".rstrip()
-            zero = values == 0.0
-            slow = np.zeros(len(work), dtype=bool)
+            key = next((known for known in groups if known[0] == channel and abs(known[1] / step - 1.0) < 0.01),
+                       (channel, step))  # fmt: skip
+            groups.setdefault(key, []).append((component, step / usual, white_noise(values)))
             if channel == "wheel_speed" and expected is not None and expected[1].shape[1] > k:
-                width = max(3, round(0.1 / work.step) | 1)
-                turning = np.abs(smooth(expected[1][:, k], width))
-                sure = 5.0 * white_noise(expected[1][:, k]) / np.sqrt(width)
-                slow = zero & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
-            if slow.mean() > 0.2:
-                found.append(Finding(
-                    "reads_zero", WARN, component,
-                    f"{component} reads 0 in {100 * slow.mean():.0f} % of the rows while {expected[0]} says it turns, "  # type: ignore[index]
-                    f"slower than two steps of its encoder ({step:.4g} rad/s)",
-                    "take its speed from counts over a longer time, or from the other wheels", work.lines(slow),
-                    int(slow.sum()), {"step": step, "share": float(slow.mean())},
-                ))  # fmt: skip
-            found.append(Finding(
-                "quantised", NOTE, component, words + f", {100 * step / usual:.0f} % of its usual size",
-                "average over longer windows; a sample alone says little", (), 0,
-                {"step": step, "usual": usual, "noise": white_noise(values)},
-            ))  # fmt: skip
+                found += _reads_zero(work, component, values, step, expected[0], expected[1][:, k])
+    for (_, step), members in groups.items():
+        names = [name for name, _, _ in members]
+        share, noise = max(each for _, each, _ in members), max(each for _, _, each in members)
+        hidden = f", hidden in a noise of {noise:.3g}" if noise > step else ""
+        found.append(Finding(
+            "quantised", NOTE, " ".join(names),
+            f"{' and '.join(names)} {'counts' if len(names) == 1 else 'count'} in steps of {step:.4g} "
+            f"{_unit_words(work, names[0], step)}, up to {100 * share:.0f} % of the usual value{hidden}",
+            "average over longer windows; a sample alone says little", (), 0,
+            {"step": step, "share": share, "noise": noise},
+        ))  # fmt: skip
     return found
+
+
+def _reads_zero(
+    work: Work, component: str, values: FloatArray, step: float, source: str, reference: FloatArray
+) -> list[Finding]:
+    """A wheel slower than its encoder can say."""
+    width = max(3, round(0.1 / work.step) | 1)
+    turning, sure = np.abs(smooth(reference, width)), 5.0 * white_noise(reference) / np.sqrt(width)
+    slow = (values == 0.0) & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
+    if slow.mean() < 0.2:
+        return []
+    return [Finding(
+        "reads_zero", WARN, component,
+        f"{component} reads 0 in {100 * slow.mean():.0f} % of the rows while {source} says it turns, slower than two "
+        f"steps of its encoder ({step:.4g} rad/s)",
+        "take its speed from counts over a longer time, or from the other wheels", work.lines(slow), int(slow.sum()),
+        {"step": step, "share": float(slow.mean())},
+    )]  # fmt: skip
 
 
 def _unit_words(work: Work, component: str, step: float) -> str:
@@ -138,14 +155,19 @@ def _should_move(work: Work, channel: str, k: int, all_flat: bool) -> str:
         speed, robot = work.full("wheel_speed"), work.geometry
         if speed is None or robot is None:
             return ""
-        from omnidyn.model.wheels import twist_from_wheel_speed
-
         own = twist_from_wheel_speed(robot.wheels, speed)[:, k]
         scale = float(np.nanstd(twist_from_wheel_speed(robot.wheels, speed), axis=0).max())
         return "the wheels say it changes" if float(np.nanstd(own)) > 0.1 * scale and _moves(own) else ""
     if channel == "pose" and k == 2:
-        twist = work.get("twist")
-        return "omega says it turns" if twist is not None and _moves(twist[:, 2]) else ""
+        twist, speed, robot = work.get("twist"), work.full("wheel_speed"), work.geometry
+        if twist is not None and _moves(twist[:, 2]):
+            return "omega says it turns"
+        if speed is None or robot is None:
+            return ""
+        own = smooth(twist_from_wheel_speed(robot.wheels, speed), max(3, round(0.3 / work.step) | 1))
+        turning = spread_of_motion(own[:, 2]) * float(np.mean(robot.wheels.robot_radius))
+        if turning > 0.3 * max(spread_of_motion(own[:, 0]), spread_of_motion(own[:, 1])):
+            return "the wheels say that the robot turns: the heading was not recorded, or the wheels ran in the air"
     return ""
 
 
@@ -184,10 +206,10 @@ def _stuck(work: Work) -> tuple[list[Finding], Work]:
     for channel in SENSORS:
         for component, values in work.columns(channel):
             k = place(component)[1]  # type: ignore[index]
-            reference = None
+            reference, measured = None, False
             if channel == "wheel_speed" and expected is not None and k < expected[1].shape[1]:
-                reference = expected[1][:, k]
-            bad = _frozen(work, values, reference)
+                reference, measured = expected[1][:, k], expected[0] in MEASUREMENTS
+            bad = _frozen(values, reference, measured, max(10, round(FOLLOWS / work.step)))
             if not bad.any():
                 continue
             stretches = runs(bad)
@@ -203,8 +225,11 @@ def _stuck(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _frozen(work: Work, values: FloatArray, reference: FloatArray | None) -> NDArray[np.bool_]:
-    """Rows of repeats that are too long for chance, or during which the reference is somewhere else."""
+def _frozen(values: FloatArray, reference: FloatArray | None, measured: bool, slow: int) -> NDArray[np.bool_]:
+    """Rows of repeats that are too long for chance, or during which the reference walks away.
+
+    measured: the reference is what the wheel did; a command it follows after `slow` rows, or, at rest, not at all.
+    """
     n = len(values)
     bad = np.zeros(n, dtype=bool)
     stretches = runs(np.diff(values) == 0.0) + [0, 1]
@@ -216,7 +241,8 @@ def _frozen(work: Work, values: FloatArray, reference: FloatArray | None) -> NDA
     away = _Away(values, reference) if reference is not None else None
     for (a, b), length in zip(stretches[long], lengths[long], strict=True):
         unlikely = values[a] != 0.0 and length > 3 * usual_length and n * chance ** (length - 1) < IMPOSSIBLE
-        if unlikely or (away is not None and away.during(a, b)):
+        asked = measured or (values[a] != 0.0 and length >= slow)
+        if unlikely or (away is not None and asked and away.during(a, b)):
             bad[a:b] = True
     return bad
 

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.logs.channels import components
-from omnidyn.logs.check.reference import emf, ground, ohmic, volts, wheels_twist
+from omnidyn.logs.check.reference import emf, ground, ohmic, pose_twist, volts, wheels_twist
 from omnidyn.logs.check.robust import smooth
 from omnidyn.logs.check.work import MIN_ROWS, Work
-from omnidyn.logs.findings import FATAL, Finding
+from omnidyn.logs.findings import FATAL, WARN, Finding
 from omnidyn.model.wheels import wheel_speed
 
 FloatArray = NDArray[np.float64]
@@ -28,7 +28,8 @@ BETTER = 0.35  # the right wiring leaves at most so much of what the logged one 
 POOR = 0.02  # a wiring that leaves less than this share of the motion unexplained is not doubted
 ALIKE = 0.15  # a wiring so close to the best one, of the way to the logged one, is as good
 MAX_TRIED = 4  # wheels up to which every order is tried; beyond, exchanges of two
-WINDOW = 0.12  # [s]
+WINDOWS = (0.12, 0.5)  # [s]; the long one for speeds that drown in noise
+SEEN = 0.15  # of the motion of the wheels, that the floor must show to be a witness
 
 MOTOR = ("voltage", "duty", "current", "wheel_angle", "wheel_speed", "wheel_speed_command")
 
@@ -100,29 +101,30 @@ def wirings(n: int) -> Iterator[Wiring]:
     return (Wiring(order, tuple(sign)) for order in orders for sign in signs)
 
 
-def choose(tried: list[Wiring], costs: FloatArray, total: float) -> Answer | None:
-    """The wiring that the costs call for; None where the log's own is not clearly wrong. The first tried is the log's."""
+def choose(tried: list[Wiring], costs: FloatArray, total: float, better: float = BETTER) -> Answer | None:
+    """The wiring that the costs call for; None where that of the log, the first, is not clearly wrong."""
     logged, least = float(costs[0]), float(costs.min())
-    if not np.isfinite(logged) or total <= 0.0 or logged < POOR * total or least > BETTER * logged:
+    if not np.isfinite(logged) or total <= 0.0 or logged < POOR * total or least > better * logged:
         return None
     alike = [k for k in np.flatnonzero(costs <= least + ALIKE * (logged - least))]
     alike.sort(key=lambda k: (tried[k].changes, costs[k]))
-    # Of those with equally few changes the cheapest; a rival is one that does not need more changes.
+    # Of those with fewest changes the cheapest; a rival is one that does not need more changes.
     best = tried[alike[0]]
-    second = tried[alike[1]] if len(alike) > 1 else None
-    return Answer(best, len(alike) - 1, second, float(costs[alike[0]]) / total, logged / total)
+    rivals = [tried[k] for k in alike[1:] if tried[k].changes == best.changes]
+    return Answer(best, len(rivals), rivals[0] if rivals else None, float(costs[alike[0]]) / total, logged / total)
 
 
 def check_wiring(work: Work) -> tuple[list[Finding], Work]:
     """Findings on order and sign of the columns of motors and axes; the work with them put right."""
     if len(work) < MIN_ROWS or work.wheels < 1:
         return [], work
+    found, work = _check_frame(work)
     motor = _by_motor(work)
-    floor = _by_floor(work)
-    found: list[Finding] = []
+    floor = next(filter(None, (_by_floor(work, seconds) for seconds in WINDOWS)), None)
     if floor is not None and floor[0] == "axes":
-        return [_axes_finding(work, floor[1])], _mended_axes(work, floor[1].best)
-    if floor is not None:
+        found.append(_axes_finding(work, floor[1]))
+        work = _mended_axes(work, floor[1].best)
+    elif floor is not None:
         blamed = "wheel_speed" if motor is not None or not _motor_known(work) else "motors"
         found.append(_wheels_finding(work, floor[1], blamed))
         channels = MOTOR if blamed == "motors" else ("wheel_speed", "wheel_angle")
@@ -147,9 +149,9 @@ def _mended(work: Work, channels: tuple[str, ...], wiring: Wiring) -> Work:
     return work
 
 
-def _windows(work: Work, *channels: FloatArray) -> list[FloatArray]:
+def _windows(work: Work, *channels: FloatArray, seconds: float = WINDOWS[0]) -> list[FloatArray]:
     """Means over short windows, rows without all channels left out. Shapes (windows, columns)."""
-    ids, count = work.windows(WINDOW)
+    ids, count = work.windows(seconds)
     table = np.column_stack(channels)
     good = np.isfinite(table).all(axis=1)
     number = np.bincount(ids[good], minlength=count)
@@ -162,7 +164,81 @@ def _windows(work: Work, *channels: FloatArray) -> list[FloatArray]:
 # --- against the floor ---
 
 
-def _by_floor(work: Work) -> tuple[str, Answer] | None:
+def _check_frame(work: Work) -> tuple[list[Finding], Work]:
+    """A pose whose x and y belong to another frame than its heading: turned, or mirrored as a picture from above is."""
+    speed, pose, robot = work.full("wheel_speed"), work.full("pose"), work.geometry
+    if speed is None or pose is None or robot is None or work.get("twist") is not None or len(work) < 3 * MIN_ROWS:
+        return [], work
+    best, plain = (0.0, 0.0 + 0.0j, 1.0), 0.0
+    for mirror in (1.0, -1.0):
+        turned = pose * [1.0, mirror, mirror]
+        twist, width = pose_twist(work, turned)
+        own = wheels_twist(work, speed, width)
+        assert own is not None
+        w, g = _windows(work, own[:, :2], twist[:, :2])
+        if len(w) < 8:
+            return [], work
+        wheel, floor = w @ [1.0, 1.0j], g @ [1.0, 1.0j]
+        size = np.sqrt((np.abs(wheel) ** 2).sum() * (np.abs(floor) ** 2).sum())
+        slope = (np.conj(wheel) * floor).sum() / size if size > 0.0 else 0.0j
+        if mirror > 0.0:
+            plain = float(slope.real)
+        if abs(slope) > best[0] + 0.05 * (mirror < 0.0):
+            best = float(abs(slope)), complex(slope), mirror
+    alike, slope, mirror = best
+    angle = float(np.degrees(np.angle(slope)))
+    trusted = _commands_agree(work)
+    if trusted and plain < 0.5 and alike < 0.8:
+        return [_unlike(plain)], work.replace(pose=None)
+    if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
+        return [], work
+    words = f"turned by {angle:.0f} deg" + (" and mirrored" if mirror < 0.0 else "")
+    mended = pose * [1.0, mirror, mirror]
+    unit = np.exp(-1.0j * np.radians(angle))
+    place = (mended[:, 0] + 1.0j * mended[:, 1]) * unit
+    mended = np.column_stack([place.real, place.imag, mended[:, 2]])
+    return [Finding(
+        "pose_frame", WARN, "x y", f"x and y of the pose are {words} against its heading and the wheels (likeness "
+        f"{plain:.2f} as logged, {alike:.2f} put right)",
+        "turn the frame of the pose, or correct its heading by that angle, before world speeds are used", (), 0,
+        {"angle_deg": angle, "mirrored": float(mirror < 0.0), "likeness": alike, "likeness_as_logged": plain},
+    )], work.replace(pose=mended)  # fmt: skip
+
+
+def _unlike(plain: float) -> Finding:
+    return Finding(
+        "pose_unlike", WARN, "x y heading", f"the pose does not follow the wheels (likeness {plain:.2f}), which turn as "
+        "they are told; no turned or mirrored frame explains it", "look at the tracking of the pose; it was not used", (),
+        0, {"likeness_as_logged": plain},
+    )  # fmt: skip
+
+
+def _commands_agree(work: Work) -> bool:
+    """Whether the wheels turn as the commanded twist says: then they are wired as the firmware thinks."""
+    orders, speed, robot = work.full("twist_command"), work.full("wheel_speed"), work.geometry
+    if orders is None or speed is None or robot is None:
+        return False
+    wanted, turned = _windows(work, wheel_speed(robot.wheels, orders), speed)
+    size = np.sqrt((wanted**2).sum() * (turned**2).sum())
+    return bool(size > 0.0 and (wanted * turned).sum() > 0.9 * size)
+
+
+def _turns_say(work: Work, mirror: float) -> bool:
+    """Whether the robot turns enough to see that its wheels are right about yaw, whatever they are about x and y."""
+    speed, pose = work.full("wheel_speed"), work.full("pose")
+    if speed is None or pose is None:
+        return False
+    twist, width = pose_twist(work, pose * [1.0, mirror, mirror])
+    own = wheels_twist(work, speed, width)
+    assert own is not None
+    w, g = _windows(work, own[:, 2:], twist[:, 2:])
+    size = np.sqrt((w**2).sum() * (g**2).sum())
+    moved = np.sqrt((w**2).sum()) * float(np.mean(work.geometry.wheels.robot_radius))  # type: ignore[union-attr]
+    planar = np.sqrt((_windows(work, own[:, :2])[0] ** 2).sum())
+    return bool(size > 0.0 and (w * g).sum() > 0.97 * size and moved > 0.3 * planar)
+
+
+def _by_floor(work: Work, seconds: float) -> tuple[str, Answer] | None:
     """("wheels" or "axes", what is wrong), from the motion over the floor and the wheels' own redundancy."""
     speed, robot = work.full("wheel_speed"), work.geometry
     if speed is None or robot is None:
@@ -186,11 +262,13 @@ def _by_floor(work: Work) -> tuple[str, Answer] | None:
     null = _null_rows(robot)
     rows = np.vstack([columns[axes], null])
     parts = [smooth(speed, width)] + ([floor[:, axes] * length[axes]] if axes and floor is not None else [])
-    means = _windows(work, *parts)
+    means = _windows(work, *parts, seconds=seconds)
     w = means[0]
     if len(w) < 8:
         return None
     v = means[1] if axes else np.zeros((len(w), 0))
+    if axes and (v**2).sum() < SEEN**2 * ((w * robot.wheels.radii) ** 2).sum() * len(axes) / n:
+        return None  # a robot that does not turn says nothing through its heading
     target = np.column_stack([v, np.zeros((len(w), len(null)))])
     moments = target.T @ target, target.T @ w, w.T @ w
     tried = list(wirings(n))
@@ -246,7 +324,7 @@ def _by_axes(work: Work, rows: FloatArray, moments, axes: list[int], total: floa
         turn = np.eye(n + free)
         turn[:n, :n] = wiring.matrix
         costs.append(_cost(rows, (turn @ vv @ turn.T, turn @ vw, ww), True))
-    return choose(tried, np.array(costs), total)
+    return choose(tried, np.array(costs), total, 0.5)  # so few are tried that chance is no matter
 
 
 def _axes_names(work: Work) -> tuple[str, tuple[str, ...]]:
