@@ -183,8 +183,9 @@ def encoder(rng: Rng, t: FloatArray, speed: FloatArray, top: float) -> FloatArra
 def tracked(rng: Rng, run: Run, twist: FloatArray) -> FloatArray:
     """A pose as a camera on the ceiling sees it: it starts anywhere, heading wraps."""
     assert run.pose is not None
-    heading = run.pose[:, 2]
-    # Without slip this is the simulated pose; with slip, the path of the slower twist along the same headings.
+    # Without slip this is the simulated pose; with slip, the path of the slower twist.
+    turned = np.diff(run.t) * 0.5 * (twist[1:, 2] + twist[:-1, 2])
+    heading = np.concatenate([[0.0], np.cumsum(turned)])
     world = np.einsum("kij,kj->ki", body_to_world(heading), twist)
     middle = 0.5 * (world[1:] + world[:-1])
     path = np.vstack([np.zeros(3), np.cumsum(middle * np.diff(run.t)[:, None], axis=0)])
@@ -256,6 +257,10 @@ def put_swapped(rng: Rng, scene: Scene, size: float):
     a, b = rng.choice(scene.robot.wheels.count, 2, replace=False)
     order = np.arange(scene.robot.wheels.count)
     order[[a, b]] = b, a
+    for name in names:
+        change = log.channels[name][:, a] - log.channels[name][:, b]
+        if np.sqrt(np.mean(change**2)) < 0.2 * np.sqrt(np.mean(log.channels[name] ** 2)):
+            return None  # the robot turns on the spot: the two do the same
     broken = {name: log.channels[name][:, order] for name in names}
     return _changed(log, **broken), scene, {"where": _where(names, [a, b])}
 
@@ -266,6 +271,9 @@ def put_inverted(rng: Rng, scene: Scene, size: float):
     k = int(rng.integers(scene.robot.wheels.count))
     sign = np.ones(scene.robot.wheels.count)
     sign[k] = -1.0
+    for name in names:
+        if np.sqrt(np.mean(log.channels[name][:, k] ** 2)) < 0.2 * np.sqrt(np.mean(log.channels[name] ** 2)):
+            return None  # that wheel hardly turns
     broken = {name: log.channels[name] * sign for name in names}
     return _changed(log, **broken), scene, {"where": _where(names, [k])}
 

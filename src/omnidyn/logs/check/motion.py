@@ -10,13 +10,14 @@ from omnidyn.logs.check.reference import ground, volts
 from omnidyn.logs.check.robust import quantum, runs, slope, smooth, white_noise
 from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
-from omnidyn.model.deadzone import moves
+from omnidyn.model.dynamics import acceleration
 from omnidyn.model.wheels import wheel_speed
 
 FloatArray = NDArray[np.float64]
 
 SETTLE, HELD = 0.4, 0.3  # [s]
 DROOP = 0.05
+MOMENT = 0.15  # [s]
 SAFETY = 1.6  # a robot that stands although its voltages are so many times those that move it was held
 
 
@@ -61,10 +62,24 @@ def _still(work: Work) -> NDArray[np.bool_] | None:
     still = np.ones(len(work), dtype=bool)
     for column in speed.T:
         if np.isfinite(column).any():
-            level = max(4.0 * white_noise(column) / np.sqrt(width), 1.01 * quantum(column), 1e-9)
             with np.errstate(invalid="ignore"):
-                still &= ~(np.abs(smooth(column, width)) > level)
+                still &= ~(np.abs(smooth(column, width)) > _rest_level(column, width))
     return still
+
+
+def _rest_level(column: FloatArray, width: int) -> float:
+    """What a mean over `width` rows has to exceed to be motion."""
+    return max(4.0 * white_noise(column) / np.sqrt(width), 1.01 * quantum(column), 1e-9)
+
+
+def _level(work: Work) -> float:
+    """The same as a speed of wheels [rad/s]."""
+    speed, robot = work.get("wheel_speed"), work.geometry
+    seen = ground(work)
+    if speed is None and seen is not None and robot is not None:
+        speed = wheel_speed(robot.wheels, seen.twist)
+    width = max(3, round(0.1 / work.step) | 1)
+    return np.inf if speed is None else max(_rest_level(column, width) for column in speed.T)
 
 
 def _never_moved(work: Work) -> Finding:
@@ -88,7 +103,10 @@ def _blocked(work: Work, still: NDArray[np.bool_]) -> list[Finding]:
         if rest.size:
             levels, back = np.unique(np.round(voltage[rest], 3), axis=0, return_inverse=True)
             if len(levels) <= 2000:
-                bad[rest] = moves(robot, levels / SAFETY).any(axis=1)[back.ravel()]
+                # It would have to be seen: a speed after a moment that is well above what counts as rest.
+                start = acceleration(robot, np.zeros((len(levels), 3)), levels / SAFETY)
+                soon = np.abs(wheel_speed(robot.wheels, MOMENT * start)).max(axis=1)
+                bad[rest] = (soon > 3.0 * _level(work))[back.ravel()]
     elif current is not None:
         load = np.nansum(np.abs(smooth(current, 9)), axis=1)
         moving = load[~still]
@@ -136,7 +154,7 @@ def _droop(work: Work) -> list[Finding]:
     ids, count = work.windows()
     w = np.where(settled[:, None], speed, np.nan)
     line = slope(w, command, ids, count)
-    if not line.differs(1.0, DROOP, 5.0) or line.windows < 6 or line.value <= 0.0:
+    if not line.differs(1.0, DROOP, 5.0) or line.windows < 4 or line.value <= 0.0:
         return []
     words = "is not reached" if line.value < 1.0 else "is exceeded"
     return [Finding(

@@ -132,7 +132,8 @@ def ratio(top: FloatArray, below: FloatArray) -> Slope:
     if keep.sum() > 0.7 * len(keep) and below[keep].sum() > 0.0:
         top, below = top[keep], below[keep]
         value = top.sum() / below.sum()
-    windows = len(top)
+    # Windows count by what they weigh: one start of a run is one witness.
+    windows = int(below.sum() ** 2 / max((below**2).sum(), 1e-300))
     if windows < 4:
         return Slope(float(value), np.inf, windows)
     residual = top - value * below

@@ -77,7 +77,7 @@ def _own_derivatives(work: Work) -> list[Finding]:
     for name, against, rate, speed, units in _pairs(work):
         ids, count = work.windows()
         line = slope(rate, speed, ids, count)
-        if not line.differs(1.0, 0.03, 6.0) or line.windows < 6 or _likeness(rate, speed, ids, count) < 0.95:
+        if not line.differs(1.0, 0.03, 6.0) or line.windows < 4 or _likeness(rate, speed, ids, count) < 0.95:
             continue
         # rate = line * speed: speed is 1/line too large, or the time is.
         unit, clock = unit_of(1.0 / line.value, units), unit_of(1.0 / line.value, TIME_UNITS)
@@ -178,7 +178,7 @@ def _speeds(work: Work) -> tuple[list[Finding], Work]:
     if these is None:
         return [], work
     floor = _joined([line for line in (these.linear, these.yaw) if line is not None])
-    electric = these.electric if these.electric is not None and these.electric.windows >= 6 else None
+    electric = these.electric if these.electric is not None and these.electric.windows >= 4 else None
     robot = work.geometry
     assert robot is not None
     factor = floor if floor is not None else electric
@@ -225,7 +225,7 @@ def _against(work: Work, floor: Slope) -> list[Finding]:
 
 def _joined(lines: list[Slope]) -> Slope | None:
     """The weighted mean of slopes, by their errors."""
-    lines = [line for line in lines if np.isfinite(line.error) and line.error > 0.0 and line.windows >= 6]
+    lines = [line for line in lines if np.isfinite(line.error) and line.error > 0.0 and line.windows >= 4]
     if not lines:
         return None
     weight = np.array([1.0 / max(line.error, 1e-4) ** 2 for line in lines])
@@ -358,7 +358,7 @@ def _dead_wheels(work: Work) -> tuple[list[Finding], Work]:
     for k, (a, size) in enumerate(zip(slopes, sizes, strict=True)):
         name = components("wheel_speed", work.wheels)[k]
         coarse = 4.0 * quantum(work.channels["wheel_speed"][:, k])
-        sure = np.isfinite(a.error) and a.windows >= 6 and abs(a.value) < 0.1 and a.error < 0.05
+        sure = np.isfinite(a.error) and a.windows >= 4 and abs(a.value) < 0.1 and a.error < 0.05
         if sure and size > max(0.2 * max(sizes), coarse) and not _told_to_rest(work, k):
             found.append(Finding(
                 "dead", FATAL, name, f"{name} is noise about 0, while {source} says that the wheel turns",
@@ -405,7 +405,7 @@ def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
         return [], work  # a robot that slips does so more in one direction than in another
     coarse = [10.0 * quantum(column) for column in work.channels["wheel_speed"].T]
     good = [k for k, a in enumerate(slopes)
-            if np.isfinite(a.error) and a.windows >= 6 and sizes[k] > max(0.2 * max(sizes), coarse[k])]  # fmt: skip
+            if np.isfinite(a.error) and a.windows >= 4 and sizes[k] > max(0.2 * max(sizes), coarse[k])]  # fmt: skip
     if len(good) < 3:
         return [], work
     found = []

@@ -14,7 +14,7 @@ from omnidyn.logs.findings import WARN, Finding
 FloatArray = NDArray[np.float64]
 
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
-LEAST, SURE = 0.025, 6.0  # of the ratio; standard errors, over all stretches that are looked at
+LEAST, SURE = 0.025, 5.5  # of the ratio; standard errors, over all stretches that are looked at
 STRETCHES = 3
 FASTER = 12.0  # mean square of the speed in one part of the log over that in the other, at most
 SPINS = 0.25  # of the path: less is no slip but a wheel that spins
@@ -85,10 +85,7 @@ def _contrast(
     moving = below > 1e-2 * below.mean()
     if moving.sum() < 12:
         return None
-    # From one window to the next slip does not change, noise does; where the robot speeds up there is more of it.
-    residual = ((top - overall * below) / np.sqrt(np.where(moving, below, 1.0)))[moving]
-    changes = np.abs(np.diff(residual)) / np.sqrt(2.0)
-    noise = max(MAD * float(np.median(changes)), float(np.quantile(changes, 0.9)) / 2.0)
+    noise = min(_noise(top, below, overall, moving, size) for size in (1, 4))
     numbers = np.concatenate([[0.0], np.cumsum(top)]), np.concatenate([[0.0], np.cumsum(np.maximum(below, 0.0))])
     shortest = max(2, round(SHORTEST / (work.step * max(1, (ids == 0).sum()))))
     starts, ends = np.triu_indices(count + 1, shortest)
@@ -119,6 +116,21 @@ def _contrast(
     if inside < SPINS * outside and not 0.5 < (d_in[k] / b_in[k]) / (d_out[k] / b_out[k]) < 2.0:
         return None  # wheels that are said to spin while the robot stands: then as fast as they turn elsewhere
     return rows, float(inside), float(outside), float(error[k] / outside)
+
+
+def _noise(top: FloatArray, below: FloatArray, overall: float, moving: NDArray[np.bool_], size: int) -> float:
+    """Noise of the ratio for one unit of `below`, from groups of `size` windows.
+
+    From one group to the next slip does not change, noise does; where the robot speeds up there is more of it. Errors
+    of a pose cancel over longer groups.
+    """
+    t, b = top[moving], below[moving]
+    groups = len(b) // size
+    if groups < 12:
+        return np.inf if size > 1 else 1.0
+    t, b = (each[: groups * size].reshape(groups, size).sum(axis=1) for each in (t, b))
+    changes = np.abs(np.diff((t - overall * b) / np.sqrt(b))) / np.sqrt(2.0)
+    return max(MAD * float(np.median(changes)), float(np.quantile(changes, 0.9)) / 2.0)
 
 
 def _at_edges(values: FloatArray, ids: NDArray[np.int64], count: int) -> FloatArray:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from omnidyn.logs.channels import place
 from omnidyn.logs.check.reference import expected_wheel_speed
@@ -241,7 +245,7 @@ def _frozen(values: FloatArray, reference: FloatArray | None, measured: bool, sl
     away = _Away(values, reference) if reference is not None else None
     for (a, b), length in zip(stretches[long], lengths[long], strict=True):
         unlikely = values[a] != 0.0 and length > 3 * usual_length and n * chance ** (length - 1) < IMPOSSIBLE
-        asked = measured or (values[a] != 0.0 and length >= slow)
+        asked = length >= (slow // 2 if measured else slow) and (measured or values[a] != 0.0)
         if unlikely or (away is not None and asked and away.during(a, b)):
             bad[a:b] = True
     return bad
@@ -251,31 +255,53 @@ class _Away:
     """Whether a reference walks away from values that repeat, measured by how far it is from them at other times."""
 
     def __init__(self, values: FloatArray, reference: FloatArray) -> None:
-        self.residual, self.reference = values - reference, reference
-        size = np.abs(self.residual[np.isfinite(self.residual)])
-        # Where the robot speeds up the two differ more, by a lag or by means: the larger of two measures.
-        usual = max(MAD * float(np.median(size)), float(np.quantile(size, 0.95)) / 1.6) if size.size else np.inf
-        self.usual = max(usual, quantum(values))
+        self.size, self.reference, self.step = np.abs(values - reference), reference, quantum(values)
+        self.good = np.isfinite(self.size)
+        self.least = max(MAD * float(np.median(self.size[self.good])), self.step) if self.good.any() else np.inf
 
     def during(self, a: int, b: int) -> bool:
         """Over rows a to b."""
-        good = np.isfinite(self.residual[a:b])
-        if good.sum() < 5:
+        part = self.good[a:b]
+        if part.sum() < 5:
             return False
-        # A reference that is elsewhere but stays there says slip or a wrong scale, no sensor that sticks.
-        # Quantiles: where a command changes, a late channel makes a reference jump for a row or two.
-        low, high = np.quantile(smooth(self.reference[a:b][good], 3), [0.1, 0.9])
-        return float(high - low) > 6.0 * self.usual
+        # A reference that is elsewhere but stays there says slip or a wrong scale, no sensor that sticks. Quantiles:
+        # where a command changes, a late channel makes a reference jump for a row or two.
+        low, high = np.quantile(smooth(self.reference[a:b][part], 3), [0.1, 0.9])
+        if not high - low > 6.0 * self.least:
+            return False
+        # Where the robot speeds up the two differ more, by a lag or by means: the larger of two measures counts.
+        others = np.concatenate([self.size[:a][self.good[:a]], self.size[b:][self.good[b:]]])
+        return bool(others.size) and bool(high - low > 6.0 * float(np.quantile(others, 0.95)) / 1.6)
 
 
 def _chance_of_a_repeat(lengths: NDArray[np.int64]) -> tuple[float, float]:
-    """(chance that a repeat is followed by another, length of the fourth longest stretch), the longest left out.
+    """(chance that a value is repeated once more, length of the fourth longest stretch), the longest left out.
 
-    The chance is of repeats after repeats: on a plateau a coarse sensor repeats itself a lot.
+    Repeats after repeats tell how the noise compares with the step of the sensor; the chance is that of a speed in the
+    middle of a step, where it is largest.
     """
     rest = np.sort(lengths)[:-3] - 1  # number of repeats in each stretch
     repeats, again = float(rest.sum()), float((rest - 1).sum())
-    return min(1.0, (again + 3.0) / (repeats + 6.0)), float(rest.max(initial=0) + 1)
+    seen = min(1.0, (again + 3.0) / (repeats + 6.0))
+    after, middle = _repeats_by_noise()
+    return float(np.interp(seen, after[::-1], middle[::-1])), float(rest.max(initial=0) + 1)
+
+
+@lru_cache(maxsize=1)
+def _repeats_by_noise() -> tuple[FloatArray, FloatArray]:
+    """(chance of a repeat after a repeat, chance of one in the middle of a step) for noises of 0.05 to 20 steps.
+
+    A speed anywhere in a step, normal noise, rounding: with P_k the chance of level k, E[sum P_k^3]/E[sum P_k^2], and
+    P_0 in the middle. Noise is taken 20 % smaller than it is: changes of the speed look like noise too.
+    """
+    noises, places = np.geomspace(0.05, 20.0, 60), np.linspace(-0.5, 0.5, 21)
+    after, middle = [], []
+    for noise in noises:
+        edges = np.arange(-math.ceil(6 * noise) - 1, math.ceil(6 * noise) + 2) + 0.5
+        chances = np.diff(ndtr((edges[:, None] - places) / noise), axis=0)
+        after.append(float((chances**3).sum() / (chances**2).sum()))
+        middle.append(float(2.0 * ndtr(0.5 / (0.8 * noise)) - 1.0))
+    return np.array(after), np.array(middle)
 
 
 def _spikes(work: Work) -> tuple[list[Finding], Work]:

@@ -118,9 +118,11 @@ def check_wiring(work: Work) -> tuple[list[Finding], Work]:
     """Findings on order and sign of the columns of motors and axes; the work with them put right."""
     if len(work) < MIN_ROWS or work.wheels < 1:
         return [], work
-    found, work = _check_frame(work)
+    floor = _floor_answer(work)
+    found, turned = _check_frame(work, floor[1].left if floor is not None else 1.0)
+    if found:
+        work, floor = turned, _floor_answer(turned)
     motor = _by_motor(work)
-    floor = next(filter(None, (_by_floor(work, seconds) for seconds in WINDOWS)), None)
     if floor is not None and floor[0] == "axes":
         found.append(_axes_finding(work, floor[1]))
         work = _mended_axes(work, floor[1].best)
@@ -139,6 +141,10 @@ def check_wiring(work: Work) -> tuple[list[Finding], Work]:
         found.append(_motor_finding(work, "wheel_speed_command", command))
         work = _mended(work, ("wheel_speed_command",), command.best)
     return found, work
+
+
+def _floor_answer(work: Work) -> tuple[str, Answer] | None:
+    return next(filter(None, (_by_floor(work, seconds) for seconds in WINDOWS)), None)
 
 
 def _mended(work: Work, channels: tuple[str, ...], wiring: Wiring) -> Work:
@@ -164,8 +170,11 @@ def _windows(work: Work, *channels: FloatArray, seconds: float = WINDOWS[0]) -> 
 # --- against the floor ---
 
 
-def _check_frame(work: Work) -> tuple[list[Finding], Work]:
-    """A pose whose x and y belong to another frame than its heading: turned, or mirrored as a picture from above is."""
+def _check_frame(work: Work, left: float) -> tuple[list[Finding], Work]:
+    """A pose whose x and y belong to another frame than its heading: turned, or mirrored as a picture from above is.
+
+    left: what the best other wiring of the wheels leaves unexplained.
+    """
     speed, pose, robot = work.full("wheel_speed"), work.full("pose"), work.geometry
     if speed is None or pose is None or robot is None or work.get("twist") is not None or len(work) < 3 * MIN_ROWS:
         return [], work
@@ -190,6 +199,8 @@ def _check_frame(work: Work) -> tuple[list[Finding], Work]:
     trusted = _commands_agree(work)
     if trusted and plain < 0.5 and alike < 0.8:
         return [_unlike(plain)], work.replace(pose=None)
+    if not trusted and left < 0.6 * (1.0 - alike**2) + 0.005:
+        return [], work
     if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
         return [], work
     words = f"turned by {angle:.0f} deg" + (" and mirrored" if mirror < 0.0 else "")
