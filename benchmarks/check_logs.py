@@ -441,7 +441,7 @@ FAULTS: dict[str, Fault] = {
     "saturation": Fault(2, 40, "% of rows", lambda s: True, put_saturation, found_saturation),
     "sag": Fault(5, 30, "%", lambda s: True, put_sag, found_sag),
     "slip": Fault(5, 50, "% of the path", _full_floor, put_slip, found_slip, ("path_ratio", "robot_radius")),
-    "stuck encoder": Fault(0.3, 5, "s", lambda s: s.has_speed, put_stuck,
+    "stuck encoder": Fault(0.4, 5, "s", lambda s: s.has_speed, put_stuck,
                            lambda v, b: _named(v, ("stuck",), b["where"])),
     "dead channel": Fault(1, 1, "a flat line", lambda s: s.has_speed, put_dead,
                           lambda v, b: _named(v, ("dead",), b["where"])),

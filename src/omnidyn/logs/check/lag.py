@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from omnidyn.logs.channels import components
 from omnidyn.logs.check.reference import electric_speed, emf, ground, ohmic, volts, wheels_twist
-from omnidyn.logs.check.robust import Slope, ratio, smooth, windowed
+from omnidyn.logs.check.robust import Slope, clusters, ratio, smooth, windowed
 from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import NOTE, WARN, Finding
 
@@ -18,6 +18,7 @@ FloatArray = NDArray[np.float64]
 
 FARTHEST = 8  # rows that are searched to either side
 WARN_FROM, NOTE_FROM = 0.75, 0.35  # rows
+ENOUGH = 60_000  # rows that tell a lag
 SURE = 5.0  # standard errors
 
 
@@ -103,13 +104,15 @@ def lag(work: Work, y: FloatArray, x: FloatArray) -> Slope | None:
     A whole number of rows first, by the least residual; then the rest from the residual's part along the slope of x,
     with the slope of y beside it as instrument, so that noise of neither pulls it.
     """
-    y, x = _filled(y), _filled(x)
+    y, x = _filled(y)[:ENOUGH], _filled(x)[:ENOUGH]
     width = 3
     y, x = smooth(y, width), smooth(x, width)
     n = len(y)
     inside = slice(FARTHEST + 4, n - FARTHEST - 4)
     good = np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1)
     for piece in work.pieces[1:]:
+        if piece.start > n:
+            break
         good[max(0, piece.start - FARTHEST - 4) : piece.start + FARTHEST + 4] = False
     keep = good[inside]
     if keep.sum() < MIN_ROWS:
@@ -138,7 +141,7 @@ def lag(work: Work, y: FloatArray, x: FloatArray) -> Slope | None:
     climb = (moved(x, best - 1) - moved(x, best + 1)) / 2.0
     instrument = moved(y, -k) - moved(y, k)
     residual = target - a * shifted
-    ids, count = work.windows()
+    ids, count = clusters(n, work.step)
     ids = ids[inside]
     top = windowed(ids, count, -(residual * instrument).sum(axis=1))
     below = windowed(ids, count, a * (climb * instrument).sum(axis=1))

@@ -78,9 +78,13 @@ def clusters(n: int, step: float, seconds: float = 0.2) -> tuple[NDArray[np.int6
     return ids, int(ids[-1]) + 1 if n else 0
 
 
-def windowed(ids: NDArray[np.int64], count: int, values: FloatArray) -> FloatArray:
-    """Sum of `values` over each window; missing values count 0."""
-    return np.bincount(ids, weights=np.nan_to_num(values), minlength=count)
+def windowed(ids: NDArray[np.int64], count: int, values: NDArray) -> FloatArray:
+    """Sum of `values` over each window; missing values count 0. `ids` as from `clusters`: windows in order."""
+    starts = np.searchsorted(ids, np.arange(count))
+    values = np.nan_to_num(values) if values.dtype.kind == "f" else values.astype(float)
+    full = np.append(starts, len(values))
+    sums = np.add.reduceat(np.append(values, 0.0), np.minimum(starts, len(values)))
+    return np.where(np.diff(full) > 0, sums, 0.0)
 
 
 def slope(y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int) -> Slope:
@@ -98,21 +102,19 @@ def products(
 ) -> tuple[FloatArray, FloatArray]:
     """(sum of y x, sum of x x without the square of its noise) of each window. Shapes (count,)."""
     y, x = y.reshape(len(y), -1), x.reshape(len(x), -1)
-    good = np.isfinite(y) & np.isfinite(x)
-    odd = (np.arange(len(x)) & 1).astype(bool)[:, None]
+    odd = (np.arange(len(x)) & 1).astype(bool)
     top, below = np.zeros(count), np.zeros(count)
     for k in range(x.shape[1]):
-        number, all_y, one, other = (
-            np.bincount(ids, weights=np.where(mask, values, 0.0), minlength=count)
-            for mask, values in (
-                (good[:, k], np.ones(len(x))), (good[:, k], y[:, k]), (good[:, k] & odd[:, 0], x[:, k]),
-                (good[:, k] & ~odd[:, 0], x[:, k]),
-            )
-        )  # fmt: skip
-        odds = np.bincount(ids, weights=good[:, k] & odd[:, 0], minlength=count)
+        good = np.isfinite(y[:, k]) & np.isfinite(x[:, k])
+        both, half = np.where(good, x[:, k], 0.0), good & odd
+        number, odds = windowed(ids, count, good), windowed(ids, count, half)
         evens = number - odds
+        mean, one, all_x = (
+            windowed(ids, count, each) for each in (np.where(good, y[:, k], 0.0), np.where(half, both, 0.0), both)
+        )
+        other = all_x - one
         with np.errstate(divide="ignore", invalid="ignore"):
-            one, other, mean = one / odds, other / evens, all_y / number
+            one, other, mean = one / odds, other / evens, mean / number
         full = (odds >= 2) & (evens >= 2)
         top += np.where(full, number * mean * 0.5 * (one + other), 0.0)
         below += np.where(full, number * one * other, 0.0)

@@ -25,6 +25,7 @@ MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
 SENSORS = ("current", "wheel_speed", "twist")
 MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # references that say what a wheel did
 FOLLOWS = 0.5  # [s] after which a wheel follows its command
+KICK = 0.3  # of the most a motor gets: a change that its wheel must answer
 SPIKE = 10.0  # a single value so many times the noise away from both its neighbours
 IMPOSSIBLE = 1e-6  # chance, over the whole log, below which repeated values are no chance
 
@@ -213,7 +214,8 @@ def _stuck(work: Work) -> tuple[list[Finding], Work]:
             reference, measured = None, False
             if channel == "wheel_speed" and expected is not None and k < expected[1].shape[1]:
                 reference, measured = expected[1][:, k], expected[0] in MEASUREMENTS
-            bad = _frozen(values, reference, measured, max(10, round(FOLLOWS / work.step)))
+            slow = max(10, round(FOLLOWS / work.step))
+            bad = _frozen(values, reference, measured, slow, _drive(work, k) if channel == "wheel_speed" else None)
             if not bad.any():
                 continue
             stretches = runs(bad)
@@ -229,7 +231,18 @@ def _stuck(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _frozen(values: FloatArray, reference: FloatArray | None, measured: bool, slow: int) -> NDArray[np.bool_]:
+def _drive(work: Work, k: int) -> FloatArray | None:
+    """What drives a wheel, as a share of the most it gets; None where nothing was recorded."""
+    for channel in ("voltage", "duty"):
+        values = work.get(channel)
+        if values is not None and k < values.shape[1] and np.nanmax(np.abs(values[:, k])) > 0.0:
+            return values[:, k] / np.nanmax(np.abs(values[:, k]))
+    return None
+
+
+def _frozen(
+    values: FloatArray, reference: FloatArray | None, measured: bool, slow: int, drive: FloatArray | None
+) -> NDArray[np.bool_]:
     """Rows of repeats that are too long for chance, or during which the reference walks away.
 
     measured: the reference is what the wheel did; a command it follows after `slow` rows, or, at rest, not at all.
@@ -246,6 +259,10 @@ def _frozen(values: FloatArray, reference: FloatArray | None, measured: bool, sl
     for (a, b), length in zip(stretches[long], lengths[long], strict=True):
         unlikely = values[a] != 0.0 and length > 3 * usual_length and n * chance ** (length - 1) < IMPOSSIBLE
         asked = length >= (slow // 2 if measured else slow) and (measured or values[a] != 0.0)
+        if drive is not None and values[a] != 0.0 and 2 * length >= slow:
+            # A wheel that turns cannot keep its speed to the digit when its voltage becomes another.
+            low, high = np.nanquantile(drive[a:b], [0.25, 0.75])
+            unlikely |= high - low > KICK
         if unlikely or (away is not None and asked and away.during(a, b)):
             bad[a:b] = True
     return bad

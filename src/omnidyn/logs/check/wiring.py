@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from omnidyn.logs.channels import components
 from omnidyn.logs.check.reference import emf, ground, ohmic, pose_twist, volts, wheels_twist
-from omnidyn.logs.check.robust import smooth
+from omnidyn.logs.check.robust import smooth, windowed
 from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import FATAL, WARN, Finding
 from omnidyn.model.wheels import wheel_speed
@@ -160,8 +160,8 @@ def _windows(work: Work, *channels: FloatArray, seconds: float = WINDOWS[0]) -> 
     ids, count = work.windows(seconds)
     table = np.column_stack(channels)
     good = np.isfinite(table).all(axis=1)
-    number = np.bincount(ids[good], minlength=count)
-    sums = np.column_stack([np.bincount(ids[good], weights=column[good], minlength=count) for column in table.T])
+    number = windowed(ids, count, good)
+    sums = np.column_stack([windowed(ids, count, np.where(good, column, 0.0)) for column in table.T])
     keep = number >= 3
     means = sums[keep] / number[keep, None]
     return np.split(means, np.cumsum([values.shape[1] for values in channels])[:-1], axis=1)

@@ -1,0 +1,154 @@
+"""`omnidyn check` on 12 faults put into 200 clean simulated logs each, and on 1000 clean logs.
+
+    python -m benchmarks check              the table
+    python -m benchmarks.check --publish    the same, into docs/check.md and docs/images/check_recall.png
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.check_logs import FAULTS, clean, draw
+from benchmarks.table import Table, machine, one_core
+from omnidyn.logs.check import check
+from omnidyn.logs.findings import NOTE
+from omnidyn.logs.log import Log
+from omnidyn.report.style import BLUE, GREY, VERMILLION, WIDTH, look, new_figure, picture
+
+LOGS, CLEAN = 200, 1000
+RECALL, FALSE = 0.95, 0.02  # the goals
+ROWS, COLUMNS, SECONDS = 500_000, 10, 2.0  # and of the speed, CPU seconds
+BINS = 5
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+BEGIN, END = "<!-- begin: benchmarks.check -->", "<!-- end: benchmarks.check -->"
+
+
+class Outcome(NamedTuple):
+    """Of one fault: sizes and whether each was found; logs in which something else was said that is not so."""
+
+    sizes: np.ndarray
+    found: np.ndarray
+    untrue: int
+
+
+def run_fault(name: str, logs: int = LOGS) -> Outcome:
+    """Check `logs` logs with one fault."""
+    fault, sizes, found, untrue = FAULTS[name], [], [], 0
+    for seed in range(logs):
+        log, robot, broken, size = draw(name, seed)
+        verdict = check(log, robot)
+        sizes.append(size)
+        found.append(fault.found(verdict, broken))
+        untrue += any(f.level != NOTE and f.code not in (*CODES[name], *fault.also) for f in verdict.findings)
+    return Outcome(np.array(sizes), np.array(found), untrue)
+
+
+# What a verdict may say about each fault; anything else above a note is counted as untrue.
+CODES = {
+    "swapped motor": ("swapped",), "inverted sign": ("inverted",), "rpm as rad/s": ("unit",),
+    "one-sample lag": ("lag",), "gap": ("gap",), "repeated stamps": ("time_repeats",), "saturation": ("saturation",),
+    "sag": ("sag",), "slip": ("slip",), "stuck encoder": ("stuck",), "dead channel": ("dead",),
+    "wrong gear": ("gear", "path_ratio"),
+}  # fmt: skip
+
+
+def run_clean(logs: int = CLEAN) -> tuple[int, list[str]]:
+    """(clean logs in which anything untrue is said, what)."""
+    wrong, words = 0, []
+    for seed in range(logs):
+        log, robot, scene = clean(seed)
+        said = [f for f in check(log, robot).findings if f.level != NOTE]
+        wrong += bool(said)
+        words += [f"clean log {seed} ({robot.name}, {scene.floor}): {f.code} {f.where}" for f in said]
+    return wrong, words
+
+
+def speed() -> float:
+    """CPU seconds for a long log of ten columns."""
+    log, robot, _ = clean(7)  # three wheels, duty, current, wheel speed and twist
+    kept = {name: np.tile(log.channels[name], (ROWS // len(log) + 1, 1))[:ROWS] for name in ("duty", "wheel_speed", "twist")}
+    step = float(np.median(np.diff(log.t)))
+    long = Log(np.arange(ROWS) * step, kept, np.arange(ROWS) + 2)
+    check(log, robot)
+    with one_core():
+        begin = time.process_time()
+        check(long, robot)  # the times and nine columns
+        return time.process_time() - begin
+
+
+def measure(logs: int = LOGS, clean_logs: int = CLEAN) -> Table:
+    """Recall of each fault, false alarms, speed."""
+    return table_of({name: run_fault(name, logs) for name in FAULTS}, run_clean(clean_logs), clean_logs)
+
+
+def table_of(outcomes: dict[str, Outcome], false: tuple[int, list[str]], clean_logs: int) -> Table:
+    """The outcomes as a table."""
+    table = Table("check: faults put into clean simulated logs", ["fault", "sizes", "logs", "found", "recall %", "untrue"])
+    for name, outcome in outcomes.items():
+        fault, share = FAULTS[name], float(outcome.found.mean())
+        sizes = f"{fault.low:g} to {fault.high:g} {fault.unit}" if fault.high > fault.low else f"{fault.unit}"
+        table.add(f">= {100 * RECALL:g} %", share >= RECALL, fault=name, sizes=sizes, logs=len(outcome.found),
+                  found=int(outcome.found.sum()), untrue=outcome.untrue, **{"recall %": 100.0 * share})  # fmt: skip
+    wrong, words = false
+    table.add(f"<= {100 * FALSE:g} % untrue", wrong <= FALSE * clean_logs, fault="none (clean)", sizes="", logs=clean_logs,
+              untrue=wrong)  # fmt: skip
+    seconds = speed()
+    table.add(f"<= {SECONDS:g} s of CPU", seconds <= SECONDS, fault=f"{ROWS} rows x {COLUMNS} columns",
+              sizes=f"{seconds:.2f} s")  # fmt: skip
+    table.notes += [machine(), "untrue: logs in which a warning or a fatal finding says what is not the case"]
+    table.notes += [f"untrue in {each}" for each in words[:20]]
+    return table
+
+
+def draw_recall(outcomes: dict[str, Outcome]) -> bytes:
+    """Recall against size, a panel per fault that has sizes. PNG."""
+    sized = [name for name in outcomes if FAULTS[name].high > FAULTS[name].low]
+    with look():
+        figure = new_figure(WIDTH, 4.6)
+        panels = figure.subplots(2, -(-len(sized) // 2), sharey=True).ravel()
+        figure.subplots_adjust(left=0.085, right=0.98, top=0.93, bottom=0.13, wspace=0.14, hspace=0.55)
+        for axes, name in zip(panels, sized, strict=False):
+            fault, outcome = FAULTS[name], outcomes[name]
+            edges = np.geomspace(fault.low, fault.high, BINS + 1)
+            place = np.clip(np.searchsorted(edges, outcome.sizes, side="right") - 1, 0, BINS - 1)
+            middle = np.sqrt(edges[1:] * edges[:-1])
+            number = np.bincount(place, minlength=BINS)
+            share = np.bincount(place, outcome.found, minlength=BINS) / np.maximum(number, 1)
+            axes.axhline(100 * RECALL, color=VERMILLION, linewidth=1.2, linestyle="--")
+            axes.plot(middle[number > 0], 100 * share[number > 0], "o-", color=BLUE)
+            axes.set_xscale("log")
+            ticks = [fault.low, float(np.sqrt(fault.low * fault.high)), fault.high]
+            axes.set_xticks(ticks, [f"{each:.2g}" for each in ticks])
+            axes.minorticks_off()
+            axes.set_title(name)
+            axes.set_xlabel(fault.unit)
+            axes.set_ylim(0.0, 104.0)
+        for axes in panels[len(sized) :]:
+            axes.set_axis_off()
+        for axes in panels[:: len(panels) // 2]:
+            axes.set_ylabel("found, %")
+        figure.text(0.985, 0.012, "dashed: 95 %", color=GREY, ha="right", fontsize=9.5)
+        return picture("check_recall", "Recall against size", "", figure).png
+
+
+def publish(logs: int = LOGS, clean_logs: int = CLEAN) -> Table:
+    """Measure, and write table and picture into the documentation."""
+    outcomes = {name: run_fault(name, logs) for name in FAULTS}
+    table = table_of(outcomes, run_clean(clean_logs), clean_logs)
+    (DOCS / "images" / "check_recall.png").write_bytes(draw_recall(outcomes))
+    page = DOCS / "check.md"
+    text = page.read_text("utf-8")
+    head, _, rest = text.partition(BEGIN)
+    body = table.as_text().split("\n", 2)[2]
+    page.write_text(f"{head}{BEGIN}\n\n{body}\n{END}{rest.partition(END)[2]}", "utf-8")
+    return table
+
+
+if __name__ == "__main__":
+    chosen = publish if "--publish" in sys.argv[1:] else measure
+    print(chosen().as_text())
