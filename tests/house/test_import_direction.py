@@ -33,7 +33,7 @@ ORDER = {
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch
         claims""",
     "report": "style figures page",
-    "report/figures": "robot traces friction steps dead_zone dead_zone_map reconcile overlay",
+    "report/figures": "robot traces friction steps dead_zone dead_zone_map reconcile overlay raw_log",
     "export": "",
     "interop": "",
     "cli": """streams numbers session progress log_options init check plan identify simulate friction deadzone compare

@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 FARTHEST = 8  # rows that are searched to either side
 WARN_FROM, NOTE_FROM = 0.75, 0.35  # rows
 ENOUGH = 60_000  # rows that tell a lag
-SURE = 5.0  # standard errors
+SURE, VAGUE = 5.0, 0.4  # standard errors; rows of error beyond which nothing is said
 
 
 class Pair(NamedTuple):
@@ -37,12 +37,10 @@ def check_lag(work: Work) -> tuple[list[Finding], Work]:
     found: list[Finding] = []
     if len(work) < 3 * MIN_ROWS or work.step <= 0.0:
         return found, work
-    lags: dict[tuple[str, str], Slope] = {}
     for pair in _pairs(work):
         line = lag(work, pair.y, pair.x)
-        if line is None or not np.isfinite(line.error):
+        if line is None or not line.error < VAGUE:
             continue
-        lags[(pair.late, pair.against)] = line
         rows = line.value
         if abs(rows) < NOTE_FROM or abs(rows) < SURE * line.error:
             continue

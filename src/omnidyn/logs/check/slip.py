@@ -56,12 +56,20 @@ def _worst(work: Work) -> tuple[NDArray[np.bool_], float, float, float] | None:
     own = wheels_twist(work, speed, seen.width)
     assert own is not None
     length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
+    if not _witness(own * length, seen.axes):
+        return None
     for weights in (length, _levelled(work, seen.twist, own, length)):
         # An axis with a scale of its own is no slip: the contrast has to be there without it as well.
         stretch = _contrast(work, seen.twist * weights, own * length, seen.axes)
         if stretch is None:
             return None
     return stretch
+
+
+def _witness(own: FloatArray, axes: list[int]) -> bool:
+    """Whether the axes that were measured hold a fair part of the motion."""
+    size = np.sqrt(np.nanmean(own**2, axis=0))
+    return bool(np.sqrt((size[axes] ** 2).sum()) > 0.3 * np.sqrt((size**2).sum()))
 
 
 def _levelled(work: Work, floor: FloatArray, own: FloatArray, length: FloatArray) -> FloatArray:
@@ -111,7 +119,7 @@ def _contrast(
     rows = (ids >= starts[k]) & (ids < ends[k])
     if inside > outside:  # then the rest is what slips
         inside, outside, rows = outside, inside, ~rows
-    if sure[k] < SURE or outside <= 0.1 or (outside - inside) / outside < LEAST:
+    if sure[k] < SURE or not 0.1 < outside < 2.0 or (outside - inside) / outside < LEAST:
         return None
     if inside < SPINS * outside and not 0.5 < (d_in[k] / b_in[k]) / (d_out[k] / b_out[k]) < 2.0:
         return None  # wheels that are said to spin while the robot stands: then as fast as they turn elsewhere

@@ -61,7 +61,8 @@ def _missing(work: Work) -> list[Finding]:
 def _quantised(work: Work) -> list[Finding]:
     """Steps of a sensor that matter: 2 % of what it usually reads, or more; sensors of one step in one finding."""
     found: list[Finding] = []
-    expected = expected_wheel_speed(work)
+    command = work.get("wheel_speed_command")
+    expected = ("the commanded speed", command) if command is not None else expected_wheel_speed(work)
     groups: dict[tuple[str, float], list[tuple[str, float, float]]] = {}
     for channel in SENSORS:
         for k, (component, values) in enumerate(work.columns(channel)):
@@ -334,8 +335,8 @@ def _spikes(work: Work) -> tuple[list[Finding], Work]:
             worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
             found.append(Finding(
                 "spike", WARN, component,
-                f"{int(bad.sum())} single value{'s' * (int(bad.sum()) > 1)} of {component} far from their neighbours, "
-                f"the farthest {values[worst]:.4g} at t = {work.t[worst]:.6g} s",
+                f"{int(bad.sum())} value{'s' * (int(bad.sum()) > 1)} of {component} alone, far from the rows before and "
+                f"after, the farthest {values[worst]:.4g} at t = {work.t[worst]:.6g} s",
                 "they are left out where a mean is taken", work.lines(bad), int(bad.sum()),
                 {"farthest": float(values[worst]), "share": float(bad.mean())},
             ))  # fmt: skip

@@ -144,7 +144,9 @@ def check_wiring(work: Work) -> tuple[list[Finding], Work]:
 
 
 def _floor_answer(work: Work) -> tuple[str, Answer] | None:
-    return next(filter(None, (_by_floor(work, seconds) for seconds in WINDOWS)), None)
+    """What is wrong between wheels and floor; wheels that turn as the firmware tells them are wired as it thinks."""
+    answer = next(filter(None, (_by_floor(work, seconds) for seconds in WINDOWS)), None)
+    return None if answer is not None and answer[0] == "wheels" and _commands_agree(work) else answer
 
 
 def _mended(work: Work, channels: tuple[str, ...], wiring: Wiring) -> Work:
@@ -278,7 +280,7 @@ def _by_floor(work: Work, seconds: float) -> tuple[str, Answer] | None:
     if len(w) < 8:
         return None
     v = means[1] if axes else np.zeros((len(w), 0))
-    if axes and (v**2).sum() < SEEN**2 * ((w * robot.wheels.radii) ** 2).sum() * len(axes) / n:
+    if axes and (v**2).sum() < (SEEN if len(axes) > 1 else 2.0 * SEEN) ** 2 * ((w * robot.wheels.radii) ** 2).sum() * len(axes) / n:
         return None  # a robot that does not turn says nothing through its heading
     target = np.column_stack([v, np.zeros((len(w), len(null)))])
     moments = target.T @ target, target.T @ w, w.T @ w
@@ -286,8 +288,11 @@ def _by_floor(work: Work, seconds: float) -> tuple[str, Answer] | None:
     costs = np.array([_cost(rows @ wiring.matrix, moments, bool(axes)) for wiring in tried])
     total = float(np.trace(moments[0])) if axes else float(np.trace(rows @ moments[2] @ rows.T) + _size(rows, w))
     answer = choose(tried, costs, total)
-    if axes and name in ("twist", "pose") and answer is not None:
+    if axes and name in ("twist", "pose"):
         turned = _by_axes(work, rows, moments, axes, total)
+        if turned is not None and answer is None:
+            return "axes", turned
+    if axes and name in ("twist", "pose") and answer is not None:
         # One axis of the floor turned about is rarer than two motors exchanged, which may look the same.
         if turned is not None and (turned.best.changes + 1 < answer.best.changes or turned.left < BETTER * answer.left):
             return "axes", turned
@@ -379,11 +384,11 @@ def _wheels_finding(work: Work, answer: Answer, blamed: str) -> Finding:
     against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")
     names = components("wheel_speed", work.wheels)
     wrong = answer.best.touched(names)
-    what = f"{against} of the robot" if against else "what the wheels must agree on"
+    what = f"the {against} of the robot" if against else "what the wheels must agree on"
     also = "; its voltage, current and speed agree, so the whole motor is meant" if blamed == "motors" else ""
     return Finding(
         _code(answer.best), FATAL, " ".join(wrong),
-        f"wheel_speed against the {what}: {answer.best.words(names)}{also}{_rivals(answer, names)}; as logged it "
+        f"wheel_speed against {what}: {answer.best.words(names)}{also}{_rivals(answer, names)}; as logged it "
         f"leaves {100 * answer.logged:.0f} % of the motion unexplained, put right {100 * answer.left:.1f} %",
         "put the columns right in the mapping (--column), or the order and signs of the wheels in the robot file",
         (), 0, {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,

@@ -1,0 +1,241 @@
+"""omnidyn check LOG... [--robot ROBOT]: is this log fit for use, and if not, why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from omnidyn.cli import log_options
+from omnidyn.cli.progress import progress
+from omnidyn.cli.streams import coloured, say, show, show_json, width
+
+if TYPE_CHECKING:
+    from omnidyn.errors import OmnidynError
+    from omnidyn.logs.findings import Finding, Verdict
+    from omnidyn.logs.log import Log
+    from omnidyn.logs.read_log import LogOptions
+    from omnidyn.model.robot import Robot
+
+BLOCK = 500_000  # rows that are held at once
+WHOLE = 3  # logs that are shown one by one in full
+BAD_INPUT, INSUFFICIENT = 3, 4
+COLOURS = {"fatal": "red", "warn": "yellow", "note": "white"}
+
+
+@dataclass
+class Checked:
+    """One log: its verdict, or why it could not be read."""
+
+    path: str
+    verdict: Verdict | None = None
+    error: OmnidynError | None = None
+    digest: str = ""
+    sha256: str = ""
+
+
+def check(
+    log: list[str] = log_options.LOGS,
+    robot: str = typer.Option("", "--robot", metavar="ROBOT", help="The robot of the logs: a preset or a robot file."),
+    picture: str = typer.Option("", "--picture", metavar="FILE", help="The raw log with what was found, .png or .svg."),
+    full: bool = typer.Option(False, "--full", help="Every finding of every log, however many logs."),
+    map_file: str = log_options.MAP,
+    column: list[str] = log_options.COLUMN,
+    assume: list[str] = log_options.ASSUME,
+    latency: list[str] = log_options.LATENCY,
+    save_map: str = log_options.SAVE_MAP,
+    no_header: bool = log_options.NO_HEADER,
+    skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
+    current_unsigned: bool = log_options.CURRENT_UNSIGNED,
+    force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+    json: bool = typer.Option(False, "--json", help="The verdicts for machines."),
+) -> None:
+    """Say what is wrong with logs: which rows, why, and what to do.
+
+    Time base, sensors, units, wiring, scales, slip, lag, limits, energy, and what the log excites. Without a robot what
+    needs none is checked. Exit code 4 when a finding is fatal, 3 when a log could not be read; the rest is still shown.
+    """
+    _refuse_picture(picture, force, log)
+    options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
+    maps = log_options.Maps(save_map, force)
+    with progress("reading") as now:
+        files = log_options.log_files(log)
+        loaded = _robot(robot)
+        done = [_checked(path, loaded, options, maps, now, picture, force) for path in files]
+    _compare_data(done)
+    _tell(done, json, full, robot)
+    if any(each.error is not None for each in done):
+        raise typer.Exit(BAD_INPUT)
+    if any(each.verdict is not None and each.verdict.fatal for each in done):
+        raise typer.Exit(INSUFFICIENT)
+
+
+def _refuse_picture(path: str, force: bool, log: Sequence[str]) -> None:
+    import os
+
+    from omnidyn.errors import InputError
+    from omnidyn.files import check_output
+
+    if not path:
+        return
+    if not path.endswith((".png", ".svg")) or "\0" in path:
+        raise InputError("cannot tell the kind of picture", got=path, expected="a name that ends in .png or .svg")
+    if len(log) > 1 or os.path.isdir(log[0]):
+        raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
+    check_output(path, force)
+
+
+def _robot(robot: str) -> Robot | None:
+    from omnidyn.model.robot_file import load_robot
+
+    return load_robot(robot) if robot else None
+
+
+def _checked(
+    path: str, robot: Robot | None, options: LogOptions, maps: log_options.Maps, now: Callable[[str], None],
+    picture: str, force: bool,
+) -> Checked:  # fmt: skip
+    """One log, block by block; an error in reading it does not stop the others."""
+    from omnidyn.errors import OmnidynError
+    from omnidyn.logs.check import check as check_log
+    from omnidyn.logs.check import check_blocks
+    from omnidyn.logs.read_log import iter_logs
+
+    done, digest, kept = Checked(path), _Digest(), _Kept()
+    now(f"reading {path}")
+
+    def said(count: int, total: int) -> None:
+        now(f"reading {path}, {100 * count // max(total, 1)} %")
+
+    try:
+        blocks = kept.first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=said)))
+        if kept.log is not None:
+            maps.show(path, kept.log.columns)
+        done.verdict = check_log(kept.log, robot) if kept.only else check_blocks(blocks, robot)  # type: ignore[arg-type]
+        if picture and kept.log is not None:
+            _draw(kept.log, done.verdict, picture, force)
+    except OmnidynError as error:
+        done.error = error
+    done.digest, done.sha256 = digest.value, digest.sha256
+    return done
+
+
+class _Kept:
+    """The first block of a log, kept for the picture, and whether it is the only one."""
+
+    def __init__(self) -> None:
+        self.log: Log | None = None
+        self.only = False
+
+    def first(self, blocks: Iterator[Log]) -> Iterator[Log]:
+        """The same blocks; two of them are read now."""
+        from itertools import chain
+
+        head = [block for _, block in zip(range(2), blocks, strict=False)]
+        self.log, self.only = (head[0] if head else None), len(head) == 1
+        return chain(head, blocks)
+
+
+class _Digest:
+    """What the numbers of a log hash to, whatever its name and format."""
+
+    def __init__(self) -> None:
+        import hashlib
+
+        self.hash, self.sha256 = hashlib.sha256(), ""
+
+    @property
+    def value(self) -> str:
+        return self.hash.hexdigest()
+
+    def through(self, blocks: Iterator[Log]) -> Iterator[Log]:
+        """The same blocks, taken note of."""
+        for block in blocks:
+            self.hash.update(block.t.tobytes())
+            for name, values in sorted(block.channels.items()):
+                self.hash.update(name.encode() + values.tobytes())
+            self.sha256 = block.sha256 or self.sha256
+            yield block
+
+
+def _compare_data(done: list[Checked]) -> None:
+    """Logs that hold the same numbers under two names: evidence that counts once."""
+    from dataclasses import replace
+
+    from omnidyn.logs.findings import WARN, Finding, in_order
+
+    first: dict[str, Checked] = {}
+    for each in done:
+        if each.verdict is None:
+            continue
+        other = first.setdefault(each.digest, each)
+        if other is not each:
+            finding = Finding(
+                "same_data", WARN, "", f"it holds the same numbers as {other.path}",
+                "leave one of them out: they are one recording, not two", (), 0, {},
+            )  # fmt: skip
+            each.verdict = replace(each.verdict, findings=in_order([*each.verdict.findings, finding]))
+
+
+def _draw(log: Log, verdict: Verdict, path: str, force: bool) -> None:
+    from omnidyn.files import write_atomic
+    from omnidyn.report.figures.raw_log import draw_raw_log
+
+    drawn = draw_raw_log(log, verdict)
+    write_atomic(path, drawn.png if path.endswith(".png") else drawn.svg, force)
+    say(f"omnidyn: wrote {path}")
+
+
+def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
+    for each in done:
+        if each.error is not None:
+            say(f"omnidyn: error: {each.error}")
+    if json:
+        show_json(_document(done, robot))
+        return
+    read = [each for each in done if each.verdict is not None]
+    for each in read:
+        assert each.verdict is not None
+        show(each.verdict.as_text(width()) if full or len(read) <= WHOLE else _brief(each.verdict))
+    if len(done) > 1:
+        show(_summary(done, read))
+
+
+def _document(done: list[Checked], robot: str) -> dict[str, Any]:
+    from omnidyn.cli.session import provenance, robot_input
+
+    logs = [each.verdict.to_dict() | {"source": each.path} for each in done if each.verdict is not None]
+    errors = [{"source": each.path, "error": str(each.error)} for each in done if each.error is not None]
+    inputs = [{"role": "log", "name": each.path, "sha256": each.sha256} for each in done if each.verdict is not None]
+    record = provenance([*([robot_input(robot)] if robot else []), *inputs])
+    fatal = any(log["fatal"] for log in logs)
+    return {"logs": logs, "unread": errors, "fatal": fatal, "provenance": record}
+
+
+def _brief(verdict: Verdict) -> str:
+    """One log in a line: its findings by name."""
+    parts = []
+    for level in ("fatal", "warn"):
+        codes = [f"{each.code} {each.where}".rstrip() for each in verdict.findings if each.level == level]
+        if codes:
+            parts.append(coloured(level.upper() if level == "fatal" else level, COLOURS[level]) + " " + ", ".join(codes))
+    return f"{verdict.source}: {'; '.join(parts) or 'fit for use'}"
+
+
+def _summary(done: list[Checked], read: list[Checked]) -> str:
+    """What was found over all logs: each kind once, in how many logs, with one example."""
+    groups: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
+    for each in read:
+        for finding in each.verdict.findings if each.verdict is not None else ():
+            groups.setdefault((finding.level, finding.code), []).append((each.path, finding))
+    lines = [f"{len(done)} logs, {len(read)} read:"]
+    for (level, code), members in sorted(groups.items(), key=lambda item: (list(COLOURS).index(item[0][0]), -len(item[1]))):
+        logs = len({path for path, _ in members})
+        path, example = members[0]
+        word = coloured(f"{level.upper() if level == 'fatal' else level:5s}", COLOURS[level])
+        lines.append(f"  {word}  {code}: in {logs} log{'s' * (logs > 1)}, such as {path}: {example.message}")
+        if example.remedy:
+            lines.append(f"         -> {example.remedy}")
+    return "\n".join(lines)
