@@ -1,7 +1,7 @@
 """`omnidyn check` on 12 faults put into 200 clean simulated logs each, and on 1000 clean logs.
 
-    python -m benchmarks check              the table
-    python -m benchmarks.check --publish    the same, into docs/check.md and docs/images/check_recall.png
+python -m benchmarks check              the table
+python -m benchmarks.check --publish    the same, into docs/check.md and docs/images/check_recall.png
 """
 
 from __future__ import annotations
@@ -71,9 +71,11 @@ def run_clean(logs: int = CLEAN) -> tuple[int, list[str]]:
 def speed() -> float:
     """CPU seconds for a long log of ten columns."""
     log, robot, _ = clean(7)  # three wheels, duty, current, wheel speed and twist
-    kept = {name: np.tile(log.channels[name], (ROWS // len(log) + 1, 1))[:ROWS] for name in ("duty", "wheel_speed", "twist")}
+    kept = {
+        name: np.tile(log.channels[name], (ROWS // len(log) + 1, 1))[:ROWS] for name in ("duty", "wheel_speed", "twist")
+    }
     step = float(np.median(np.diff(log.t)))
-    long = Log(np.arange(ROWS) * step, kept, np.arange(ROWS) + 2)
+    long = Log(np.arange(ROWS, dtype=float) * step, kept, np.arange(ROWS) + 2)
     check(log, robot)
     with one_core():
         begin = time.process_time()
@@ -88,15 +90,17 @@ def measure(logs: int = LOGS, clean_logs: int = CLEAN) -> Table:
 
 def table_of(outcomes: dict[str, Outcome], false: tuple[int, list[str]], clean_logs: int) -> Table:
     """The outcomes as a table."""
-    table = Table("check: faults put into clean simulated logs", ["fault", "sizes", "logs", "found", "recall %", "untrue"])
+    table = Table(
+        "check: faults put into clean simulated logs", ["fault", "sizes", "logs", "found", "recall %", "untrue"]
+    )
     for name, outcome in outcomes.items():
         fault, share = FAULTS[name], float(outcome.found.mean())
         sizes = f"{fault.low:g} to {fault.high:g} {fault.unit}" if fault.high > fault.low else f"{fault.unit}"
         table.add(f">= {100 * RECALL:g} %", share >= RECALL, fault=name, sizes=sizes, logs=len(outcome.found),
                   found=int(outcome.found.sum()), untrue=outcome.untrue, **{"recall %": 100.0 * share})  # fmt: skip
     wrong, words = false
-    table.add(f"<= {100 * FALSE:g} % untrue", wrong <= FALSE * clean_logs, fault="none (clean)", sizes="", logs=clean_logs,
-              untrue=wrong)  # fmt: skip
+    goal = f"<= {100 * FALSE:g} % untrue"
+    table.add(goal, wrong <= FALSE * clean_logs, fault="none (clean)", sizes="", logs=clean_logs, untrue=wrong)
     seconds = speed()
     table.add(f"<= {SECONDS:g} s of CPU", seconds <= SECONDS, fault=f"{ROWS} rows x {COLUMNS} columns",
               sizes=f"{seconds:.2f} s")  # fmt: skip

@@ -151,7 +151,9 @@ def record(rng: Rng, scene: Scene, truth: Truth, ground_slip: FloatArray | None 
     stall = float(np.max(settled_current(robot.motor, np.full(robot.wheels.count, LIMIT), 0.0 * run.current[0])))
     if scene.has_current:
         noise = stall * rng.uniform(0.003, 0.02)
-        channels["current"] = stepped(run.current + noise * rng.normal(size=run.current.shape), stall * rng.uniform(0.001, 0.01))
+        channels["current"] = stepped(
+            run.current + noise * rng.normal(size=run.current.shape), stall * rng.uniform(0.001, 0.01)
+        )
     top = float(np.abs(run.wheel_speed).max()) or 1.0
     if scene.has_speed:
         channels["wheel_speed"] = encoder(rng, run.t, run.wheel_speed, top)
@@ -171,7 +173,9 @@ def record(rng: Rng, scene: Scene, truth: Truth, ground_slip: FloatArray | None 
 def encoder(rng: Rng, t: FloatArray, speed: FloatArray, top: float) -> FloatArray:
     """Speed as firmware gives it (steps and noise), or as differences of counts from row to row."""
     if rng.random() < 0.3 and len(t) > 2:
-        angle = np.vstack([np.zeros(speed.shape[1]), np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t)[:, None], axis=0)])
+        angle = np.vstack(
+            [np.zeros(speed.shape[1]), np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t)[:, None], axis=0)]
+        )
         counts = 2.0 * np.pi / rng.choice([1024.0, 2048.0, 4096.0])
         measured = np.diff(stepped(angle, counts), axis=0) / np.diff(t)[:, None]
         return np.vstack([np.zeros(speed.shape[1]), measured])
@@ -450,12 +454,12 @@ FAULTS: dict[str, Fault] = {
 
 
 def draw(name: str, seed: int) -> tuple[Log, Robot, dict, float]:
-    """(log with that fault, robot file, what was broken, size), for a seed; sizes are spread evenly in their logarithm."""
+    """(log with that fault, robot file, what was broken, size), for a seed; sizes are even in their logarithm."""
     fault = FAULTS[name]
     rng = np.random.default_rng([seed, sorted(FAULTS).index(name)])
     while True:
         scene = random_scene(rng)
-        size = float(np.exp(rng.uniform(np.log(fault.low), np.log(fault.high)))) if fault.high > fault.low else fault.low
+        size = float(np.exp(rng.uniform(np.log(fault.low), np.log(fault.high))))
         size = float(round(size)) if fault.unit == "rows" else size
         if not fault.needs(scene):
             continue

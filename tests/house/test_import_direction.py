@@ -25,8 +25,8 @@ ORDER = {
     "logs": """channels dialect header rows text_file table parquet_pages parquet tables run_file steady_table
         command_file words mapping clock guess log read_log segments plateaus findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
-    "logs/check": """robust work time_base reference values limits wiring slip scale lag energy motion
-        excitation""",
+    "logs/check": """robust work time_base reference values limits wirings frame floor motors wiring slip mistakes scale
+        lag energy motion excitation""",
     "identification": "estimate geometry line points doubts steady_state band",
     "control": "",
     "campaigns": "",

@@ -37,6 +37,7 @@ def _omnidyn(
 
 
 for _command in (
-    demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, deadzone.deadzone, robots.robots
+    demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, deadzone.deadzone,
+    robots.robots,
 ):  # fmt: skip
     app.command()(_command)

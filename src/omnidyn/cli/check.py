@@ -220,8 +220,14 @@ def _brief(verdict: Verdict) -> str:
     for level in ("fatal", "warn"):
         codes = [f"{each.code} {each.where}".rstrip() for each in verdict.findings if each.level == level]
         if codes:
-            parts.append(coloured(level.upper() if level == "fatal" else level, COLOURS[level]) + " " + ", ".join(codes))
+            word = level.upper() if level == "fatal" else level
+            parts.append(f"{coloured(word, COLOURS[level])} {', '.join(codes)}")
     return f"{verdict.source}: {'; '.join(parts) or 'fit for use'}"
+
+
+def _gravest_first(group: tuple[tuple[str, str], list[Any]]) -> tuple[int, int]:
+    (level, _), members = group
+    return list(COLOURS).index(level), -len(members)
 
 
 def _summary(done: list[Checked], read: list[Checked]) -> str:
@@ -231,7 +237,7 @@ def _summary(done: list[Checked], read: list[Checked]) -> str:
         for finding in each.verdict.findings if each.verdict is not None else ():
             groups.setdefault((finding.level, finding.code), []).append((each.path, finding))
     lines = [f"{len(done)} logs, {len(read)} read:"]
-    for (level, code), members in sorted(groups.items(), key=lambda item: (list(COLOURS).index(item[0][0]), -len(item[1]))):
+    for (level, code), members in sorted(groups.items(), key=_gravest_first):
         logs = len({path for path, _ in members})
         path, example = members[0]
         word = coloured(f"{level.upper() if level == 'fatal' else level:5s}", COLOURS[level])

@@ -18,7 +18,9 @@ def clean_log(robot, seconds=20.0, seed=0, level=4.0):
     segments = []
     n = robot.wheels.count
     for _ in range(int(seconds / 0.5) - 1):
-        push = robot.wheels.wrench_matrix.T @ (rng.normal(size=3) / [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
+        push = robot.wheels.wrench_matrix.T @ (
+            rng.normal(size=3) / [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))]
+        )
         segments.append(np.tile(level * rng.uniform(0.5, 1.0) * push / np.abs(push).max(), (int(0.5 * RATE), 1)))
     voltage = np.vstack([np.zeros((int(0.5 * RATE), n)), *segments])
     run = simulate(robot, voltage, 1.0 / RATE, tol=None)

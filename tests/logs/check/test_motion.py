@@ -48,14 +48,19 @@ def test_currents_without_a_sign(log, robot, with_channels, grave):
 def test_a_robot_that_never_moved(robot):
     n, rng = 1000, np.random.default_rng(0)
     voltage = np.tile([0.0, 0.3, -0.3], (n, 1))
-    channels = {"voltage": voltage, "wheel_speed": np.zeros((n, 3)), "current": voltage / 1.69 + 0.01 * rng.normal(size=(n, 3))}
+    channels = {
+        "voltage": voltage,
+        "wheel_speed": np.zeros((n, 3)),
+        "current": voltage / 1.69 + 0.01 * rng.normal(size=(n, 3)),
+    }
     verdict = check(Log(np.arange(n) * 0.01, channels, np.arange(n) + 2), robot)
     assert verdict.of("never_moved")[0].level == "fatal"
     assert not verdict.of("blocked")
 
 
 def test_a_blocked_robot(log, robot, with_channels):
-    voltage, speed, twist, current = (log.channels[name].copy() for name in ("voltage", "wheel_speed", "twist", "current"))
+    names = ("voltage", "wheel_speed", "twist", "current")
+    voltage, speed, twist, current = (log.channels[name].copy() for name in names)
     held = slice(800, 950)
     voltage[held] = [0.0, 4.0, -4.0]
     speed[held], twist[held] = 0.0, 0.0

@@ -108,7 +108,8 @@ def test_a_latency_that_is_known_is_no_lag(log, robot, with_channels):
     from omnidyn.logs.mapping import Column, ColumnMap
 
     late = np.vstack([log.channels["twist"][:1]] * 3 + [log.channels["twist"][:-3]])
-    columns = {name: Column(name, unit, latency=0.03) for name, unit in (("vx", "m/s"), ("vy", "m/s"), ("omega", "rad/s"))}
+    units = {"vx": "m/s", "vy": "m/s", "omega": "rad/s"}
+    columns = {name: Column(name, unit, latency=0.03) for name, unit in units.items()}
     broken = with_channels(twist=late, pose=None)
     assert check(broken, robot).of("lag")
     assert not check(replace(broken, columns=ColumnMap(columns)), robot).of("lag")

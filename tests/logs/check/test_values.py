@@ -104,8 +104,9 @@ def test_missing_values_are_counted(log, robot, with_channels):
 def test_a_slow_wheel_that_reads_zero(robot, log, with_channels):
     command = np.tile([3.0, 3.0, 0.2], (len(log), 1))
     rng = np.random.default_rng(0)
-    speed = np.round((0.9 * command + 0.05 * rng.normal(size=command.shape)) / 0.5) * 0.5
-    broken = with_channels(wheel_speed_command=command, wheel_speed=speed, voltage=None, current=None, twist=None, pose=None)
+    speed = np.round((0.9 * command + 0.2 * rng.normal(size=command.shape)) / 0.5) * 0.5
+    others = dict.fromkeys(("voltage", "current", "twist", "pose"))
+    broken = with_channels(wheel_speed_command=command, wheel_speed=speed, **others)
     (finding,) = check(broken).of("reads_zero")
     assert finding.where == "w3"
     assert finding.numbers["step"] == pytest.approx(0.5)

@@ -4,11 +4,11 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
-from tests.logs.check.conftest import clean_log
 
 from omnidyn.logs.check import check
-from omnidyn.logs.check.wiring import Wiring, wirings
+from omnidyn.logs.check.wirings import Wiring, wirings
 from omnidyn.model.robot_file import load_robot
+from tests.logs.check.conftest import clean_log
 
 SOME = [((1, 0, 2), (1, 1, 1)), ((0, 2, 1), (1, 1, 1)), ((2, 0, 1), (1, 1, 1)), ((0, 1, 2), (1, -1, 1)),
         ((0, 1, 2), (-1, -1, 1)), ((2, 1, 0), (1, 1, -1))]  # fmt: skip
@@ -19,7 +19,8 @@ def names_of(order, sign, letter="w"):
 
 
 def test_all_orders_and_signs_are_tried():
-    assert {(w.order, w.sign) for w in wirings(3)} == set(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))
+    signs = product((1.0, -1.0), repeat=3)
+    assert {(w.order, w.sign) for w in wirings(3)} == set(product(permutations(range(3)), signs))
     assert next(wirings(4)) == Wiring((0, 1, 2, 3), (1.0, 1.0, 1.0, 1.0))
 
 

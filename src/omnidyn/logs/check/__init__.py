@@ -15,7 +15,7 @@ from omnidyn.logs.check.excitation import check_excitation, joined, judge
 from omnidyn.logs.check.lag import check_lag
 from omnidyn.logs.check.limits import check_limits
 from omnidyn.logs.check.motion import check_motion
-from omnidyn.logs.check.scale import check_scale
+from omnidyn.logs.check.scale import check_dead_wheels, check_scale
 from omnidyn.logs.check.slip import check_slip
 from omnidyn.logs.check.time_base import begin, between
 from omnidyn.logs.check.values import check_values
@@ -29,8 +29,8 @@ __all__ = ["check", "check_blocks"]
 
 Family = Callable[[Work], tuple[list[Finding], Work]]
 FAMILIES: tuple[Family, ...] = (
-    check_values, check_limits, check_wiring, check_slip, check_scale, check_lag, check_energy, check_motion,
-    check_excitation,
+    check_values, check_limits, check_wiring, check_dead_wheels, check_slip, check_scale, check_lag, check_energy,
+    check_motion, check_excitation,
 )  # fmt: skip
 
 # What only a whole log can show: dropped unless every block shows it.
@@ -80,7 +80,8 @@ def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
     parts, rows, duration, rates, channels, source = [], 0, 0.0, [], (), ""
     last: tuple[float, int] | None = None
     count = 0
-    for count, block in enumerate(blocks, 1):
+    for block in blocks:
+        count += 1
         verdict = check(block, robot)
         more, last = between(last, block, verdict.rate)
         for finding in (*more, *verdict.findings):

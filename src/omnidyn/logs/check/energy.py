@@ -40,7 +40,8 @@ def check_energy(work: Work) -> tuple[list[Finding], Work]:
         "energy", FATAL, "",
         f"the motors would take up to {worst:.3g} W out of the robot while it does not slow down: the back-EMF is "
         f"{excess:.3g} times the voltage applied",
-        "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of voltage "
+        "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of "
+        "voltage "
         "and speed", work.lines(bad), int(bad.sum()), {"worst_W": worst, "emf_over_voltage": excess},
     )], work  # fmt: skip
 

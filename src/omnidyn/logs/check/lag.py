@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.logs.channels import components
 from omnidyn.logs.check.reference import electric_speed, emf, ground, ohmic, volts, wheels_twist
 from omnidyn.logs.check.robust import Slope, clusters, ratio, smooth, windowed
 from omnidyn.logs.check.work import MIN_ROWS, Work
@@ -107,7 +106,7 @@ def lag(work: Work, y: FloatArray, x: FloatArray) -> Slope | None:
     y, x = smooth(y, width), smooth(x, width)
     n = len(y)
     inside = slice(FARTHEST + 4, n - FARTHEST - 4)
-    good = np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1)
+    good = np.asarray(np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1))
     for piece in work.pieces[1:]:
         if piece.start > n:
             break

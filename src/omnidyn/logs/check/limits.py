@@ -1,4 +1,4 @@
-"""Limits of driver and battery: saturation, sag of the supply, a duty whose supply nobody knows, current without sign."""
+"""Limits of driver and battery: saturation, sag, a duty whose supply nobody knows, currents without a sign."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _saturated(work: Work, channel: str) -> list[Finding]:
     tolerance = np.minimum(tolerance, 0.03 * np.max(limit))
     with np.errstate(invalid="ignore"):
         at = np.abs(values) >= limit - tolerance
-    bad = at.any(axis=1)
+    bad = np.asarray(at.any(axis=1))
     share = float(bad.mean())
     if share < LEAST_SHARE:
         return []

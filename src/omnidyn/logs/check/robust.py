@@ -97,9 +97,7 @@ def slope(y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int) -> S
     return ratio(*products(y, x, ids, count))
 
 
-def products(
-    y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int
-) -> tuple[FloatArray, FloatArray]:
+def products(y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int) -> tuple[FloatArray, FloatArray]:
     """(sum of y x, sum of x x without the square of its noise) of each window. Shapes (count,)."""
     y, x = y.reshape(len(y), -1), x.reshape(len(x), -1)
     odd = (np.arange(len(x)) & 1).astype(bool)

@@ -1,34 +1,33 @@
-"""Units and scales: what is proportional to something else, but not equal to it."""
+"""Scales: what is proportional to something else, but not equal to it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.logs.channels import components
-from omnidyn.logs.check.reference import Ground, electric_speed, emf, ground, volts, wheels_twist
-from omnidyn.logs.check.robust import Slope, quantum, slope, smooth, windowed
+from omnidyn.logs.check.mistakes import (
+    TURN_UNITS,
+    current_unit,
+    duty_as_voltage,
+    emf_alone,
+    own_derivatives,
+    unit_finding,
+    unit_of,
+)
+from omnidyn.logs.check.reference import Ground, electric_speed, expected_wheel_speed, ground, wheels_twist
+from omnidyn.logs.check.robust import Slope, quantum, slope, smooth
 from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
-from omnidyn.units import DEGREE, TURN
+from omnidyn.units import TURN
 
 FloatArray = NDArray[np.float64]
 
 LEAST = 0.02  # a scale that is off by less is not worth a word
-UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file is not exact either
+NOTHING = 0.003  # of the motion: no unit mistake makes as little of it
 ALONE = 0.15  # of the motion: an axis that moves less is no witness
-
-# How many times too large a value is, if it is read in the unit before "read as".
-TURN_UNITS = {"rpm read as rad/s": 60.0 / TURN, "deg/s read as rad/s": 1.0 / DEGREE,
-              "turns/s read as rad/s": 1.0 / TURN, "rad/s read as rpm": TURN / 60.0,
-              "rad/s read as deg/s": DEGREE}  # fmt: skip
-ANGLE_UNITS = {"deg read as rad": 1.0 / DEGREE, "turns read as rad": 1.0 / TURN, "rad read as deg": DEGREE}
-LENGTH_UNITS = {"mm read as m": 1e3, "cm read as m": 1e2, "m read as mm": 1e-3, "m read as cm": 1e-2}
-CURRENT_UNITS = {"mA read as A": 1e3, "A read as mA": 1e-3}
-TIME_UNITS = {"ms read as s": 1e3, "us read as s": 1e6, "ns read as s": 1e9, "s read as ms": 1e-3}
 
 
 class Scales(NamedTuple):
@@ -46,97 +45,16 @@ def check_scale(work: Work) -> tuple[list[Finding], Work]:
     """Findings on units and scales; the work with the wheel speeds put right."""
     if len(work) < MIN_ROWS:
         return [], work
-    found: list[Finding] = []
-    found += _own_derivatives(work)
-    more, work = _current(work)
-    found += more
-    dead, work = _dead_wheels(work)
-    found += dead
-    more, work = _speeds(work)
-    found += more
-    more, work = _single_wheels(work)
-    found += more
-    return found + _duty_as_voltage(work), work
+    found = own_derivatives(work)
+    for part in (current_unit, duty_as_voltage, _speeds, _single_wheels):
+        more, work = part(work)
+        found += more
+    return found, work
 
 
-def unit_of(factor: float, units: dict[str, float]) -> str:
-    """The unit mistake that makes values so many times too large; empty where none does."""
-    if not np.isfinite(factor) or factor <= 0.0:
-        return ""
-    off = {name: abs(np.log(factor / size)) for name, size in units.items()}
-    name = min(off, key=lambda each: off[each])
-    return name if off[name] < UNIT_OFF else ""
-
-
-# --- a channel and its own derivative: needs no robot ---
-
-
-def _own_derivatives(work: Work) -> list[Finding]:
-    """Position and speed of the same thing: their ratio is 1, or a unit is wrong."""
-    found = []
-    for name, against, rate, speed, units in _pairs(work):
-        ids, count = work.windows()
-        line = slope(rate, speed, ids, count)
-        if not line.differs(1.0, 0.03, 6.0) or line.windows < 4 or _likeness(rate, speed, ids, count) < 0.95:
-            continue
-        # rate = line * speed: speed is 1/line too large, or the time is.
-        unit, clock = unit_of(1.0 / line.value, units), unit_of(1.0 / line.value, TIME_UNITS)
-        words = f"{against} changes {line.value:.4g} times as fast as {name} says"
-        if unit:
-            found.append(_unit_finding(name, f"{words}: {unit}?", 1.0 / line.value))
-        elif clock or (line.value < 0.02 or line.value > 50.0):
-            found.append(Finding(
-                "time_unit", FATAL, "t", f"{words}: the time is not in the unit given" + (f" ({clock}?)" if clock else ""),
-                "give the unit of the time column, such as --column t=NAME:ms", (), 0, {"ratio": line.value},
-            ))  # fmt: skip
-        else:
-            found.append(Finding(
-                "scale", WARN, name, words + f" (+-{line.error:.2g})",
-                "one of the two has a wrong scale, or the rows are too far apart to see how it moves", (), 0,
-                {"ratio": line.value, "error": line.error},
-            ))  # fmt: skip
-    return found
-
-
-def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
-    """Correlation, about 0, of window means: 1 where one is the other times a number."""
-    good = np.isfinite(y) & np.isfinite(x)
-    a, b = (windowed(ids, count, np.where(good, each, 0.0)) for each in (y, x))
-    return float(abs(a @ b) / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
-
-
-def _pairs(work: Work) -> Iterator[tuple[str, str, FloatArray, FloatArray, dict[str, float]]]:
-    """(speed, position, derivative of the position, speed smoothed alike, units of the speed)."""
-    half = max(1, round(0.05 / work.step)) if work.step > 0.0 else 1
-    pose, twist = work.get("pose"), work.get("twist")
-    if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
-        heading = np.where(np.isfinite(pose[:, 2]), pose[:, 2], np.nan)
-        yield "omega", "heading", _rate(heading, work.t, half, TURN), smooth(twist[:, 2], 2 * half + 1), TURN_UNITS
-    angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
-    if angle is not None and speed is not None and angle.shape == speed.shape:
-        for name, a, w in zip(components("wheel_speed", speed.shape[1]), angle.T, speed.T, strict=True):
-            yield name, name.replace("w", "a"), _rate(a, work.t, half), smooth(w, 2 * half + 1), TURN_UNITS
-
-
-def _rate(values: FloatArray, t: FloatArray, half: int, period: float = 0.0) -> FloatArray:
-    out = np.full(len(values), np.nan)
-    if period:
-        good = np.isfinite(values)
-        values = values.copy()
-        values[good] = np.unwrap(values[good], period=period)
-    if len(values) > 2 * half:
-        out[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
-    return out
-
-
-def _unit_finding(where: str, words: str, factor: float) -> Finding:
-    return Finding(
-        "unit", FATAL, where, words, "give the unit of the column (--column NAME:UNIT) or its side of the gear",
-        (), 0, {"factor": factor},
-    )  # fmt: skip
-
-
-# --- speeds of the wheels against floor and motors ---
+def check_dead_wheels(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on wheels whose speed is noise only; a flat line was found before."""
+    return ([], work) if len(work) < MIN_ROWS else _dead_wheels(work)
 
 
 def scales(work: Work) -> Scales | None:
@@ -183,18 +101,19 @@ def _speeds(work: Work) -> tuple[list[Finding], Work]:
     assert robot is not None
     factor = floor if floor is not None else electric
     if factor is None:
-        return _emf_alone(work)
-    if floor is not None and not floor.value > 0.1:
+        return emf_alone(work)
+    if floor is not None and not floor.value > max(4.0 * floor.error, NOTHING):
         return _against(work, floor), work
     work = work.knowing(floor_ratio=floor, electric_ratio=electric)
-    units = {**TURN_UNITS, "the motor's speed read as the wheel's": float(np.mean(robot.motor.gear_ratio)),
-             "the motor's rpm read as the wheel's rad/s": float(np.mean(robot.motor.gear_ratio)) * 60.0 / TURN}  # fmt: skip
+    gear = float(np.mean(robot.motor.gear_ratio))
+    units = {**TURN_UNITS, "the motor's speed read as the wheel's": gear,
+             "the motor's rpm read as the wheel's rad/s": gear * 60.0 / TURN}  # fmt: skip
     unit = unit_of(1.0 / factor.value, units) if abs(np.log(abs(factor.value) + 1e-12)) > 0.5 else ""
     names = " ".join(components("wheel_speed", work.wheels))
     if unit and (electric is None or floor is None or abs(np.log(max(electric.value, 1e-9) / factor.value)) < 0.5):
         speed = work.channels["wheel_speed"]
         source = "the motion over the floor" if floor is not None else "voltage and current"
-        found = [_unit_finding(names, f"the wheel speeds are {1 / factor.value:.4g} times what {source} says: {unit}?",
+        found = [unit_finding(names, f"the wheel speeds are {1 / factor.value:.4g} times what {source} says: {unit}?",
                                1.0 / factor.value)]  # fmt: skip
         return found, work.replace(wheel_speed=speed * factor.value)
     return _ratio_findings(work, these, floor, electric, names)
@@ -211,12 +130,14 @@ def _against(work: Work, floor: Slope) -> list[Finding]:
         if abs(floor.value) > 0.1 or floor.error > 0.03:
             return []
         return [Finding(
-            "dead", WARN, where, f"{where} stays as it is while the wheels say that the robot moves: it was not recorded, "
+            "dead", WARN, where,
+            f"{where} stays as it is while the wheels say that the robot moves: it was not recorded, "
             "or the wheels ran in the air", "leave it out of the mapping", (), 0,
             {"ratio": floor.value, "error": floor.error},
         )]  # fmt: skip
     return [Finding(
-        "inverted", FATAL, where, f"{where} goes the other way than the wheels say ({floor.value:.3g} +-{floor.error:.2g} of "
+        "inverted", FATAL, where,
+        f"{where} goes the other way than the wheels say ({floor.value:.3g} +-{floor.error:.2g} of "
         "it): it has the opposite sign, or all wheels have",
         "set `invert` for that column in the mapping, or turn the wheels' signs", (), 0,
         {"ratio": floor.value, "error": floor.error},
@@ -251,9 +172,11 @@ def _ratio_findings(
         both = _joined([floor, electric]) or floor
         return [Finding(
             "gear", WARN, names,
-            f"floor and motors agree that the wheels turn {both.value:.4g} times (+-{both.error:.2g}) what wheel_speed says: "
+            f"floor and motors agree that the wheels turn {both.value:.4g} times (+-{both.error:.2g}) what "
+            "wheel_speed says: "
             "a wrong gear ratio or a wrong number of counts per turn in the log",
-            "divide by the right gear ratio, or give the right counts per turn", (), 0, {**numbers, "ratio": both.value},
+            "divide by the right gear ratio, or give the right counts per turn", (), 0,
+            {**numbers, "ratio": both.value},
         )], work.replace(wheel_speed=speed * both.value).knowing(floor_ratio=None)  # fmt: skip
     found = []
     if off_floor and floor is not None:
@@ -264,7 +187,8 @@ def _ratio_findings(
 
 
 def _same(a: Slope, b: Slope) -> bool:
-    return abs(a.value - b.value) < max(0.4 * min(abs(a.value - 1.0), abs(b.value - 1.0)), 3.0 * np.hypot(a.error, b.error))
+    nearest = min(abs(a.value - 1.0), abs(b.value - 1.0))
+    return abs(a.value - b.value) < max(0.4 * nearest, 3.0 * np.hypot(a.error, b.error))
 
 
 def _apart(a: Slope, b: Slope) -> float | None:
@@ -275,7 +199,8 @@ def _apart(a: Slope, b: Slope) -> float | None:
 def _yaw_only(yaw: Slope) -> Finding:
     return Finding(
         "robot_radius", WARN, "omega",
-        f"the robot turns {yaw.value:.4g} times (+-{yaw.error:.2g}) as fast as its wheels say, while it drives as far as "
+        f"the robot turns {yaw.value:.4g} times (+-{yaw.error:.2g}) as fast as its wheels say, while it drives "
+        "as far as "
         "they say: the robot radius of the file is not that of the robot, or the gyro has a wrong scale",
         f"try a robot radius {1.0 / yaw.value:.4g} times as large", (), 0, {"ratio": yaw.value, "error": yaw.error},
     )  # fmt: skip
@@ -294,13 +219,15 @@ def _path_ratio(
         )  # fmt: skip
     if electric is not None and not off_motor:
         return Finding(
-            "wheel_radius", WARN, names, words + ", while voltage and current agree with the wheels: the wheel radius of "
+            "wheel_radius", WARN, names,
+            words + ", while voltage and current agree with the wheels: the wheel radius of "
             "the file is too small, or the ground speed has a wrong scale",
             f"try a wheel radius {floor.value:.4g} times as large", (), 0, numbers,
         )  # fmt: skip
     slips = " it slips, or" if floor.value < 1.0 else ""
     return Finding(
-        "path_ratio", WARN, names, words + f", the whole log through:{slips} the gear ratio (counts per turn) of the log "
+        "path_ratio", WARN, names,
+        words + f", the whole log through:{slips} the gear ratio (counts per turn) of the log "
         "or the wheel radius of the file is wrong",
         "roll the robot over a measured distance by hand: that tells slip from a wrong radius or gear", (), 0, numbers,
     )  # fmt: skip
@@ -309,10 +236,12 @@ def _path_ratio(
 def _motor_constants(
     electric: Slope, floor: Slope | None, off_floor: bool, names: str, numbers: dict[str, float]
 ) -> Finding:
-    words = f"by voltage and current the wheels turn {electric.value:.4g} times (+-{electric.error:.2g}) what wheel_speed says"
+    size = f"{electric.value:.4g} times (+-{electric.error:.2g})"
+    words = f"by voltage and current the wheels turn {size} what wheel_speed says"
     if floor is not None and not off_floor:
         return Finding(
-            "motor_constants", NOTE, names, words + ", while the floor agrees with the wheels: K, R or the gear ratio of "
+            "motor_constants", NOTE, names,
+            words + ", while the floor agrees with the wheels: K, R or the gear ratio of "
             "the robot file, or the scale of voltage or current, is off",
             "identify the motor from this log", (), 0, numbers,
         )  # fmt: skip
@@ -320,32 +249,6 @@ def _motor_constants(
         "gear", WARN, names, words + ": the gear ratio, the counts per turn, or K and R of the robot file are off",
         "check the gear ratio; roll the robot over a measured distance by hand", (), 0, numbers,
     )  # fmt: skip
-
-
-def _emf_alone(work: Work) -> tuple[list[Finding], Work]:
-    """Without floor and current: speeds that no motor reaches at these voltages."""
-    speed, voltage = work.full("wheel_speed"), volts(work)
-    counter = None if speed is None else emf(work, speed)
-    if counter is None or voltage is None or speed is None or counter.shape != voltage.shape:
-        return [], work
-    good = np.isfinite(counter) & np.isfinite(voltage)
-    if not good.any():
-        return [], work
-    excess = float((np.abs(counter[good]) * np.abs(voltage[good])).sum() / max((voltage[good] ** 2).sum(), 1e-12))
-    if excess < 1.5:
-        return [], work
-    robot = work.geometry
-    assert robot is not None
-    gear = float(np.mean(robot.motor.gear_ratio))
-    # At the voltages given a motor turns at most 1, usually 0.5 to 1 times as fast as without load.
-    fits = {name: factor for name, factor in {**TURN_UNITS, "the motor's speed read as the wheel's": gear}.items()
-            if 0.2 < excess / factor < 1.15}  # fmt: skip
-    likely = max(fits, key=lambda name: -abs(np.log(excess / fits[name] / 0.7))) if fits else ""
-    words = f"the wheel speeds imply a back-EMF {excess:.3g} times the voltage applied"
-    names = " ".join(components("wheel_speed", work.wheels))
-    found = [_unit_finding(names, words + (f": {likely}?" if likely else ": the unit of speed or voltage is wrong"),
-                           excess)]  # fmt: skip
-    return found, work.replace(wheel_speed=speed * np.nan)
 
 
 def _dead_wheels(work: Work) -> tuple[list[Finding], Work]:
@@ -380,8 +283,6 @@ def _told_to_rest(work: Work, k: int) -> bool:
 
 def _wheel_lines(work: Work) -> tuple[str, list[Slope], list[float]] | None:
     """(source, slope of each wheel's speed on what it should be, how much that moves)."""
-    from omnidyn.logs.check.reference import expected_wheel_speed
-
     speed, expected = work.get("wheel_speed"), expected_wheel_speed(work)
     if speed is None or expected is None or expected[1].shape != speed.shape or work.geometry is None:
         return None
@@ -397,7 +298,7 @@ def _wheel_lines(work: Work) -> tuple[str, list[Slope], list[float]] | None:
 def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
     """One wheel that differs from the others: its own radius, gear or counter."""
     line = _wheel_lines(work)
-    if line is None or work.known.get("floor_ratio") is None and not line[0].startswith("voltage"):
+    if line is None or (work.known.get("floor_ratio") is None and not line[0].startswith("voltage")):
         return [], work
     source, slopes, sizes = line
     ratio = work.known.get("floor_ratio")
@@ -421,53 +322,3 @@ def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
             {"ratio": off, "error": slopes[k].error},
         ))  # fmt: skip
     return (found, work) if len(found) == 1 else ([], work)
-
-
-# --- currents and voltages ---
-
-
-def _current(work: Work) -> tuple[list[Finding], Work]:
-    """Currents in the wrong unit, by what voltage and speed leave for R i, or by the largest a motor can draw."""
-    current, voltage, robot = work.full("current"), volts(work), work.geometry
-    if current is None or robot is None:
-        return [], work
-    names = " ".join(components("current", work.wheels))
-    stall = float(np.max(robot.motor.voltage_limit)) / float(np.min(robot.motor.resistance))
-    high = float(np.nanquantile(np.abs(current), 0.95))
-    if high > 20.0 * stall:
-        unit = unit_of(high / (0.3 * stall), {"mA read as A": 1e3}) or "mA read as A" if high < 3e3 * stall else ""
-        words = f"currents of {high:.4g} A, where a blocked motor draws {stall:.3g} A" + (f": {unit}?" if unit else "")
-        return [_unit_finding(names, words, high / stall)], work.replace(current=current * (1e-3 if unit else np.nan))
-    speed = work.full("wheel_speed")
-    counter = None if speed is None else emf(work, speed)
-    if voltage is None or counter is None or work.log.current_unsigned:
-        return [], work
-    ids, count = work.windows()
-    ohm = current * np.mean(robot.motor.resistance)
-    line = slope(voltage - counter, ohm, ids, count)
-    unit = unit_of(1.0 / line.value, CURRENT_UNITS) if np.isfinite(line.error) and line.value > 0.0 else ""
-    if unit and line.differs(1.0, 0.5):
-        words = f"the currents are {1 / line.value:.3g} times what voltage and speed leave for them: {unit}?"
-        return [_unit_finding(names, words, 1.0 / line.value)], work.replace(current=current * line.value)
-    return [], work
-
-
-def _duty_as_voltage(work: Work) -> list[Finding]:
-    """A voltage that never leaves -1..1 while the speeds want more, or that counts to 255."""
-    voltage, robot = work.get("voltage"), work.geometry
-    if voltage is None or robot is None:
-        return []
-    limit = float(np.max(robot.motor.voltage_limit))
-    high = float(np.nanmax(np.abs(voltage)))
-    speed = work.get("wheel_speed")
-    counter = None if speed is None else emf(work, speed)
-    names = " ".join(components("voltage", work.wheels))
-    if high > 1.5 * limit:
-        unit = "pwm 0..255 read as volts" if 2.0 * limit < high <= 256.0 and limit < 100.0 else (
-            "mV read as V" if high > 100.0 * limit else "")  # fmt: skip
-        words = f"voltages up to {high:.4g} V, where the driver of the robot file gives {limit:.4g} V"
-        return [_unit_finding(names, words + (f": {unit}?" if unit else ""), high / limit)]
-    if counter is not None and high <= 1.0 and limit > 2.0 and float(np.nanquantile(np.abs(counter), 0.95)) > 1.5 * high:
-        return [_unit_finding(names, f"voltages within -1..1 ({high:.3g} at most), while the speeds need "
-                              f"{float(np.nanquantile(np.abs(counter), 0.95)):.3g} V: duty read as volts?", 1.0)]  # fmt: skip
-    return []

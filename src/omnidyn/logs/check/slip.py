@@ -40,7 +40,8 @@ def check_slip(work: Work) -> tuple[list[Finding], Work]:
             f"(+-{error:.2g}) of the path its wheels roll, measured by the rest of the log ({inside:.3g} there, "
             f"{outside:.3g} elsewhere): it slips, or was pushed",
             "leave those rows out of fits of wheel speed against ground speed", work.lines(bad), int(bad.sum()),
-            {"ratio": inside / outside, "error": error, "from_s": float(work.t[rows[0]]), "to_s": float(work.t[rows[-1]])},
+            {"ratio": inside / outside, "error": error, "from_s": float(work.t[rows[0]]),
+             "to_s": float(work.t[rows[-1]])},
         ))  # fmt: skip
         values = work.channels[seen.name].copy()
         values[bad] = np.nan

@@ -151,7 +151,8 @@ def _unit(work: Work) -> list[Finding]:
     likely = "ms, us or ticks read as seconds" if work.step > LONGEST_STEP else "seconds read as ms or us"
     return [
         Finding(
-            "time_unit", FATAL, "t", f"one row every {work.step:.4g} s: the time is hardly in the unit given ({likely})",
+            "time_unit", FATAL, "t",
+            f"one row every {work.step:.4g} s: the time is hardly in the unit given ({likely})",
             "give the unit of the time column, such as --column t=NAME:ms", (), 0, {"step_s": work.step},
         )
     ]  # fmt: skip
@@ -169,9 +170,7 @@ def _few(work: Work) -> list[Finding]:
     ]  # fmt: skip
 
 
-def between(
-    last: tuple[float, int] | None, block: Log, rate: float
-) -> tuple[list[Finding], tuple[float, int] | None]:
+def between(last: tuple[float, int] | None, block: Log, rate: float) -> tuple[list[Finding], tuple[float, int] | None]:
     """(findings on time where two blocks of a log meet, (time, line) of the last row of this one)."""
     timed = np.flatnonzero(np.isfinite(block.t))
     if not timed.size:

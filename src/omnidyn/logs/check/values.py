@@ -250,7 +250,7 @@ def _frozen(
     """
     n = len(values)
     bad = np.zeros(n, dtype=bool)
-    stretches = runs(np.diff(values) == 0.0) + [0, 1]
+    stretches = runs(np.diff(values) == 0.0) + np.array([0, 1])
     lengths = stretches[:, 1] - stretches[:, 0]
     long = lengths >= 5
     if not long.any():
@@ -335,7 +335,8 @@ def _spikes(work: Work) -> tuple[list[Finding], Work]:
             worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
             found.append(Finding(
                 "spike", WARN, component,
-                f"{int(bad.sum())} value{'s' * (int(bad.sum()) > 1)} of {component} alone, far from the rows before and "
+                f"{int(bad.sum())} value{'s' * (int(bad.sum()) > 1)} of {component} alone, far from the rows "
+                "before and "
                 f"after, the farthest {values[worst]:.4g} at t = {work.t[worst]:.6g} s",
                 "they are left out where a mean is taken", work.lines(bad), int(bad.sum()),
                 {"farthest": float(values[worst]), "share": float(bad.mean())},
@@ -345,7 +346,7 @@ def _spikes(work: Work) -> tuple[list[Finding], Work]:
 
 
 def _kicked(work: Work) -> NDArray[np.bool_]:
-    """Rows just after a change of a command, where a short kick is no error; none where commands change all the time."""
+    """Rows just after a change of a command, where a kick is no error; none where commands change all the time."""
     near = np.zeros(len(work), dtype=bool)
     for channel in INPUTS:
         values = work.get(channel)

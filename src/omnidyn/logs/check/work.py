@@ -115,4 +115,3 @@ class Work:
         values = self.channels[channel].copy()
         (values if values.ndim == 1 else values[:, column])[bad] = np.nan
         return self.replace(**{channel: values})
-

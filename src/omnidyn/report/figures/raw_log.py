@@ -51,7 +51,9 @@ def draw_raw_log(log: Log, verdict: Verdict) -> Picture:
     total = sum(heights) + 0.32 * len(heights) + EDGES
     with look():
         figure = new_figure(WIDTH, total)
-        panels = figure.subplots(len(heights), 1, sharex=True, gridspec_kw={"height_ratios": heights}, squeeze=False)[:, 0]
+        panels = figure.subplots(len(heights), 1, sharex=True, gridspec_kw={"height_ratios": heights}, squeeze=False)[
+            :, 0
+        ]
         figure.subplots_adjust(left=0.185, right=0.985, top=1.0 - 0.42 / total, bottom=0.6 / total, hspace=0.42)
         if lanes:
             _lanes(panels[0], log, lanes)
@@ -132,5 +134,7 @@ def _gaps(axes: Axes, log: Log) -> None:
 
 
 def _caption(verdict: Verdict) -> str:
-    words = "; ".join(f"{each.level}: {each.code} {each.where}".rstrip() for each in verdict.findings if each.level != NOTE)
+    words = "; ".join(
+        f"{each.level}: {each.code} {each.where}".rstrip() for each in verdict.findings if each.level != NOTE
+    )
     return f"{verdict.headline()}. {words or 'nothing to heed'}. Hatched: gaps."
