@@ -1,0 +1,159 @@
+"""omnidyn check: what it prints, writes and returns."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from omnidyn.cli import main
+from omnidyn.logs.run_file import write_run
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def run():
+    """A run of the AxeBot under pushes in many directions, with a little noise."""
+    rng = np.random.default_rng(0)
+    robot = load_robot("axebot")
+    push = (robot.wheels.wrench_matrix.T @ (rng.normal(size=(24, 3)) / [1.0, 1.0, 0.1]).T).T
+    volts = np.repeat(4.0 * push / np.abs(push).max(axis=1, keepdims=True), 50, axis=0)
+    clean = simulate(robot, volts, 0.01)
+
+    def noisy(values):
+        return values + 0.005 * np.abs(values).max() * rng.normal(size=values.shape)
+
+    return clean.replace(current=noisy(clean.current), wheel_speed=noisy(clean.wheel_speed), twist=noisy(clean.twist))
+
+
+@pytest.fixture
+def logs(tmp_path, monkeypatch, run):
+    """A folder with a clean log, one with two motors exchanged, and one with a gap."""
+    monkeypatch.chdir(tmp_path)
+    write_run(run, "clean.csv")
+    write_run(run.replace(wheel_speed=run.wheel_speed[:, [1, 0, 2]]), "swapped.csv")
+    keep = np.r_[0:400, 430:1201]
+    channels = {name: values[keep] for name, values in run.channels.items()}
+    write_run(Run(t=run.t[keep], **channels), "gap.csv")
+    return tmp_path
+
+
+@pytest.fixture
+def call(logs, capsys):
+    def run_it(*arguments):
+        code = main(["check", *arguments])
+        return code, *capsys.readouterr()
+
+    return run_it
+
+
+def strict(text):
+    def refuse(name):
+        raise AssertionError(f"{name} in JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_a_clean_log_is_fit_for_use(call):
+    code, out, err = call("clean.csv", "--robot", "axebot")
+    assert code == 0
+    assert "0 fatal, 0 to heed" in out
+    assert "wheel_speed: w1 <- w1_rad_s" in err  # the columns are always shown
+
+
+def test_a_fatal_finding_is_exit_code_4_and_shown(call):
+    code, out, _ = call("swapped.csv", "--robot", "axebot")
+    assert code == 4
+    assert "FATAL  swapped w1 w2" in out
+    assert "-> put the columns right" in out
+
+
+def test_without_a_robot_what_needs_none_is_checked(call):
+    code, out, _ = call("gap.csv")
+    assert code == 0
+    assert "1 gap, about 30 rows lost" in " ".join(out.split())
+    assert "line 401-402" in " ".join(out.split())
+
+
+def test_a_log_that_cannot_be_read_does_not_stop_the_others(call):
+    code, out, err = call("missing.csv", "gap.csv", "clean.csv")
+    assert code == 3
+    assert "gap.csv" in out
+    assert "3 logs, 2 read" in out
+    assert "missing.csv: no such file" in err
+
+
+def test_a_folder_is_its_logs_in_brief_with_a_summary(call, run):
+    write_run(run, "again.csv")
+    code, out, _ = call(".", "--robot", "axebot")
+    assert code == 4
+    assert "again.csv: fit for use" in out
+    assert "swapped.csv: FATAL swapped w1 w2" in out
+    assert "4 logs, 4 read:" in out
+    assert "swapped: in 1 log" in out
+
+
+def test_two_names_for_one_recording(call):
+    Path("copy.csv").write_bytes(Path("clean.csv").read_bytes())
+    code, out, _ = call("clean.csv", "copy.csv")
+    assert code == 0
+    assert "it holds the same numbers as clean.csv" in " ".join(out.split())
+
+
+def test_json_of_all_logs(call):
+    code, out, _ = call(".", "missing.csv", "--robot", "axebot", "--json")
+    document = strict(out)
+    assert code == 3
+    assert [Path(log["source"]).name for log in document["logs"]] == ["clean.csv", "gap.csv", "swapped.csv"]
+    assert document["fatal"] is True
+    assert "no such file" in document["unread"][0]["error"]
+    (swapped,) = [f for f in document["logs"][2]["findings"] if f["code"] == "swapped"]
+    assert swapped["where"] == "w1 w2"
+    assert {each["role"] for each in document["provenance"]["inputs"]} == {"robot", "log"}
+    assert all(len(each["sha256"]) == 64 for each in document["provenance"]["inputs"])
+
+
+@pytest.mark.parametrize("ending, magic", [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_a_picture_of_the_log(call, ending, magic):
+    code, _, err = call("gap.csv", "--picture", f"log.{ending}")
+    assert code == 0
+    assert Path(f"log.{ending}").read_bytes().startswith(magic)
+    assert f"wrote log.{ending}" in err
+    code, _, err = call("gap.csv", "--picture", f"log.{ending}")
+    assert code == 3
+    assert "exists already" in err
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (["clean.csv", "--picture", "log.pdf"], "cannot tell the kind of picture"),
+    (["clean.csv", "gap.csv", "--picture", "log.png"], "a picture shows one log"),
+    ([".", "--picture", "log.png"], "a picture shows one log"),
+    (["clean.csv", "--robot", "nobody"], "nobody"),
+])  # fmt: skip
+def test_what_is_refused_before_any_work(call, arguments, words):
+    code, out, err = call(*arguments)
+    assert (code, out) == (3, "")
+    assert words in err
+
+
+def test_a_robot_with_fewer_wheels_is_refused_for_that_log(call):
+    code, _, err = call("clean.csv", "--robot", "four-wheel")
+    assert code == 0 or "wheels" in err
+
+
+def test_ascii_in_the_c_locale_and_narrow(call, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "50")
+    code, out, _ = call("gap.csv", "--robot", "axebot")
+    assert code == 0
+    assert out.isascii()
+
+
+def test_blocks_of_a_long_log_are_one_verdict(call, monkeypatch):
+    whole = call("gap.csv", "--robot", "axebot", "--json")[1]
+    monkeypatch.setattr("omnidyn.cli.check.BLOCK", 500)
+    parts = call("gap.csv", "--robot", "axebot", "--json")[1]
+    (one,), (other,) = ([f for f in strict(out)["logs"][0]["findings"] if f["code"] == "gap"] for out in (whole, parts))
+    assert one["rows"] == other["rows"]
+    assert strict(parts)["logs"][0]["rows"] == strict(whole)["logs"][0]["rows"]
