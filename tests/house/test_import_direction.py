@@ -23,21 +23,22 @@ ORDER = {
         exact_inductance implicit_step implicit simulate tangent_step tangent_events
         tangent_march tangent""",
     "logs": """channels dialect header rows text_file table parquet_pages parquet tables run_file steady_table
-        command_file words mapping clock guess log read_log segments plateaus findings check""",
+        command_file words mapping clock guess log read_log segments average plateaus findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
     "logs/check": """robust work time_base reference values limits wirings frame floor motors wiring slip mistakes scale
         lag energy motion excitation""",
-    "identification": "estimate geometry line points doubts steady_state band",
+    "identification": """estimate geometry line points doubts steady_state band operating shapes shape_fit shape_choice
+        study_parts study_words steady_study drive_windows drive_line study_table""",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch
         claims""",
-    "report": "style figures page",
-    "report/figures": "robot traces friction steps dead_zone dead_zone_map reconcile overlay raw_log",
+    "report": "style figures html page steady_page",
+    "report/figures": """robot traces friction steps dead_zone dead_zone_map reconcile overlay shapes drive_lines raw_log""",
     "export": "",
     "interop": "",
-    "cli": """streams numbers session progress log_options init check plan identify simulate friction deadzone compare
-        track tune sweep export robots demo_folder claims_table demo app outcome""",
+    "cli": """streams numbers session progress log_options init check plan identify_logs identify simulate friction
+        deadzone compare track tune sweep export robots demo_folder claims_table demo app outcome""",
     "studio": "",
 }
 

@@ -1,0 +1,262 @@
+"""Steady windows of a run, and one point per window: what the steady-state identification is made from.
+
+A window lies between two gaps, within a stretch over which the commands stand still. Its start-up is cut off where the
+standard error of what remains is least: MSER, K. P. White, Simulation 69, 323 (1997), here for all measured channels at
+once; an end that differs (the robot brakes) is cut off in the same way. Where no command comes in steps, windows of
+fixed length are taken instead. A window whose second half differs from its first is not steady and left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.logs.average import robust_mean
+from omnidyn.logs.segments import segments
+from omnidyn.model.frames import world_to_body
+from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
+
+MIN_ROWS, MIN_DURATION = 12, 0.4  # [s]
+WINDOW = 0.5  # [s] length where no command comes in steps
+SAME_COMMAND = 0.01  # of the largest command: a change by less is none
+STEPWISE = 0.05  # a command that changes in more than this share of the rows does not come in steps
+START_SHARE, END_SHARE = 0.5, 0.25  # at most so much of a stretch is cut off
+SAFETY = 3  # times what MSER cuts: it leaves a transient as large as the noise of one window, which many do not average
+DEAD_SHARE = 0.05  # of what the speeds tell: an angle that turns less is dead
+DRIFT_ERRORS, DRIFT_SHARE = 4.0, 0.1  # halves that differ by more than both are not steady
+
+COMMANDS = ("wheel_speed_command", "twist_command", "duty", "voltage")
+ANGLE, SPEED = "differences of wheel_angle", "wheel_speed"
+
+
+@dataclass(frozen=True, eq=False)
+class Plateau:
+    """One steady window of a run, as one point.
+
+    rows: where it stands in the run. start, end: its times [s]. mean, std: channel of Run -> robust mean and its
+    standard error, SI, shape (columns,) or (); of wheel_speed, and of twist where only a pose was logged, from
+    differences over the window. speed_from: where wheel_speed comes from, "" where there is none.
+    hold: number of the stretch of one command in its run; a gap may cut one into several windows. count: rows used.
+    """
+
+    rows: slice
+    start: float
+    end: float
+    mean: Mapping[str, FloatArray]
+    std: Mapping[str, FloatArray]
+    speed_from: str = ""
+    hold: int = 0
+    count: int = 0
+
+    @property
+    def wheel_side(self) -> FloatArray:
+        """The way each wheel turns: -1, 0, 1. Shape (wheels,). From the command where the speed reads 0."""
+        speed, command = self.mean.get("wheel_speed"), self.mean.get("wheel_speed_command")
+        if speed is None:
+            speed = command
+        if speed is None:
+            raise InputError("no speed of wheels", got=", ".join(self.mean), expected="wheel_speed or wheel_angle")
+        side = np.sign(np.nan_to_num(speed))
+        return side if command is None else np.where(side == 0.0, np.sign(np.nan_to_num(command)), side)
+
+
+def find_plateaus(run: Run, *, start: float | None = None, end: float | None = None) -> tuple[Plateau, ...]:
+    """The steady windows of a run, in order, one point each.
+
+    start, end: instead of looking for steady rows, take these shares of each stretch of one command (0.4 and 0.95:
+    from 40 % to 95 % of its rows). Returns no window where none is long enough and steady.
+    Raises InputError when only one of the two is given, or when they are not 0 <= start < end <= 1.
+    """
+    fixed = _fixed(start, end)
+    found = []
+    for number, hold in enumerate(stretches(run)):
+        for piece in _between_gaps(run, _share(hold, *fixed) if fixed else hold):
+            rows = piece if fixed else _settled(run, piece)
+            if rows is not None and _long_enough(run, rows) and (fixed or _is_steady(run, rows)):
+                found.append(replace(plateau(run, rows), hold=number))
+    return tuple(found)
+
+
+def pool(plateaus: Sequence[Plateau]) -> tuple[Plateau, ...]:
+    """One point per stretch of one command: the windows of a run between which a gap lies, averaged by their rows."""
+    holds: dict[int, list[Plateau]] = {}
+    for each in plateaus:
+        holds.setdefault(each.hold, []).append(each)
+    return tuple(windows[0] if len(windows) == 1 else _pooled(windows) for windows in holds.values())
+
+
+def _pooled(windows: Sequence[Plateau]) -> Plateau:
+    first, last = windows[0], windows[-1]
+    weight = np.array([each.count for each in windows], dtype=float)
+    weight /= weight.sum()
+    mean = {name: sum(w * each.mean[name] for w, each in zip(weight, windows, strict=True)) for name in first.mean}
+    std = {
+        name: np.sqrt(sum((w * each.std[name]) ** 2 for w, each in zip(weight, windows, strict=True)))
+        for name in first.std
+    }
+    rows, count = slice(first.rows.start, last.rows.stop), sum(each.count for each in windows)
+    return replace(first, rows=rows, end=last.end, mean=mean, std=std, count=count)
+
+
+def plateau(run: Run, rows: slice) -> Plateau:
+    """The point of the given rows, which the caller knows to lie between two gaps."""
+    mean, std = {}, {}
+    for name, values in run.channels.items():
+        if name not in ("wheel_angle", "pose"):
+            mean[name], std[name] = robust_mean(values[rows])
+    speed_from = SPEED if "wheel_speed" in mean else ""
+    angle = live_angle(run)
+    if angle is not None and np.isfinite(angle[rows]).all():
+        mean["wheel_speed"], std["wheel_speed"] = _rate(run.t[rows], angle[rows])
+        speed_from = ANGLE
+    if run.twist is None and run.pose is not None and np.isfinite(run.pose[rows]).all():
+        mean["twist"], std["twist"] = _body_rate(run.t[rows], run.pose[rows])
+    return Plateau(
+        rows, float(run.t[rows][0]), float(run.t[rows][-1]), mean, std, speed_from, count=rows.stop - rows.start
+    )
+
+
+def live_angle(run: Run) -> FloatArray | None:
+    """The angles of the wheels, None where none were logged or where one stands still while its wheel turns."""
+    if run.wheel_angle is None or run.wheel_speed is None:
+        return run.wheel_angle
+    steps = np.diff(run.t)[:, None]
+    turned = np.nansum(np.abs(np.diff(run.wheel_angle, axis=0)), axis=0)
+    told = np.nansum(np.abs(run.wheel_speed[:-1]) * steps, axis=0)
+    return None if (turned < DEAD_SHARE * told).any() else run.wheel_angle
+
+
+def stretches(run: Run) -> list[slice]:
+    """Pieces of a run over which the commands that come in steps stand still, in order; a gap may lie in one.
+
+    Where no command comes in steps: pieces of `WINDOW` seconds between gaps.
+    """
+    changes = _changes(run)
+    if changes is None:
+        return [window for piece in segments(run.t) for window in _cut(run.t, piece)]
+    cuts = np.flatnonzero(changes)
+    return [slice(int(a), int(b)) for a, b in zip([0, *cuts], [*cuts, len(run)], strict=True) if b > a]
+
+
+def _between_gaps(run: Run, hold: slice) -> list[slice]:
+    """A stretch cut at the gaps of the run."""
+    pieces = [slice(max(p.start, hold.start), min(p.stop, hold.stop)) for p in segments(run.t)]
+    return [piece for piece in pieces if piece.stop > piece.start]
+
+
+def _changes(run: Run) -> NDArray[np.bool_] | None:
+    """Rows with another command than the row before; None where no command comes in steps."""
+    changed, known = np.zeros(len(run), dtype=bool), False
+    for name in COMMANDS:
+        values = run.channels.get(name)
+        if values is None or not np.isfinite(values).any():
+            continue
+        bound = SAME_COMMAND * float(np.nanmax(np.abs(values)))
+        moved = (np.abs(np.diff(values, axis=0)) > bound).any(axis=1)
+        if moved.mean() <= STEPWISE:
+            changed[1:] |= moved
+            known = True
+    return changed if known else None
+
+
+def _cut(t: FloatArray, piece: slice) -> list[slice]:
+    """A piece in windows of fixed length."""
+    number = ((t[piece] - t[piece.start]) // WINDOW).astype(int)
+    edges = piece.start + np.flatnonzero(np.diff(number, prepend=-1, append=number[-1] + 1))
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
+
+
+def _fixed(start: float | None, end: float | None) -> tuple[float, float] | None:
+    if start is None and end is None:
+        return None
+    if start is None or end is None or not 0.0 <= start < end <= 1.0:
+        raise InputError("not a share of the rows", got=f"start {start}, end {end}", expected="0 <= start < end <= 1")
+    return start, end
+
+
+def _share(stretch: slice, start: float, end: float) -> slice:
+    n = stretch.stop - stretch.start
+    return slice(stretch.start + int(start * n), stretch.start + int(end * n))
+
+
+def _long_enough(run: Run, rows: slice) -> bool:
+    n = rows.stop - rows.start
+    return n >= MIN_ROWS and bool(run.t[rows.stop - 1] - run.t[rows.start] >= MIN_DURATION)
+
+
+def _responses(run: Run, rows: slice) -> FloatArray:
+    """What shows whether the robot has settled: speeds, else currents; robust z-scores, spikes clipped. (n, k)."""
+    speed = run.wheel_speed if run.wheel_speed is not None else run.twist
+    angle = live_angle(run)
+    if angle is not None:
+        speed = np.diff(angle, axis=0, prepend=angle[:1]) / np.diff(run.t, prepend=-np.inf)[:, None]
+    parts = [part[rows] for part in (speed, run.current) if part is not None]
+    if not parts:
+        return np.zeros((rows.stop - rows.start, 0))
+    table = np.concatenate(parts, axis=1)
+    table = table[:, np.isfinite(table).all(axis=0)]
+    middle = np.median(table, axis=0)
+    spread = 1.4826 * np.median(np.abs(table - middle), axis=0)
+    spread = np.where(spread > 0.0, spread, np.std(table, axis=0))
+    moving = spread > 0.0
+    return np.clip((table[:, moving] - middle[moving]) / spread[moving], -5.0, 5.0)
+
+
+def _settled(run: Run, stretch: slice) -> slice | None:
+    """The stretch without its start-up, and without an end that differs."""
+    if not _long_enough(run, stretch):
+        return None
+    scores = _responses(run, stretch)
+    first = min(SAFETY * _truncation(scores, START_SHARE), int(START_SHARE * len(scores)))
+    last = min(SAFETY * _truncation(scores[first:][::-1], END_SHARE), int(END_SHARE * len(scores)))
+    return slice(stretch.start + first, stretch.stop - last)
+
+
+def _truncation(scores: FloatArray, share: float) -> int:
+    """How many rows at the start to leave out: the least sum over the columns of var(rest) / len(rest)."""
+    n = len(scores)
+    if not scores.size:
+        return 0
+    counts = np.arange(n, 0, -1)[:, None]
+    totals = np.cumsum(scores[::-1], axis=0)[::-1]
+    squares = np.cumsum(scores[::-1] ** 2, axis=0)[::-1]
+    error = ((squares / counts - (totals / counts) ** 2) / counts).sum(axis=1)
+    return int(np.argmin(error[: max(1, int(share * n) + 1)]))
+
+
+def _is_steady(run: Run, rows: slice) -> bool:
+    """Whether the halves agree in the speeds, as far as their noise allows to tell."""
+    speed = run.wheel_speed if run.wheel_speed is not None else run.twist
+    half = (rows.start + rows.stop) // 2
+    halves = slice(rows.start, half), slice(half, rows.stop)
+    angle = live_angle(run)
+    if angle is not None:
+        pairs = [_rate(run.t[part], angle[part]) for part in halves]
+    elif speed is not None:
+        pairs = [robust_mean(speed[part]) for part in halves]
+    else:
+        return True
+    (first, a), (second, b) = pairs
+    difference, size = np.abs(second - first), np.abs(first + second).max() / 2.0
+    drifts = (difference > DRIFT_ERRORS * np.hypot(a, b)) & (difference > DRIFT_SHARE * size)
+    return not bool(drifts.any())
+
+
+def _rate(t: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean rate over a window from its two ends, with the standard error of the mean of the single steps."""
+    steps = np.diff(angle, axis=0) / np.diff(t)[:, None]
+    return (angle[-1] - angle[0]) / (t[-1] - t[0]), robust_mean(steps)[1]
+
+
+def _body_rate(t: FloatArray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean twist over a window from the pose: each step turned into the body frame of its middle."""
+    heading = 0.5 * (pose[1:, 2] + pose[:-1, 2])
+    turned = np.einsum("nij,nj->ni", world_to_body(heading), np.diff(pose, axis=0))
+    return turned.sum(axis=0) / (t[-1] - t[0]), robust_mean(turned / np.diff(t)[:, None])[1]
