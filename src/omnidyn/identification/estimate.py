@@ -100,12 +100,10 @@ class Estimate:
 
 
 def unit(name: str) -> str:
-    """The unit of a parameter: friction on axes depends on the axis; other keys end in their unit or have none."""
-    yaw = name.endswith("[2]")
-    if name.startswith("friction.axes.viscous"):
-        return "N m s" if yaw else "N s/m"
-    if name.startswith("friction.axes."):
-        return "N m" if yaw else "N"
+    """The unit of a parameter: friction depends on where it acts; other keys end in their unit or have none."""
+    yaw = (name.startswith("friction.axes.") and name.endswith("[2]")) or ".yaw_" in name
+    if name.startswith("friction."):
+        return ("N m s" if yaw else "N s/m") if "viscous" in name else "N m" if yaw else "N"
     return _KEY_UNITS.get(name.partition("[")[0].rpartition(".")[2], "")
 
 

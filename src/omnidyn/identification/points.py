@@ -47,7 +47,7 @@ def points_from_currents(
     """
     twist = _rows("twist", twist, 3)
     current = _rows("current", current, robot.wheels.count, len(twist))
-    _refuse_losses(robot)
+    refuse_losses(robot)
     wrench = wrench_from_currents(robot, current)
     spread = None
     if current_std is not None:
@@ -85,7 +85,7 @@ def points_from_voltage(
     """
     twist = _rows("twist", twist, 3)
     volts = _rows("voltage", voltage, robot.wheels.count, len(twist))
-    _refuse_losses(robot)
+    refuse_losses(robot)
     spread = None
     if voltage_std is not None:
         deviation = _one_each("voltage_std", voltage_std, robot.wheels.count, "wheel")
@@ -195,8 +195,8 @@ def _at_limit(robot: Robot, twist: FloatArray, voltage: FloatArray) -> tuple[str
     return (words,) if rows else ()
 
 
-def _refuse_losses(robot: Robot) -> None:
-    """What a gear loses between motor and wheel would be counted as friction."""
+def refuse_losses(robot: Robot) -> None:
+    """Raises UnsupportedError for a gear that loses power: it would be counted as friction."""
     if np.any(np.asarray(robot.motor.gear_efficiency) < 1.0):
         raise UnsupportedError(
             "steady points know no such loss yet",
