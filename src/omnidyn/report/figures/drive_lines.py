@@ -1,0 +1,65 @@
+"""What each motor needs to turn: input against speed, with the fitted line."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from omnidyn.identification.drive_line import DriveLine, DriveStudy
+from omnidyn.report.style import BLUE, GREY, INK, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
+
+PER_ROW = 3
+
+
+def draw_drive_lines(study: DriveStudy) -> Picture:
+    """One panel per motor: a mark per window, its inertia taken off, and the line with its dead band."""
+    lines = [line for line in study.lines if line.motor != "all"][: 2 * PER_ROW]
+    with look():
+        rows = -(-len(lines) // PER_ROW)
+        columns = min(len(lines), PER_ROW)
+        figure = new_figure(WIDTH, 0.9 + 3.1 * rows)
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        height = 0.9 + 3.1 * rows
+        figure.subplots_adjust(
+            left=0.1, right=0.98, top=1 - 0.35 / height, bottom=1.0 / height, wspace=0.34, hspace=0.45
+        )
+        for panel, line in zip(panels, lines, strict=False):
+            _panel(panel, study, line)
+        for panel in panels[len(lines) :]:
+            panel.set_axis_off()
+        handles, names = panels[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="lower left", bbox_to_anchor=(0.08, 0.0), ncols=3)
+        return picture("drive_lines", "What each motor needs to turn", _words(study), figure)
+
+
+def _panel(axes: Axes, study: DriveStudy, line: DriveLine) -> None:
+    put_in, speed, error, side, change, _ = study.windows.of(int(line.motor) - 1)
+    inertia = np.nan_to_num(line.value["inertia"]) * change
+    axes.errorbar(speed, put_in - inertia, xerr=error, fmt="o", color=GREY, markersize=3.5, elinewidth=0.6, zorder=1,
+                  label="windows, inertia taken off")  # fmt: skip
+    slope, band = line.value["slope"], float(np.nan_to_num(line.value["dead_band"]))
+    reach = np.abs(speed).max()
+    sides = [way for way in (-1.0, 1.0) if (side * way > 0.0).any()]
+    for k, way in enumerate(sides):
+        span = way * np.linspace(0.0, reach, 20)
+        axes.plot(span, slope * span + band * way, color=BLUE, label="line" if k == 0 else None)
+    low, high = line.ci95["dead_band"]
+    if np.isfinite(low):
+        for k, way in enumerate(sides):
+            axes.plot([0.0, 0.0], [way * low, way * high], color=VERMILLION, linewidth=4, alpha=0.8,
+                      solid_capstyle="butt", label="dead band, 95 %" if k == 0 else None)  # fmt: skip
+    axes.axhline(0.0, color=INK, linewidth=0.6)
+    axes.axvline(0.0, color=INK, linewidth=0.6)
+    axes.set_title(f"motor {line.motor}")
+    axes.set_xlabel("speed, rad/s")
+    if (int(line.motor) - 1) % PER_ROW == 0:
+        axes.set_ylabel(f"{study.windows.kind}, {study.windows.unit}")
+    thin_out(axes, 4, 5)
+
+
+def _words(study: DriveStudy) -> str:
+    return (
+        f"Mean {study.windows.kind} over each window against the mean speed ({study.windows.speed_from}), with the "
+        "standard error of the speed. Where the line meets speed 0 is the dead band; the bar is its 95 % interval: "
+        "where it contains 0, the data do not show one."
+    )

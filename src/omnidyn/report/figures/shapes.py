@@ -1,0 +1,195 @@
+"""The force of the motors at constant speed over the direction of travel, and the shapes of friction through it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.projections.polar import PolarAxes
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from omnidyn.identification.operating import SPEEDS, ForcePoints
+from omnidyn.identification.shapes import SHAPES
+from omnidyn.identification.steady_study import SteadyStudy
+from omnidyn.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    WIDTH,
+    Picture,
+    look,
+    new_figure,
+    picture,
+    thin_out,
+)
+
+FloatArray = NDArray[np.float64]
+
+GROUP_COLOURS, GROUP_MARKS = (BLUE, VERMILLION, GREEN, PURPLE), ("o", "s", "^", "D")
+LINES = ("-", "--", "-.", (0, (1, 1)))
+COMPARED = {"box": (ORANGE, ":"), "wheel": (SKY, "-.")}
+MAX_GROUPS, MAX_SHAPES = 4, 12
+STEP_DEG = 1.0
+
+
+def shape_pictures(study: SteadyStudy) -> list[Picture]:
+    """All pictures of a study, in the order in which one reads them."""
+    return [draw_scores(study), draw_polar(study), draw_components(study)]
+
+
+def draw_scores(study: SteadyStudy) -> Picture:
+    """Left-out error of every shape, with its standard error; the chosen one stands out."""
+    scores = study.choice.scores[:MAX_SHAPES][::-1]
+    with look():
+        figure = new_figure(WIDTH, 1.1 + 0.33 * len(scores))
+        height = 1.1 + 0.33 * len(scores)
+        axes = figure.add_axes((0.27, 0.62 / height, 0.70, 1.0 - 0.72 / height))
+        for row, score in enumerate(scores):
+            chosen = score.name == study.choice.chosen
+            colour = BLUE if chosen else INK if score.in_model else GREY
+            axes.errorbar(score.loo, row, xerr=2.0 * score.loo_std, fmt="o" if score.in_model else "D", color=colour,
+                          markersize=8 if chosen else 6, capsize=3,
+                          markerfacecolor=colour if score.in_model else "white")  # fmt: skip
+        axes.set_yticks(range(len(scores)), [_score_label(study, score.name) for score in scores])
+        axes.set_xlim(left=0.0)
+        axes.set_ylim(-0.6, len(scores) - 0.4)
+        axes.set_xlabel("force error in a direction left out, N (bars: two standard errors)")
+        axes.grid(axis="y", visible=False)
+        return picture("shape_errors", "Which shape predicts the force in a direction it has not seen", _scores_words(
+            study), figure)  # fmt: skip
+
+
+def _score_label(study: SteadyStudy, name: str) -> str:
+    return f"{name}  (chosen)" if name == study.choice.chosen else name
+
+
+def _scores_words(study: SteadyStudy) -> str:
+    return (
+        "Each shape of friction is fitted to all other directions and asked for the force vector in the one left out: "
+        "root mean square over all points. Diamonds are shapes that a robot file cannot hold, drawn to compare. "
+        f"{study.statements[0][0].upper()}{study.statements[0][1:]}."
+    )
+
+
+def draw_polar(study: SteadyStudy) -> Picture:
+    """Force along travel over the direction: a mark per point, a line per group of the chosen shape."""
+    groups = study.points.groups[:MAX_GROUPS]
+    with look():
+        figure = new_figure(WIDTH, 5.2)
+        axes = cast(PolarAxes, figure.add_axes((0.06, 0.06, 0.56, 0.84), projection="polar"))
+        top = 0.0
+        for group, colour, mark, line in zip(groups, GROUP_COLOURS, GROUP_MARKS, LINES, strict=False):
+            own = _of(study.points, group)
+            name = "measured" if group == "all" else group
+            axes.plot(np.arctan2(own.twist[:, 1], own.twist[:, 0]), own.along, mark, color=colour, markersize=3.5,
+                      alpha=0.55, markeredgewidth=0, label=name)  # fmt: skip
+            way, curve = _curve(study, group, study.choice.chosen, own)
+            axes.plot(np.radians(way), _along(way, curve), color=colour, linestyle=line, linewidth=2.2,  # type: ignore[arg-type]
+                      label=f"{study.choice.chosen}" + ("" if group == "all" else f", {group}"))  # fmt: skip
+            top = max(top, float(np.nanmax(own.along)))
+        _compared(study, axes, groups[0])
+        _dress(axes, top)
+        figure.legend(*axes.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.68, 0.5))
+        figure.text(0.02, 0.95, "force along travel, N", fontsize=11.5)
+        return picture("force_polar", "Force along travel, over the direction of travel", _polar_words(study), figure)
+
+
+def _compared(study: SteadyStudy, axes: PolarAxes, group: str) -> None:
+    """The box of the paper and the wheels, of the first group, to compare."""
+    for name, (colour, line) in COMPARED.items():
+        if name in study.choice.fits and name != study.choice.chosen:
+            way, curve = _curve(study, group, name, _of(study.points, group))
+            axes.plot(np.radians(way), _along(way, curve), color=colour, linestyle=line, linewidth=1.5, label=name)
+
+
+def _polar_words(study: SteadyStudy) -> str:
+    return (
+        "What it takes to keep the robot moving at constant speed, seen from above: forward is up, left is left. "
+        f"Marks: one run and command each, direction from the {SPEEDS[study.points.speed_from]}. Lines: fitted shapes; "
+        "a box or friction at the wheels has corners, friction along the direction of travel has none."
+    )
+
+
+def draw_components(study: SteadyStudy) -> Picture:
+    """Both components of the force over the direction, with the chosen shape and the box."""
+    groups = study.points.groups[:MAX_GROUPS]
+    with look():
+        figure = new_figure(WIDTH, 4.6)
+        panels = figure.subplots(1, 2)
+        figure.subplots_adjust(left=0.075, right=0.985, top=0.92, bottom=0.3, wspace=0.24)
+        for component, panel in enumerate(panels):
+            for k, group in enumerate(groups):
+                _component(study, panel, component, group, k)
+            panel.set_title(f"force along {'xy'[component]}, N")
+            panel.set_xlabel("direction of travel, degree")
+            panel.set_xticks(range(-180, 181, 90))
+            thin_out(panel, None, 6)
+        handles, names = panels[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="lower left", bbox_to_anchor=(0.065, 0.0), ncols=3, columnspacing=1.5)
+        return picture(
+            "force_components", "Both components of the force", "The same points, as components along the body axes "
+            "(x forward, y left), over the direction of travel (90 degrees is left). The line is the chosen shape; the "
+            "dotted one is the box of the paper, which jumps where an axis changes its sign.", figure,
+        )  # fmt: skip
+
+
+def _component(study: SteadyStudy, panel: Axes, component: int, group: str, number: int) -> None:
+    own = _of(study.points, group)
+    colour = GROUP_COLOURS[number]
+    way = np.degrees(np.arctan2(own.twist[:, 1], own.twist[:, 0]))
+    name = "measured" if group == "all" else group
+    panel.plot(way, own.wrench[:, component], GROUP_MARKS[number], color=colour, markersize=3.5, alpha=0.55,
+               markeredgewidth=0, label=name)  # fmt: skip
+    angles, curve = _curve(study, group, study.choice.chosen, own)
+    label = study.choice.chosen + ("" if group == "all" else f", {group}")
+    panel.plot(angles, curve[:, component], color=colour, linestyle=LINES[number], label=label)  # type: ignore[arg-type]
+    if number == 0 and "box" in study.choice.fits and study.choice.chosen != "box":
+        angles, curve = _curve(study, group, "box", own)
+        panel.plot(angles, curve[:, component], ":", color=ORANGE, linewidth=1.6, label="box (the paper)")
+
+
+def _curve(study: SteadyStudy, group: str, name: str, own: ForcePoints) -> tuple[FloatArray, FloatArray]:
+    """(direction [degree], driving wrench) of a fitted shape at the middle speed of the group, without turning."""
+    fit = study.choice.fits[name][group]
+    way = np.arange(-180.0, 180.0 + STEP_DEG, STEP_DEG) + 0.01  # beside the corners, not on them
+    speed = float(np.median(own.speed[own.speed > 0.0]))
+    angle = np.radians(way)
+    twist = speed * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+    empty = np.zeros(len(way))
+    points = replace(
+        own, twist=twist, still=empty, wrench=np.zeros((len(way), 3)), wrench_std=np.zeros((len(way), 3)),
+        traction=np.zeros((len(way), own.traction.shape[1])), direction=way, group=(group,) * len(way),
+        run=empty.astype(np.int64), rows=empty.astype(np.int64),
+    )  # fmt: skip
+    turning = any(".yaw_" in key or key == "friction.axes.coulomb[2]" for key in fit.keys)
+    return way, SHAPES[name].force(study.robot, points, turning, fit.level)
+
+
+def _along(way: FloatArray, wrench: FloatArray) -> FloatArray:
+    angle = np.radians(way)
+    return wrench[:, 0] * np.cos(angle) + wrench[:, 1] * np.sin(angle)
+
+
+def _of(points: ForcePoints, group: str) -> ForcePoints:
+    moving = points.speed > points.still
+    return points.chosen(np.array([name == group for name in points.group]) & moving)
+
+
+def _dress(axes: PolarAxes, top: float) -> None:
+    """Forward is up, left is left, as in the picture of the robot."""
+    axes.set_theta_zero_location("N")
+    axes.set_thetagrids([0.0, 90.0, 180.0, 270.0], ["x\nforward", "y\nleft", "180°", "-90°"], fontsize=10.0)
+    axes.set_ylim(0.0, 1.15 * top)
+    ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, 1.15 * top)
+    axes.set_rgrids([each for each in ticks if 0.0 < each <= 1.15 * top], angle=-112.5, fontsize=9.5, color=INK)
+    axes.spines["polar"].set_visible(True)
+    axes.spines["polar"].set_color(GREY)
+    axes.grid(color=GREY, alpha=0.35)

@@ -1,0 +1,95 @@
+"""Parts of a page that needs nothing else: no script, no request, every text escaped, the style fixed by its hash."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from omnidyn.report.style import Picture
+
+STYLE = (Path(__file__).parent / "page.css").read_text("utf-8")
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page with a heading: key (its anchor), title, and content that is HTML already."""
+
+    key: str
+    title: str
+    content: str
+
+
+def page(
+    title: str, introduction: str, sections: Sequence[Section], provenance: Mapping[str, Any], *, lead: str = ""
+) -> str:
+    """The page as HTML. lead: HTML between the introduction and the links.
+
+    provenance: version ("omnidyn"), "command" and "inputs" (role, name, sha256); it is the last section.
+    """
+    every = [*sections, Section("made", "How this was made", provenance_table(provenance))]
+    links = "".join(f'<a href="#{escape(each.key, quote=True)}">{escape(each.title)}</a>' for each in every)
+    head = f"<header><h1>{escape(title)}</h1><p>{escape(introduction)}</p>{lead}<nav>{links}</nav></header>"
+    parts = (
+        f'<section id="{escape(each.key, quote=True)}"><h2>{escape(each.title)}</h2>{each.content}</section>'
+        for each in every
+    )
+    return _document(title, head + "".join(parts))
+
+
+def _document(title: str, body: str) -> str:
+    allowed = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
+    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{allowed}'; base-uri 'none'; form-action 'none'"
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<meta name="color-scheme" content="light dark"><link rel="icon" href="data:,">'
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head>\n<body><main>{body}</main></body></html>\n"
+    )
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], name: str = "plain") -> str:
+    """A table of plain text; `name` is its class in page.css."""
+    top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    return f'<div class="wide"><table class="{name}"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def bullets(words: Sequence[str]) -> str:
+    """A list of sentences; nothing where there are none."""
+    return f"<ul>{''.join(f'<li>{escape(each)}</li>' for each in words)}</ul>" if words else ""
+
+
+def paragraph(words: str) -> str:
+    """One paragraph of plain text."""
+    return f"<p>{escape(words)}</p>"
+
+
+def figure(picture: Picture) -> str:
+    """A picture with its title and caption, inside the page."""
+    data = base64.b64encode(picture.svg).decode()
+    image = f'<img alt="{escape(picture.caption, quote=True)}" src="data:image/svg+xml;base64,{data}">'
+    words = f"<b>{escape(picture.title)}.</b> {escape(picture.caption)}"
+    return f'<figure id="{escape(picture.name, quote=True)}">{image}<figcaption>{words}</figcaption></figure>'
+
+
+SHOWN_INPUTS = 20
+
+
+def provenance_table(provenance: Mapping[str, Any]) -> str:
+    """Version, command and inputs with their hashes; many logs of one folder fold up."""
+    rows = [("omnidyn", provenance["omnidyn"]), ("command", provenance["command"])]
+    inputs = [(each["role"], f"{each['name']}, sha256 {each['sha256']}") for each in provenance["inputs"]]
+    if len(inputs) <= SHOWN_INPUTS:
+        return _made([*rows, *inputs])
+    return _made(rows) + f"<details><summary>{len(inputs)} inputs with their hashes</summary>{_made(inputs)}</details>"
+
+
+def _made(rows: Sequence[tuple[str, str]]) -> str:
+    cells = (f'<tr><th scope="row">{escape(name)}</th><td><code>{escape(text)}</code></td></tr>' for name, text in rows)
+    return f'<table class="made">{"".join(cells)}</table>'

@@ -1,0 +1,63 @@
+"""The report of `omnidyn identify` on logs: what was used, what was found, how sure it is, what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from omnidyn.identification.drive_line import DriveStudy
+from omnidyn.identification.operating import SPEEDS
+from omnidyn.identification.steady_study import SteadyStudy
+from omnidyn.identification.study_table import (
+    DRIVE_HEAD,
+    LEVEL_HEAD,
+    SHAPE_HEAD,
+    TRAVEL_HEAD,
+    drive_rows,
+    level_rows,
+    shape_rows,
+    travel_rows,
+)
+from omnidyn.identification.study_words import FORCES
+from omnidyn.report.figures.drive_lines import draw_drive_lines
+from omnidyn.report.figures.shapes import shape_pictures
+from omnidyn.report.html import Section, bullets, figure, page, paragraph, table
+
+
+def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
+    """The page of a steady-state study, as HTML."""
+    points = study.points
+    introduction = (
+        f"Friction of {study.robot.name} from stretches of constant speed: there it balances what the motors push. "
+        f"Forces are from {FORCES[points.force_from]}; the motion is the {SPEEDS[points.speed_from]}."
+    )
+    errors, *pictures = shape_pictures(study)
+    doubts = [*study.warnings]
+    for group, estimate in study.estimates.items():
+        doubts += [words if group == "all" else f"{group}: {words}" for words in estimate.warnings]
+    sections = [
+        Section("findings", "What the data say", bullets(study.statements)),
+        Section("levels", "Friction, with 95 % intervals", table(LEVEL_HEAD, level_rows(study))),
+        Section("data", "What was used", table(TRAVEL_HEAD, travel_rows(study))),
+        Section("shapes", "Which shape", figure(errors) + table(SHAPE_HEAD, shape_rows(study))),
+        Section("forces", "Forces", "".join(map(figure, pictures))),
+        Section("doubts", "Doubts", bullets(doubts) or paragraph("None.")),
+        Section("next", "What to measure next", bullets(study.advice)),
+    ]
+    return page(f"{study.robot.name}: friction from logs", introduction, sections, provenance)
+
+
+def render_drives(study: DriveStudy, provenance: Mapping[str, Any]) -> str:
+    """The page of the lines of motors, as HTML."""
+    introduction = (
+        "What each motor needs to turn: slope, dead band and inertia, from windows in integral form: the integral of "
+        "the input is the slope times the angle turned, plus the dead band times the time it turned, plus the inertia "
+        "times the change of speed."
+    )
+    sections = [
+        Section("findings", "What the data say", bullets(study.statements)),
+        Section("lines", "Lines, with 95 % intervals", table(DRIVE_HEAD, drive_rows(study))),
+        Section("figures", "Figures", figure(draw_drive_lines(study))),
+        Section("doubts", "Doubts", bullets(study.warnings) or paragraph("None.")),
+    ]
+    return page("Motors from logs", introduction, sections, provenance)

@@ -1,0 +1,83 @@
+"""The page of a study: whole, closed to the outside, with the numbers of the study on it."""
+
+import numpy as np
+import pytest
+
+from benchmarks.steady_logs import clean_runs, robot_with, spoiled
+from omnidyn.identification.drive_line import fit_drive_lines
+from omnidyn.identification.steady_study import identify_steady
+from omnidyn.model.robot_file import load_robot
+from omnidyn.report.figures.drive_lines import draw_drive_lines
+from omnidyn.report.figures.shapes import shape_pictures
+from omnidyn.report.steady_page import render_drives, render_study
+from omnidyn.run import Run
+from tests.report.test_page import Reader
+
+RECORD = {
+    "omnidyn": "0.1.0", "command": "omnidyn identify <b>",
+    "inputs": [{"role": "log", "name": f"run{k}.csv", "sha256": "ab" * 32} for k in range(24)],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def study():
+    rng = np.random.default_rng(0)
+    runs = [spoiled(run, rng) for run in clean_runs(robot_with("ellipse"), range(0, 360, 30))]
+    return identify_steady([*runs, *runs], load_robot("axebot"), groups=["first"] * 12 + ["<second>"] * 12)
+
+
+@pytest.fixture(scope="module")
+def motors():
+    t = np.arange(600) * 0.01
+    speed = np.repeat([2.0, -3.0, 5.0, -6.0, 4.0, 1.0], 100)[:, None]
+    angle = np.cumsum(np.vstack([[[0.0]], speed[:-1]]) * 0.01, axis=0)
+    return fit_drive_lines([Run(t=t, voltage=0.5 * speed + 0.4 * np.sign(speed), wheel_angle=angle)])
+
+
+@pytest.fixture(scope="module")
+def page(study):
+    return render_study(study, RECORD)
+
+
+def test_it_is_whole_and_every_id_is_there_once(page):
+    ids = Reader(page).all("id")
+    assert len(ids) == len(set(ids))
+    assert {"findings", "levels", "data", "shapes", "forces", "doubts", "next", "made", "force_polar"} <= set(ids)
+
+
+def test_it_asks_for_nothing_from_outside_and_runs_nothing(page, motors):
+    for text in (page, render_drives(motors, RECORD)):
+        read = Reader(text)
+        links = [*read.all("src"), *read.all("href")]
+        assert links
+        assert all(link.startswith(("data:", "#")) for link in links)
+        assert not {"script", "iframe", "object", "embed", "form"} & set(read.tags)
+        assert not [name for _, name, _ in read.values if name.startswith("on") or name == "style"]
+
+
+def test_names_of_groups_are_text(page):
+    assert "<second>" in Reader(page).text
+    assert "<second>" not in page
+
+
+def test_the_numbers_of_the_study_are_on_it(study, page):
+    text = Reader(page).text
+    for words in (*study.statements, *study.warnings, *study.advice):
+        assert words in text
+    for group, travel in study.travel.items():
+        assert f"{travel.mean:.2f}" in text, group
+    assert f"{study.choice.score.loo:.2f}" in text
+    assert "24 inputs with their hashes" in text
+
+
+def test_the_same_study_gives_the_same_page(study, page):
+    assert render_study(study, RECORD) == page
+
+
+def test_pictures_have_names_captions_and_both_formats(study, motors):
+    pictures = [*shape_pictures(study), draw_drive_lines(motors)]
+    assert len({each.name for each in pictures}) == 4
+    for each in pictures:
+        assert each.caption.endswith(".")
+        assert each.png.startswith(b"\x89PNG")
+        assert b"<svg" in each.svg
