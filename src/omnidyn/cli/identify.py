@@ -1,4 +1,4 @@
-"""omnidyn identify TABLE --robot ROBOT: friction from measured points."""
+"""omnidyn identify LOG...: friction, or the lines of motors, from logs or from a table of steady points."""
 
 from __future__ import annotations
 
@@ -6,33 +6,190 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from omnidyn.cli import log_options as options
 from omnidyn.cli.progress import progress
 from omnidyn.cli.streams import say, show, show_json
 
 if TYPE_CHECKING:
+    from omnidyn.cli.identify_logs import Loaded
+    from omnidyn.identification.drive_line import DriveStudy
     from omnidyn.identification.estimate import Estimate
+    from omnidyn.identification.steady_study import SteadyStudy
+    from omnidyn.model.robot import Robot
 
 STEADY_STATE = "steady-state"
+FRICTION, MOTORS = "friction", "motors"
 
 
 def identify(
-    table: str = typer.Argument(metavar="TABLE", help="CSV file axis,speed,force[,speed_std,force_std]."),
-    robot: str = typer.Option(..., metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
+    logs: list[str] = typer.Argument(
+        metavar="LOG...", help="Logs (CSV, Parquet) or folders of them; or one table axis,speed,force."
+    ),
+    robot: str = typer.Option("", metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
     method: str = typer.Option(STEADY_STATE, help="How: steady-state is the paper's, eqs (15)-(17)."),
-    rest: str = typer.Option("bound", help="What a row at rest says: bound, line (the paper's way) or ignore."),
-    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Robot file to write (TOML)."),
-    force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
-    json: bool = typer.Option(False, "--json", help="The estimate for machines."),
+    what: str = typer.Option(FRICTION, help="friction, or motors: the line of each motor, wheels off the ground."),
+    shape: str = typer.Option("auto", help="box, disc, ellipse, wheel, wheels, disc+wheel, ... or auto: the best."),
+    speed: str = typer.Option("wheel", help="Which speed friction is a function of: wheel, set or ground."),
+    force_from: str = typer.Option("", help="current or voltage; default: current where all logs have it."),
+    input_: str = typer.Option("", "--input", help="Of the motors: voltage, duty or current; default: the first."),
+    window: str = typer.Option("", metavar="A,B", help="Use these shares of each command's rows, such as 0.4,0.95."),
+    group: list[str] = typer.Option([], metavar="NAME=GLOB", help="Logs of one floor or load. Repeatable."),
+    rest: str = typer.Option("bound", help="Of a table: what a row at rest says: bound, line (the paper) or ignore."),
+    report: str = typer.Option("", metavar="FILE.html", help="A page with pictures, numbers and what they say."),
+    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Robot file to write (TOML), one per group."),
+    force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+    json: bool = typer.Option(False, "--json", help="The result for machines."),
+    map_file: str = options.MAP,
+    column: list[str] = options.COLUMN,
+    assume: list[str] = options.ASSUME,
+    latency: list[str] = options.LATENCY,
+    save_map: str = options.SAVE_MAP,
+    sort: bool = options.SORT,
+    no_header: bool = options.NO_HEADER,
+    skip_bad_rows: bool = options.SKIP_BAD_ROWS,
+    current_unsigned: bool = options.CURRENT_UNSIGNED,
 ) -> None:
-    """Identify friction from steady points.
+    """Identify friction from logs at steady speeds, or from a table of steady points.
 
-    The answer carries standard errors, 95 % intervals and warnings in words.
+    The answer carries standard errors, 95 % intervals and warnings in words, and says what the data cannot tell.
     """
-    _refuse_method(method)
-    if out:
-        from omnidyn.files import check_output
+    from omnidyn.cli.identify_logs import is_steady_table, load_runs
 
-        check_output(out, force)
+    _refuse_words(method, what)
+    if not robot and what == FRICTION:
+        raise typer.BadParameter("Missing option '--robot'.")
+    _refuse_places(out, report, force)
+    if what == FRICTION and len(logs) == 1 and is_steady_table(logs[0]):
+        _from_table(logs[0], robot, rest, out, report, force, json)
+        return
+    maps = options.Maps(save_map, force)
+    with progress("reading") as now:
+        loaded_robot = _robot(robot)
+        how = options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
+        loaded = load_runs(logs, group, loaded_robot, how, sort=sort, maps=maps, now=now)
+        now("identifying")
+        record = _record(robot, loaded)
+        if what == MOTORS:
+            drives = _drives(loaded, loaded_robot, input_, speed, window)
+            now("writing")
+            _tell_drives(drives, record, report, out, force, json)
+        else:
+            assert loaded_robot is not None
+            study = _study(loaded, loaded_robot, shape, speed, force_from, window)
+            now("writing")
+            _tell_study(study, record, report, out, force, json)
+
+
+def _refuse_words(method: str, what: str) -> None:
+    from omnidyn.errors import InputError, UnsupportedError
+
+    if method != STEADY_STATE:
+        raise UnsupportedError("no such method yet", got=method, expected=STEADY_STATE, where="--method")
+    if what not in (FRICTION, MOTORS):
+        raise InputError("nothing of that name", got=what, expected=f"{FRICTION} or {MOTORS}", where="--what")
+
+
+def _refuse_places(out: str, report: str, force: bool) -> None:
+    """Before any work: places where the result could not be written in the end."""
+    from omnidyn.files import check_output
+
+    for path in (out, report):
+        if path:
+            check_output(path, force)
+
+
+def _robot(robot: str) -> Robot | None:
+    from omnidyn.model.robot_file import load_robot
+
+    return load_robot(robot) if robot else None
+
+
+def _shares(window: str) -> tuple[float, float] | None:
+    from omnidyn.cli.numbers import number_list
+    from omnidyn.errors import InputError
+
+    if not window:
+        return None
+    values = number_list("--window", window)
+    if len(values) != 2 or not 0.0 <= values[0] < values[1] <= 1.0:
+        raise InputError("not two shares", got=window, expected="such as 0.4,0.95", where="--window")
+    return values[0], values[1]
+
+
+def _study(loaded: Loaded, robot: Robot, shape: str, speed: str, force_from: str, window: str) -> SteadyStudy:
+    from omnidyn.identification.steady_study import identify_steady
+
+    return identify_steady(
+        loaded.runs, robot, groups=loaded.groups, shape=shape, speed=speed, force_from=force_from,
+        window=_shares(window),
+    )  # fmt: skip
+
+
+def _drives(loaded: Loaded, robot: Robot | None, kind: str, speed: str, window: str) -> DriveStudy:
+    from omnidyn.identification.drive_line import fit_drive_lines
+
+    return fit_drive_lines(loaded.runs, kind=kind, speed=speed, robot=robot, share=_shares(window))
+
+
+def _record(robot: str, loaded: Loaded) -> dict[str, Any]:
+    from omnidyn.cli.session import provenance, robot_input
+
+    return provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
+
+
+def _tell_study(study: SteadyStudy, record: dict[str, Any], report: str, out: str, force: bool, json: bool) -> None:
+    from omnidyn.cli.identify_logs import outputs
+    from omnidyn.files import check_output, write_atomic
+    from omnidyn.identification.study_table import study_summary, study_to_dict
+    from omnidyn.model.robot_file import save_robot
+
+    files = outputs(out, list(study.estimates))
+    for path in files.values():
+        check_output(path, force)
+    if report:
+        from omnidyn.report.steady_page import render_study
+
+        write_atomic(report, render_study(study, record), force)
+    for group, path in files.items():
+        save_robot(study.estimates[group].robot, path, force)
+    if json:
+        for warning in study.warnings:
+            say(f"omnidyn: warning: {warning}")
+        show_json({**study_to_dict(study), "output": files or None, "report": report or None, "provenance": record})
+    else:
+        show(study_summary(study).rstrip("\n"))
+    _say_written([*files.values(), report])
+
+
+def _tell_drives(drives: DriveStudy, record: dict[str, Any], report: str, out: str, force: bool, json: bool) -> None:
+    from omnidyn.files import write_atomic
+    from omnidyn.identification.study_table import drive_summary, drive_to_dict
+
+    if out:
+        say("omnidyn: the lines of the motors do not go into a robot file; -o is not used")
+    if report:
+        from omnidyn.report.steady_page import render_drives
+
+        write_atomic(report, render_drives(drives, record), force)
+    if json:
+        for warning in drives.warnings:
+            say(f"omnidyn: warning: {warning}")
+        show_json({**drive_to_dict(drives), "report": report or None, "provenance": record})
+    else:
+        show(drive_summary(drives).rstrip("\n"))
+    _say_written([report])
+
+
+def _say_written(paths: list[str]) -> None:
+    for path in paths:
+        if path:
+            say(f"omnidyn: wrote {path}")
+
+
+def _from_table(table: str, robot: str, rest: str, out: str, report: str, force: bool, json: bool) -> None:
+    """The paper's way, from a table of steady points."""
+    if report:
+        raise typer.BadParameter("--report needs logs; a table of points has none.")
     with progress("identifying"):
         estimate, record = _estimated(table, robot, rest)
     if out:
@@ -45,15 +202,7 @@ def identify(
         show_json({**estimate.to_dict(), "output": out or None, "provenance": record})
     else:
         show(estimate.summary().rstrip("\n"))
-    if out:
-        say(f"omnidyn: wrote {out}")
-
-
-def _refuse_method(method: str) -> None:
-    from omnidyn.errors import UnsupportedError
-
-    if method != STEADY_STATE:
-        raise UnsupportedError("no such method yet", got=method, expected=STEADY_STATE, where="--method")
+    _say_written([out])
 
 
 def _estimated(table: str, robot: str, rest: str) -> tuple[Estimate, dict[str, Any]]:

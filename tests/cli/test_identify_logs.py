@@ -1,0 +1,184 @@
+"""omnidyn identify on logs: what it prints and writes, groups, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks.steady_logs import clean_runs, robot_with, spoiled
+from omnidyn.cli import main
+from omnidyn.logs.run_file import write_run
+from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+
+DIRECTIONS = range(0, 360, 30)
+
+
+@pytest.fixture(scope="session")
+def floors(tmp_path_factory):
+    """Two folders of logs: a floor with 2.0 N and one with 2.6 N, the same in every direction."""
+    folder, rng = tmp_path_factory.mktemp("floors"), np.random.default_rng(0)
+    for name, level in (("smooth", 2.0), ("rough", 2.6)):
+        friction = Friction(direction=DirectionFriction(coulomb=(level, level), yaw_coulomb=0.099))
+        (folder / name).mkdir()
+        for k, run in enumerate(clean_runs(robot_with("disc").replace(friction=friction), DIRECTIONS)):
+            write_run(spoiled(run, rng), folder / name / f"run{k}.csv")
+    return folder
+
+
+@pytest.fixture
+def call(floors, tmp_path, monkeypatch, capsys):
+    """Run a command in the folder of the floors, outputs elsewhere: (exit code, stdout, stderr)."""
+    monkeypatch.chdir(floors)
+
+    def run(*arguments):
+        code = main(["identify", *arguments])
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def test_a_folder_of_logs_gives_friction_with_its_shape(call, tmp_path):
+    code, out, err = call("smooth", "--robot", "axebot", "-o", str(tmp_path / "fit.toml"))
+    assert code == 0
+    assert "friction has the shape disc" in out
+    assert "columns of smooth/run0.csv" in err
+    assert err.count("columns of") == 1  # said once for all files that agree
+    robot = load_robot(tmp_path / "fit.toml")
+    assert robot.friction.direction.coulomb == pytest.approx((2.0, 2.0), rel=0.05)
+    assert robot.priors["friction.direction.coulomb"].std > 0.0
+
+
+def test_folders_are_groups_and_each_has_its_file(call, tmp_path):
+    code, out, err = call("smooth", "rough", "--robot", "axebot", "-o", str(tmp_path / "fit.toml"))
+    assert code == 0
+    assert "smooth" in out
+    assert "differs" in out
+    assert "wrote" in err
+    levels = [load_robot(tmp_path / f"fit-{name}.toml").friction.direction.coulomb[0] for name in ("smooth", "rough")]
+    assert levels == pytest.approx([2.0, 2.6], rel=0.05)
+
+
+def test_groups_by_glob_are_the_same_as_by_folder(call):
+    by_folder = json.loads(call("smooth", "rough", "--robot", "axebot", "--json")[1])
+    by_glob = json.loads(
+        call(".", "--robot", "axebot", "--group", "smooth=smooth/*", "--group", "rough=rough", "--json")[1]
+    )
+    for name in ("smooth", "rough"):
+        one, other = (each["groups"][name]["parameters"] for each in (by_folder, by_glob))
+        assert one == other
+    assert by_folder["differences"][0]["differs"] is True
+    assert len(by_folder["provenance"]["inputs"]) == 25
+
+
+def test_logs_of_no_group_are_not_used_and_counted(call):
+    _, out, err = call(".", "--robot", "axebot", "--group", "smooth=smooth", "--json")
+    assert [*json.loads(out)["groups"]] == ["smooth"]
+    assert "12 of 24 logs belong to no group and are not used" in err
+
+
+def test_json_holds_no_nan_and_says_what_was_used(call):
+    def refuse(name):
+        raise AssertionError(name)
+
+    result = json.loads(call("smooth", "--robot", "axebot", "--speed", "set", "--json")[1], parse_constant=refuse)
+    assert result["shape"] == "disc"
+    assert result["speed_from"] == "set"
+    assert result["groups"]["all"]["along_travel"]["points"] == 12
+    assert result["output"] is None
+
+
+def test_a_report_is_one_page(call, tmp_path):
+    code, _, err = call("smooth", "rough", "--robot", "axebot", "--report", str(tmp_path / "r.html"))
+    assert code == 0
+    assert f"wrote {tmp_path / 'r.html'}" in err
+    assert "What to measure next" in (tmp_path / "r.html").read_text("utf-8")
+
+
+def test_a_shape_can_be_asked_for(call):
+    result = json.loads(call("smooth", "--robot", "axebot", "--shape", "box", "--json")[1])
+    assert [*result["groups"]["all"]["parameters"]] == ["friction.axes.coulomb[0]", "friction.axes.coulomb[1]"]
+
+
+def test_unsigned_currents_get_their_sign_when_told(call, floors, tmp_path):
+    for k in range(12):
+        from omnidyn.logs.run_file import read_run
+
+        run = read_run(floors / "smooth" / f"run{k}.csv")
+        write_run(run.replace(current=np.abs(run.current)), tmp_path / f"run{k}.csv")
+    code, _, _err = call(str(tmp_path), "--robot", "axebot")
+    assert code in (0, 4)
+    code, out, _ = call(str(tmp_path), "--robot", "axebot", "--current-unsigned")
+    assert code == 0
+    assert "friction has the shape disc" in out
+
+
+def test_existing_files_are_refused_before_any_work(call, tmp_path, monkeypatch):
+    (tmp_path / "fit.toml").write_text("mine")
+    monkeypatch.setattr("omnidyn.identification.steady_study.identify_steady", None)
+    assert call("smooth", "--robot", "axebot", "-o", str(tmp_path / "fit.toml"))[0] == 3
+    assert (tmp_path / "fit.toml").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["smooth", "--robot", "axebot", "--shape", "round"], "no such shape; got round; expected auto, box"),
+        (["smooth", "--robot", "axebot", "--speed", "fast"], "no such speed; got fast"),
+        (["smooth", "--robot", "axebot", "--what", "magic"], "--what: nothing of that name; got magic"),
+        (["smooth", "--robot", "axebot", "--window", "0.9,0.4"], "--window: not two shares; got 0.9,0.4"),
+        (["smooth", "--robot", "axebot", "--group", "a"], "--group: cannot read the group; got a; expected NAME=GLOB"),
+        (["smooth", "--robot", "axebot", "--group", "a=none"], "--group a: no log belongs to this group; got none"),
+        ([".", "--robot", "axebot", "--group", "a=smooth", "--group", "b=s*"], "belongs to two groups; got a and b"),
+        (["nothing.csv", "--robot", "axebot"], "nothing.csv: no such file"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_exit_3(call, arguments, words):
+    code, out, err = call(*arguments)
+    assert (code, out) == (3, "")
+    assert words in err
+
+
+def test_a_robot_is_needed_for_friction(call):
+    code, out, err = call("smooth")
+    assert (code, out) == (2, "")
+    assert "--robot" in err
+
+
+def test_data_that_cannot_answer_are_exit_4(call):
+    code, out, err = call("smooth/run0.csv", "--robot", "axebot")
+    assert (code, out) == (4, "")
+    assert "no shape can be fitted" in err
+    assert "drive in more directions" in err
+
+
+# ---- motors ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def bench(tmp_path_factory):
+    """Two motors, u = 0.5 w + 0.4 sgn w, at many steady speeds."""
+    folder, t = tmp_path_factory.mktemp("bench"), np.arange(2000) * 0.01
+    speed = np.repeat(np.tile([2.0, -3.0, 5.0, -6.0, 4.0], 8), 50)[:, None] * [1.0, 0.9]
+    angle = np.cumsum(np.vstack([[[0.0, 0.0]], speed[:-1]]) * 0.01, axis=0)
+    write_run(Run(t=t, voltage=0.5 * speed + 0.4 * np.sign(speed), wheel_angle=angle), folder / "bench.csv")
+    return folder / "bench.csv"
+
+
+def test_motors_need_no_robot(call, bench, tmp_path):
+    report = tmp_path / "m.html"
+    code, out, _ = call(str(bench), "--what", "motors", "--json", "--report", str(report))
+    assert code == 0
+    first = json.loads(out)["motors"][0]
+    assert first["value"]["slope"] == pytest.approx(0.5, rel=0.02)
+    assert first["value"]["dead_band"] == pytest.approx(0.4, rel=0.05)
+    assert first["dead_band_seen"] is True
+    assert "What each motor needs to turn" in report.read_text("utf-8")
+
+
+def test_motors_in_words(call, bench):
+    code, out, err = call(str(bench), "--what", "motors", "-o", "x.toml")
+    assert code == 0
+    assert "motor 1: slope 2 +-" in out
+    assert "-o is not used" in err
