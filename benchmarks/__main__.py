@@ -14,6 +14,7 @@ NAMES = {
     "rest": "60 s inside the dead zone: the robot must not move at all",
     "compare": "compare on simulated logs: rmse, false alarms of the test of white errors, which robot is better",
     "check": "12 faults in 200 simulated logs each, 1000 clean logs: what `omnidyn check` finds and says (10 minutes)",
+    "steady": "steady-state identification: real logs beside their README; coverage on simulated ones (3 minutes)",
     "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
     "big_log": "a log of 1 GB in pieces, CSV and Parquet: processor time and memory (writes it to a temporary folder)",
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
