@@ -7,6 +7,7 @@ divided by the length of the window. The integral needs no derivative of a noisy
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -94,6 +95,7 @@ def drive_windows(
     """
     kind = _kind(runs, kind)
     angles = [_motion(run, speed, robot) for run in runs]
+    inputs = [getattr(run, kind) * INPUTS[kind][1] for run in runs]
     usual = _usual_speed(runs, angles)
     if length is None:
         length, sharp = _length(runs, angles, usual)
@@ -102,9 +104,10 @@ def drive_windows(
     rows: list[tuple[float, ...]] = []
     counts, rest = {"unresolved": 0, "resting": 0}, np.full(angles[0].count, np.nan)
     block = 0
-    for run, motion in zip(runs, angles, strict=True):
+    for run, motion, values in zip(runs, angles, inputs, strict=True):
+        largest = np.nanmax(np.abs(values), axis=0, initial=0.0)
         for window in _windows(run, length, steady, share):
-            own = _window(run, motion, window, kind, usual, counts, rest)
+            own = _window(run, motion, window, values, largest, usual, counts, rest)
             rows += [(*each, block) for each in own]
             block += 1
         block += 1  # no block of the bootstrap reaches over the end of a run
@@ -142,30 +145,36 @@ class _Motion:
     angle: FloatArray | None
     speed: FloatArray
     origin: str
+    pieces: tuple[slice, ...]
 
     @property
     def count(self) -> int:
         return self.speed.shape[1]
 
+    def piece(self, row: int) -> slice:
+        """The rows between the two gaps around a row."""
+        return self.pieces[bisect_right([each.start for each in self.pieces], row) - 1]
+
 
 def _motion(run: Run, speed: str, robot: Robot | None) -> _Motion:
+    pieces = tuple(segments(run.t))
     if speed == GROUND:
         if run.pose is None or robot is None or not np.isfinite(run.pose[:, 2]).any():
             raise InputError("the heading is not known", got=", ".join(run.channels), expected="heading, and a robot",
                              where=run.source)  # fmt: skip
         angle = run.pose[:, 2:] * wheel_speed(robot.wheels, [0.0, 0.0, 1.0])
-        return _Motion(angle, np.gradient(angle, run.t, axis=0), "heading, the robot turning on the spot")
+        return _Motion(angle, np.gradient(angle, run.t, axis=0), "heading, the robot turning on the spot", pieces)
     if speed != WHEEL:
         raise InputError("no such speed", got=speed, expected=f"{WHEEL} or {GROUND}", where="speed")
     angle = live_angle(run)
     if angle is not None:
-        return _Motion(angle, np.gradient(angle, run.t, axis=0), "wheel_angle")
+        return _Motion(angle, np.gradient(angle, run.t, axis=0), "wheel_angle", pieces)
     if run.wheel_speed is None:
         raise InputError(
             "the log does not show how the motors turn", got=", ".join(run.channels) or "no channels",
             expected="wheel_angle or wheel_speed", where=run.source,
         )  # fmt: skip
-    return _Motion(None, run.wheel_speed, "wheel_speed")
+    return _Motion(None, run.wheel_speed, "wheel_speed", pieces)
 
 
 def _usual_speed(runs: Sequence[Run], motions: Sequence[_Motion]) -> float:
@@ -243,10 +252,10 @@ def _mean_of_noisy(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
 
 
 def _window(
-    run: Run, motion: _Motion, window: slice, kind: str, usual: float, counts: dict[str, int], rest: FloatArray
-) -> list[tuple[float, ...]]:
+    run: Run, motion: _Motion, window: slice, values: FloatArray, largest: FloatArray, usual: float,
+    counts: dict[str, int], rest: FloatArray,
+) -> list[tuple[float, ...]]:  # fmt: skip
     """The rows of one window, a motor each: (input, speed, its error, side, change, motor)."""
-    values = getattr(run, kind) * INPUTS[kind][1]
     t = run.t[window]
     mean, error = _mean_speed(run, motion, window)
     found = []
@@ -254,8 +263,8 @@ def _window(
         own = values[window, motor]
         if not np.isfinite(own).all() or not np.isfinite(mean[motor]):
             continue
-        put_in = _mean_input(run, values[:, motor], window)
-        if _unresolved(values[:, motor], window):
+        put_in = _mean_input(run, motion, values[:, motor], window)
+        if _unresolved(values[:, motor], window, float(largest[motor])):
             counts["unresolved"] += 1
             continue
         sides = _sides(motion, window, motor, usual, float(error[motor]), put_in)
@@ -269,7 +278,7 @@ def _window(
     return found
 
 
-def _mean_input(run: Run, whole: FloatArray, window: slice) -> float:
+def _mean_input(run: Run, motion: _Motion, whole: FloatArray, window: slice) -> float:
     """Mean over the window: of held values where the input comes in steps, else of a cubic through the rows.
 
     Straight lines from row to row would cut the crests of a sine of 20 rows by almost a percent.
@@ -278,14 +287,14 @@ def _mean_input(run: Run, whole: FloatArray, window: slice) -> float:
     held = np.mean(np.diff(own) != 0.0) <= max(STEPWISE, 2.0 / len(own))
     if held:
         return float(np.sum(own[:-1] * np.diff(t)) / (t[-1] - t[0]))
-    piece = next(piece for piece in segments(run.t) if piece.start <= window.start < piece.stop)
+    piece = motion.piece(window.start)
     near = slice(max(piece.start, window.start - SPLINE_ROWS), min(piece.stop, window.stop + SPLINE_ROWS))
     if not np.isfinite(whole[near]).all():
         near = window
     return float(CubicSpline(run.t[near], whole[near]).integrate(t[0], t[-1]) / (t[-1] - t[0]))
 
 
-def _unresolved(whole: FloatArray, window: slice) -> bool:
+def _unresolved(whole: FloatArray, window: slice, largest: float) -> bool:
     """Whether the input jumps about so much between rows that what happened there is not in the log."""
     more = max(0, CONTEXT_ROWS - (window.stop - window.start)) // 2
     own = whole[max(0, window.start - more) : window.stop + more]
@@ -293,7 +302,7 @@ def _unresolved(whole: FloatArray, window: slice) -> bool:
     jumps = np.abs(np.diff(own))
     size = float(np.sqrt(np.mean(jumps**2)))
     many = np.mean(jumps > spread / 10.0) > 2.0 * STEPWISE  # a step alone is no jitter
-    return bool(many) and spread > JITTER_SIZE * float(np.nanmax(np.abs(whole))) and size > JITTER * spread
+    return bool(many) and spread > JITTER_SIZE * largest and size > JITTER * spread
 
 
 def _sides(motion: _Motion, window: slice, motor: int, usual: float, error: float, put_in: float) -> FloatArray:
@@ -301,6 +310,7 @@ def _sides(motion: _Motion, window: slice, motor: int, usual: float, error: floa
     mean over the whole window is too noisy for a sign, the input tells.
     """
     speed = motion.speed[window, motor]
+    speed = np.where(np.isfinite(speed), speed, np.nanmedian(speed))
     rows = len(speed)
     noise = max(float(np.median(np.abs(np.diff(speed)))) * TO_SIGMA / np.sqrt(2.0), error * np.sqrt(rows))
     count = int(np.ceil((noise / (SIGN_NOISE * usual)) ** 2)) if usual > 0.0 else rows
@@ -317,7 +327,7 @@ def _end_speed(run: Run, motion: _Motion, window: slice, motor: int, end: int) -
     rows = window.stop - window.start
     half = max(1, round(EDGE_SHARE * rows / 2))
     middle = window.start if end == 0 else window.stop - 1
-    piece = next(piece for piece in segments(run.t) if piece.start <= middle < piece.stop)
+    piece = motion.piece(middle)
     near = slice(max(piece.start, middle - half), min(piece.stop, middle + half + 1))
     if motion.angle is None:
         return float(robust_mean(motion.speed[near, motor])[0])

@@ -75,12 +75,12 @@ def find_plateaus(run: Run, *, start: float | None = None, end: float | None = N
     Raises InputError when only one of the two is given, or when they are not 0 <= start < end <= 1.
     """
     fixed = _fixed(start, end)
-    found = []
+    angle, pieces, found = live_angle(run), segments(run.t), []
     for number, hold in enumerate(stretches(run)):
-        for piece in _between_gaps(run, _share(hold, *fixed) if fixed else hold):
-            rows = piece if fixed else _settled(run, piece)
-            if rows is not None and _long_enough(run, rows) and (fixed or _is_steady(run, rows)):
-                found.append(replace(plateau(run, rows), hold=number))
+        for piece in _between_gaps(pieces, _share(hold, *fixed) if fixed else hold):
+            rows = piece if fixed else _settled(run, piece, angle)
+            if rows is not None and _long_enough(run, rows) and (fixed or _is_steady(run, rows, angle)):
+                found.append(replace(_plateau(run, rows, angle), hold=number))
     return tuple(found)
 
 
@@ -107,12 +107,15 @@ def _pooled(windows: Sequence[Plateau]) -> Plateau:
 
 def plateau(run: Run, rows: slice) -> Plateau:
     """The point of the given rows, which the caller knows to lie between two gaps."""
+    return _plateau(run, rows, live_angle(run))
+
+
+def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
     mean, std = {}, {}
     for name, values in run.channels.items():
         if name not in ("wheel_angle", "pose"):
             mean[name], std[name] = robust_mean(values[rows])
     speed_from = SPEED if "wheel_speed" in mean else ""
-    angle = live_angle(run)
     if angle is not None and np.isfinite(angle[rows]).all():
         mean["wheel_speed"], std["wheel_speed"] = _rate(run.t[rows], angle[rows])
         speed_from = ANGLE
@@ -145,10 +148,10 @@ def stretches(run: Run) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in zip([0, *cuts], [*cuts, len(run)], strict=True) if b > a]
 
 
-def _between_gaps(run: Run, hold: slice) -> list[slice]:
-    """A stretch cut at the gaps of the run."""
-    pieces = [slice(max(p.start, hold.start), min(p.stop, hold.stop)) for p in segments(run.t)]
-    return [piece for piece in pieces if piece.stop > piece.start]
+def _between_gaps(pieces: Sequence[slice], hold: slice) -> list[slice]:
+    """A stretch cut at the gaps of the run, which lie between its `pieces`."""
+    cut = [slice(max(p.start, hold.start), min(p.stop, hold.stop)) for p in pieces]
+    return [piece for piece in cut if piece.stop > piece.start]
 
 
 def _changes(run: Run) -> NDArray[np.bool_] | None:
@@ -191,13 +194,13 @@ def _long_enough(run: Run, rows: slice) -> bool:
     return n >= MIN_ROWS and bool(run.t[rows.stop - 1] - run.t[rows.start] >= MIN_DURATION)
 
 
-def _responses(run: Run, rows: slice) -> FloatArray:
+def _responses(run: Run, rows: slice, angle: FloatArray | None) -> FloatArray:
     """What shows whether the robot has settled: speeds, else currents; robust z-scores, spikes clipped. (n, k)."""
     speed = run.wheel_speed if run.wheel_speed is not None else run.twist
-    angle = live_angle(run)
-    if angle is not None:
-        speed = np.diff(angle, axis=0, prepend=angle[:1]) / np.diff(run.t, prepend=-np.inf)[:, None]
     parts = [part[rows] for part in (speed, run.current) if part is not None]
+    if angle is not None:
+        rates = np.diff(angle[rows], axis=0) / np.diff(run.t[rows])[:, None]
+        parts = [np.concatenate([rates[:1], rates]), *parts[0 if speed is None else 1 :]]
     if not parts:
         return np.zeros((rows.stop - rows.start, 0))
     table = np.concatenate(parts, axis=1)
@@ -209,11 +212,11 @@ def _responses(run: Run, rows: slice) -> FloatArray:
     return np.clip((table[:, moving] - middle[moving]) / spread[moving], -5.0, 5.0)
 
 
-def _settled(run: Run, stretch: slice) -> slice | None:
+def _settled(run: Run, stretch: slice, angle: FloatArray | None) -> slice | None:
     """The stretch without its start-up, and without an end that differs."""
     if not _long_enough(run, stretch):
         return None
-    scores = _responses(run, stretch)
+    scores = _responses(run, stretch, angle)
     first = min(SAFETY * _truncation(scores, START_SHARE), int(START_SHARE * len(scores)))
     last = min(SAFETY * _truncation(scores[first:][::-1], END_SHARE), int(END_SHARE * len(scores)))
     return slice(stretch.start + first, stretch.stop - last)
@@ -231,12 +234,11 @@ def _truncation(scores: FloatArray, share: float) -> int:
     return int(np.argmin(error[: max(1, int(share * n) + 1)]))
 
 
-def _is_steady(run: Run, rows: slice) -> bool:
+def _is_steady(run: Run, rows: slice, angle: FloatArray | None) -> bool:
     """Whether the halves agree in the speeds, as far as their noise allows to tell."""
     speed = run.wheel_speed if run.wheel_speed is not None else run.twist
     half = (rows.start + rows.stop) // 2
     halves = slice(rows.start, half), slice(half, rows.stop)
-    angle = live_angle(run)
     if angle is not None:
         pairs = [_rate(run.t[part], angle[part]) for part in halves]
     elif speed is not None:
@@ -244,7 +246,7 @@ def _is_steady(run: Run, rows: slice) -> bool:
     else:
         return True
     (first, a), (second, b) = pairs
-    difference, size = np.abs(second - first), np.abs(first + second).max() / 2.0
+    difference, size = np.abs(second - first), float(np.nan_to_num(np.abs(first + second)).max()) / 2.0
     drifts = (difference > DRIFT_ERRORS * np.hypot(a, b)) & (difference > DRIFT_SHARE * size)
     return not bool(drifts.any())
 
