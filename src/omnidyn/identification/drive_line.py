@@ -289,6 +289,8 @@ def _doubts(windows: DriveWindows, lines: Sequence[DriveLine]) -> list[str]:
         )
     if windows.resting:
         found.append(f"{windows.resting} windows at rest, wholly or in part, were left out")
+    if windows.every > 1:
+        found.append(f"the logs are long: one window in {windows.every} was used")
     if any(line.one_way for line in lines):
         found.append("a motor turned one way only: a dead band and an offset of the input cannot be told apart")
     return found

@@ -30,7 +30,7 @@ INPUTS = {"voltage": ("V", 1.0), "duty": ("%", 100.0), "current": ("A", 1.0)}  #
 WHEEL, GROUND = "wheel", "ground"
 LENGTHS = (0.05, 0.1, 0.2, 0.5)  # [s] the shortest whose mean speed is sharp enough is taken
 SHARP = 0.02  # of the spread of the speeds: a mean speed with this error needs no longer window
-MIN_ROWS = 5
+MIN_ROWS, MAX_WINDOWS = 5, 3000
 WILD = 5.0  # scales from the median beyond which a speed is not believed
 SETTLED_SHARE = (1.0 / 3.0, 1.0)  # of each command's rows, where speeds are too noisy to correct for a start-up
 EDGE_SHARE = 0.2  # of a window, around each end: where the speed at the end is taken from
@@ -49,7 +49,8 @@ class DriveWindows:
     the speed, over the length of the window [rad/s^2]. motor: its number from 0. block: number of the window.
     rest: per motor the largest mean input [unit] under which it stayed at rest, NaN where it never rested.
     unresolved, resting: windows left out because the log does not resolve their input, or because the motor rested.
-    settled: start-ups were left out, so that nothing is known of the inertia.
+    settled: start-ups were left out, so that nothing is known of the inertia. every: of a very long log, only every so
+    many-th window was used.
     """
 
     put_in: FloatArray
@@ -67,6 +68,7 @@ class DriveWindows:
     resting: int
     speed_from: str
     settled: bool
+    every: int = 1
 
     def of(self, motor: int | None) -> tuple[FloatArray, ...]:
         """(put_in, speed, speed_std, side, change, block) of one motor, or of all."""
@@ -101,12 +103,14 @@ def drive_windows(
         length, sharp = _length(runs, angles, usual)
         if not sharp and not steady and share is None and all(_in_steps(run, kind) for run in runs):
             share = SETTLED_SHARE if all(_windows(run, length, False, SETTLED_SHARE) for run in runs) else None
+    windows = [_windows(run, length, steady, share) for run in runs]
+    every = -(-sum(map(len, windows)) // MAX_WINDOWS)
     rows: list[tuple[float, ...]] = []
     counts, rest = {"unresolved": 0, "resting": 0}, np.full(angles[0].count, np.nan)
     block = 0
-    for run, motion, values in zip(runs, angles, inputs, strict=True):
+    for run, motion, values, several in zip(runs, angles, inputs, windows, strict=True):
         largest = np.nanmax(np.abs(values), axis=0, initial=0.0)
-        for window in _windows(run, length, steady, share):
+        for window in several[::every]:
             own = _window(run, motion, window, values, largest, usual, counts, rest)
             rows += [(*each, block) for each in own]
             block += 1
@@ -121,7 +125,7 @@ def drive_windows(
         put_in=table[:, 0], speed=table[:, 1], speed_std=table[:, 2], side=table[:, 3], change=table[:, 4],
         motor=table[:, 5].astype(np.int64), block=table[:, 6].astype(np.int64), unit=INPUTS[kind][0], kind=kind,
         length=length, rest=rest, unresolved=counts["unresolved"], resting=counts["resting"],
-        speed_from=angles[0].origin, settled=steady or share is not None,
+        speed_from=angles[0].origin, settled=steady or share is not None, every=every,
     )  # fmt: skip
 
 
@@ -182,7 +186,7 @@ def _usual_speed(runs: Sequence[Run], motions: Sequence[_Motion]) -> float:
     means = [
         abs(float(value))
         for run, motion in zip(runs, motions, strict=True)
-        for window in _windows(run, LENGTHS[-1], False)
+        for window in _windows(run, LENGTHS[-1], False)[:: max(1, len(run) // 20_000)]
         for value in np.atleast_1d(_mean_speed(run, motion, window)[0])
     ]
     known = np.array([value for value in means if np.isfinite(value)])
@@ -200,7 +204,7 @@ def _length(runs: Sequence[Run], motions: Sequence[_Motion], usual: float) -> tu
     for length in LENGTHS:
         errors, rows = [], []
         for run, motion in zip(runs, motions, strict=True):
-            for window in _windows(run, length, False)[:: max(1, len(run) // 200)]:
+            for window in _windows(run, length, False)[:: max(1, len(run) // 500)]:
                 errors.append(np.max(_mean_speed(run, motion, window)[1]))
                 rows.append(window.stop - window.start)
         if errors and np.nanmedian(errors) <= SHARP * usual and np.median(rows) >= 2 * MIN_ROWS:

@@ -33,6 +33,7 @@ CURRENT, VOLTAGE = "current", "voltage"
 STILL_SHARE = 1e-6  # of the fastest rim: slower is not moving, whatever the speed is
 STILL_ERRORS = 2.0  # standard errors: a measured speed below is not known to move
 AT_REST = 1e-3  # [m/s] at the rim
+UNSIGNED_SHARE = 0.1  # of the windows, in which a wheel turns backward while no current is below 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +123,8 @@ def force_points(
         found += [(number, _point(run, robot, each, speed, origin), each) for each in windows]
     if empty:
         notes.append(f"{len(empty)} of {len(runs)} runs have no steady window, such as {empty[0] or 'run 0'}")
+    if origin == CURRENT:
+        _refuse_unsigned(runs, [each for *_, each in found])
     points = _stacked(found, robot, names, speed, origin, notes)
     return _moving(points, robot)
 
@@ -241,6 +244,19 @@ def _direction(robot: Robot, each: Plateau, twist: FloatArray) -> FloatArray:
     commanded = _commanded(robot, each)
     way = twist if commanded is None or not commanded.any() else commanded
     return np.degrees(np.arctan2(way[1], way[0]))
+
+
+def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
+    """A sensor without sign: no current is ever below 0 although wheels turn both ways."""
+    lowest = min((float(np.nanmin(run.current, initial=0.0)) for run in runs if run.current is not None), default=0.0)
+    speeds = [each.mean.get("wheel_speed", each.mean.get("wheel_speed_command")) for each in windows]
+    back = sum(bool((speed < 0.0).any()) for speed in speeds if speed is not None)
+    if lowest >= 0.0 and back > UNSIGNED_SHARE * len(windows):
+        raise InputError(
+            "the currents have no sign: none is below 0", got=f"wheels that turn backward in {back} of {len(windows)} "
+            "windows", expected="currents signed as the torque", remedy="use --current-unsigned",
+            where=runs[0].source,
+        )  # fmt: skip
 
 
 def _stacked(

@@ -2,8 +2,9 @@
 
 Shapes are compared by the root mean square of the left-out error of the full force vector. A difference is that of the
 squared errors at the same points, so what all shapes share drops out; its standard error counts that neighbouring
-directions err alike. Of the shapes within two standard errors of the best, the one with the fewest levels is taken, as
-with the one-standard-error rule of Breiman et al., Classification and Regression Trees (1984), section 3.4.3.
+directions err alike. Of the shapes that cannot be told from the best (within two standard errors of the difference, and
+of the best's own error), the one with the fewest levels is taken, much as with the one-standard-error rule of Breiman
+et al., Classification and Regression Trees (1984), section 3.4.3.
 """
 
 from __future__ import annotations
@@ -133,10 +134,16 @@ def _scores(fits: Mapping[str, Mapping[str, ShapeFit]]) -> tuple[ShapeScore, ...
         found.append(
             ShapeScore(
                 name, SHAPES[name].words, len(own[0].keys), loo, loo_std, near, near_std, behind, behind_std,
-                bool(behind > APART * behind_std), SHAPES[name].in_model, any((fit.free <= 0.0).any() for fit in own),
+                _apart(behind, behind_std, found[0].loo_std if found else 0.0), SHAPES[name].in_model,
+                any((fit.free <= 0.0).any() for fit in own),
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def _apart(behind: float, behind_std: float, best_std: float) -> bool:
+    """Whether a shape is told from the best: by the difference, or by being beyond the best's own uncertainty."""
+    return bool(behind > APART * min(behind_std, best_std))
 
 
 def _difference(first: FloatArray, second: FloatArray, fold: NDArray[np.int64]) -> tuple[float, float]:
@@ -170,7 +177,10 @@ def _choice(scores: Sequence[ShapeScore], missing: Mapping[str, str]) -> str:
             remedy="check the sign of the currents, and which wheel is which",
         )  # fmt: skip
     leader = able[0]
-    equal = [score for score in able if score.behind - leader.behind <= APART * score.behind_std or score is leader]
+    equal = [
+        score for score in able
+        if score is leader or not _apart(score.behind - leader.behind, score.behind_std, leader.loo_std)
+    ]  # fmt: skip
     return min(equal, key=lambda score: (score.levels, score.loo)).name
 
 
