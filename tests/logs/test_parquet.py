@@ -222,5 +222,5 @@ def test_an_index_beyond_its_dictionary_is_refused(write):
     packed = b"\x24\x49\x92" * 4
     assert content.count(packed) >= 1
     path.write_bytes(content.replace(packed, b"\xff" * len(packed)))
-    with pytest.raises(InputError, match="damaged or cut short; got .*out of bounds"):
+    with pytest.raises(InputError, match=r"damaged or cut short; got .*out of bounds"):
         read_any(path)
