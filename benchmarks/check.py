@@ -1,7 +1,7 @@
 """`omnidyn check` on 12 faults put into 200 clean simulated logs each, and on 1000 clean logs.
 
 python -m benchmarks check              the table
-python -m benchmarks.check --publish    the same, into docs/check.md and docs/images/check_recall.png
+python -m benchmarks.check --publish    the same, into docs/check.md and docs/images
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from benchmarks.table import Table, machine, one_core
 from omnidyn.logs.check import check
 from omnidyn.logs.findings import NOTE
 from omnidyn.logs.log import Log
+from omnidyn.report.figures.raw_log import draw_raw_log
 from omnidyn.report.style import BLUE, GREY, VERMILLION, WIDTH, look, new_figure, picture
 
 LOGS, CLEAN = 200, 1000
@@ -140,11 +141,19 @@ def draw_recall(outcomes: dict[str, Outcome]) -> bytes:
         return picture("check_recall", "Recall against size", "", figure).png
 
 
+def draw_example() -> bytes:
+    """A log with a stuck encoder and a gap, as `omnidyn check --picture` shows it. PNG."""
+    log, robot, _, _ = draw("stuck encoder", 3)
+    broken = log.rows(np.r_[0:600, 900 : len(log)])
+    return draw_raw_log(broken, check(broken, robot)).png
+
+
 def publish(logs: int = LOGS, clean_logs: int = CLEAN) -> Table:
     """Measure, and write table and picture into the documentation."""
     outcomes = {name: run_fault(name, logs) for name in FAULTS}
     table = table_of(outcomes, run_clean(clean_logs), clean_logs)
     (DOCS / "images" / "check_recall.png").write_bytes(draw_recall(outcomes))
+    (DOCS / "images" / "check_log.png").write_bytes(draw_example())
     page = DOCS / "check.md"
     text = page.read_text("utf-8")
     head, _, rest = text.partition(BEGIN)

@@ -103,7 +103,7 @@ def _channel(axes: Axes, log: Log, name: str) -> None:
     few = slice(None, None, max(1, len(log) // MAX_POINTS))
     for k, column in enumerate(values.T):
         if np.isfinite(column).any():
-            t, shown = _thin(log.t, column, few)
+            t, shown = _cut(*_thin(log.t, column, few), log)
             axes.plot(t, shown, LINES[k % len(LINES)], color=COLOURS[k % len(COLOURS)], linewidth=1.1, label=names[k])
     axes.set_title(f"{name.replace('_', ' ')}, {UNITS[name]}")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.94), ncols=len(names), fontsize=9.5, handlelength=1.6,
@@ -123,6 +123,16 @@ def _thin(t: FloatArray, values: FloatArray, few: slice) -> tuple[FloatArray, Fl
     start = np.arange(len(rows)) * 2 * stride
     index = np.sort(np.stack([start + low, start + high], axis=1), axis=1).ravel()
     return t[index], values[index]
+
+
+def _cut(t: FloatArray, values: FloatArray, log: Log) -> tuple[FloatArray, FloatArray]:
+    """The same, with a break in each gap, so that no line is drawn across."""
+    good = log.t[np.isfinite(log.t)]
+    if (np.diff(good) < 0.0).any():
+        return t, values
+    starts = np.array([good[piece.start] for piece in segments(good)[1:]])
+    places = np.searchsorted(t, starts)
+    return np.insert(t, places, starts), np.insert(values, places, np.nan)
 
 
 def _gaps(axes: Axes, log: Log) -> None:
