@@ -116,7 +116,7 @@ def draw_recall(outcomes: dict[str, Outcome]) -> bytes:
     with look():
         figure = new_figure(WIDTH, 4.6)
         panels = figure.subplots(2, -(-len(sized) // 2), sharey=True).ravel()
-        figure.subplots_adjust(left=0.085, right=0.98, top=0.93, bottom=0.13, wspace=0.14, hspace=0.55)
+        figure.subplots_adjust(left=0.085, right=0.98, top=0.93, bottom=0.13, wspace=0.22, hspace=0.55)
         for axes, name in zip(panels, sized, strict=False):
             fault, outcome = FAULTS[name], outcomes[name]
             edges = np.geomspace(fault.low, fault.high, BINS + 1)
@@ -127,8 +127,8 @@ def draw_recall(outcomes: dict[str, Outcome]) -> bytes:
             axes.axhline(100 * RECALL, color=VERMILLION, linewidth=1.2, linestyle="--")
             axes.plot(middle[number > 0], 100 * share[number > 0], "o-", color=BLUE)
             axes.set_xscale("log")
-            ticks = [fault.low, float(np.sqrt(fault.low * fault.high)), fault.high]
-            axes.set_xticks(ticks, [f"{each:.2g}" for each in ticks])
+            ticks = [fault.low, round(float(np.sqrt(fault.low * fault.high))) or 1, fault.high]
+            axes.set_xticks(ticks, [f"{round(each, 1):g}" for each in ticks])
             axes.minorticks_off()
             axes.set_title(name)
             axes.set_xlabel(fault.unit)

@@ -121,9 +121,9 @@ def products(y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int) -
 
 def ratio(top: FloatArray, below: FloatArray) -> Slope:
     """sum(top)/sum(below) over windows, with the standard error of their scatter; gross windows left out once."""
-    if below.sum() <= 0.0:
+    value = top.sum() / below.sum() if below.sum() > 0.0 else np.nan
+    if not np.isfinite(value) or not np.isfinite((below**2).sum()):
         return Slope(np.nan, np.inf, 0)
-    value = top.sum() / below.sum()
     weight = np.sqrt(np.maximum(below, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.where(weight > 0.0, (top - value * below) / weight, 0.0)

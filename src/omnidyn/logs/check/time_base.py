@@ -111,7 +111,7 @@ def _gaps(work: Work) -> list[Finding]:
     if not cuts:
         return []
     lengths = np.array([work.t[k] - work.t[k - 1] for k in cuts])
-    lost = int(np.round(lengths / work.step - 1.0).sum())
+    lost = int(min(np.round(lengths / work.step - 1.0).sum(), 1e15))
     lines = work.log.lines[work.rows]
     return [
         Finding(

@@ -67,7 +67,8 @@ def _quantised(work: Work) -> list[Finding]:
     for channel in SENSORS:
         for k, (component, values) in enumerate(work.columns(channel)):
             step = quantum(values)
-            usual = float(np.median(np.abs(values[np.isfinite(values) & (values != 0.0)]))) if values.any() else 0.0
+            busy = np.abs(values[np.isfinite(values) & (values != 0.0)])
+            usual = float(np.median(busy)) if busy.size else 0.0
             if not step or step < 0.02 * usual:
                 continue
             key = next((known for known in groups if known[0] == channel and abs(known[1] / step - 1.0) < 0.01),
