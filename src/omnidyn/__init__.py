@@ -26,7 +26,9 @@ _HOME = {
     "breakaway_voltage": "omnidyn.model.deadzone",
     "compare": "omnidyn.comparison.compare",
     "dead_zone_map": "omnidyn.model.deadzone",
+    "fit_drive_lines": "omnidyn.identification.drive_line",
     "fit_steady_state": "omnidyn.identification.steady_state",
+    "identify_steady": "omnidyn.identification.steady_study",
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
     "preset_names": "omnidyn.model.robot_file",
@@ -46,8 +48,10 @@ if TYPE_CHECKING:
     from omnidyn.comparison.compare import compare
     from omnidyn.comparison.result import Comparison
     from omnidyn.errors import OmnidynError
+    from omnidyn.identification.drive_line import fit_drive_lines
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.steady_state import fit_steady_state
+    from omnidyn.identification.steady_study import identify_steady
     from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.logs.read_log import read_log
     from omnidyn.logs.run_file import write_run

@@ -107,8 +107,10 @@ def test_unsigned_currents_get_their_sign_when_told(call, floors, tmp_path):
 
         run = read_run(floors / "smooth" / f"run{k}.csv")
         write_run(run.replace(current=np.abs(run.current)), tmp_path / f"run{k}.csv")
-    code, _, _err = call(str(tmp_path), "--robot", "axebot")
-    assert code in (0, 4)
+    code, _, err = call(str(tmp_path), "--robot", "axebot")
+    assert code == 3
+    assert "the currents have no sign: none is below 0" in err
+    assert "use --current-unsigned" in err
     code, out, _ = call(str(tmp_path), "--robot", "axebot", "--current-unsigned")
     assert code == 0
     assert "friction has the shape disc" in out
