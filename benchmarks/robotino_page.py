@@ -1,4 +1,4 @@
-"""python -m benchmarks.robotino_page: the answer and the picture in docs/robotino.md, from the real logs of both floors."""
+"""python -m benchmarks.robotino_page: the answer and the picture in docs/robotino.md, from the real logs."""
 
 from __future__ import annotations
 
