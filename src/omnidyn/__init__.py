@@ -24,11 +24,13 @@ _HOME = {
     "acceleration": "omnidyn.model.dynamics",
     "axis_patterns": "omnidyn.model.deadzone",
     "breakaway_voltage": "omnidyn.model.deadzone",
+    "check": "omnidyn.logs.check",
     "compare": "omnidyn.comparison.compare",
     "dead_zone_map": "omnidyn.model.deadzone",
     "fit_drive_lines": "omnidyn.identification.drive_line",
     "fit_steady_state": "omnidyn.identification.steady_state",
     "identify_steady": "omnidyn.identification.steady_study",
+    "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
     "preset_names": "omnidyn.model.robot_file",
@@ -52,8 +54,9 @@ if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.steady_state import fit_steady_state
     from omnidyn.identification.steady_study import identify_steady
+    from omnidyn.logs.check import check
     from omnidyn.logs.command_file import read_commands, read_voltages
-    from omnidyn.logs.read_log import read_log
+    from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
     from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
