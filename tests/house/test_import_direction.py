@@ -19,16 +19,19 @@ ORDER = {
     "model": """frames value layout wheels motor drive friction robot robot_file starter plant scratch
         forces face holding inclusion rest dynamics statespace deadzone""",
     "model/friction": "law axes direction wheels",
-    "simulation": """inputs commands exact_step travel exact exact_inductance_step exact_inductance_travel
-        exact_inductance implicit_step implicit simulate tangent_step tangent_events
+    "simulation": """inputs commands exact_step exact_sensitivity travel exact exact_inductance_step
+        exact_inductance_travel exact_inductance implicit_step implicit simulate tangent_step tangent_events
         tangent_march tangent""",
     "logs": """channels dialect header rows text_file table parquet_pages parquet tables run_file steady_table
-        command_file words mapping clock guess log read_log segments average plateaus findings check""",
+        command_file words mapping clock guess log read_log segments average plateaus findings
+        check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
-    "logs/check": """robust work time_base reference values limits wirings frame floor motors wiring slip mistakes scale
-        lag energy motion excitation""",
-    "identification": """estimate geometry line points doubts steady_state band operating shapes shape_fit shape_choice
-        study_parts study_words steady_study drive_windows drive_line study_table""",
+    "logs/check": """robust work time_base reference values limits wirings frame floor motors wiring slip mistakes
+        scale lag energy motion excitation""",
+    "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
+        shape_choice study_parts study_words steady_study drive_windows drive_line study_table""",
+    "identification/output_error": """parameters primitives record totals kernel axis_kernel exact_engine solver starts uncertainty
+        nuisances breakaway fit""",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch
