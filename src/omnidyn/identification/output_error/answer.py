@@ -1,0 +1,68 @@
+"""OutputErrorEstimate: the answer of a fit to whole logs, in values, intervals and words."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from omnidyn.identification.estimate import Estimate, _finite
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """A number of the log, not of the robot: value, std, 95 % interval, in `unit`."""
+
+    value: float
+    std: float
+    ci95: tuple[float, float]
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class OutputErrorEstimate(Estimate):
+    """An Estimate from whole logs. `correlation` covers the nuisances too.
+
+    nuisances: name -> Nuisance. noise: output -> std of what the model leaves, in the unit of the output.
+    unidentifiable: names of what the data do not determine; they keep what the robot had, std and interval are
+    infinite. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
+    iterations, converged: of the minimisation.
+    """
+
+    nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
+    noise: Mapping[str, float] = field(default_factory=dict)
+    unidentifiable: tuple[str, ...] = ()
+    blind: tuple[str, ...] = ()
+    covariance: str = ""
+    iterations: int = 0
+    converged: bool = True
+
+    def summary(self) -> str:
+        """The estimate as a plain table, for reading. ASCII only."""
+        lines = [super().summary()]
+        for name, nuisance in self.nuisances.items():
+            low, high = nuisance.ci95
+            lines.append(f"{name}: {nuisance.value:.4g} [{low:.4g}, {high:.4g}] {nuisance.unit}".rstrip())
+        lines += [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
+        for words in self.blind:
+            lines += textwrap.wrap(f"not shown by the data: {words}", 100, subsequent_indent="  ")
+        return "\n".join(line.rstrip("\n") for line in lines) + "\n"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The estimate as JSON can hold it."""
+        nuisances = {
+            name: {
+                "value": _finite(n.value), "std": _finite(n.std), "ci95": [_finite(b) for b in n.ci95], "unit": n.unit,
+            }
+            for name, n in self.nuisances.items()
+        }  # fmt: skip
+        return {
+            **super().to_dict(),
+            "nuisances": nuisances,
+            "noise": {name: _finite(std) for name, std in self.noise.items()},
+            "unidentifiable": list(self.unidentifiable),
+            "blind": list(self.blind),
+            "covariance": self.covariance,
+            "converged": self.converged,
+        }

@@ -1,0 +1,186 @@
+"""The exact engine of a fit: robots whose axes do not couple, one march per piece."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.identification.output_error.axis_kernel import (
+    BY,
+    GRAD,
+    LAG,
+    LOSS,
+    NUMBER,
+    SIZE,
+    SQUARE,
+    march_axis,
+    spread,
+)
+from omnidyn.identification.output_error.kernel import FINAL, KEEP, Loss, Physics, Slopes, Sums, march
+from omnidyn.identification.output_error.primitives import Mapping, Primitives
+from omnidyn.identification.output_error.problem import Column, Piece, PieceSums, Point, Problem
+from omnidyn.model.layout import AXES
+
+FloatArray = NDArray[np.float64]
+
+VECTOR = 4  # rows of slopes are padded to a multiple
+LATE, GAIN, DEAD, FADE = "latency.", "gain", "dead_band", "fade"
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel.py."""
+
+    variance: FloatArray
+    nu: float = 0.0
+    mode: int = 0
+    block: int = 1
+
+
+class ExactEngine:
+    """Residuals and sensitivities of a problem by the exact step.
+
+    fast: whether the march of axis_kernel.py may serve where it can.
+    """
+
+    def __init__(self, problem: Problem, fast: bool = True):
+        self.problem = problem
+        self.mapping = Mapping(problem.robot, problem.parameters[: problem.robot_count])
+        self._columns = problem.columns
+        twists = all(name == "twist" for name, _ in self._columns)
+        margins = any(piece.margin.any() for piece in problem.pieces)
+        friction = self.mapping.linear and problem.robot_count == len(problem.parameters)
+        self._axes_only = fast and twists and friction and not margins
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the march over every piece adds up."""
+        now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
+        if self._axes_only:
+            return [
+                self._axes(piece, state, now, slopes, weighting)
+                for piece, state in zip(self.problem.pieces, point.states, strict=True)
+            ]
+        return [
+            self._piece(piece, state, point.values, now, slopes, weighting)[0]
+            for piece, state in zip(self.problem.pieces, point.states, strict=True)
+        ]
+
+    def outputs(self, point: Point) -> list[tuple[FloatArray, FloatArray]]:
+        """(outputs, slopes) of every piece, rows of its record, NaN outside: (rows, C) and (rows, C, P + 3 + C)."""
+        now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
+        plain = Weighting(np.ones(len(self._columns)), mode=KEEP)
+        return [
+            self._piece(piece, state, point.values, now, slopes, plain)[1]
+            for piece, state in zip(self.problem.pieces, point.states, strict=True)
+        ]
+
+    def _axes(
+        self, piece: Piece, state: FloatArray, now: Primitives, by: Primitives, weighting: Weighting
+    ) -> PieceSums:
+        """The sums of a piece, axis by axis."""
+        record, count = piece.record, len(self.problem.parameters)
+        width = count + AXES + AXES
+        rows, grad, info = np.zeros((AXES, SIZE)), np.zeros((AXES, width)), np.zeros((AXES, width, width))
+        blocks = _blocks(piece, weighting)
+        score, drift, scores = np.zeros((blocks, width)), np.zeros((blocks, AXES)), np.zeros((AXES, blocks, BY + 1))
+        for axis in range(AXES):
+            march_axis(
+                record.t, record.voltage, record.outputs, axis, piece.first, piece.last, now.drive[axis],
+                now.rate[axis], now.coulomb[axis], now.hold[axis], state[axis], weighting.variance[axis], weighting.nu,
+                weighting.block, weighting.mode, rows[axis], scores[axis],
+            )  # fmt: skip
+            slopes = np.zeros((BY, width))
+            slopes[0, :count], slopes[1, :count] = by.rate[axis], by.coulomb[axis]
+            slopes[2, count + axis] = piece.free[axis]
+            grad[axis], info[axis] = rows[axis, GRAD : GRAD + BY] @ slopes, spread(rows[axis], slopes)
+            if blocks:
+                score += scores[axis, :, :BY] @ slopes
+                drift[:, axis] = scores[axis, :, BY]
+        number, square, loss, lag = (rows[:, what] for what in (NUMBER, SQUARE, LOSS, LAG))
+        return PieceSums(np.arange(AXES), number, square, loss, lag, grad, info, score, drift)
+
+    def _piece(
+        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, weighting: Weighting
+    ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:
+        columns, count = piece.record.columns, len(self.problem.parameters)
+        known = np.array([self._columns.index(column) for column in columns])
+        total = count + AXES + len(columns)
+        physics, slopes, groups = self._numbers(piece, values, now, by, -(-total // VECTOR) * VECTOR)
+        loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode)
+        sums = _empty(
+            len(columns), slopes.rate.shape[1], total, len(piece.record.t), weighting.mode, _blocks(piece, weighting)
+        )
+        march(
+            piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
+            float(piece.record.t[0]), piece.record.span, piece.margin, state[:AXES], state[AXES:], groups,
+            physics, slopes, loss, sums,
+        )  # fmt: skip
+        tight = PieceSums(
+            known, sums.number, sums.square, sums.loss, sums.lag, sums.grad[:, :total], sums.info[:, :total, :total],
+            sums.score[:, :total], sums.drift,
+        )  # fmt: skip
+        return tight, (sums.predicted, sums.slopes)
+
+    def _numbers(
+        self, piece: Piece, values: FloatArray, now: Primitives, by: Primitives, padded: int
+    ) -> tuple[Physics, Slopes, NDArray[np.int64]]:
+        """Physics and slopes of the outputs of one piece."""
+        problem, columns = self.problem, piece.record.columns
+        count, robot_count, width = len(problem.parameters), problem.robot_count, len(columns)
+
+        def wide(slope: FloatArray) -> FloatArray:
+            out = np.zeros((*slope.shape[:-1], padded))
+            out[..., :robot_count] = slope
+            return out
+
+        maps, slopes = _maps(columns, now), _maps(columns, by, (robot_count,))
+        late = [problem.where(LATE + name) for name, _ in columns]
+        driver = [problem.where(name) for name in (GAIN, DEAD, FADE)]
+        fixed = (1.0, 0.0, 0.0)
+        physics = Physics(
+            now.rate, now.coulomb, now.hold, now.drive, maps[0], maps[1], maps[2], _wheel_of(columns),
+            np.array([values[k] if k >= 0 else 0.0 for k in late]),
+            np.array([values[k] if k >= 0 else fixed[i] for i, k in enumerate(driver)]),
+        )  # fmt: skip
+        state = np.where(piece.free, np.arange(count, count + AXES + width), -1)
+        derivatives = Slopes(
+            wide(by.rate), wide(by.coulomb), wide(by.drive), wide(slopes[0]), wide(slopes[1]), wide(slopes[2]),
+            not self.mapping.linear, np.array(late), np.array(driver), state[:AXES], state[AXES:],
+        )  # fmt: skip
+        starts = [c for c in range(width) if c == 0 or columns[c][0] != columns[c - 1][0]]
+        return physics, derivatives, np.array([*starts, width])
+
+
+def _maps(columns: Sequence[Column], now: Primitives, more: tuple[int, ...] = ()) -> list[FloatArray]:
+    """(M, Q, E) of the outputs, or their derivatives where `more` is the shape of the parameters."""
+    speed, travel = np.zeros((len(columns), AXES, *more)), np.zeros((len(columns), AXES, *more))
+    volts = np.zeros((len(columns), *more))
+    for c, (name, i) in enumerate(columns):
+        if name == "wheel_speed":
+            speed[c] = now.wheels[i]
+        elif name == "current":
+            speed[c], volts[c] = now.braking[i], now.per_volt[i]
+        elif not more:  # the twist and the heading themselves
+            (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
+    return [speed, travel, volts]
+
+
+def _wheel_of(columns: Sequence[Column]) -> NDArray[np.int64]:
+    return np.array([i if name == "current" else -1 for name, i in columns])
+
+
+def _blocks(piece: Piece, weighting: Weighting) -> int:
+    """Number of blocks of rows whose scores are kept."""
+    return -(-(piece.last - piece.first + 1) // weighting.block) if weighting.mode & FINAL else 0
+
+
+def _empty(columns: int, padded: int, total: int, rows: int, mode: int, blocks: int) -> Sums:
+    kept = (rows, columns) if mode & KEEP else (0, columns)
+    return Sums(
+        np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros((columns, padded)),
+        np.zeros((columns, padded, padded)), np.zeros((blocks, padded)), np.zeros((blocks, columns)),
+        np.full(kept, np.nan), np.full((*kept, total), np.nan),
+    )  # fmt: skip

@@ -1,0 +1,124 @@
+"""A Run as the kernels read it: voltages before the driver, outputs in columns, pieces without a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.logs.segments import segments
+from omnidyn.model.motor import clip_voltage
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
+
+OUTPUTS = ("twist", "wheel_speed", "current", "heading")
+SHORTEST = 3  # rows of a piece that is used
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One run. t (rows,); voltage (rows, W); outputs (rows, C), columns named by (channel, index).
+
+    pieces: (first, last) rows of what has no gap. supplied: whether the voltage is a duty times a supply that was not
+    logged. notes: what a reader should know.
+    """
+
+    t: FloatArray
+    voltage: FloatArray
+    outputs: FloatArray
+    columns: tuple[tuple[str, int], ...]
+    pieces: tuple[tuple[int, int], ...]
+    source: str
+    supplied: bool
+    notes: tuple[str, ...]
+
+    @property
+    def span(self) -> float:
+        return float(self.t[-1] - self.t[0]) or 1.0
+
+
+def record(run: Run, robot: Robot, outputs: Sequence[str] | None = None) -> Record:
+    """Raises InputError for a run without inputs or outputs, InsufficientDataError where no piece is long enough."""
+    voltage, supplied, notes = _voltage(run, robot)
+    clipped = clip_voltage(robot.motor, voltage)
+    beyond = int((np.abs(clipped) < np.abs(voltage)).any(axis=1).sum())
+    if beyond:
+        notes.append(f"{beyond} rows ask for more than the voltage limit: they are clipped to it")
+        voltage = clipped
+    names, values = _outputs(run, robot, outputs)
+    known = np.asarray(np.isfinite(voltage).all(axis=1), dtype=bool)
+    pieces = [piece for s in segments(run.t) for piece in _whole(known, s.start, s.stop)]
+    if not pieces:
+        raise InsufficientDataError(
+            "no stretch of the log has inputs throughout", got=f"{int(known.sum())} rows of {len(run)} with all inputs",
+            expected=f"{SHORTEST} rows in a row", where=run.source,
+        )  # fmt: skip
+    if not known.all():
+        notes.append(f"{int((~known).sum())} rows lack an input: the log is split there")
+    return Record(
+        run.t, np.ascontiguousarray(voltage), values, names, tuple(pieces), run.source, supplied, tuple(notes)
+    )
+
+
+def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
+    """(voltages, whether the supply is only nominal, notes)."""
+    if run.wheels is not None and run.wheels != robot.wheels.count:
+        raise InputError(
+            "the log has another number of wheels", got=run.wheels,
+            expected=f"{robot.wheels.count}, as {robot.name} has", where=run.source,
+        )  # fmt: skip
+    if run.voltage is not None:
+        return run.voltage, False, []
+    if run.duty is not None:
+        if run.supply is not None:
+            return run.duty * run.supply[:, None], False, []
+        nominal = robot.drive.supply
+        if nominal is None:
+            raise InputError(
+                "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
+                remedy="add supply_V to the robot file",
+            )  # fmt: skip
+        note = f"the supply is not logged: its nominal {nominal:g} V is taken"
+        return run.duty * nominal, True, [note]
+    if run.wheel_speed_command is not None or run.twist_command is not None:
+        raise UnsupportedError(
+            "only set speeds are logged: the firmware's loop would have to be fitted too", got=", ".join(run.channels),
+            expected="voltage or duty", where=run.source,
+        )  # fmt: skip
+    raise InputError("the log has no input", got=", ".join(run.channels), expected="voltage or duty", where=run.source)
+
+
+def _outputs(run: Run, robot: Robot, wanted: Sequence[str] | None) -> tuple[tuple[tuple[str, int], ...], FloatArray]:
+    unknown = [name for name in wanted or () if name not in OUTPUTS]
+    if unknown:
+        raise InputError("no such output", got=unknown[0], expected=", ".join(OUTPUTS), where="outputs")
+    found: dict[str, FloatArray] = {}
+    for name in OUTPUTS:
+        value = run.pose if name == "heading" else getattr(run, name)
+        if value is None or (wanted is not None and name not in wanted):
+            continue
+        value = value[:, 2:] if name == "heading" else value
+        if np.isfinite(value).any():
+            found[name] = value
+    if not found:
+        raise InputError(
+            "the log has no output to fit", got=", ".join(run.channels) or "no channels",
+            expected=", ".join(wanted or OUTPUTS), where=run.source,
+        )  # fmt: skip
+    names = tuple((name, i) for name, value in found.items() for i in range(value.shape[1]))
+    values = next(iter(found.values())) if len(found) == 1 else np.hstack(list(found.values()))
+    return names, np.ascontiguousarray(values)
+
+
+def _whole(known: NDArray[np.bool_], start: int, stop: int) -> list[tuple[int, int]]:
+    """Stretches of rows with all inputs, (first, last). The last row needs none: nothing follows it."""
+    if known[start : stop - 1].all():
+        return [(start, stop - 1)] if stop - start >= SHORTEST else []
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], known[start:stop].astype(int), [0]])))
+    runs = zip(start + edges[::2], start + edges[1::2] - 1, strict=True)
+    return [(int(a), int(b)) for a, b in runs if b - a + 1 >= SHORTEST]

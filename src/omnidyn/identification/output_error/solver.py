@@ -1,0 +1,248 @@
+"""Levenberg-Marquardt on the likelihood of whole logs, the states at the start of each piece eliminated.
+
+Gauss: the noise of each column is concentrated out, F = 1/2 sum n_c log(sum of r^2 / n_c), so that one minimisation
+finds parameters and noise together. Student's t: F = sum of rho + n_c log s_c at a fixed scale s_c, which is renewed
+between minimisations (expectation maximisation). A prior adds ((p - mean)/std)^2 / 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.identification.output_error.exact_engine import ExactEngine, Weighting
+from omnidyn.identification.output_error.problem import PieceSums, Point, Problem, per_column
+
+FloatArray = NDArray[np.float64]
+
+MAX_ITERATIONS = 60
+CLOSE = 1e-6  # squared distance to the best point, in standard errors, at which it ends
+DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-4, 1e-10, 1e10
+PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
+SCALES, SCALE_CHANGE = 12, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A point, its sums, F there and the variance of each column."""
+
+    point: Point
+    sums: list[PieceSums]
+    objective: float
+    variance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short."""
+
+    state: State
+    held: NDArray[np.bool_]
+    iterations: int
+    converged: bool
+
+
+class Solver:
+    """Minimises F over a problem. `floor` (columns,): least variance of each column."""
+
+    def __init__(self, problem: Problem, engine: ExactEngine, nu: float = 0.0):
+        self.problem, self.engine, self.nu = problem, engine, nu
+        self.floor = _floor(problem)
+        self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
+        self._high = np.array([p.inner(p.high) for p in problem.parameters])
+
+    def state(self, point: Point, variance: FloatArray | None = None) -> State:
+        """F and all sums at a point; at a fixed `variance` for Student's t."""
+        given = np.ones(len(self.problem.columns)) if variance is None else variance
+        sums = self.engine.sums(point, Weighting(given, self.nu))
+        count = per_column(sums, len(given), "number")
+        mean = per_column(sums, len(given), "square") / np.maximum(count, 1.0)
+        if self.nu:
+            objective = float(per_column(sums, len(given), "loss").sum() + 0.5 * count @ np.log(given))
+            return State(point, sums, objective + self._prior(point), given)
+        now = np.maximum(mean, self.floor)
+        return State(point, sums, float(0.5 * count @ np.log(now)) + self._prior(point), now)
+
+    def minimise(
+        self, start: Point, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None
+    ) -> Solution:
+        """The best point from `start`; `watch` sees every better one on the way."""
+        if not self.nu:
+            return self._descend(self.state(self._inside(start)), limit, watch)
+        plain = Solver(self.problem, self.engine).minimise(start, limit)
+        variance, point, steps, found = plain.state.variance, plain.state.point, plain.iterations, plain
+        for _ in range(SCALES):
+            found = self._descend(self.state(point, variance), limit, watch)
+            count = per_column(found.state.sums, len(variance), "number")
+            renewed = per_column(found.state.sums, len(variance), "square") / np.maximum(count, 1.0)
+            renewed, steps = np.maximum(renewed, self.floor), steps + found.iterations
+            point, change, variance = found.state.point, np.abs(np.log(renewed / variance)).max(), renewed
+            if change < SCALE_CHANGE:
+                break
+        return Solution(found.state, found.held, steps, found.converged)
+
+    def _descend(self, now: State, limit: int, watch: Callable[[State], None] | None) -> Solution:
+        damping = DAMPING
+        held = np.zeros(len(self.problem.parameters), bool)
+        for iteration in range(limit):
+            normal = Normal(self, now)
+            held = normal.held
+            if normal.distance < CLOSE:
+                return Solution(now, held, iteration, True)
+            while True:
+                trial = self.state(normal.moved(damping), now.variance if self.nu else None)
+                if trial.objective < now.objective:
+                    now, damping = trial, max(damping / 10.0, LEAST_DAMPING)
+                    if watch:
+                        watch(now)
+                    break
+                damping *= 10.0
+                if damping > MOST_DAMPING:  # no way down: the last digits of F, or a kink
+                    return Solution(now, held, iteration, True)
+        return Solution(now, held, limit, False)
+
+    def inner(self, values: FloatArray) -> FloatArray:
+        return np.array([p.inner(float(v)) for p, v in zip(self.problem.parameters, values, strict=True)])
+
+    def outer(self, inner: FloatArray) -> FloatArray:
+        return np.array([p.outer(float(z)) for p, z in zip(self.problem.parameters, inner, strict=True)])
+
+    def clipped(self, inner: FloatArray) -> FloatArray:
+        return np.clip(inner, self._low, self._high)
+
+    def at_bound(self, inner: FloatArray, gradient: FloatArray) -> NDArray[np.bool_]:
+        """Which parameters stand at a bound and are pushed against it by `gradient` (downhill direction)."""
+        return ((inner <= self._low) & (gradient < 0.0)) | ((inner >= self._high) & (gradient > 0.0))
+
+    def _inside(self, point: Point) -> Point:
+        return Point(self.outer(self.clipped(self.inner(point.values))), point.states)
+
+    def _prior(self, point: Point) -> float:
+        total = 0.0
+        for p, value in zip(self.problem.parameters, point.values, strict=True):
+            if p.prior is not None:
+                total += 0.5 * ((float(value) - p.prior[0]) / p.prior[1]) ** 2
+        return total
+
+
+class Normal:
+    """The normal equations at a state, in the numbers that the solver sees, states of the pieces eliminated.
+
+    gradient (P,): downhill. information (P, P): of all parameters, free of the states. distance: squared length of the
+    Gauss-Newton step in standard errors, over what no bound holds.
+    """
+
+    def __init__(self, solver: Solver, state: State):
+        problem = solver.problem
+        self.solver, self.state, count = solver, state, len(problem.parameters)
+        self.scale = np.array([p.slope(float(v)) for p, v in zip(problem.parameters, state.point.values, strict=True)])
+        self.pieces = [_weighted(sums, 1.0 / state.variance[sums.columns], self.scale) for sums in state.sums]
+        self._count = count
+        self.inner = solver.inner(state.point.values)
+        self._add_priors()
+        self.gradient, self.information = self._reduced(0.0)
+        self.held = solver.at_bound(self.inner, self.gradient)
+        self.distance = self._distance()
+
+    def _add_priors(self) -> None:
+        self.prior_gradient, self.prior_information = np.zeros(self._count), np.zeros(self._count)
+        for j, p in enumerate(self.solver.problem.parameters):
+            if p.prior is not None:
+                mean, std = p.prior
+                self.prior_information[j] = (self.scale[j] / std) ** 2
+                self.prior_gradient[j] = (mean - self.state.point.values[j]) / std**2 * self.scale[j]
+
+    def _reduced(self, damping: float) -> tuple[FloatArray, FloatArray]:
+        """Gradient and information of the parameters, the states of each piece eliminated."""
+        gradient, information = self.prior_gradient.copy(), np.diag(self.prior_information)
+        for grad, info in self.pieces:
+            k = self._count
+            damped = _damped(info, damping)
+            gradient += grad[:k]
+            information = information + damped[:k, :k]
+            if grad.shape[0] > k:
+                lift = np.linalg.solve(damped[k:, k:], damped[k:, :k])
+                gradient -= lift.T @ grad[k:]
+                information -= damped[:k, k:] @ lift
+        return gradient, information
+
+    def _distance(self) -> float:
+        free = ~self.held
+        step = _solve(self.information[np.ix_(free, free)], self.gradient[free])
+        total = float(step @ self.gradient[free])
+        for grad, info in self.pieces:  # what the states alone would gain
+            if grad.shape[0] > self._count:
+                k = self._count
+                total += float(grad[k:] @ np.linalg.solve(info[k:, k:], grad[k:]))
+        return total
+
+    def scores(self) -> FloatArray:
+        """Score of each block of rows, the states eliminated. Shape (blocks, P). Needs sums of a final march."""
+        k, found = self._count, []
+        for sums, (_, info) in zip(self.state.sums, self.pieces, strict=True):
+            score = sums.score * np.concatenate([self.scale, np.ones(sums.score.shape[1] - k)])
+            own = score[:, :k]
+            if info.shape[0] > k:
+                own = own - score[:, k:] @ np.linalg.solve(info[k:, k:], info[k:, :k])
+            found.append(own)
+        return np.concatenate(found)
+
+    def moved(self, damping: float) -> Point:
+        """The point of the damped step, within the bounds."""
+        gradient, information = self._reduced(damping)
+        free = ~self.held
+        step = np.zeros(self._count)
+        step[free] = _solve(information[np.ix_(free, free)], gradient[free])
+        inner = self.solver.clipped(self.inner + step)
+        step = inner - self.inner
+        k, states = self._count, []
+        for (grad, info), old in zip(self.pieces, self.state.point.states, strict=True):
+            new = old.copy()
+            if grad.shape[0] > k:
+                damped = _damped(info, damping)
+                new += np.linalg.solve(damped[k:, k:], grad[k:] - damped[k:, :k] @ step)
+            states.append(new)
+        return Point(self.solver.outer(inner), tuple(states))
+
+
+def _weighted(sums: PieceSums, weight: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Gradient and information of a piece over its columns, in inner numbers; states that are not free do not move."""
+    count = len(scale)
+    full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
+    grad = (weight @ sums.grad) * full
+    info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
+    if not np.diag(info)[count:].any():
+        return grad[:count], info[:count, :count]
+    still = np.flatnonzero(np.diag(info)[count:] == 0.0) + count
+    info[still, still] = 1.0
+    return grad, info
+
+
+def _damped(info: FloatArray, damping: float) -> FloatArray:
+    return info + np.diag(damping * np.diag(info)) if damping else info
+
+
+def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
+    """information^-1 gradient in balanced units; directions that the data do not see stay where they are."""
+    size = np.sqrt(np.maximum(np.diag(information), 0.0))
+    size[size == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(information / np.outer(size, size))
+    seen = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
+    inverse = np.where(seen, 1.0 / np.where(seen, values, 1.0), 0.0)
+    return (vectors @ (inverse * (vectors.T @ (gradient / size)))) / size
+
+
+def _floor(problem: Problem) -> FloatArray:
+    """Least variance of each column: (PRECISION times its root mean square)^2."""
+    columns = problem.columns
+    size, count = np.zeros(len(columns)), np.zeros(len(columns))
+    for rec in {id(piece.record): piece.record for piece in problem.pieces}.values():
+        for c, column in enumerate(rec.columns):
+            values = rec.outputs[:, c]
+            k = columns.index(column)
+            size[k] += float(np.nansum(values * values))
+            count[k] += float(np.isfinite(values).sum())
+    return PRECISION**2 * np.maximum(size / np.maximum(count, 1.0), 1e-12)

@@ -1,0 +1,168 @@
+"""How far a fit can be trusted: information, sandwich for coloured residuals, intervals, blind directions.
+
+    white residuals      cov = (J' W J)^-1
+    coloured residuals   cov = (J' W J)^-1 (sum over blocks of s s') (J' W J)^-1,   s the score of a block of rows
+
+The blocks are longer than the residuals remember, so that the sandwich needs no model of their colour: it is consistent
+under heteroskedasticity and autocorrelation, and its intervals take the quantile of Student's t for the number of
+blocks that carry the information. Which of the two is used is decided by the residuals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri, stdtrit
+
+from omnidyn.identification.output_error.exact_engine import Weighting
+from omnidyn.identification.output_error.kernel import FINAL
+from omnidyn.identification.output_error.problem import PieceSums, per_column
+from omnidyn.identification.output_error.solver import Normal, Solution, Solver, State
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
+COLOURED = 4.0  # standard errors of a correlation of neighbours, and of a variance ratio
+BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below which a direction is not seen
+WEAK = 1e-4  # below it, is hardly seen
+SHARE = 0.05  # of a blind direction that a parameter must have to be named
+WHITE, SANDWICH = "white", "sandwich"
+TAIL = 0.975
+
+
+@dataclass(frozen=True, eq=False)
+class Trust:
+    """Covariance of the parameters in the numbers that the solver sees, and what is behind it.
+
+    covariance (P, P): infinite variances where the data are blind. held: at a bound. blind: not determined by the
+    data, alone or only together. free_step (P,): from a bound to where the fit would go without it. kind: white or
+    sandwich. widening: largest ratio of the sandwich's std to the plain one. quantile: standard errors in half a 95 %
+    interval. degrees: of freedom behind it. neighbours (columns,): correlation of successive residuals.
+    directions: blind or weak ones, each parameter -> its share.
+    """
+
+    covariance: FloatArray
+    held: BoolArray
+    blind: BoolArray
+    free_step: FloatArray
+    kind: str
+    widening: float
+    quantile: float
+    degrees: int
+    neighbours: FloatArray
+    directions: tuple[tuple[float, FloatArray], ...]
+
+    @property
+    def std(self) -> FloatArray:
+        return np.sqrt(np.diag(self.covariance))
+
+
+def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
+    """The covariance at a solution; `kind`: "white", "sandwich" or "auto"."""
+    rows = sum(piece.last - piece.first + 1 for piece in solver.problem.pieces)
+    weighting = Weighting(solution.state.variance, solver.nu, FINAL, max(LEAST_BLOCK, -(-rows // BLOCKS)))
+    sums = solver.engine.sums(solution.state.point, weighting)
+    normal = Normal(solver, State(solution.state.point, sums, solution.state.objective, solution.state.variance))
+    seen, directions = _seen(normal.information, normal.held)
+    plain = _inverse(normal.information, seen)
+    influence = normal.scores() @ plain  # what each block moves each parameter by
+    coloured, neighbours = _coloured(solver, sums)
+    if kind == "auto":  # a loss that is not the likelihood of the noise says nothing by its curvature alone
+        kind = SANDWICH if coloured or solver.nu else WHITE
+    wide = influence.T @ influence + plain @ np.diag(normal.prior_information) @ plain
+    degrees = _degrees(influence, seen) if kind == SANDWICH else _rows(solver, sums) - int(seen.sum())
+    if len(influence) <= len(plain):
+        kind, degrees = WHITE, _rows(solver, sums) - int(seen.sum())
+    covariance = _at_least(wide, plain) if kind == SANDWICH else plain.copy()
+    covariance[~seen, ~seen] = np.inf
+    return Trust(
+        covariance, normal.held, ~seen, _free_step(plain, normal), kind, float(np.sqrt(_ratio(wide, plain, seen))),
+        float(stdtrit(degrees, TAIL) if degrees > 0 else ndtri(TAIL)), max(int(degrees), 0), neighbours, directions,
+    )  # fmt: skip
+
+
+def _rows(solver: Solver, sums: list[PieceSums]) -> int:
+    return int(per_column(sums, len(solver.problem.columns), "number").sum())
+
+
+def _coloured(solver: Solver, sums: list[PieceSums]) -> tuple[bool, FloatArray]:
+    """Whether the residuals of any column remember: (verdict, correlation of neighbours of each column).
+
+    For white noise the correlation of neighbours is 0 +- 1/sqrt(n), and the squared sums over blocks add up to the sum
+    of squares, +- sqrt(2/blocks) of it: the first sees fast colours, the second slow ones.
+    """
+    columns = len(solver.problem.columns)
+    square = np.maximum(per_column(sums, columns, "square"), 1e-300)
+    neighbours = per_column(sums, columns, "lag") / square
+    slow, blocks = np.zeros(columns), np.zeros(columns)
+    for piece in sums:
+        slow[piece.columns] += (piece.drift**2).sum(axis=0)
+        blocks[piece.columns] += len(piece.drift)
+    fast = np.abs(neighbours) * np.sqrt(np.maximum(per_column(sums, columns, "number"), 1.0)) > COLOURED
+    return bool((fast | (slow / square > 1.0 + COLOURED * np.sqrt(2.0 / np.maximum(blocks, 1.0)))).any()), neighbours
+
+
+def _degrees(influence: FloatArray, seen: BoolArray) -> float:
+    """Degrees of freedom of a sum of squares over blocks of unlike weight (Satterthwaite), the least of all parameters.
+
+    (sum of variances)^2 / (sum of their squares), the latter from fourth powers, which are 3 times as large.
+    """
+    chosen = influence[:, seen]
+    second, fourth = (chosen**2).sum(axis=0), (chosen**4).sum(axis=0)
+    if not chosen.size or not fourth.all():
+        return float(len(influence))
+    return float(np.clip((3.0 * second**2 / fourth).min(), 3.0, len(influence) - 1))
+
+
+def _seen(information: FloatArray, held: BoolArray) -> tuple[BoolArray, tuple[tuple[float, FloatArray], ...]]:
+    """Which parameters the data determine, and the directions that they hardly do, in scaled parameters."""
+    diagonal = np.diag(information)
+    seen = diagonal > 0.0
+    chosen = np.flatnonzero(seen & ~held)
+    directions = []
+    if chosen.size:
+        size = np.sqrt(diagonal[chosen])
+        values, vectors = np.linalg.eigh(information[np.ix_(chosen, chosen)] / np.outer(size, size))
+        for value, vector in zip(values, vectors.T, strict=True):
+            if value < WEAK:
+                way = np.zeros(len(diagonal))
+                way[chosen] = vector / size
+                way /= np.abs(way).max()
+                directions.append((float(value), way))
+                if value < BLIND:
+                    seen[chosen[np.abs(way[chosen]) > SHARE]] = False
+    return seen, tuple(directions)
+
+
+def _inverse(information: FloatArray, seen: BoolArray) -> FloatArray:
+    """Inverse over what is seen, 0 elsewhere."""
+    inverse = np.zeros_like(information)
+    if seen.any():
+        chosen = np.ix_(seen, seen)
+        part = information[chosen]
+        size = np.sqrt(np.diag(part))
+        inverse[chosen] = np.linalg.pinv(part / np.outer(size, size), rcond=1e-14, hermitian=True) / np.outer(
+            size, size
+        )
+    return inverse
+
+
+def _ratio(wide: FloatArray, plain: FloatArray, seen: BoolArray) -> float:
+    if not seen.any():
+        return 1.0
+    return float((np.diag(wide)[seen] / np.maximum(np.diag(plain)[seen], 1e-300)).max())
+
+
+def _at_least(wide: FloatArray, plain: FloatArray) -> FloatArray:
+    """The sandwich, with no variance below the plain one: few blocks may also err to the good side."""
+    own, least = np.diag(wide), np.diag(plain)
+    stretch = np.sqrt(np.maximum(least, own) / np.where(own > 0.0, own, 1.0))
+    return wide * np.outer(stretch, stretch)
+
+
+def _free_step(plain: FloatArray, normal: Normal) -> FloatArray:
+    """From where a bound holds a parameter to where the fit would be without the bound, to first order."""
+    return np.where(normal.held, plain @ normal.gradient, 0.0)
