@@ -111,7 +111,7 @@ class ExactEngine:
         physics, slopes, groups = self._numbers(piece, values, now, by, -(-total // VECTOR) * VECTOR)
         loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode)
         sums = _empty(
-            len(columns), slopes.rate.shape[1], total, len(piece.record.t), weighting.mode, _blocks(piece, weighting)
+            len(columns), slopes.law.shape[2], total, len(piece.record.t), weighting.mode, _blocks(piece, weighting)
         )
         march(
             piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
@@ -141,13 +141,13 @@ class ExactEngine:
         driver = [problem.where(name) for name in (GAIN, DEAD, FADE)]
         fixed = (1.0, 0.0, 0.0)
         physics = Physics(
-            now.rate, now.coulomb, now.hold, now.drive, maps[0], maps[1], maps[2], _wheel_of(columns),
+            np.stack([now.rate, now.coulomb, now.hold]), now.drive, maps[0], maps[1], maps[2], _wheel_of(columns),
             np.array([values[k] if k >= 0 else 0.0 for k in late]),
             np.array([values[k] if k >= 0 else fixed[i] for i, k in enumerate(driver)]),
         )  # fmt: skip
         state = np.where(piece.free, np.arange(count, count + AXES + width), -1)
         derivatives = Slopes(
-            wide(by.rate), wide(by.coulomb), wide(by.drive), wide(slopes[0]), wide(slopes[1]), wide(slopes[2]),
+            wide(np.stack([by.rate, by.coulomb])), wide(by.drive), wide(slopes[0]), wide(slopes[2]),
             not self.mapping.linear, np.array(late), np.array(driver), state[:AXES], state[AXES:],
         )  # fmt: skip
         starts = [c for c in range(width) if c == 0 or columns[c][0] != columns[c - 1][0]]

@@ -35,9 +35,7 @@ class Physics(NamedTuple):
     M v + Q s + E u_w + offset,   v the twist, s its integral since the start, u_w the voltage at wheel w.
     """
 
-    rate: FloatArray  # (3,) a
-    coulomb: FloatArray  # (3,) c
-    hold: FloatArray  # (3,) S
+    law: FloatArray  # (3, 3) rows a, c, S of the axes
     drive: FloatArray  # (3, W) acceleration per volt
     speed_map: FloatArray  # (C, 3) M
     travel_map: FloatArray  # (C, 3) Q
@@ -50,11 +48,9 @@ class Physics(NamedTuple):
 class Slopes(NamedTuple):
     """Derivatives of the numbers above; the last axis is the parameter, in all P. at_...: index of one, or -1."""
 
-    rate: FloatArray  # (3, P)
-    coulomb: FloatArray  # (3, P)
+    law: FloatArray  # (2, 3, P) of a and c
     drive: FloatArray  # (3, W, P)
     speed_map: FloatArray  # (C, 3, P)
-    travel_map: FloatArray  # (C, 3, P)
     input_map: FloatArray  # (C, P)
     maps_vary: bool
     at_late: IntArray  # (C,)
@@ -103,12 +99,12 @@ def loss_terms(residual, variance, nu, final):
 
 
 @part
-def driven(u, w, gain, dead):
+def driven(u, gain, dead):
     """(voltage at the wheel, its derivative by gain, by the dead band): gain (|u| - dead)+ sgn u."""
-    size = abs(u[w]) - dead
+    size = abs(u) - dead
     if size <= 0.0:
         return 0.0, 0.0, 0.0
-    side = 1.0 if u[w] > 0.0 else -1.0
+    side = 1.0 if u > 0.0 else -1.0
     return gain * size * side, size * side, -gain * side
 
 
@@ -136,16 +132,9 @@ def held_values(cache, axis, rate, off):
 
 
 @part
-def add_column(c, row, residual, loss, sums, last, block, final):
-    """Add one residual and its row of slopes to the sums of column c."""
-    weight, curvature, rho = loss_terms(residual, loss.variance[c], loss.nu, final)
-    pull = weight * residual
-    sums.number[c] += 1.0
-    sums.square[c] += pull * residual
-    sums.loss[c] += rho
-    sums.lag[c] += pull * last[c]
-    last[c] = pull
-    grad, info, size = sums.grad[c], sums.info[c], len(row)
+def add_information(info, grad, row, pull, curvature):
+    """grad += pull row, info += curvature row row'."""
+    size = len(row)
     for i in range(size):
         grad[i] += pull * row[i]
     for i in range(size):
@@ -153,11 +142,102 @@ def add_column(c, row, residual, loss, sums, last, block, final):
         if lead != 0.0:
             for j in range(size):
                 info[i, j] += lead * row[j]
-    if final:
-        score = sums.score[block]
-        sums.drift[block, c] += pull
-        for i in range(size):
-            score[i] += pull / loss.variance[c] * row[i]
+
+
+@part
+def put_volts(volts, u, k, worn, driver):
+    """Row 0 of `volts`: at the wheels; rows 1 to 3: its derivatives by gain, dead band and fade."""
+    left = 1.0 - driver[FADE] * worn
+    for w in range(volts.shape[1]):
+        whole, more, less = driven(u[k, w], driver[GAIN], driver[DEAD])
+        volts[0, w] = left * whole
+        volts[1 + GAIN, w], volts[1 + DEAD, w], volts[1 + FADE, w] = left * more, left * less, -worn * whole
+
+
+@part
+def put_drive(g, dg, volts, drive, d_drive, at_driver, vary):
+    """Drive of the axes and its slopes."""
+    for axis in range(3):
+        for i in range(dg.shape[1]):
+            dg[axis, i] = 0.0
+        g[axis] = 0.0
+        for w in range(volts.shape[1]):
+            g[axis] += drive[axis, w] * volts[0, w]
+            if vary:
+                for i in range(dg.shape[1]):
+                    dg[axis, i] += d_drive[axis, w, i] * volts[0, w]
+            for k in range(3):
+                if at_driver[k] >= 0:
+                    dg[axis, at_driver[k]] += drive[axis, w] * volts[1 + k, w]
+
+
+@part
+def advance(v, s, g, dv, ds, dg, law, dlaw, dt, cache, travels):
+    """Move twist v and its integral s on by dt, and their slopes. law (3, 3): a, c, S; dlaw (2, 3, P)."""
+    off = held(cache, law[0], dt)
+    for axis in range(3):
+        a, c, hold = law[0, axis], law[1, axis], law[2, axis]
+        phi, dphi, psi, dpsi = held_values(cache, axis, a, off)
+        if travels:
+            path, kv, kg, kc, ka = travel_slopes(v[axis], g[axis], c, hold, a, dt, phi, dphi, psi, dpsi)
+            s[axis] += path
+            for i in range(dv.shape[1]):
+                ds[axis, i] += kv * dv[axis, i] + kg * dg[axis, i] + kc * dlaw[1, axis, i] + ka * dlaw[0, axis, i]
+        v[axis], kv, kg, kc, ka = step_slopes(v[axis], g[axis], c, hold, a, phi, dphi)
+        for i in range(dv.shape[1]):
+            dv[axis, i] = kv * dv[axis, i] + kg * dg[axis, i] + kc * dlaw[1, axis, i] + ka * dlaw[0, axis, i]
+
+
+@part
+def copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels):
+    """The motion at the start of a step, to go on from."""
+    for axis in range(3):
+        v_now[axis], s_now[axis] = v[axis], s[axis]
+        for i in range(dv.shape[1]):
+            dv_now[axis, i] = dv[axis, i]
+        if travels:
+            for i in range(dv.shape[1]):
+                ds_now[axis, i] = ds[axis, i]
+
+
+@part
+def put_row(row, c, v, s, dv, ds, physics_speed, physics_travel, d_speed, vary):
+    """What column c takes from the motion, and its slopes in `row`."""
+    value, size = 0.0, len(row)
+    for i in range(size):
+        row[i] = 0.0
+    for axis in range(3):
+        m, q = physics_speed[c, axis], physics_travel[c, axis]
+        value += m * v[axis] + q * s[axis]
+        if m != 0.0:
+            for i in range(size):
+                row[i] += m * dv[axis, i]
+        if q != 0.0:
+            for i in range(size):
+                row[i] += q * ds[axis, i]
+        if vary:
+            for i in range(size):
+                row[i] += d_speed[c, axis, i] * v[axis]
+    return value
+
+
+@part
+def add_latency(row, c, at, v, g, law, speed_map, travel_map):
+    """The slope of column c by its latency: what was earlier."""
+    for axis in range(3):
+        pace = acceleration_at_end(v[axis], g[axis], law[1, axis], law[2, axis], law[0, axis])
+        row[at] -= speed_map[c, axis] * pace + travel_map[c, axis] * v[axis]
+
+
+@part
+def add_input(row, volts, wheel, e, d_input, c, at_driver):
+    """What a current takes directly from the voltage of its wheel."""
+    for i in range(len(row)):
+        row[i] += d_input[c, i] * volts[0, wheel]
+    for k in range(3):
+        if at_driver[k] >= 0:
+            row[at_driver[k]] += e * volts[1 + k, wheel]
+    return e * volts[0, wheel]
 
 
 @kernel
@@ -168,146 +248,65 @@ def march(t, u, y, first, last, origin, span, margin, start, offset, groups, phy
     the whole run, for the fade. margin (C,): time after `first` before which outputs are not used. start (3,) twist;
     offset (C,). groups: first column of each group of one latency, and C.
     """
-    rate, coulomb, hold = physics.rate, physics.coulomb, physics.hold
-    wheels, size, final, keep = u.shape[1], slopes.rate.shape[1], loss.mode & FINAL, loss.mode & KEEP
-    gain, dead, fade = physics.driver[0], physics.driver[1], physics.driver[2]
-    travels = False
-    for c in range(len(offset)):
-        for axis in range(3):
-            travels |= physics.travel_map[c, axis] != 0.0
-    v, s, now, way, g = start.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    dv, ds, dg = np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size))
-    dnow, dway, row = np.zeros((3, size)), np.zeros((3, size)), np.zeros(size)
-    volts, by_gain, by_dead, by_fade = np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.zeros(wheels)
-    before, pointer = np.zeros(len(offset)), np.full(len(groups) - 1, first)
-    steps, parts = np.zeros((4, 4)), np.zeros((len(groups) - 1, 4, 4))
+    law, dlaw, size = physics.law, slopes.law, slopes.law.shape[2]
+    speed_map, travel_map, d_speed, vary = physics.speed_map, physics.travel_map, slopes.speed_map, slopes.maps_vary
+    final, keep, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, np.abs(travel_map).max() > 0.0
+    v, s, g, v_now, s_now = start.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    dv, ds, dg, dv_now, ds_now = (
+        np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)),
+    )  # fmt: skip
     for axis in range(3):
         if slopes.at_start[axis] >= 0:
             dv[axis, slopes.at_start[axis]] = 1.0
+    volts, row, before = np.zeros((4, u.shape[1])), np.zeros(size), np.zeros(len(offset))
+    pointer, steps, parts = np.full(len(groups) - 1, first), np.zeros((4, 4)), np.zeros((len(groups) - 1, 4, 4))
+    drive, d_drive, driver, at_driver = physics.drive, slopes.drive, physics.driver, slopes.at_driver
+    lates, wheels, input_map, d_input = physics.late, physics.input_wheel, physics.input_map, slopes.input_map
+    at_late, at_offset, variance, nu, block = slopes.at_late, slopes.at_offset, loss.variance, loss.nu, loss.block
+    number, square, total, lag, grad, info = sums.number, sums.square, sums.loss, sums.lag, sums.grad, sums.info
+    score, drift, predicted, kept = sums.score, sums.drift, sums.predicted, sums.slopes
     for k in range(first, last + 1):
-        worn = (t[k] - origin) / span
-        for w in range(wheels):
-            whole, more, less = driven(u[k], w, gain, dead)
-            left = 1.0 - fade * worn
-            volts[w], by_gain[w], by_dead[w], by_fade[w] = left * whole, left * more, left * less, -worn * whole
-        for axis in range(3):
-            g[axis] = 0.0
-            for w in range(wheels):
-                g[axis] += physics.drive[axis, w] * volts[w]
-            for i in range(size):
-                dg[axis, i] = 0.0
-        if slopes.maps_vary:
-            for axis in range(3):
-                for w in range(wheels):
-                    for i in range(size):
-                        dg[axis, i] += slopes.drive[axis, w, i] * volts[w]
-        for axis in range(3):
-            for w in range(wheels):
-                if slopes.at_driver[GAIN] >= 0:
-                    dg[axis, slopes.at_driver[GAIN]] += physics.drive[axis, w] * by_gain[w]
-                if slopes.at_driver[DEAD] >= 0:
-                    dg[axis, slopes.at_driver[DEAD]] += physics.drive[axis, w] * by_dead[w]
-                if slopes.at_driver[FADE] >= 0:
-                    dg[axis, slopes.at_driver[FADE]] += physics.drive[axis, w] * by_fade[w]
+        put_volts(volts, u, k, (t[k] - origin) / span, driver)
+        put_drive(g, dg, volts, drive, d_drive, at_driver, vary)
         dt = t[k + 1] - t[k] if k < last else math.inf
         for group in range(len(groups) - 1):
-            column, end = groups[group], groups[group + 1]
-            late = physics.late[column]
-            while pointer[group] <= last:
+            late = lates[groups[group]]
+            while pointer[group] <= last and t[pointer[group]] - late - t[k] < dt:
                 sample = pointer[group]
-                into = t[sample] - late - t[k]
-                if not into < dt:
-                    break
                 pointer[group] += 1
-                if into < 0.0 or t[sample] - t[first] < margin[column]:
+                into = t[sample] - late - t[k]
+                if into < 0.0 or t[sample] - t[first] < margin[groups[group]]:
                     continue
-                off = held(parts[group], rate, into) if into > 0.0 else 0.0
-                for axis in range(3):
-                    if into == 0.0:
-                        now[axis], way[axis] = v[axis], s[axis]
-                        for i in range(size):
-                            dnow[axis, i], dway[axis, i] = dv[axis, i], ds[axis, i]
-                        continue
-                    phi, dphi, psi, dpsi = held_values(parts[group], axis, rate[axis], off)
-                    now[axis], kv, kg, kc, ka = step_slopes(
-                        v[axis], g[axis], coulomb[axis], hold[axis], rate[axis], phi, dphi
-                    )
-                    for i in range(size):
-                        dnow[axis, i] = (
-                            kv * dv[axis, i]
-                            + kg * dg[axis, i]
-                            + kc * slopes.coulomb[axis, i]
-                            + ka * slopes.rate[axis, i]
-                        )
-                    if travels:
-                        way[axis], kv, kg, kc, ka = travel_slopes(
-                            v[axis], g[axis], coulomb[axis], hold[axis], rate[axis], into, phi, dphi, psi, dpsi
-                        )
-                        way[axis] += s[axis]
-                        for i in range(size):
-                            dway[axis, i] = ds[axis, i] + (
-                                kv * dv[axis, i] + kg * dg[axis, i]
-                                + kc * slopes.coulomb[axis, i] + ka * slopes.rate[axis, i]
-                            )  # fmt: skip
-                for c in range(column, end):
-                    wheel = physics.input_wheel[c]
+                copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels)
+                if into > 0.0:
+                    advance(v_now, s_now, g, dv_now, ds_now, dg, law, dlaw, into, parts[group], travels)
+                for c in range(groups[group], groups[group + 1]):
                     value = offset[c]
-                    for i in range(size):
-                        row[i] = 0.0
-                    for axis in range(3):
-                        m, q = physics.speed_map[c, axis], physics.travel_map[c, axis]
-                        value += m * now[axis] + q * way[axis]
-                        if m != 0.0:
-                            for i in range(size):
-                                row[i] += m * dnow[axis, i]
-                        if q != 0.0:
-                            for i in range(size):
-                                row[i] += q * dway[axis, i]
-                        if slopes.maps_vary:
-                            for i in range(size):
-                                row[i] += slopes.speed_map[c, axis, i] * now[axis]
-                                row[i] += slopes.travel_map[c, axis, i] * way[axis]
-                        if slopes.at_late[c] >= 0:
-                            pace = acceleration_at_end(now[axis], g[axis], coulomb[axis], hold[axis], rate[axis])
-                            row[slopes.at_late[c]] -= m * pace + q * now[axis]
-                    if wheel >= 0:
-                        e = physics.input_map[c]
-                        value += e * volts[wheel]
-                        for i in range(size):
-                            row[i] += slopes.input_map[c, i] * volts[wheel]
-                        if slopes.at_driver[GAIN] >= 0:
-                            row[slopes.at_driver[GAIN]] += e * by_gain[wheel]
-                        if slopes.at_driver[DEAD] >= 0:
-                            row[slopes.at_driver[DEAD]] += e * by_dead[wheel]
-                        if slopes.at_driver[FADE] >= 0:
-                            row[slopes.at_driver[FADE]] += e * by_fade[wheel]
-                    if slopes.at_offset[c] >= 0:
-                        row[slopes.at_offset[c]] += 1.0
+                    value += put_row(row, c, v_now, s_now, dv_now, ds_now, speed_map, travel_map, d_speed, vary)
+                    if wheels[c] >= 0:
+                        value += add_input(row, volts, wheels[c], input_map[c], d_input, c, at_driver)
+                    if at_late[c] >= 0:
+                        add_latency(row, c, at_late[c], v_now, g, law, speed_map, travel_map)
+                    if at_offset[c] >= 0:
+                        row[at_offset[c]] += 1.0
                     if keep:
-                        sums.predicted[sample, c] = value
-                        for i in range(sums.slopes.shape[2]):
-                            sums.slopes[sample, c, i] = row[i]
+                        predicted[sample, c] = value
+                        kept[sample, c, :] = row[: kept.shape[2]]
                     residual = y[sample, c] - value
-                    if residual == residual:
-                        add_column(c, row, residual, loss, sums, before, (k - first) // loss.block, final)
-                    else:
+                    if residual != residual:
                         before[c] = 0.0
-        if k == last:
-            break
-        off = held(steps, rate, dt)
-        for axis in range(3):
-            phi, dphi, psi, dpsi = held_values(steps, axis, rate[axis], off)
-            if travels:
-                path, kv, kg, kc, ka = travel_slopes(
-                    v[axis], g[axis], coulomb[axis], hold[axis], rate[axis], dt, phi, dphi, psi, dpsi
-                )
-                s[axis] += path
-                for i in range(size):
-                    ds[axis, i] += (
-                        kv * dv[axis, i] + kg * dg[axis, i] + kc * slopes.coulomb[axis, i] + ka * slopes.rate[axis, i]
-                    )
-            v[axis], kv, kg, kc, ka = step_slopes(v[axis], g[axis], coulomb[axis], hold[axis], rate[axis], phi, dphi)
-            for i in range(size):
-                dv[axis, i] = (
-                    kv * dv[axis, i] + kg * dg[axis, i] + kc * slopes.coulomb[axis, i] + ka * slopes.rate[axis, i]
-                )
+                        continue
+                    weight, curvature, rho = loss_terms(residual, variance[c], nu, final)
+                    pull = weight * residual
+                    number[c] += 1.0
+                    square[c] += pull * residual
+                    total[c] += rho
+                    lag[c] += pull * before[c]
+                    before[c] = pull
+                    add_information(info[c], grad[c], row, pull, curvature)
+                    if final:
+                        drift[(k - first) // block, c] += pull
+                        for i in range(size):
+                            score[(k - first) // block, i] += pull / variance[c] * row[i]
+        if k < last:
+            advance(v, s, g, dv, ds, dg, law, dlaw, dt, steps, travels)
