@@ -88,13 +88,14 @@ def loss_terms(residual, variance, nu, final):
     """(w, curvature, rho) of one residual: score w r / variance, curvature / variance for the information.
 
     Gauss: 1, 1, r^2/(2 variance). Student's t with nu degrees: w = (nu + 1)/(nu + z^2), rho = (nu + 1)/2
-    log(1 + z^2/nu); its curvature may be negative: the solver takes w for it, only the final march the curvature.
+    log(1 + z^2/nu); its curvature may be negative: the solver takes w (nu + 1)/(nu + 3), which has the right mean where
+    the noise is of that kind, and only the final march the curvature itself.
     """
     z2 = residual * residual / variance
     if nu == 0.0:
         return 1.0, 1.0, 0.5 * z2
     weight = (nu + 1.0) / (nu + z2)
-    curvature = weight * (nu - z2) / (nu + z2) if final else weight
+    curvature = weight * (nu - z2) / (nu + z2) if final else weight * (nu + 1.0) / (nu + 3.0)
     return weight, curvature, 0.5 * (nu + 1.0) * math.log1p(z2 / nu)
 
 

@@ -1,8 +1,8 @@
 """Levenberg-Marquardt on the likelihood of whole logs, the states at the start of each piece eliminated.
 
 Gauss: the noise of each column is concentrated out, F = 1/2 sum n_c log(sum of r^2 / n_c), so that one minimisation
-finds parameters and noise together. Student's t: F = sum of rho + n_c log s_c at a fixed scale s_c, which is renewed
-between minimisations (expectation maximisation). A prior adds ((p - mean)/std)^2 / 2.
+finds parameters and noise together. Student's t: F = sum of rho + n_c log s_c, steps in the parameters and in the
+scales s_c in turn. A prior adds ((p - mean)/std)^2 / 2.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ FloatArray = NDArray[np.float64]
 
 MAX_ITERATIONS = 60
 CLOSE = 1e-6  # squared distance to the best point, in standard errors, at which it ends
-DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-4, 1e-10, 1e10
+DAMPING, LEAST_DAMPING = 1e-4, 1e-10
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
-SCALES, SCALE_CHANGE = 12, 1e-4
+SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,36 +73,40 @@ class Solver:
         if not self.nu:
             return self._descend(self.state(self._inside(start)), limit, watch)
         plain = Solver(self.problem, self.engine).minimise(start, limit)
-        variance, point, steps, found = plain.state.variance, plain.state.point, plain.iterations, plain
-        for _ in range(SCALES):
-            found = self._descend(self.state(point, variance), limit, watch)
-            count = per_column(found.state.sums, len(variance), "number")
-            renewed = per_column(found.state.sums, len(variance), "square") / np.maximum(count, 1.0)
-            renewed, steps = np.maximum(renewed, self.floor), steps + found.iterations
-            point, change, variance = found.state.point, np.abs(np.log(renewed / variance)).max(), renewed
-            if change < SCALE_CHANGE:
-                break
-        return Solution(found.state, found.held, steps, found.converged)
+        now = self.state(plain.state.point, plain.state.variance)
+        return self._descend(self._rescaled(now)[0], limit, watch)
 
     def _descend(self, now: State, limit: int, watch: Callable[[State], None] | None) -> Solution:
-        damping = DAMPING
+        damping, change = DAMPING, 0.0
         held = np.zeros(len(self.problem.parameters), bool)
         for iteration in range(limit):
             normal = Normal(self, now)
-            held = normal.held
-            if normal.distance < CLOSE:
-                return Solution(now, held, iteration, True)
-            while True:
+            held, better = normal.held, False
+            while not better and normal.distance / (1.0 + damping) > CLOSE:
                 trial = self.state(normal.moved(damping), now.variance if self.nu else None)
-                if trial.objective < now.objective:
-                    now, damping = trial, max(damping / 10.0, LEAST_DAMPING)
-                    if watch:
-                        watch(now)
-                    break
-                damping *= 10.0
-                if damping > MOST_DAMPING:  # no way down: the last digits of F, or a kink
-                    return Solution(now, held, iteration, True)
+                better = trial.objective < now.objective
+                damping = max(damping / 10.0, LEAST_DAMPING) if better else damping * 10.0
+                now = trial if better else now
+            if self.nu:
+                now, change = self._rescaled(now)
+            if better and watch:
+                watch(now)
+            if not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
+                return Solution(now, held, iteration + 1, True)
         return Solution(now, held, limit, False)
+
+    def _rescaled(self, now: State) -> tuple[State, float]:
+        """The same point at a better scale of Student's t, and the relative change: one Newton step per column.
+
+        With m = mean w z^2, which is 1 at the right scale: log s += (nu + 3)/(2 nu) (m - 1), the information of log s
+        being 2 nu/(nu + 3) a row.
+        """
+        number = np.maximum(per_column(now.sums, len(now.variance), "number"), 1.0)
+        mean = per_column(now.sums, len(now.variance), "square") / number / now.variance
+        step = np.clip((self.nu + 3.0) / self.nu * (mean - 1.0), -1.0, 1.0)
+        variance = np.maximum(now.variance * np.exp(step), self.floor)
+        change = float(np.abs(np.log(variance / now.variance)).max())
+        return (self.state(now.point, variance), change) if change >= SCALE_CHANGE else (now, change)
 
     def inner(self, values: FloatArray) -> FloatArray:
         return np.array([p.inner(float(v)) for p, v in zip(self.problem.parameters, values, strict=True)])

@@ -105,11 +105,11 @@ def _of_piece(t: FloatArray, v: FloatArray, g: FloatArray) -> Windows | None:
         return None
     v = v if known.all() else np.interp(t, t[known], v[known])
     dt = np.diff(t)
-    rows = max(LEAST_ROWS, round(WINDOW / float(np.median(dt))))
+    rows = window_rows(t)
     if len(t) < 2 * rows:
         return None
-    smooth = _mean(v, max(rows // 2, 1))
-    noise = float(np.median(np.abs(np.diff(v)))) / 0.954  # the median of |difference of two| is 0.954 sigma
+    smooth = centred_mean(v, max(rows // 2, 1))
+    noise = difference_noise(v)
     side = np.where(np.abs(smooth) > CLEAR * noise / np.sqrt(max(rows // 2, 1)), np.sign(smooth), 0.0)
     sums = np.zeros((4, len(t)))
     sums[0, 1:], sums[1, 1:] = np.cumsum(g * dt), np.cumsum(0.5 * (v[1:] + v[:-1]) * dt)
@@ -126,6 +126,21 @@ def _of_piece(t: FloatArray, v: FloatArray, g: FloatArray) -> Windows | None:
     return Windows(change[:3, moving].T, change[3, moving], most)
 
 
+def window_rows(t: FloatArray) -> int:
+    """Rows of a window."""
+    return max(LEAST_ROWS, round(WINDOW / float(np.median(np.diff(t)))))
+
+
+def difference_noise(v: FloatArray) -> float:
+    """Standard deviation of the noise of a signal that moves slowly, from the differences of its neighbours.
+
+    Their median is 0.954 sigma; where most are 0, the signal is quantised, and half of its step is taken.
+    """
+    size = np.abs(np.diff(v))
+    middle = float(np.median(size)) / 0.954
+    return middle if middle > 0.0 else 0.5 * float(size[size > 0.0].min(initial=np.inf)) if size.any() else 0.0
+
+
 def _summed(values: FloatArray) -> FloatArray:
     """Running sums along the last axis, from 0."""
     total = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
@@ -133,7 +148,7 @@ def _summed(values: FloatArray) -> FloatArray:
     return total
 
 
-def _mean(values: FloatArray, width: int) -> FloatArray:
+def centred_mean(values: FloatArray, width: int) -> FloatArray:
     """Centred mean over `width` rows; shorter at the ends."""
     total, row = _summed(values), np.arange(len(values))
     low, high = np.maximum(row - width // 2, 0), np.minimum(row + width - width // 2, len(values))

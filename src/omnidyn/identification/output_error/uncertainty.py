@@ -37,11 +37,11 @@ TAIL = 0.975
 class Trust:
     """Covariance of the parameters in the numbers that the solver sees, and what is behind it.
 
-    covariance (P, P): infinite variances where the data are blind. held: at a bound. blind: not determined by the
-    data, alone or only together. free_step (P,): from a bound to where the fit would go without it. kind: white or
-    sandwich. widening: largest ratio of the sandwich's std to the plain one. quantile: standard errors in half a 95 %
-    interval. degrees: of freedom behind it. neighbours (columns,): correlation of successive residuals.
-    directions: blind or weak ones, each parameter -> its share.
+    covariance (P, P): infinite variances where the data are blind. held: at a bound. blind: not determined by the data,
+    alone or only together with others. free_step (P,): from a bound to where the fit would go without it. kind: white
+    or sandwich. widening: largest ratio of the sandwich's std to the plain one. quantile: standard errors in half a
+    95 % interval. degrees: of freedom behind it. neighbours (columns,): correlation of successive residuals.
+    directions: blind or weak ones: (eigenvalue, relative change of each parameter).
     """
 
     covariance: FloatArray
@@ -66,7 +66,8 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     weighting = Weighting(solution.state.variance, solver.nu, FINAL, max(LEAST_BLOCK, -(-rows // BLOCKS)))
     sums = solver.engine.sums(solution.state.point, weighting)
     normal = Normal(solver, State(solution.state.point, sums, solution.state.objective, solution.state.variance))
-    seen, directions = _seen(normal.information, normal.held)
+    relative = _relative(solver, solution)
+    seen, directions = _seen(normal.information, normal.held, relative)
     plain = _inverse(normal.information, seen)
     influence = normal.scores() @ plain  # what each block moves each parameter by
     coloured, neighbours = _coloured(solver, sums)
@@ -117,8 +118,16 @@ def _degrees(influence: FloatArray, seen: BoolArray) -> float:
     return float(np.clip((3.0 * second**2 / fourth).min(), 3.0, len(influence) - 1))
 
 
-def _seen(information: FloatArray, held: BoolArray) -> tuple[BoolArray, tuple[tuple[float, FloatArray], ...]]:
-    """Which parameters the data determine, and the directions that they hardly do, in scaled parameters."""
+def _relative(solver: Solver, solution: Solution) -> FloatArray:
+    """What a relative change of 1 is in the numbers that the solver sees. Shape (P,)."""
+    pairs = zip(solver.problem.parameters, solution.state.point.values, strict=True)
+    return np.array([1.0 if p.log else abs(float(value)) or 1.0 for p, value in pairs])
+
+
+def _seen(
+    information: FloatArray, held: BoolArray, relative: FloatArray
+) -> tuple[BoolArray, tuple[tuple[float, FloatArray], ...]]:
+    """Which parameters the data determine, and the directions that they hardly do, in relative changes, largest 1."""
     diagonal = np.diag(information)
     seen = diagonal > 0.0
     chosen = np.flatnonzero(seen & ~held)
@@ -129,11 +138,11 @@ def _seen(information: FloatArray, held: BoolArray) -> tuple[BoolArray, tuple[tu
         for value, vector in zip(values, vectors.T, strict=True):
             if value < WEAK:
                 way = np.zeros(len(diagonal))
-                way[chosen] = vector / size
+                way[chosen] = vector / size / relative[chosen]
                 way /= np.abs(way).max()
                 directions.append((float(value), way))
                 if value < BLIND:
-                    seen[chosen[np.abs(way[chosen]) > SHARE]] = False
+                    seen[np.abs(way) > SHARE] = False
     return seen, tuple(directions)
 
 

@@ -1,0 +1,163 @@
+"""From the minimum to the answer: values, intervals, and what a reader must know, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InsufficientDataError
+from omnidyn.identification.estimate import Correlation, identified
+from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
+from omnidyn.identification.output_error.nuisances import LATENCY
+from omnidyn.identification.output_error.problem import Problem
+from omnidyn.identification.output_error.record import Record
+from omnidyn.identification.output_error.solver import Solution, Solver
+from omnidyn.identification.output_error.uncertainty import BLIND, SHARE, Trust
+from omnidyn.model.robot import Robot
+
+FloatArray = NDArray[np.float64]
+
+
+def conclude(
+    solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], loss: str, more: Sequence[str],
+    lower_bound: Mapping[str, float],
+) -> OutputErrorEstimate:  # fmt: skip
+    """The Estimate of a solution. loss: of the fit, in words; more: warnings to join; lower_bound: for the Estimate.
+
+    Raises InsufficientDataError where the logs say nothing about any of the robot's numbers.
+    """
+    problem, values = solver.problem, solution.state.point.values.copy()
+    blind = tuple(p.name for p, b in zip(problem.parameters, known.blind, strict=True) if b)
+    own = problem.robot_count
+    if known.blind[:own].all():
+        raise InsufficientDataError(
+            "the logs say nothing about what is free", got=", ".join(p.name for p in problem.parameters[:own]),
+            expected="motion", remedy="drive the robot faster than its dead zone", where=records[0].source,
+        )  # fmt: skip
+    std, ci95 = intervals(problem, values, known)
+    data = _data(records)
+    names = [p.name for p in problem.parameters]
+    fitted = problem.parameters[:own]
+    warnings = [*_warnings(solver, solution, known, records, blind), *more]
+    return OutputErrorEstimate(
+        robot=_robot(problem, values, std, blind, data),
+        value={p.name: float(v) for p, v in zip(fitted, values, strict=False)},
+        std={name: std[name] for name in names[:own]},
+        ci95={name: ci95[name] for name in names[:own]},
+        correlation=_correlation(names, known),
+        degrees_of_freedom={name: known.degrees for name in names[:own]},
+        at_bound=tuple(name for name, held in zip(names[:own], known.held, strict=False) if held),
+        warnings=tuple(warnings),
+        method=f"output error, maximum likelihood, {loss}, {known.kind} covariance",
+        lower_bound=dict(lower_bound),
+        data=data,
+        nuisances={
+            name: Nuisance(float(values[own + j]), std[name], ci95[name], _unit(name))
+            for j, name in enumerate(names[own:])
+        },
+        noise={_column(c): float(s) for c, s in zip(problem.columns, np.sqrt(solution.state.variance), strict=True)},
+        unidentifiable=blind,
+        blind=tuple(_direction(problem, value, way) for value, way in known.directions),
+        covariance=known.kind,
+        iterations=solution.iterations,
+        converged=solution.converged,
+    )
+
+
+def intervals(
+    problem: Problem, values: FloatArray, known: Trust
+) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Standard errors and 95 % intervals, on the scale on which the solver works; at a bound as for a friction line.
+
+    At a bound: from the bound to what the free fit would reach, or to what it would reach from the bound.
+    """
+    std: dict[str, float] = {}
+    ci95: dict[str, tuple[float, float]] = {}
+    for j, p in enumerate(problem.parameters):
+        value, own = float(values[j]), float(known.std[j])
+        std[p.name] = own * p.slope(value)
+        half, inner = known.quantile * own, p.inner(value) if value > 0.0 or not p.log else -math.inf
+        if not math.isfinite(own):
+            ci95[p.name] = (p.low, math.inf)
+            continue
+        low, high = inner - half, inner + half
+        if known.held[j]:
+            pushed = float(known.free_step[j])
+            below = value <= p.low
+            low = inner if below else inner + min(-half, pushed - half)
+            high = inner + max(half, pushed + half) if below else inner
+        low = max(low, p.inner(p.low)) if not p.log else low
+        ci95[p.name] = (p.outer(low), p.outer(high))
+    return std, ci95
+
+
+def _robot(problem: Problem, values: FloatArray, std: Mapping[str, float], blind: Sequence[str], data: str) -> Robot:
+    """The robot with the fitted numbers, and where they come from."""
+    robot, priors = problem.robot, dict(problem.robot.priors)
+    for p, value in zip(problem.parameters[: problem.robot_count], values, strict=False):
+        if p.name in blind:
+            continue
+        robot = p.on(robot, float(value))
+        whole = p.name.partition("[")[0]
+        if whole != p.name and whole in priors:  # what was known of a list goes to its items
+            inherited = priors.pop(whole)
+            priors.update({f"{whole}[{i}]": inherited for i in range(3)})
+        for key, factor in ((p.name, 1.0), *p.also):
+            priors[key] = identified(std[p.name] * factor, f"output error, {data}")
+    axes = robot.friction.axes
+    if axes.breakaway is not None:
+        axes = axes.model_copy(
+            update={"breakaway": tuple(max(s, c) for s, c in zip(axes.breakaway, axes.coulomb, strict=True))}
+        )
+        robot = robot.model_copy(update={"friction": robot.friction.model_copy(update={"axes": axes})})
+    return robot.replace(priors=priors)
+
+
+def _correlation(names: Sequence[str], known: Trust) -> Correlation:
+    finite = np.isfinite(np.diag(known.covariance))
+    size = np.where(finite & (known.std > 0.0), known.std, 1.0)
+    matrix = np.where(np.outer(finite, finite), known.covariance, 0.0) / np.outer(size, size)
+    np.fill_diagonal(matrix, 1.0)
+    return Correlation(tuple(names), matrix)
+
+
+def _warnings(
+    solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], blind: Sequence[str]
+) -> list[str]:
+    words = list(dict.fromkeys(f"{r.source or 'log'}: {note}" for r in records for note in r.notes))
+    if not solution.converged:
+        words.append(f"the fit was cut short after {solution.iterations} iterations: the numbers are of its last step")
+    words += [f"{name} is not identifiable from these logs" for name in blind]
+    for j, p in enumerate(solver.problem.parameters):
+        if known.held[j]:
+            words.append(f"{p.name} is at its bound {solution.state.point.values[j]:.4g}: the best fit lies beyond it")
+    if known.kind == "sandwich":
+        words.append(
+            f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
+            f"intervals allow for it, up to {max(known.widening, 1.0):.2g} times as wide as for white noise"
+        )
+    return words
+
+
+def _direction(problem: Problem, value: float, way: FloatArray) -> str:
+    """A direction of the parameters in words: how many percent each moves where one moves by 1 %."""
+    parts = [f"{p.name} {share:+.2g} %" for p, share in zip(problem.parameters, way, strict=True) if abs(share) > SHARE]
+    change = "leaves the outputs as they are" if value < BLIND else "hardly changes the outputs"
+    return f"{' with '.join(parts)} {change}"
+
+
+def _column(column: tuple[str, int]) -> str:
+    return f"{column[0]}[{column[1]}]"
+
+
+def _unit(name: str) -> str:
+    return {LATENCY: "s", "dead_band": "V"}.get(name.partition(".")[0], "")
+
+
+def _data(records: Sequence[Record]) -> str:
+    rows = sum(last - first + 1 for r in records for first, last in r.pieces)
+    first = records[0].source or "unnamed"
+    return f"{first}, {rows} rows" if len(records) == 1 else f"{first} and {len(records) - 1} more logs, {rows} rows"
