@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from omnidyn.identification.output_error.primitives import primitives
 from omnidyn.identification.output_error.record import Record
-from omnidyn.identification.output_error.starts import centred_mean, difference_noise, measured_twist, window_rows
+from omnidyn.identification.output_error.starts import count_far, difference_noise, measured_twist, window_rows
 from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.robot import Robot
 
@@ -39,16 +39,11 @@ def motion(records: Sequence[Record], robot: Robot) -> Motion:
             wrench = record.voltage[first:last] @ drive.T * mass
             held = np.maximum(held, np.abs(wrench).max(axis=0))
             for axis in range(3):
-                moved[axis] |= _moved(record.t[first : last + 1], twist[first : last + 1, axis])
+                moved[axis] |= _moved(record.t, twist, axis, first, last)
     return Motion(moved, held)
 
 
-def _moved(t: FloatArray, v: FloatArray) -> bool:
-    known = np.isfinite(v)
-    if known.sum() < 3:
-        return False
-    t, v = t[known], v[known]
-    rows = max(window_rows(t) // 2, 1)
-    noise = difference_noise(v)
-    far = np.abs(centred_mean(v, rows)) > CLEAR * noise / np.sqrt(rows)
-    return int(far.sum()) >= rows
+def _moved(t: FloatArray, twist: FloatArray, axis: int, first: int, last: int) -> bool:
+    rows = max(window_rows(t[first : last + 1]) // 2, 1)
+    noise = difference_noise(twist[first : last + 1, axis])
+    return int(count_far(twist, axis, first, last, rows, CLEAR * noise / np.sqrt(rows))) >= rows

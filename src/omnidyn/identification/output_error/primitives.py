@@ -106,17 +106,12 @@ class Mapping:
         """Derivatives by the six levels of the axes, from one probe: B moves the rate of its axis, C its coulomb."""
         base = self._base if robot is self.robot else primitives(robot)
         slopes = [np.zeros((*part.shape, len(self.parameters))) for part in base.parts]
-        probe = robot
-        for key in FRICTION:
-            probe = Parameter(key, 0.0, 0.0, 0.0).on(probe, 1.0 + _level(robot, key))
-        more = primitives(probe)
+        viscous, coulomb, _ = robot.friction.axes.levels
+        levels = {"viscous": tuple(viscous + 1.0), "coulomb": tuple(coulomb + 1.0), "breakaway": None}
+        friction = robot.friction.model_copy(update={"axes": robot.friction.axes.model_copy(update=levels)})
+        more = primitives(robot.model_copy(update={"friction": friction}))
         for j, p in enumerate(self.parameters):
             if p.name in FRICTION:
                 kind, axis = divmod(FRICTION.index(p.name), 3)
                 slopes[kind][axis, j] = (more.rate - base.rate, more.coulomb - base.coulomb)[kind][axis]
         return Primitives(*slopes)
-
-
-def _level(robot: Robot, key: str) -> float:
-    kind, axis = divmod(FRICTION.index(key), 3)
-    return float(robot.friction.axes.levels[kind][axis])

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.compiled import kernel, part
 from omnidyn.identification.output_error.primitives import Mapping
 from omnidyn.identification.output_error.record import Record
 from omnidyn.model.robot import Robot
@@ -25,7 +26,8 @@ WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
 CLEAR = 4.0  # standard errors of the noise that a speed must be away from 0
 LEAST_WINDOWS = 8
-ENOUGH = 200_000  # rows of a log that are looked at
+ENOUGH = 200_000  # rows of a piece that are looked at
+SAMPLE = 1500  # rows for a median
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,46 +91,21 @@ def _windows(record: Record, twist: FloatArray, drive: FloatArray, axis: int) ->
     designs, changes, most = [np.zeros((0, 3))], [np.zeros(0)], 0.0
     for first, last in record.pieces:
         last = min(last, first + ENOUGH)
-        t, v = record.t[first : last + 1], twist[first : last + 1, axis]
-        g = record.voltage[first:last] @ drive
-        part = _of_piece(t, v, g)
-        if part is not None:
-            designs.append(part.design)
-            changes.append(part.change)
-            most = max(most, part.most)
+        rows = window_rows(record.t[first : last + 1])
+        if last - first < 2 * rows or np.isfinite(twist[first : last + 1, axis]).sum() < 2 * LEAST_ROWS:
+            continue
+        noise = difference_noise(twist[first : last + 1, axis])
+        clear = CLEAR * noise / np.sqrt(max(rows // 2, 1))
+        design, change, own = window_sums(record.t, record.voltage, twist, axis, first, last, drive, rows, clear)
+        designs.append(design)
+        changes.append(change)
+        most = max(most, own)
     return Windows(np.concatenate(designs), np.concatenate(changes), most)
-
-
-def _of_piece(t: FloatArray, v: FloatArray, g: FloatArray) -> Windows | None:
-    known = np.isfinite(v)
-    if known.sum() < 2 * LEAST_ROWS:
-        return None
-    v = v if known.all() else np.interp(t, t[known], v[known])
-    dt = np.diff(t)
-    rows = window_rows(t)
-    if len(t) < 2 * rows:
-        return None
-    smooth = centred_mean(v, max(rows // 2, 1))
-    noise = difference_noise(v)
-    side = np.where(np.abs(smooth) > CLEAR * noise / np.sqrt(max(rows // 2, 1)), np.sign(smooth), 0.0)
-    sums = np.zeros((4, len(t)))
-    sums[0, 1:], sums[1, 1:] = np.cumsum(g * dt), np.cumsum(0.5 * (v[1:] + v[:-1]) * dt)
-    sums[2, 1:] = np.cumsum(0.5 * (side[1:] + side[:-1]) * dt)
-    sums[3] = v
-    total = _summed(sums)
-    begin = np.arange(0, len(t) - rows, max(rows // 2, 1))
-    stop = begin + rows
-    change = total[:, stop] - total[:, stop - EDGE] - total[:, begin + EDGE] + total[:, begin]
-    change /= EDGE
-    forward, backward = (_summed((side == way).astype(float)) for way in (1.0, -1.0))
-    moving = (forward[stop] - forward[begin] == rows) | (backward[stop] - backward[begin] == rows)
-    most = float(np.abs(g[side[:-1] != 0.0]).max(initial=0.0))
-    return Windows(change[:3, moving].T, change[3, moving], most)
 
 
 def window_rows(t: FloatArray) -> int:
     """Rows of a window."""
-    return max(LEAST_ROWS, round(WINDOW / float(np.median(np.diff(t)))))
+    return max(LEAST_ROWS, round(WINDOW / float(np.median(np.diff(t[: SAMPLE + 1])))))
 
 
 def difference_noise(v: FloatArray) -> float:
@@ -137,19 +114,70 @@ def difference_noise(v: FloatArray) -> float:
     Their median is 0.954 sigma; where most are 0, the signal is quantised, and half of its step is taken.
     """
     size = np.abs(np.diff(v))
-    middle = float(np.median(size)) / 0.954
+    size = size[:: max(len(size) // SAMPLE, 1)]
+    size = size[np.isfinite(size)]
+    middle = float(np.median(size)) / 0.954 if size.size else 0.0
     return middle if middle > 0.0 else 0.5 * float(size[size > 0.0].min(initial=np.inf)) if size.any() else 0.0
 
 
-def _summed(values: FloatArray) -> FloatArray:
-    """Running sums along the last axis, from 0."""
-    total = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
-    np.cumsum(values, axis=-1, out=total[..., 1:])
-    return total
+@part
+def smoothed(y, axis, first, last, width):
+    """(values, missing ones held; their centred mean over `width` rows, shorter at the ends) of rows first..last."""
+    count = last - first + 1
+    v, total, mean = np.empty(count), np.zeros(count + 1), np.empty(count)
+    known = 0.0
+    for k in range(count):
+        if y[first + k, axis] == y[first + k, axis]:
+            known = y[first + k, axis]
+        v[k] = known
+        total[k + 1] = total[k] + known
+    for k in range(count):
+        low, high = max(k - width // 2, 0), min(k + width - width // 2, count)
+        mean[k] = (total[high] - total[low]) / (high - low)
+    return v, mean
 
 
-def centred_mean(values: FloatArray, width: int) -> FloatArray:
-    """Centred mean over `width` rows; shorter at the ends."""
-    total, row = _summed(values), np.arange(len(values))
-    low, high = np.maximum(row - width // 2, 0), np.minimum(row + width - width // 2, len(values))
-    return (total[high] - total[low]) / (high - low)
+@kernel
+def count_far(y, axis, first, last, width, limit):
+    """Rows first..last of column `axis` whose mean over `width` rows is beyond `limit`."""
+    _, mean = smoothed(y, axis, first, last, width)
+    return (np.abs(mean) > limit).sum()
+
+
+@kernel
+def window_sums(t, u, y, axis, first, last, drive, rows, clear):
+    """(design (n, 3), change (n,), largest |g| in motion) of windows of `rows` rows, each half over the next."""
+    v, mean = smoothed(y, axis, first, last, max(rows // 2, 1))
+    count, most = last - first + 1, 0.0
+    side, total = np.empty(count), np.zeros((4, count + 1))
+    sums, same = np.zeros(3), np.ones(count, np.int64)
+    for k in range(count):
+        side[k] = 0.0 if abs(mean[k]) <= clear else (1.0 if mean[k] > 0.0 else -1.0)
+        if k > 0:
+            same[k] = same[k - 1] + 1 if side[k] == side[k - 1] else 1
+            dt, g = t[first + k] - t[first + k - 1], 0.0
+            for w in range(len(drive)):
+                g += drive[w] * u[first + k - 1, w]
+            if side[k - 1] != 0.0:
+                most = max(most, abs(g))
+            sums[0] += g * dt
+            sums[1] += 0.5 * (v[k] + v[k - 1]) * dt
+            sums[2] += 0.5 * (side[k] + side[k - 1]) * dt
+        for i in range(3):
+            total[i, k + 1] = total[i, k] + sums[i]
+        total[3, k + 1] = total[3, k] + v[k]
+    step = max(rows // 2, 1)
+    size = max((count - rows) // step + 1, 0)
+    design, change, used = np.empty((size, 3)), np.empty(size), 0
+    for begin in range(0, count - rows + 1, step):
+        stop = begin + rows
+        if side[stop - 1] == 0.0 or same[stop - 1] < rows:
+            continue
+        for i in range(4):
+            ends = total[i, stop] - total[i, stop - EDGE] - total[i, begin + EDGE] + total[i, begin]
+            if i < 3:
+                design[used, i] = ends / EDGE
+            else:
+                change[used] = ends / EDGE
+        used += 1
+    return design[:used], change[:used], most
