@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
+from omnidyn.identification.output_error.breakaway import Breakaway
 from omnidyn.identification.output_error.nuisances import LATENCY
 from omnidyn.identification.output_error.problem import Problem
 from omnidyn.identification.output_error.record import Record
@@ -23,9 +25,10 @@ FloatArray = NDArray[np.float64]
 
 def conclude(
     solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], loss: str, more: Sequence[str],
-    lower_bound: Mapping[str, float],
+    lower_bound: Mapping[str, float], levels: Sequence[Breakaway] = (),
 ) -> OutputErrorEstimate:  # fmt: skip
-    """The Estimate of a solution. loss: of the fit, in words; more: warnings to join; lower_bound: for the Estimate.
+    """The Estimate of a solution. loss: of the fit, in words; more: warnings to join; lower_bound: for the Estimate;
+    levels: of breakaway that were asked for.
 
     Raises InsufficientDataError where the logs say nothing about any of the robot's numbers.
     """
@@ -39,16 +42,18 @@ def conclude(
         )  # fmt: skip
     std, ci95 = intervals(problem, values, known)
     data = _data(records)
+    own_levels = _levels(levels, ci95)
     names = [p.name for p in problem.parameters]
     fitted = problem.parameters[:own]
     warnings = [*_warnings(solver, solution, known, records, blind), *more]
     return OutputErrorEstimate(
-        robot=_robot(problem, values, std, blind, data),
-        value={p.name: float(v) for p, v in zip(fitted, values, strict=False)},
-        std={name: std[name] for name in names[:own]},
-        ci95={name: ci95[name] for name in names[:own]},
+        robot=_with_levels(_robot(problem, values, std, blind, data), own_levels),
+        value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
+        | {k: v for k, (v, _) in own_levels.items()},
+        std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
+        ci95={name: ci95[name] for name in names[:own]} | {k: i for k, (_, i) in own_levels.items()},
         correlation=_correlation(names, known),
-        degrees_of_freedom={name: known.degrees for name in names[:own]},
+        degrees_of_freedom={name: known.degrees for name in (*names[:own], *own_levels)},
         at_bound=tuple(name for name, held in zip(names[:own], known.held, strict=False) if held),
         warnings=tuple(warnings),
         method=f"output error, maximum likelihood, {loss}, {known.kind} covariance",
@@ -109,11 +114,45 @@ def _robot(problem: Problem, values: FloatArray, std: Mapping[str, float], blind
             priors[key] = identified(std[p.name] * factor, f"output error, {data}")
     axes = robot.friction.axes
     if axes.breakaway is not None:
-        axes = axes.model_copy(
-            update={"breakaway": tuple(max(s, c) for s, c in zip(axes.breakaway, axes.coulomb, strict=True))}
-        )
-        robot = robot.model_copy(update={"friction": robot.friction.model_copy(update={"axes": axes})})
+        robot = _breaking_at(robot, [max(s, c) for s, c in zip(axes.breakaway, axes.coulomb, strict=True)])
     return robot.replace(priors=priors)
+
+
+def _breaking_at(robot: Robot, levels: Sequence[float]) -> Robot:
+    axes = robot.friction.axes.model_copy(update={"breakaway": tuple(levels)})
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"axes": axes})})
+
+
+def _levels(
+    found: Sequence[Breakaway], ci95: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, tuple[float, float]]]:
+    """Key -> (level, interval) of breakaway. Where it may be coulomb itself, it is as uncertain as coulomb is."""
+    levels = {}
+    for one in found:
+        coulomb = ci95.get(f"friction.axes.coulomb[{one.axis}]", (one.low, one.low))
+        low = coulomb[0] if one.tied else one.low
+        high = max(one.high, coulomb[1]) if one.tied else one.high
+        levels[f"friction.axes.breakaway[{one.axis}]"] = (one.value, (low, high))
+    return levels
+
+
+def _spread(interval: tuple[float, float]) -> float:
+    """The std that a normal number with this 95 % interval has."""
+    return (interval[1] - interval[0]) / (2.0 * float(ndtri(0.975)))
+
+
+def _with_levels(robot: Robot, levels: Mapping[str, tuple[float, tuple[float, float]]]) -> Robot:
+    """The robot with the levels of breakaway; the other axes keep theirs, which is coulomb where they had none."""
+    if not levels:
+        return robot
+    hold, coulomb = robot.friction.axes.levels[2].copy(), robot.friction.axes.coulomb
+    priors = dict(robot.priors)
+    for axis in range(3):
+        key = f"friction.axes.breakaway[{axis}]"
+        if key in levels:
+            hold[axis] = max(levels[key][0], coulomb[axis])
+            priors[key] = identified(_spread(levels[key][1]), "output error, profile over the drives of the log")
+    return _breaking_at(robot, hold.tolist()).replace(priors=priors)
 
 
 def _correlation(names: Sequence[str], known: Trust) -> Correlation:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ from omnidyn.identification.output_error.axis_kernel import (
 from omnidyn.identification.output_error.kernel import FINAL, KEEP, Loss, Physics, Slopes, Sums, march
 from omnidyn.identification.output_error.primitives import Mapping, Primitives
 from omnidyn.identification.output_error.problem import Column, Piece, PieceSums, Point, Problem
+from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.layout import AXES
 
 FloatArray = NDArray[np.float64]
@@ -54,6 +56,28 @@ class ExactEngine:
         margins = any(piece.margin.any() for piece in problem.pieces)
         friction = self.mapping.linear and problem.robot_count == len(problem.parameters)
         self._axes_only = fast and twists and friction and not margins
+
+    def with_breakaway(self, breakaway: FloatArray) -> ExactEngine:
+        """The same engine with other fixed levels of breakaway, shape (3,) [N, N, N m], NaN where S follows coulomb."""
+        engine = copy.copy(self)
+        engine.mapping = copy.copy(self.mapping)
+        engine.mapping.breakaway = breakaway
+        return engine
+
+    def drives(self, point: Point) -> list[FloatArray]:
+        """Drive of the axes [N, N, N m] in every row of every piece but the last, shape (rows, 3)."""
+        robot = self.mapping.robot_at(point.values[: self.problem.robot_count])
+        matrix = self.mapping.at(point.values[: self.problem.robot_count])[0].drive * mass_matrix(robot)[:, None]
+        gain, dead, fade = (
+            point.values[k] if (k := self.problem.where(name)) >= 0 else plain
+            for name, plain in ((GAIN, 1.0), (DEAD, 0.0), (FADE, 0.0))
+        )
+        found = []
+        for piece in self.problem.pieces:
+            u, t = piece.record.voltage[piece.first : piece.last], piece.record.t[piece.first : piece.last]
+            left = gain * (1.0 - fade * (t - piece.record.t[0]) / piece.record.span)
+            found.append((left[:, None] * np.sign(u) * np.maximum(np.abs(u) - dead, 0.0)) @ matrix.T)
+        return found
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the march over every piece adds up."""
@@ -108,21 +132,22 @@ class ExactEngine:
         columns, count = piece.record.columns, len(self.problem.parameters)
         known = np.array([self._columns.index(column) for column in columns])
         total = count + AXES + len(columns)
-        physics, slopes, groups = self._numbers(piece, values, now, by, -(-total // VECTOR) * VECTOR)
+        used = np.concatenate([np.arange(count), count + np.flatnonzero(piece.free)])  # the kernel knows no others
+        physics, slopes, groups = self._numbers(piece, values, now, by, -(-len(used) // VECTOR) * VECTOR)
         loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode)
         sums = _empty(
-            len(columns), slopes.law.shape[2], total, len(piece.record.t), weighting.mode, _blocks(piece, weighting)
+            len(columns), slopes.law.shape[2], len(used), len(piece.record.t), weighting.mode, _blocks(piece, weighting)
         )
         march(
             piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
             float(piece.record.t[0]), piece.record.span, piece.margin, state[:AXES], state[AXES:], groups,
             physics, slopes, loss, sums,
         )  # fmt: skip
-        tight = PieceSums(
-            known, sums.number, sums.square, sums.loss, sums.lag, sums.grad[:, :total], sums.info[:, :total, :total],
-            sums.score[:, :total], sums.drift,
-        )  # fmt: skip
-        return tight, (sums.predicted, sums.slopes)
+        grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
+        info = np.zeros((len(columns), total, total))
+        info[:, used[:, None], used] = sums.info[:, : len(used), : len(used)]
+        tight = PieceSums(known, sums.number, sums.square, sums.loss, sums.lag, grad, info, score, sums.drift)
+        return tight, (sums.predicted, _at(used, sums.slopes, total))
 
     def _numbers(
         self, piece: Piece, values: FloatArray, now: Primitives, by: Primitives, padded: int
@@ -145,7 +170,7 @@ class ExactEngine:
             np.array([values[k] if k >= 0 else 0.0 for k in late]),
             np.array([values[k] if k >= 0 else fixed[i] for i, k in enumerate(driver)]),
         )  # fmt: skip
-        state = np.where(piece.free, np.arange(count, count + AXES + width), -1)
+        state = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
         derivatives = Slopes(
             wide(np.stack([by.rate, by.coulomb])), wide(by.drive), wide(slopes[0]), wide(slopes[2]),
             not self.mapping.linear, np.array(late), np.array(driver), state[:AXES], state[AXES:],
@@ -166,6 +191,13 @@ def _maps(columns: Sequence[Column], now: Primitives, more: tuple[int, ...] = ()
         elif not more:  # the twist and the heading themselves
             (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
     return [speed, travel, volts]
+
+
+def _at(used: NDArray[np.int64], values: FloatArray, total: int) -> FloatArray:
+    """Values of the kernel's parameters among all, 0 for the rest. Shape (*batch, total)."""
+    wide = np.zeros((*values.shape[:-1], total))
+    wide[..., used] = values[..., : len(used)]
+    return wide
 
 
 def _wheel_of(columns: Sequence[Column]) -> NDArray[np.int64]:

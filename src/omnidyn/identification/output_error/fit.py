@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import unit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.output_error.breakaway import find_breakaway
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.exact_engine import ExactEngine
-from omnidyn.identification.output_error.motion import motion
+from omnidyn.identification.output_error.motion import Motion, motion
 from omnidyn.identification.output_error.nuisances import AUTO, LATENCY, nuisance_parameters, pieces
 from omnidyn.identification.output_error.parameters import FRICTION, robot_parameters
 from omnidyn.identification.output_error.problem import Point, Problem
@@ -32,6 +33,8 @@ FloatArray = NDArray[np.float64]
 
 GAUSS, STUDENT = "gaussian", "student-t"
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
+MANY = 100_000  # rows to which a long log is first fitted
+BREAKAWAY = "friction.axes.breakaway"
 IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
 
 
@@ -67,8 +70,8 @@ def fit_output_error(
 
     runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
     free: keys of the robot file, such as "body.mass_kg"; by default B and C of the three axes. fixed: keys taken out.
-    The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb where the robot has
-    none of its own.
+    The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, or stays as
+    the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval.
     nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade".
     start: "rest", "free", or "auto": at rest where that shows.
     use_priors: a std in the robot file counts as a Gaussian prior of what is free, and what has one is free too. Off by
@@ -87,13 +90,18 @@ def fit_output_error(
         None if outputs is None else tuple(outputs), loss, covariance,
     )  # fmt: skip
     records = _records([runs] if isinstance(runs, Run) else list(runs), robot, given)
-    robot, given, still = _without_still_axes(records, robot, given)
+    motion_of = motion(records, robot)
+    robot, given, still = _without_still_axes(motion_of, records[0].source, robot, given)
     problem = make_problem(records, robot, given)
     solver = Solver(problem, ExactEngine(problem), NU if loss == STUDENT else 0.0)
-    solution = solver.minimise(first_point(solver, records), watch=watch)
+    solution, levels = solver.minimise(first_point(solver, records), watch=watch), []
+    axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in (free or ()) and motion_of.moved[axis]]
+    if axes:
+        solver, solution, levels = find_breakaway(solver, solution, axes)
     words = "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
     known = trust(solver, solution, covariance)
-    return conclude(solver, solution, known, records, words, [w for _, _, w in still], {k: b for k, b, _ in still})
+    more, bounds = [words for _, _, words in still], {key: bound for key, bound, _ in still}
+    return conclude(solver, solution, known, records, words, more, bounds, levels)
 
 
 def _records(runs: list[Run], robot: Robot, given: Options) -> list[Record]:
@@ -117,14 +125,13 @@ def _records(runs: list[Run], robot: Robot, given: Options) -> list[Record]:
 
 
 def _without_still_axes(
-    records: Sequence[Record], robot: Robot, given: Options
+    found: Motion, source: str, robot: Robot, given: Options
 ) -> tuple[Robot, Options, list[tuple[str, float, str]]]:
     """Take the friction of axes that never visibly moved out of the fit: (robot, options, (key, bound, words) each).
 
     Such an axis has held what drove it: the robot gets at least that level there. Raises InsufficientDataError where
     no axis moved.
     """
-    found = motion(records, robot)
     still: list[tuple[str, float, str]] = []
     fixed = set(given.fixed)
     for axis in np.flatnonzero(~found.moved):
@@ -139,7 +146,7 @@ def _without_still_axes(
         raise InsufficientDataError(
             "the robot never visibly moved: its friction is only bounded from below",
             got="; ".join(f"{AXES[axis]} held {held:.3g}" for axis, held in enumerate(found.held)),
-            expected="motion", remedy="drive it beyond its dead zone", where=records[0].source,
+            expected="motion", remedy="drive it beyond its dead zone", where=source,
         )  # fmt: skip
     if not still:
         return robot, given, still
@@ -156,7 +163,7 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     unknown = [key for key in given.fixed if key not in keys]
     if unknown and given.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
-    keys = [key for key in keys if key not in given.fixed]
+    keys = [key for key in keys if key not in given.fixed and not key.startswith(BREAKAWAY)]
     if not keys:
         raise InputError("nothing is free", got="no key", expected="at least one", where="free")
     own = robot_parameters(robot, keys, priors)
@@ -180,12 +187,15 @@ def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
 
 
 def first_point(solver: Solver, records: Sequence[Record]) -> Point:
-    """The best of: the robot as it is, the integral form; axis by axis where the axes do not share parameters."""
+    """The better one of the robot as it is and the integral form; for long logs, the fit to their first part."""
     problem, engine = solver.problem, solver.engine
     own = problem.start()
     count = problem.robot_count
     found = integral_start(engine.mapping, own.values[:count], records)
     values = own.values.copy()
     values[:count] = friction_values(engine.mapping, own.values[:count], found)
-    states = [solver.state(own), solver.state(Point(values, own.states))]
-    return min(states, key=lambda state: state.objective).point
+    short = problem.shortened(MANY)
+    trial = solver if short is problem else Solver(short, ExactEngine(short))
+    states = [trial.state(own), trial.state(Point(values, own.states))]
+    best = min(states, key=lambda state: state.objective).point
+    return best if trial is solver else trial.minimise(best).state.point

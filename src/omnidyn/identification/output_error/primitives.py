@@ -8,13 +8,13 @@ numbers, and the whole fit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.identification.output_error.parameters import FRICTION, Parameter
-from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.dynamics import mass_matrix, settled_currents
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
@@ -52,7 +52,7 @@ def primitives(robot: Robot) -> Primitives:
     system, count = state_space(robot), robot.wheels.count
     rate, coulomb, hold = axis_levels(robot, system)
     return Primitives(
-        rate, coulomb, np.maximum(hold, coulomb), system.B,
+        rate, coulomb, hold, system.B,
         wheel_speed(robot.wheels, np.eye(3)).T,
         settled_currents(robot, np.eye(3), np.zeros(count)).T,
         np.diag(settled_currents(robot, np.zeros(3), np.eye(count))).copy(),
@@ -60,15 +60,20 @@ def primitives(robot: Robot) -> Primitives:
 
 
 class Mapping:
-    """From the free parameters of a robot to its primitives and their derivatives."""
+    """From the free parameters of a robot to its primitives and their derivatives.
 
-    def __init__(self, robot: Robot, parameters: Sequence[Parameter]):
+    breakaway (3,): levels S that stay [N, N, N m]; NaN where S follows coulomb. By default as the robot file has it.
+    """
+
+    def __init__(self, robot: Robot, parameters: Sequence[Parameter], breakaway: FloatArray | None = None):
         self.robot, self.parameters = robot, tuple(parameters)
+        own = robot.friction.axes.breakaway
+        self.breakaway = np.full(3, np.nan) if own is None else np.array(own)
+        self.breakaway = self.breakaway if breakaway is None else breakaway
         self.linear = all(p.name in FRICTION for p in parameters)
         self._start = np.array([parameter(robot, p.name) for p in parameters])
         self._base = primitives(robot)
         self._probe = self._friction_slopes()
-        self._tied = robot.friction.axes.breakaway is None
 
     def robot_at(self, values: FloatArray) -> Robot:
         """The robot with these values, not checked."""
@@ -83,8 +88,7 @@ class Mapping:
             moved = values - self._start
             parts = [part + slope @ moved for part, slope in zip(self._base.parts, self._probe.parts, strict=True)]
             now = Primitives(*parts)
-            hold = now.coulomb if self._tied else np.maximum(self._base.hold, now.coulomb)
-            return Primitives(now.rate, now.coulomb, hold, *parts[3:]), self._probe
+            return self._held(now, self.robot), self._probe
         robot = self.robot_at(values)
         slopes = [np.zeros((*part.shape, len(values))) for part in self._base.parts]
         fast = self._friction_at(robot)
@@ -97,7 +101,11 @@ class Mapping:
             up, down = (primitives(p.on(robot, float(value) + side * step)) for side in (1.0, -1.0))
             for slope, a, b in zip(slopes, up.parts, down.parts, strict=True):
                 slope[..., j] = (a - b) / (2.0 * step)
-        return primitives(robot), Primitives(*slopes)
+        return self._held(primitives(robot), robot), Primitives(*slopes)
+
+    def _held(self, now: Primitives, robot: Robot) -> Primitives:
+        """With the breakaway of this mapping; never below coulomb."""
+        return replace(now, hold=np.fmax(now.coulomb, self.breakaway / mass_matrix(robot)))
 
     def _friction_slopes(self) -> Primitives:
         return self._friction_at(self.robot)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,18 @@ class Problem:
     def where(self, name: str) -> int:
         """Index of a parameter by its name, -1 where it is not free."""
         return self.names.index(name) if name in self.names else -1
+
+    def shortened(self, rows: int) -> Problem:
+        """The same problem on the first `rows` rows of all pieces together, each cut by the same share."""
+        total = sum(piece.last - piece.first + 1 for piece in self.pieces)
+        if total <= rows:
+            return self
+        share = rows / total
+        pieces = [
+            replace(piece, last=max(piece.first + int((piece.last - piece.first) * share), piece.first + 1))
+            for piece in self.pieces
+        ]
+        return replace(self, pieces=tuple(pieces))
 
     def start(self) -> Point:
         """Where the fit starts."""

@@ -19,8 +19,8 @@ from omnidyn.identification.output_error.problem import PieceSums, Point, Proble
 FloatArray = NDArray[np.float64]
 
 MAX_ITERATIONS = 60
-CLOSE = 1e-6  # squared distance to the best point, in standard errors, at which it ends
-DAMPING, LEAST_DAMPING = 1e-4, 1e-10
+CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
+DAMPING, LEAST_DAMPING, FIRM = 1e-4, 1e-10, 1e-2  # FIRM: least after a step that failed
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
 
@@ -85,7 +85,7 @@ class Solver:
             while not better and normal.distance / (1.0 + damping) > CLOSE:
                 trial = self.state(normal.moved(damping), now.variance if self.nu else None)
                 better = trial.objective < now.objective
-                damping = max(damping / 10.0, LEAST_DAMPING) if better else damping * 10.0
+                damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
                 now = trial if better else now
             if self.nu:
                 now, change = self._rescaled(now)
