@@ -101,6 +101,15 @@ def test_a_shape_can_be_asked_for(call):
     assert [*result["groups"]["all"]["parameters"]] == ["friction.axes.coulomb[0]", "friction.axes.coulomb[1]"]
 
 
+def test_the_paper_s_line_on_each_axis(call, tmp_path):
+    """A disc seen through the paper's eyes: lines on x and y, which a group each gets, and a robot with axes only."""
+    out_file = tmp_path / "line.toml"
+    code, out, _ = call("smooth", "rough", "--robot", "axebot", "--shape", "line", "-o", str(out_file))
+    assert code == 0
+    assert out.count("eqs (15)-(17)") == 2
+    assert load_robot(tmp_path / "line-smooth.toml").friction.only_axes
+
+
 def test_unsigned_currents_get_their_sign_when_told(call, floors, tmp_path):
     for k in range(12):
         from omnidyn.logs.run_file import read_run

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
 
 STEADY_STATE = "steady-state"
-FRICTION, MOTORS = "friction", "motors"
+FRICTION, MOTORS, LINE = "friction", "motors", "line"
 
 
 def identify(
@@ -28,7 +28,9 @@ def identify(
     robot: str = typer.Option("", metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
     method: str = typer.Option(STEADY_STATE, help="How: steady-state is the paper's, eqs (15)-(17)."),
     what: str = typer.Option(FRICTION, help="friction, or motors: the line of each motor, wheels off the ground."),
-    shape: str = typer.Option("auto", help="box, disc, ellipse, wheel, wheels, disc+wheel, ... or auto: the best."),
+    shape: str = typer.Option(
+        "auto", help="box, disc, ellipse, wheel, wheels, disc+wheel, ...; auto: the best; line: per axis, the paper."
+    ),
     speed: str = typer.Option("wheel", help="Which speed friction is a function of: wheel, set or ground."),
     force_from: str = typer.Option("", help="current or voltage; default: current where all logs have it."),
     input_: str = typer.Option("", "--input", help="Of the motors: voltage, duty or current; default: the first."),
@@ -73,6 +75,9 @@ def identify(
             drives = _drives(loaded, loaded_robot, input_, speed, window)
             now("writing")
             _tell_drives(drives, record, report, out, force, json)
+        elif shape == LINE:
+            assert loaded_robot is not None
+            _tell_lines(_lines(loaded, loaded_robot, speed, force_from, window), record, report, out, force, json)
         else:
             assert loaded_robot is not None
             study = _study(loaded, loaded_robot, shape, speed, force_from, window)
@@ -125,6 +130,14 @@ def _study(loaded: Loaded, robot: Robot, shape: str, speed: str, force_from: str
     )  # fmt: skip
 
 
+def _lines(loaded: Loaded, robot: Robot, speed: str, force_from: str, window: str) -> dict[str, Estimate]:
+    from omnidyn.identification.steady_lines import identify_lines
+
+    return identify_lines(
+        loaded.runs, robot, groups=loaded.groups, speed=speed, force_from=force_from, window=_shares(window)
+    )
+
+
 def _drives(loaded: Loaded, robot: Robot | None, kind: str, speed: str, window: str) -> DriveStudy:
     from omnidyn.identification.drive_line import fit_drive_lines
 
@@ -159,6 +172,28 @@ def _tell_study(study: SteadyStudy, record: dict[str, Any], report: str, out: st
     else:
         show(study_summary(study).rstrip("\n"))
     _say_written([*files.values(), report])
+
+
+def _tell_lines(
+    lines: dict[str, Estimate], record: dict[str, Any], report: str, out: str, force: bool, json: bool
+) -> None:
+    from omnidyn.cli.identify_logs import outputs
+    from omnidyn.files import check_output
+    from omnidyn.model.robot_file import save_robot
+
+    files = outputs(out, list(lines))
+    for path in files.values():
+        check_output(path, force)
+    for group, path in files.items():
+        save_robot(lines[group].robot, path, force)
+    if report:
+        say("omnidyn: --shape line has no page; --report is not used")
+    if json:
+        groups = {group: estimate.to_dict() for group, estimate in lines.items()}
+        show_json({"shape": LINE, "groups": groups, "output": files or None, "provenance": record})
+    else:
+        show("\n".join(estimate.summary() for estimate in lines.values()).rstrip("\n"))
+    _say_written([*files.values()])
 
 
 def _tell_drives(drives: DriveStudy, record: dict[str, Any], report: str, out: str, force: bool, json: bool) -> None:
