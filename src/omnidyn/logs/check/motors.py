@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,8 @@ from omnidyn.logs.findings import FATAL, Finding
 
 FloatArray = NDArray[np.float64]
 
+EXACT = 0.004  # of the voltage: what less is left of it is the noise of an exact relation
+
 
 def motor_known(work: Work) -> bool:
     """Whether voltage or current is there to say which motor a speed belongs to."""
@@ -21,11 +25,15 @@ def motor_known(work: Work) -> bool:
     )
 
 
-def by_motor(work: Work) -> tuple[str, Answer] | None:
-    """(channel that is wired wrongly, how), from u = R i + K l w or, without it, from likeness."""
-    exact = _by_circuit(work)
-    if exact is not None:
-        return exact[0]
+class Circuit(NamedTuple):
+    """known: whether u = R i + K l w can be formed. wrong: (channel that is wired wrongly, how), or None."""
+
+    known: bool
+    wrong: tuple[str, Answer] | None = None
+
+
+def by_drive(work: Work) -> tuple[str, Answer] | None:
+    """(channel that is wired wrongly, how), from the likeness of voltage or duty and speed."""
     for channel in ("voltage", "duty"):
         if work.full(channel) is not None:
             answer = by_likeness(work, channel)
@@ -33,19 +41,18 @@ def by_motor(work: Work) -> tuple[str, Answer] | None:
     return None
 
 
-def _by_circuit(work: Work) -> tuple[tuple[str, Answer] | None] | None:
-    """The same from u - R i - K l w, which is 0 for the right wiring; None where it cannot be had."""
+def by_circuit(work: Work) -> Circuit:
+    """What u - R i - K l w says, which is 0 for the right wiring."""
     voltage, current, speed = volts(work), work.full("current"), work.full("wheel_speed")
     robot = work.geometry
     if voltage is None or current is None or speed is None or robot is None or work.log.current_unsigned:
-        return None
+        return Circuit(False)
     lost, counter = ohmic(work, current), emf(work, speed)
     assert lost is not None
     assert counter is not None
     u, r, e = means(work, voltage, lost, counter)
     if len(u) < 8:
-        return None
-    # Scales of file and log may differ: each pair may have its own, from the data as logged or as tried.
+        return Circuit(False)
     tried = list(wirings(u.shape[1]))
     total = float((u**2).sum())
     names = ("duty" if work.get("voltage") is None else "voltage", "current", "wheel_speed")
@@ -55,10 +62,10 @@ def _by_circuit(work: Work) -> tuple[tuple[str, Answer] | None] | None:
         m = changed.T @ fixed
         size = float((changed**2).sum() + (fixed**2).sum())
         costs = np.array([size - 2.0 * float((wiring.matrix * m.T).sum()) for wiring in tried])
-        answer = choose(tried, costs, total)
+        answer = choose(tried, costs, total, poor=EXACT)
         if answer is not None and (best is None or answer.left < best[1].left):
             best = (name, answer)
-    return (best,)
+    return Circuit(True, best)
 
 
 def by_likeness(work: Work, channel: str) -> Answer | None:

@@ -316,6 +316,13 @@ def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
             continue
         off = slopes[k].value / float(np.mean(others))
         name = components("wheel_speed", work.wheels)[k]
+        if off < 0.0:
+            found.append(Finding(
+                "inverted", FATAL, name, f"{name} has the opposite sign of what {source} says, while the other wheels "
+                "agree with it", "put the column right in the mapping (--column)", (), 0,
+                {"ratio": off, "error": slopes[k].error},
+            ))  # fmt: skip
+            continue
         found.append(Finding(
             "wheel_scale", WARN, name, f"{name} reads {off:.4g} times what {source} says, measured by the other wheels",
             "that wheel has another radius, gear or counter; give it its own in the mapping or the robot file", (), 0,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from omnidyn.logs.check.floor import axes_finding, by_floor, mended_axes, wheels_finding
 from omnidyn.logs.check.frame import check_frame
-from omnidyn.logs.check.motors import by_likeness, by_motor, motor_finding, motor_known
+from omnidyn.logs.check.motors import by_circuit, by_drive, by_likeness, motor_finding, motor_known
 from omnidyn.logs.check.wirings import Wiring
 from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import Finding
@@ -27,24 +27,27 @@ def check_wiring(work: Work) -> tuple[list[Finding], Work]:
     """Findings on order and sign of the columns of motors and axes; the work with them put right."""
     if len(work) < MIN_ROWS or work.wheels < 1:
         return [], work
+    found: list[Finding] = []
+    circuit = by_circuit(work)  # of each motor for itself: it names the column, so it comes first
+    if circuit.wrong is not None:
+        found.append(motor_finding(work, *circuit.wrong))
+        work = _mended(work, (circuit.wrong[0],), circuit.wrong[1].best)
     floor = by_floor(work)
-    found, turned = check_frame(work, floor[1].left if floor is not None else 1.0)
-    if found:
-        work, floor = turned, by_floor(turned)
-    motor = by_motor(work)
+    framed, turned = check_frame(work, floor[1].left if floor is not None else 1.0)
+    if framed:
+        found, work, floor = found + framed, turned, by_floor(turned)
+    likeness = None if circuit.known else by_drive(work)
     if floor is not None and floor[0] == "axes":
         found.append(axes_finding(work, floor[1]))
         work = mended_axes(work, floor[1].best)
     elif floor is not None:
-        blamed = "wheel_speed" if motor is not None or not motor_known(work) else "motors"
-        found.append(wheels_finding(work, floor[1], blamed))
-        channels = MOTOR if blamed == "motors" else ("wheel_speed", "wheel_angle")
-        work = _mended(work, channels, floor[1].best)
-        motor = by_motor(work)
-    if motor is not None:
-        channel, answer = motor
-        found.append(motor_finding(work, channel, answer))
-        work = _mended(work, (channel,), answer.best)
+        whole = circuit.known or (motor_known(work) and likeness is None)
+        found.append(wheels_finding(work, floor[1], "motors" if whole else "wheel_speed"))
+        work = _mended(work, MOTOR if whole else ("wheel_speed", "wheel_angle"), floor[1].best)
+        likeness = None if circuit.known else by_drive(work)
+    if likeness is not None:
+        found.append(motor_finding(work, *likeness))
+        work = _mended(work, (likeness[0],), likeness[1].best)
     command = by_likeness(work, "wheel_speed_command")
     if command is not None:
         found.append(motor_finding(work, "wheel_speed_command", command))

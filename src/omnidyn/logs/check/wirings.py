@@ -89,10 +89,12 @@ def wirings(n: int) -> Iterator[Wiring]:
     return (Wiring(order, tuple(sign)) for order in orders for sign in signs)
 
 
-def choose(tried: list[Wiring], costs: FloatArray, total: float, better: float = BETTER) -> Answer | None:
+def choose(
+    tried: list[Wiring], costs: FloatArray, total: float, better: float = BETTER, poor: float = POOR
+) -> Answer | None:
     """The wiring that the costs call for; None where that of the log, the first, is not clearly wrong."""
     logged, least = float(costs[0]), float(costs.min())
-    if not np.isfinite(logged) or total <= 0.0 or logged < POOR * total or least > better * logged:
+    if not np.isfinite(logged) or total <= 0.0 or logged < poor * total or least > better * logged:
         return None
     alike = [k for k in np.flatnonzero(costs <= least + ALIKE * (logged - least))]
     alike.sort(key=lambda k: (tried[k].changes, costs[k]))
