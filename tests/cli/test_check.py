@@ -89,7 +89,7 @@ def test_a_folder_is_its_logs_in_brief_with_a_summary(call, run):
     write_run(run, "again.csv")
     code, out, _ = call(".", "--robot", "axebot")
     assert code == 4
-    assert "again.csv: fit for use" in out
+    assert "again.csv: nothing to heed" in out
     assert "swapped.csv: FATAL swapped w1 w2" in out
     assert "4 logs, 4 read:" in out
     assert "swapped: in 1 log" in out

@@ -179,6 +179,20 @@ def test_noise_steps_and_spikes_of_the_wheel_speed(data):
     assert verdict.of("no_supply")
 
 
+def test_the_last_row_has_no_duty(data):
+    verdict = udea(data / "udea_three_omni" / "motor_tests" / "stage1_1.txt")
+    assert [finding.rows for finding in verdict.of("last_row")] == [((1201, 1201),)]
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_the_camera_shoots_up_to_17_rad_per_s(data, number):
+    path = data / "udea_three_omni" / "video_trajectories" / f"traj_vid_{number}.csv"
+    verdict = check(load_log(path), UDEA)
+    (burst,) = [finding for finding in verdict.of("burst") if finding.where == "omega"]
+    assert 16.0 < abs(burst.numbers["farthest"]) < 19.0
+    assert not verdict.fatal
+
+
 def test_a_heading_that_was_not_recorded(data):
     # In stage 1 the wheels turn at up to 45 % while alpha stays within 0.02 rad; in exp5 it is 0 from t = 10.2 s on.
     for path in ("motor_tests/stage1_1.txt", "motor_tests/stage1_2.txt", "sensor_data/exp5.txt"):

@@ -222,7 +222,7 @@ def _brief(verdict: Verdict) -> str:
         if codes:
             word = level.upper() if level == "fatal" else level
             parts.append(f"{coloured(word, COLOURS[level])} {', '.join(codes)}")
-    return f"{verdict.source}: {'; '.join(parts) or 'fit for use'}"
+    return f"{verdict.source}: {'; '.join(parts) or 'nothing to heed'}"
 
 
 def _gravest_first(group: tuple[tuple[str, str], list[Any]]) -> tuple[int, int]:

@@ -16,6 +16,7 @@ from omnidyn.logs.check.excitation import check_excitation, joined, judge
 from omnidyn.logs.check.lag import check_lag
 from omnidyn.logs.check.limits import check_limits
 from omnidyn.logs.check.motion import check_motion
+from omnidyn.logs.check.oddities import check_oddities
 from omnidyn.logs.check.scale import check_dead_wheels, check_scale
 from omnidyn.logs.check.slip import check_slip
 from omnidyn.logs.check.time_base import begin, between
@@ -31,7 +32,7 @@ __all__ = ["check", "check_blocks"]
 Family = Callable[[Work], tuple[list[Finding], Work]]
 FAMILIES: tuple[Family, ...] = (
     check_values, check_limits, check_wiring, check_dead_wheels, check_slip, check_scale, check_lag, check_energy,
-    check_motion, check_excitation,
+    check_motion, check_oddities, check_excitation,
 )  # fmt: skip
 
 # What only a whole log can show: dropped unless every block shows it.
