@@ -17,7 +17,7 @@ from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.motion import Motion, motion
 from omnidyn.identification.output_error.nuisances import AUTO, LATENCY, nuisance_parameters, pieces
 from omnidyn.identification.output_error.parameters import FRICTION, robot_parameters
-from omnidyn.identification.output_error.problem import Point, Problem
+from omnidyn.identification.output_error.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.record import Record, record
 from omnidyn.identification.output_error.solver import Solver, State
 from omnidyn.identification.output_error.starts import friction_values, integral_start
@@ -34,6 +34,7 @@ FloatArray = NDArray[np.float64]
 GAUSS, STUDENT = "gaussian", "student-t"
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 MANY = 100_000  # rows to which a long log is first fitted
+LATENCIES = 500  # steps for their median
 BREAKAWAY = "friction.axes.breakaway"
 IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
 
@@ -197,5 +198,32 @@ def first_point(solver: Solver, records: Sequence[Record]) -> Point:
     short = problem.shortened(MANY)
     trial = solver if short is problem else Solver(short, ExactEngine(short))
     states = [trial.state(own), trial.state(Point(values, own.states))]
-    best = min(states, key=lambda state: state.objective).point
+    best = _with_latencies(trial, min(states, key=lambda state: state.objective).point)
     return best if trial is solver else trial.minimise(best).state.point
+
+
+def _with_latencies(solver: Solver, point: Point) -> Point:
+    """The point with the best of a few latencies for each channel.
+
+    A current follows the voltage at once, so that its likelihood jumps where a latency passes a row: no descent crosses
+    that. What a channel shows depends on its own latency only, so that one march tries a latency for all of them.
+    """
+    problem = solver.problem
+    own = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
+    if not own:
+        return point
+    row = float(np.median(np.diff(problem.pieces[0].record.t[: 2 * LATENCIES + 1])))
+    tried = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
+    costs = []
+    for late in tried:
+        values = point.values.copy()
+        values[own] = late
+        state = solver.state(Point(values, point.states), np.ones(len(problem.columns)) if solver.nu else None)
+        square = per_column(state.sums, len(problem.columns), "square")
+        number = np.maximum(per_column(state.sums, len(problem.columns), "number"), 1.0)
+        costs.append(np.log(np.maximum(square / number, solver.floor)))
+    values = point.values.copy()
+    for j in own:
+        mine = [k for k, (channel, _) in enumerate(problem.columns) if f"{LATENCY}.{channel}" == problem.names[j]]
+        values[j] = tried[int(np.argmin([cost[mine].sum() for cost in costs]))]
+    return Point(values, point.states)

@@ -20,6 +20,7 @@ FloatArray = NDArray[np.float64]
 
 MAX_ITERATIONS = 60
 CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
+ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
 DAMPING, LEAST_DAMPING, FIRM = 1e-4, 1e-10, 1e-2  # FIRM: least after a step that failed
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
@@ -82,7 +83,7 @@ class Solver:
         for iteration in range(limit):
             normal = Normal(self, now)
             held, better = normal.held, False
-            while not better and normal.distance / (1.0 + damping) > CLOSE:
+            while not better and normal.distance / (1.0 + damping) > (CLOSE if damping < FIRM else ENOUGH):
                 trial = self.state(normal.moved(damping), now.variance if self.nu else None)
                 better = trial.objective < now.objective
                 damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
