@@ -26,9 +26,10 @@ FloatArray = NDArray[np.float64]
 def conclude(
     solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], loss: str, more: Sequence[str],
     lower_bound: Mapping[str, float], levels: Sequence[Breakaway] = (),
+    better: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None,
 ) -> OutputErrorEstimate:  # fmt: skip
     """The Estimate of a solution. loss: of the fit, in words; more: warnings to join; lower_bound: for the Estimate;
-    levels: of breakaway that were asked for.
+    levels: of breakaway that were asked for; better: name -> (std, interval) that replace those of the covariance.
 
     Raises InsufficientDataError where the logs say nothing about any of the robot's numbers.
     """
@@ -41,6 +42,8 @@ def conclude(
             expected="motion", remedy="drive the robot faster than its dead zone", where=records[0].source,
         )  # fmt: skip
     std, ci95 = intervals(problem, values, known)
+    for name, (spread, interval) in (better or {}).items():
+        std[name], ci95[name] = std[name] if spread is None else spread, interval
     data = _data(records)
     own_levels = _levels(levels, ci95)
     names = [p.name for p in problem.parameters]

@@ -57,6 +57,12 @@ class ExactEngine:
         friction = self.mapping.linear and problem.robot_count == len(problem.parameters)
         self._axes_only = fast and twists and friction and not margins
 
+    def on(self, problem: Problem) -> ExactEngine:
+        """The same engine on other pieces of the same logs, with the same parameters."""
+        engine = copy.copy(self)
+        engine.problem = problem
+        return engine
+
     def with_breakaway(self, breakaway: FloatArray) -> ExactEngine:
         """The same engine with other fixed levels of breakaway, shape (3,) [N, N, N m], NaN where S follows coulomb."""
         engine = copy.copy(self)

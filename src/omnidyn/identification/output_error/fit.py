@@ -19,9 +19,11 @@ from omnidyn.identification.output_error.nuisances import AUTO, LATENCY, nuisanc
 from omnidyn.identification.output_error.parameters import FRICTION, robot_parameters
 from omnidyn.identification.output_error.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.record import Record, record
-from omnidyn.identification.output_error.solver import Solver, State
+from omnidyn.identification.output_error.resampling import bootstrap as resample
+from omnidyn.identification.output_error.resampling import profile_interval
+from omnidyn.identification.output_error.solver import Solution, Solver, State
 from omnidyn.identification.output_error.starts import friction_values, integral_start
-from omnidyn.identification.output_error.uncertainty import trust
+from omnidyn.identification.output_error.uncertainty import Trust, trust
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -65,6 +67,8 @@ def fit_output_error(
     outputs: Sequence[str] | None = None,
     loss: str = GAUSS,
     covariance: str = AUTO,
+    profile: Sequence[str] = (),
+    bootstrap: int = 0,
     watch: Callable[[State], None] | None = None,
 ) -> OutputErrorEstimate:
     """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
@@ -80,6 +84,8 @@ def fit_output_error(
     are never used.
     outputs: of "twist", "wheel_speed", "current", "heading"; by default all that the log has.
     loss: "gaussian", or "student-t" for logs with outliers. covariance: "white", "sandwich", or "auto".
+    profile: names whose interval comes from the profile of the likelihood instead. bootstrap: draws of whole runs from
+    which the std and intervals of all come instead; deterministic.
     watch: is called with every better state on the way.
 
     Returns an Estimate with nuisances, noise and what is not identifiable. Raises InputError for options and logs that
@@ -102,7 +108,28 @@ def fit_output_error(
     words = "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
     known = trust(solver, solution, covariance)
     more, bounds = [words for _, _, words in still], {key: bound for key, bound, _ in still}
-    return conclude(solver, solution, known, records, words, more, bounds, levels)
+    better = _resampled(solver, solution, known, tuple(profile), bootstrap)
+    return conclude(solver, solution, known, records, words, more, bounds, levels, better)
+
+
+def _resampled(
+    solver: Solver, solution: Solution, known: Trust, profile: tuple[str, ...], draws: int
+) -> dict[str, tuple[float | None, tuple[float, float]]]:
+    """Name -> (std or None, interval) where a profile or a bootstrap was asked for."""
+    names = solver.problem.names
+    unknown = [name for name in profile if name not in names]
+    if unknown:
+        raise InputError("not a free number", got=unknown[0], expected=", ".join(names), where="profile")
+    found: dict[str, tuple[float | None, tuple[float, float]]] = {}
+    if draws:
+        values = resample(solver, solution, draws)
+        ends = np.quantile(values, [0.025, 0.975], axis=0)
+        for j, name in enumerate(names):
+            found[name] = (float(values[:, j].std(ddof=1)), (float(ends[0, j]), float(ends[1, j])))
+    for name in profile:
+        j = names.index(name)
+        found[name] = (None, profile_interval(solver, solution, j, float(known.std[j])))
+    return found
 
 
 def _records(runs: list[Run], robot: Robot, given: Options) -> list[Record]:

@@ -1,0 +1,103 @@
+"""Intervals under colour, at bounds, from profiles and bootstrap; directions that the data do not show."""
+
+import numpy as np
+import pytest
+
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+from omnidyn.simulation.tangent import with_parameter
+from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+
+KT = "motor.torque_constant_Nm_A"
+
+
+@pytest.fixture(scope="module")
+def clean(axebot):
+    return simulate(axebot, voltages(np.random.default_rng(11)), 0.01)
+
+
+def coloured(run, seed, memory=0.9):
+    """Noise of the same size with a correlation of 0.9 from sample to sample: its slow part is 4.4 times as large."""
+    rng = np.random.default_rng(seed)
+    noise = np.zeros(run.twist.shape)
+    fresh = rng.normal(size=noise.shape) * NOISE * np.sqrt(1.0 - memory**2)
+    for k in range(1, len(noise)):
+        noise[k] = memory * noise[k - 1] + fresh[k]
+    return Run(t=run.t, voltage=run.voltage, twist=run.twist + noise)
+
+
+def test_coloured_noise_is_seen_and_the_intervals_follow(axebot, clean):
+    """25 logs, 150 intervals: with white intervals fewer than 85 % would hold the truth, the sandwich's do."""
+    held = {"auto": 0, "white": 0}
+    for seed in range(25):
+        log = coloured(clean, seed)
+        for kind in held:
+            fit = fit_output_error(log, axebot, start="rest", covariance=kind)
+            held[kind] += sum(fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in TRUTH.items())
+        assert fit_output_error(log, axebot, start="rest").covariance == "sandwich"
+    assert held["white"] < 0.85 * 150
+    assert held["auto"] >= 0.90 * 150
+
+
+def test_no_friction_stands_at_the_bound_with_an_interval_that_holds_it(axebot, clean):
+    none = axebot
+    for key in FRICTION:
+        none = with_parameter(none, key, 0.0)
+    fit = fit_output_error(noisy(simulate(none, clean.voltage[:-1], 0.01), 5), axebot, start="rest")
+    assert all(fit.ci95[key][0] <= 0.0 <= fit.ci95[key][1] for key in FRICTION)
+    assert fit.at_bound
+    for key in fit.at_bound:
+        assert fit.value[key] == 0.0
+        assert any(f"{key} is at its bound 0" in words for words in fit.warnings)
+
+
+def test_what_only_the_product_shows_is_named(axebot, clean):
+    """Torque constant times gear ratio is all that voltage and speed see of the two; from 1.5x wrong constants."""
+    start = with_parameter(with_parameter(axebot, KT, 1.5 * 0.0059), "motor.emf_constant_Vs_rad", 1.5 * 0.0059)
+    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, "motor.gear_ratio"], start="rest")
+    assert set(fit.unidentifiable) == {KT, "motor.gear_ratio"}
+    assert fit.value[KT] * fit.value["motor.gear_ratio"] == pytest.approx(0.0059 * 19.0, rel=0.01)
+    (words,) = fit.blind
+    assert "motor.gear_ratio +1 %" in words or "motor.gear_ratio -1 %" in words
+    assert "friction" not in words
+    assert np.isfinite([fit.std[key] for key in FRICTION]).all()
+
+
+def test_physical_numbers_with_currents(axebot, clean):
+    """Mass, inertia, resistance and torque constant are identifiable once currents are measured."""
+    rng, keys = np.random.default_rng(2), ("body.mass_kg", "body.inertia_kg_m2", "motor.resistance_ohm", KT)
+    log = noisy(clean, 2).replace(current=clean.current + 0.05 * rng.normal(size=clean.current.shape))
+    start = axebot
+    for key, wrong in zip((*keys, "motor.emf_constant_Vs_rad"), (2.5, 0.015, 2.6, 0.009, 0.009), strict=True):
+        start = with_parameter(start, key, wrong)
+    fit = fit_output_error(log, start, free=[*FRICTION, *keys], start="rest")
+    for key, true in zip(keys, (1.5, 0.025, 1.69, 0.0059), strict=True):
+        assert abs(fit.value[key] - true) < 4.0 * fit.std[key]
+        assert fit.std[key] < 0.005 * true
+    assert fit.robot.motor.emf_constant == pytest.approx(fit.robot.motor.torque_constant)
+
+
+def test_the_profile_agrees_where_the_likelihood_is_quadratic(axebot, clean):
+    key = FRICTION[0]
+    log = noisy(clean, 3)
+    plain = fit_output_error(log, axebot, start="rest")
+    profiled = fit_output_error(log, axebot, start="rest", profile=[key])
+    np.testing.assert_allclose(profiled.ci95[key], plain.ci95[key], atol=0.15 * plain.std[key])
+    with pytest.raises(InputError, match="not a free number; got body.mass_kg"):
+        fit_output_error(log, axebot, profile=["body.mass_kg"])
+
+
+def test_bootstrap_over_runs(axebot):
+    rng = np.random.default_rng(4)
+    runs = [noisy(simulate(axebot, voltages(rng, 10.0), 0.01), k) for k in range(12)]
+    plain = fit_output_error(runs, axebot, start="rest")
+    drawn, again = (fit_output_error(runs, axebot, start="rest", bootstrap=60) for _ in range(2))
+    assert drawn.std == again.std
+    ratio = np.array([drawn.std[key] / plain.std[key] for key in FRICTION])
+    assert (ratio > 0.5).all()
+    assert (ratio < 2.0).all()
+    with pytest.raises(InsufficientDataError, match="too few runs for a bootstrap; got 1; expected 5"):
+        fit_output_error(runs[0], axebot, bootstrap=10)
