@@ -86,7 +86,7 @@ def test_the_profile_agrees_where_the_likelihood_is_quadratic(axebot, clean):
     plain = fit_output_error(log, axebot, start="rest")
     profiled = fit_output_error(log, axebot, start="rest", profile=[key])
     np.testing.assert_allclose(profiled.ci95[key], plain.ci95[key], atol=0.15 * plain.std[key])
-    with pytest.raises(InputError, match="not a free number; got body.mass_kg"):
+    with pytest.raises(InputError, match=r"not a free number; got body\.mass_kg"):
         fit_output_error(log, axebot, profile=["body.mass_kg"])
 
 
