@@ -104,7 +104,7 @@ def _cost(matrix: FloatArray, moments: Moments, scaled: bool) -> float:
         return size
     if along <= 0.0 or size <= 0.0:
         return float(np.trace(vv))
-    return float(np.trace(vv)) - along**2 / size
+    return float(np.trace(vv)) - along * (along / size)
 
 
 def _by_axes(rows: FloatArray, moments: Moments, axes: list[int], total: float) -> Answer | None:

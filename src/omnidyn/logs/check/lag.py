@@ -124,7 +124,7 @@ def lag(work: Work, y: FloatArray, x: FloatArray) -> Slope | None:
     for by in range(-FARTHEST, FARTHEST + 1):
         shifted = moved(x, by)
         size, along = float((shifted**2).sum()), float((target * shifted).sum())
-        left = float((target**2).sum()) - along**2 / size if size > 0.0 and along > 0.0 else np.inf
+        left = float((target**2).sum()) - along * (along / size) if size > 0.0 and along > 0.0 else np.inf
         at[by] = left
         if left < least:
             best, least = by, left

@@ -50,7 +50,12 @@ def own_derivatives(work: Work) -> list[Finding]:
     for name, against, rate, speed, units in _pairs(work):
         ids, count = work.windows()
         line = slope(rate, speed, ids, count)
-        if not line.differs(1.0, 0.03, 6.0) or line.windows < 4 or _likeness(rate, speed, ids, count) < 0.95:
+        if (
+            line.value == 0.0
+            or not line.differs(1.0, 0.03, 6.0)
+            or line.windows < 4
+            or _likeness(rate, speed, ids, count) < 0.95
+        ):
             continue
         # rate = line * speed: speed is 1/line too large, or the time is.
         unit, clock = unit_of(1.0 / line.value, units), unit_of(1.0 / line.value, TIME_UNITS)

@@ -108,7 +108,9 @@ def _speeds(work: Work) -> tuple[list[Finding], Work]:
     gear = float(np.mean(robot.motor.gear_ratio))
     units = {**TURN_UNITS, "the motor's speed read as the wheel's": gear,
              "the motor's rpm read as the wheel's rad/s": gear * 60.0 / TURN}  # fmt: skip
-    unit = unit_of(1.0 / factor.value, units) if abs(np.log(abs(factor.value) + 1e-12)) > 0.5 else ""
+    if not factor.value > 0.0:
+        return [], work  # a current that says the motors run backward: its wiring or sign was named before
+    unit = unit_of(1.0 / factor.value, units) if abs(np.log(factor.value)) > 0.5 else ""
     names = " ".join(components("wheel_speed", work.wheels))
     if unit and (electric is None or floor is None or abs(np.log(max(electric.value, 1e-9) / factor.value)) < 0.5):
         speed = work.channels["wheel_speed"]
@@ -149,7 +151,7 @@ def _joined(lines: list[Slope]) -> Slope | None:
     lines = [line for line in lines if np.isfinite(line.error) and line.error > 0.0 and line.windows >= 4]
     if not lines:
         return None
-    weight = np.array([1.0 / max(line.error, 1e-4) ** 2 for line in lines])
+    weight = np.array([1.0 / (max(line.error, 1e-4) * max(line.error, 1e-4)) for line in lines])
     value = float(np.dot(weight, [line.value for line in lines]) / weight.sum())
     return Slope(value, float(weight.sum() ** -0.5), min(line.windows for line in lines))
 
@@ -202,7 +204,7 @@ def _yaw_only(yaw: Slope) -> Finding:
         f"the robot turns {yaw.value:.4g} times (+-{yaw.error:.2g}) as fast as its wheels say, while it drives "
         "as far as "
         "they say: the robot radius of the file is not that of the robot, or the gyro has a wrong scale",
-        f"try a robot radius {1.0 / yaw.value:.4g} times as large", (), 0, {"ratio": yaw.value, "error": yaw.error},
+        f"try a robot radius {1.0 / max(yaw.value, 1e-9):.4g} times as large", (), 0, {"ratio": yaw.value, "error": yaw.error},
     )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], Work]:
     rows = rows[~again]
     t = log.t[rows]
     steps = np.diff(t)
-    step = float(np.median(steps)) if steps.size else 0.0
+    step = float(np.clip(np.median(steps), 1e-9, 1e9)) if steps.size else 0.0
     pieces = tuple(segments(t)) if len(t) else ()
     chosen = log.rows(rows)
     # As in a Run: what is recorded on change is filled in, latencies that are known are taken out.
