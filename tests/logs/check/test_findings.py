@@ -1,6 +1,7 @@
 """Findings and verdicts as values: JSON, text, spans, merging."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -45,6 +46,34 @@ def test_merging_joins_what_touches_and_counts_all():
     assert both.rows == ((2, 12), (40, 41))
     assert (both.count, both.level) == (13, "fatal")
     assert both.message == "second (so in 2 of 7 blocks of the log)"
+
+
+def mutilated(log, rng):
+    """A log with channels lost, zeroed, scaled, rounded, frozen or turned about, and times that do anything."""
+    first = int(rng.integers(0, len(log) - 1))
+    log = log.rows(np.arange(first, min(len(log), first + int(rng.choice([1, 2, 10, 41, 100, 700])))))
+    channels, t = {}, log.t.copy()
+    for name, values in log.channels.items():
+        spoil = [
+            lambda v: v, lambda v: v * 0.0, lambda v: v * np.nan, lambda v: v * rng.choice([1e-6, 1e3, -1.0, 1e150]),
+            np.abs, np.round, lambda v: v[:, ::-1], lambda v: np.where(rng.random(v.shape) < 0.5, np.nan, v),
+            lambda v: np.repeat(v[:1], len(v), axis=0), lambda v: v, lambda v: v,
+        ][rng.integers(11)]  # fmt: skip
+        channels[name] = spoil(values)
+    k = rng.integers(8)
+    t = [t * 1e3, t * 0.0, rng.permutation(t), np.where(rng.random(len(t)) < 0.3, np.nan, t), np.round(t, 1), t, t, t][
+        k
+    ]
+    return replace(log, t=t, channels=channels, current_unsigned=bool(rng.random() < 0.2))
+
+
+def test_no_mutilated_log_makes_it_raise(log, robot):
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        broken = mutilated(log, rng)
+        verdict = check(broken, robot if rng.random() < 0.8 else None)
+        json.dumps(verdict.to_dict(), allow_nan=False)
+        assert verdict.as_text().isascii()
 
 
 ROBOT = load_robot("axebot")

@@ -204,7 +204,8 @@ def _yaw_only(yaw: Slope) -> Finding:
         f"the robot turns {yaw.value:.4g} times (+-{yaw.error:.2g}) as fast as its wheels say, while it drives "
         "as far as "
         "they say: the robot radius of the file is not that of the robot, or the gyro has a wrong scale",
-        f"try a robot radius {1.0 / max(yaw.value, 1e-9):.4g} times as large", (), 0, {"ratio": yaw.value, "error": yaw.error},
+        f"try a robot radius {1.0 / max(yaw.value, 1e-9):.4g} times as large", (), 0,
+        {"ratio": yaw.value, "error": yaw.error},
     )  # fmt: skip
 
 
