@@ -1,15 +1,19 @@
 """Logs as they come: gaps, several runs, missing rows, duty and supply, latency, outliers; and what is refused."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+
+fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
 
 @pytest.fixture(scope="module")
@@ -229,3 +233,17 @@ def test_logs_that_cannot_be_used(axebot, four_wheel, clean):
         fit_output_error(log.replace(voltage=log.voltage * 0.01, twist=still), axebot)
     with pytest.raises(InsufficientDataError, match="no stretch of the log has inputs throughout"):
         fit_output_error(log.replace(voltage=np.full(log.voltage.shape, np.nan)), axebot)
+
+
+def test_nuisances_by_default_are_those_that_a_log_supports(axebot, clean):
+    """Latency and dead band are fitted where the log tells them; a gain of 0.96 is not, but is asked for in words."""
+    log = noisy(clean, 20)
+    fit = whole.fit_output_error(log, axebot)
+    assert set(fit.nuisances) == {"latency.twist", "dead_band"}
+    assert holds(fit)
+    assert not fit.warnings
+    wrong = whole.fit_output_error(log.replace(voltage=log.voltage / 0.96), axebot)
+    (words,) = [words for words in wrong.warnings if '"gain"' in words]
+    assert float(words.split("gain = ")[1].split()[0]) == pytest.approx(0.96, abs=0.02)
+    again = whole.fit_output_error(log.replace(voltage=log.voltage / 0.96), axebot, nuisances=["latency", "gain"])
+    assert holds(again)

@@ -1,15 +1,19 @@
 """Intervals under colour, at bounds, from profiles and bootstrap; directions that the data do not show."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.tangent import with_parameter
 from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+
+fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
 KT = "motor.torque_constant_Nm_A"
 

@@ -173,7 +173,7 @@ def _warnings(
     if not solution.converged:
         words.append(f"the fit was cut short after {solution.iterations} iterations: the numbers are of its last step")
     words += [f"{name} is not identifiable from these logs" for name in blind]
-    for j, p in enumerate(solver.problem.parameters):
+    for j, p in enumerate(solver.problem.parameters[: solver.problem.robot_count]):
         if known.held[j]:
             words.append(f"{p.name} is at its bound {solution.state.point.values[j]:.4g}: the best fit lies beyond it")
     if known.kind == "sandwich":

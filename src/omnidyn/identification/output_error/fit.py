@@ -11,11 +11,18 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import unit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.breakaway import find_breakaway
+from omnidyn.identification.output_error.breakaway import Breakaway, find_breakaway
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.motion import Motion, motion
-from omnidyn.identification.output_error.nuisances import AUTO, LATENCY, nuisance_parameters, pieces
+from omnidyn.identification.output_error.nuisances import (
+    AUTO,
+    LATENCY,
+    NUISANCES,
+    automatic,
+    nuisance_parameters,
+    pieces,
+)
 from omnidyn.identification.output_error.parameters import FRICTION, robot_parameters
 from omnidyn.identification.output_error.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.record import Record, record
@@ -23,6 +30,7 @@ from omnidyn.identification.output_error.resampling import bootstrap as resample
 from omnidyn.identification.output_error.resampling import profile_interval
 from omnidyn.identification.output_error.solver import Solution, Solver, State
 from omnidyn.identification.output_error.starts import friction_values, integral_start
+from omnidyn.identification.output_error.support import supported, wanted
 from omnidyn.identification.output_error.uncertainty import Trust, trust
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.motor import DYNAMIC
@@ -37,6 +45,7 @@ GAUSS, STUDENT = "gaussian", "student-t"
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 MANY = 100_000  # rows to which a long log is first fitted
 LATENCIES = 500  # steps for their median
+NOTHING = 1e-9  # [N, N m] a drive that is only rounding
 BREAKAWAY = "friction.axes.breakaway"
 IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
 
@@ -47,7 +56,7 @@ class Options:
 
     free: tuple[str, ...] | None = None
     fixed: tuple[str, ...] = ()
-    nuisances: tuple[str, ...] = ()
+    nuisances: tuple[str, ...] | None = ()  # None: those that the logs support
     start: str = AUTO
     use_priors: bool = False
     outputs: tuple[str, ...] | None = None
@@ -61,7 +70,7 @@ def fit_output_error(
     *,
     free: Sequence[str] | None = None,
     fixed: Sequence[str] = (),
-    nuisances: Sequence[str] = (),
+    nuisances: str | Sequence[str] = AUTO,
     start: str = AUTO,
     use_priors: bool = False,
     outputs: Sequence[str] | None = None,
@@ -77,7 +86,9 @@ def fit_output_error(
     free: keys of the robot file, such as "body.mass_kg"; by default B and C of the three axes. fixed: keys taken out.
     The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, or stays as
     the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval.
-    nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade".
+    nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade". By default
+    latency and dead band, and the gain where the supply is only nominal, as far as the logs determine them; a warning
+    says what else would fit the logs better. () for none.
     start: "rest", "free", or "auto": at rest where that shows.
     use_priors: a std in the robot file counts as a Gaussian prior of what is free, and what has one is free too. Off by
     default: a std that an earlier fit wrote from the same log would count the log twice; such ones ("identified: ...")
@@ -93,21 +104,24 @@ def fit_output_error(
     engine.
     """
     given = Options(
-        None if free is None else tuple(free), tuple(fixed), tuple(nuisances), start, use_priors,
+        None if free is None else tuple(free), tuple(fixed), _names(nuisances), start, use_priors,
         None if outputs is None else tuple(outputs), loss, covariance,
     )  # fmt: skip
     records = _records([runs] if isinstance(runs, Run) else list(runs), robot, given)
     motion_of = motion(records, robot)
     robot, given, still = _without_still_axes(motion_of, records[0].source, robot, given)
-    problem = make_problem(records, robot, given)
-    solver = Solver(problem, ExactEngine(problem), NU if loss == STUDENT else 0.0)
-    solution, levels = solver.minimise(first_point(solver, records), watch=watch), []
+    solver, solution = _solve(records, robot, given, watch)
+    solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
+    levels: list[Breakaway] = []
     axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in (free or ()) and motion_of.moved[axis]]
     if axes:
         solver, solution, levels = find_breakaway(solver, solution, axes)
     words = "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
     known = trust(solver, solution, covariance)
-    more, bounds = [words for _, _, words in still], {key: bound for key, bound, _ in still}
+    more, bounds = (
+        [*(words for _, _, words in still), *hints],
+        {key: bound for key, bound, _ in still if bound > NOTHING},
+    )
     better = _resampled(solver, solution, known, tuple(profile), bootstrap)
     return conclude(solver, solution, known, records, words, more, bounds, levels, better)
 
@@ -130,6 +144,35 @@ def _resampled(
         j = names.index(name)
         found[name] = (None, profile_interval(solver, solution, j, float(known.std[j])))
     return found
+
+
+def _names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:
+    if nuisances == AUTO:
+        return None
+    return (nuisances,) if isinstance(nuisances, str) else tuple(nuisances)
+
+
+def _solve(
+    records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None
+) -> tuple[Solver, Solution]:
+    problem = make_problem(records, robot, given)
+    solver = Solver(problem, ExactEngine(problem), NU if given.loss == STUDENT else 0.0)
+    return solver, solver.minimise(first_point(solver, records), watch=watch)
+
+
+def _settled(
+    records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None, solver: Solver,
+    solution: Solution,
+) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
+    """Where the nuisances are automatic: without those that the logs do not support; and what they ask for beside."""
+    if given.nuisances is not None:
+        return solver, solution, given, []
+    kept = supported(solver, solution, automatic(records))
+    given = replace(given, nuisances=kept)
+    if set(kept) != set(automatic(records)):
+        solver, solution = _solve(records, robot, given, watch)
+    wider = make_problem(records, robot, replace(given, nuisances=tuple(dict.fromkeys((*kept, *NUISANCES)))))
+    return solver, solution, given, wanted(solver, solution, Solver(wider, ExactEngine(wider), solver.nu))
 
 
 def _records(runs: list[Run], robot: Robot, given: Options) -> list[Record]:
@@ -165,8 +208,8 @@ def _without_still_axes(
     for axis in np.flatnonzero(~found.moved):
         keys = [f"friction.axes.{name}[{axis}]" for name in ("viscous", "coulomb")]
         held, key = float(found.held[axis]), f"friction.axes.breakaway[{axis}]"
-        words = f"axis {AXES[axis]} never visibly moved: its friction is not fitted; it held {held:.4g} {unit(key)}"
-        still.append((key, held, words))
+        what = f"it held {held:.4g} {unit(key)}" if held > NOTHING else "nothing drove it"
+        still.append((key, held, f"axis {AXES[axis]} never visibly moved: its friction is not fitted; {what}"))
         fixed |= set(keys)
         if robot.friction.axes.levels[2][axis] < held:
             robot = with_parameter(robot, keys[1], held)
@@ -195,7 +238,7 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     if not keys:
         raise InputError("nothing is free", got="no key", expected="at least one", where="free")
     own = robot_parameters(robot, keys, priors)
-    more = nuisance_parameters(given.nuisances, records)
+    more = nuisance_parameters(automatic(records) if given.nuisances is None else given.nuisances, records)
     parts = pieces(records, robot, given.start, any(p.name.startswith(LATENCY) for p in more))
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
     if rows <= len(own) + len(more):

@@ -59,6 +59,11 @@ def nuisance_parameters(wanted: Sequence[str], records: Sequence[Record]) -> lis
     return list({p.name: p for p in found}.values())
 
 
+def automatic(records: Sequence[Record]) -> tuple[str, ...]:
+    """The nuisances that a log of a real robot is likely to have, before it is asked whether it determines them."""
+    return (LATENCY, DEAD, GAIN) if any(record.supplied for record in records) else (LATENCY, DEAD)
+
+
 def pieces(records: Sequence[Record], robot: Robot, start: str, late: bool) -> list[Piece]:
     """The pieces of all records. start: "rest", "free" or "auto"; late: whether a latency is free.
 
