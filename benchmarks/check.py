@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.check_logs import FAULTS, clean, draw
+from benchmarks.check_faults import FAULTS, draw
+from benchmarks.check_logs import clean
 from benchmarks.table import Table, machine, one_core
 from omnidyn.logs.check import check
 from omnidyn.logs.findings import NOTE

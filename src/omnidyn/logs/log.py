@@ -52,7 +52,7 @@ class Log:
         counts = [values.shape[1] for name, values in self.channels.items() if CHANNELS[name] == WHEEL]
         return counts[0] if counts else None
 
-    def rows(self, keep: NDArray) -> Log:
+    def rows(self, keep: NDArray | slice) -> Log:
         """The log with some of its rows: a mask, indices or a slice."""
         channels = {name: values[keep] for name, values in self.channels.items()}
         return replace(self, t=self.t[keep], lines=self.lines[keep], channels=channels)
@@ -64,9 +64,9 @@ class Log:
         no two times differ.
         """
         warnings = list(self.notes)
-        log = self._without(self._empty(), "hold no time or no number", warnings)
+        log = self._without(self.empty_rows(), "hold no time or no number", warnings)
         log = log._without(
-            log._padding(), "at the end repeat one row with an earlier time (padding)", warnings, bound=1.0
+            log.padding_rows(), "at the end repeat one row with an earlier time (padding)", warnings, bound=1.0
         )
         if sort and (np.diff(log.t) < 0.0).any():
             warnings.append(f"time goes back {int((np.diff(log.t) < 0.0).sum())} times: rows were sorted")
@@ -79,12 +79,14 @@ class Log:
                 where=self.source,
             )  # fmt: skip
         log = log._without(repeated, "repeat the time of the row before", warnings, bound=1.0)
-        channels = {name: log._aligned(name, values, warnings) for name, values in log.channels.items()}
+        channels = {name: log.aligned(name, values, warnings) for name, values in log.channels.items()}
         return Run(t=log.t, **channels, source=self.source, warnings=tuple(warnings))
 
-    def _aligned(self, channel: str, values: FloatArray, warnings: list[str]) -> FloatArray:
-        """What was recorded on change: commands held, measurements interpolated, never matched by row. And the
-        latency of each component taken out.
+    def aligned(self, channel: str, values: FloatArray, warnings: list[str]) -> FloatArray:
+        """A channel on the times of the log, once these can be trusted; what was done goes to `warnings`.
+
+        What was recorded on change: commands held, measurements interpolated, never matched by row. And the latency of
+        each component taken out. `values` has the shape of the channel, and so has the result.
         """
         columns = values.reshape(len(self), -1)
         changed = columns.copy()
@@ -102,7 +104,8 @@ class Log:
                 warnings.append(f"{component} was moved back by its latency of {late:g} s")
         return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
 
-    def _empty(self) -> NDArray[np.bool_]:
+    def empty_rows(self) -> NDArray[np.bool_]:
+        """Rows without a time or without any number. Shape (rows,)."""
         nothing = np.isnan(self.t)
         if self.channels:
             numbers = np.zeros(len(self), dtype=bool)
@@ -111,7 +114,7 @@ class Log:
             nothing |= ~numbers
         return nothing
 
-    def _padding(self) -> NDArray[np.bool_]:
+    def padding_rows(self) -> NDArray[np.bool_]:
         """Rows at the end that all repeat the last one while time has gone back."""
         padding = np.zeros(len(self), dtype=bool)
         table = np.column_stack([self.t, *(values.reshape(len(self), -1) for values in self.channels.values())])

@@ -20,10 +20,10 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], Work]:
     """The findings on time, and the work on the rows that have one: sorted, each time once."""
     found: list[Finding] = []
     rows = np.arange(len(log))
-    empty = log._empty() if len(log) else np.zeros(0, dtype=bool)
+    empty = log.empty_rows() if len(log) else np.zeros(0, dtype=bool)
     found += _empty_rows(log, empty)
     rows = rows[~empty]
-    padding = log.rows(rows)._padding() if rows.size else np.zeros(0, dtype=bool)
+    padding = log.rows(rows).padding_rows() if rows.size else np.zeros(0, dtype=bool)
     found += _padded(log, rows[padding])
     rows = rows[~padding]
     found += _backward(log, rows)
@@ -37,7 +37,7 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], Work]:
     pieces = tuple(segments(t)) if len(t) else ()
     chosen = log.rows(rows)
     # As in a Run: what is recorded on change is filled in, latencies that are known are taken out.
-    channels = {name: chosen._aligned(name, values, []) for name, values in chosen.channels.items()} if len(t) else {}
+    channels = {name: chosen.aligned(name, values, []) for name, values in chosen.channels.items()} if len(t) else {}
     work = Work(log, robot, rows, t, step, pieces, channels)
     return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
 
