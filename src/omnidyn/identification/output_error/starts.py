@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled import kernel, maker
 from omnidyn.identification.output_error.primitives import Mapping
 from omnidyn.identification.output_error.record import Record
 from omnidyn.model.robot import Robot
@@ -120,7 +120,7 @@ def difference_noise(v: FloatArray) -> float:
     return middle if middle > 0.0 else 0.5 * float(size[size > 0.0].min(initial=np.inf)) if size.any() else 0.0
 
 
-@part
+@maker
 def smoothed(y, axis, first, last, width):
     """(values, missing ones held; their centred mean over `width` rows, shorter at the ends) of rows first..last."""
     count = last - first + 1
