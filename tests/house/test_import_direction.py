@@ -29,8 +29,8 @@ ORDER = {
     "logs/check": """robust work time_base reference values limits wirings frame floor motors wiring slip mistakes
         scale lag energy motion oddities excitation""",
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
-        shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table""",
-    "identification/output_error": """parameters primitives record problem kernel axis_kernel exact_engine solver starts
+        shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line
+        study_table""",
         motion nuisances uncertainty support breakaway resampling answer conclusion fit""",
     "control": "",
     "campaigns": "",

@@ -31,6 +31,7 @@ from omnidyn.identification.output_error.resampling import profile_interval
 from omnidyn.identification.output_error.solver import Solution, Solver, State
 from omnidyn.identification.output_error.starts import friction_values, integral_start
 from omnidyn.identification.output_error.support import supported, wanted
+from omnidyn.identification.output_error.tangent_engine import TangentEngine
 from omnidyn.identification.output_error.uncertainty import Trust, trust
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.motor import DYNAMIC
@@ -46,6 +47,8 @@ NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count,
 MANY = 100_000  # rows to which a long log is first fitted
 LATENCIES = 500  # steps for their median
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
+FINE = 1e-3  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
+LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 BREAKAWAY = "friction.axes.breakaway"
 IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
 
@@ -100,8 +103,8 @@ def fit_output_error(
     watch: is called with every better state on the way.
 
     Returns an Estimate with nuisances, noise and what is not identifiable. Raises InputError for options and logs that
-    cannot be used, InsufficientDataError where nothing can be learnt, UnsupportedError for robots without an exact
-    engine.
+    cannot be used, InsufficientDataError where nothing can be learnt. Robots that need the implicit engine know latency
+    only, and start at rest; UnsupportedError for more.
     """
     given = Options(
         None if free is None else tuple(free), tuple(fixed), _names(nuisances), start, use_priors,
@@ -114,6 +117,11 @@ def fit_output_error(
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
     levels: list[Breakaway] = []
     axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in (free or ()) and motion_of.moved[axis]]
+    if axes and not is_exact(robot):
+        raise UnsupportedError(
+            "breakaway is profiled with the exact engine only", got=robot.name, expected="friction on the body axes",
+            where="free",
+        )  # fmt: skip
     if axes:
         solver, solution, levels = find_breakaway(solver, solution, axes)
     words = "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
@@ -155,9 +163,19 @@ def _names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:
 def _solve(
     records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None
 ) -> tuple[Solver, Solution]:
-    problem = make_problem(records, robot, given)
-    solver = Solver(problem, ExactEngine(problem), NU if given.loss == STUDENT else 0.0)
-    return solver, solver.minimise(first_point(solver, records), watch=watch)
+    problem, nu = make_problem(records, robot, given), NU if given.loss == STUDENT else 0.0
+    if is_exact(robot):
+        solver = Solver(problem, ExactEngine(problem), nu)
+        return solver, solver.minimise(first_point(solver, records), watch=watch)
+    coarse = Solver(problem, TangentEngine(problem), nu)
+    first = coarse.minimise(problem.start())
+    fine = Solver(problem, TangentEngine(problem, FINE), nu)
+    return fine, fine.minimise(first.state.point, watch=watch)
+
+
+def is_exact(robot: Robot) -> bool:
+    """Whether the exact engine fits this robot."""
+    return not why_not_exact(robot) and robot.motor.electrical != DYNAMIC
 
 
 def _settled(
@@ -165,7 +183,7 @@ def _settled(
     solution: Solution,
 ) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
     """Where the nuisances are automatic: without those that the logs do not support; and what they ask for beside."""
-    if given.nuisances is not None:
+    if given.nuisances is not None or not isinstance(solver.engine, ExactEngine):
         return solver, solution, given, []
     kept = supported(solver, solution, automatic(records))
     given = replace(given, nuisances=kept)
@@ -184,14 +202,6 @@ def _records(runs: list[Run], robot: Robot, given: Options) -> list[Record]:
             raise InputError(f"unknown {where}", got=value, expected=" or ".join(known), where=where)
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
-    reasons = why_not_exact(robot)
-    if robot.motor.electrical == DYNAMIC:
-        reasons.append('winding inductance ([motor] electrical = "dynamic")')
-    if reasons:
-        raise UnsupportedError(
-            "this fit needs the exact engine", got="; ".join(reasons), expected="a robot whose axes do not couple",
-            remedy="leave that out of the robot file", where=robot.name,
-        )  # fmt: skip
     return [record(run, robot, given.outputs) for run in runs]
 
 
@@ -238,7 +248,10 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     if not keys:
         raise InputError("nothing is free", got="no key", expected="at least one", where="free")
     own = robot_parameters(robot, keys, priors)
-    more = nuisance_parameters(automatic(records) if given.nuisances is None else given.nuisances, records)
+    if not is_exact(robot):
+        own = [replace(p, low=LEAST * p.value) if p.low == 0.0 else p for p in own]
+    auto = automatic(records) if is_exact(robot) else (LATENCY,)
+    more = nuisance_parameters(auto if given.nuisances is None else given.nuisances, records)
     parts = pieces(records, robot, given.start, any(p.name.startswith(LATENCY) for p in more))
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
     if rows <= len(own) + len(more):
@@ -260,6 +273,7 @@ def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
 def first_point(solver: Solver, records: Sequence[Record]) -> Point:
     """The better one of the robot as it is and the integral form; for long logs, the fit to their first part."""
     problem, engine = solver.problem, solver.engine
+    assert isinstance(engine, ExactEngine)
     own = problem.start()
     count = problem.robot_count
     found = integral_start(engine.mapping, own.values[:count], records)

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.identification.output_error.exact_engine import ExactEngine, Weighting
+from omnidyn.identification.output_error.exact_engine import Weighting
 from omnidyn.identification.output_error.problem import PieceSums, Point, Problem, per_column
 
 FloatArray = NDArray[np.float64]
@@ -24,6 +25,20 @@ ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close t
 DAMPING, LEAST_DAMPING, FIRM = 1e-4, 1e-10, 1e-2  # FIRM: least after a step that failed
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
+
+
+class Engine(Protocol):
+    """What simulates a problem with its sensitivities: exact_engine.py, tangent_engine.py."""
+
+    problem: Problem
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the residuals of every piece add up to; see kernel.py."""
+        ...
+
+    def on(self, problem: Problem) -> Self:
+        """The same engine on other pieces of the same logs, with the same parameters."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +64,11 @@ class Solution:
 class Solver:
     """Minimises F over a problem. `floor` (columns,): least variance of each column."""
 
-    def __init__(self, problem: Problem, engine: ExactEngine, nu: float = 0.0):
+    def __init__(self, problem: Problem, engine: Engine, nu: float = 0.0):
         self.problem, self.engine, self.nu = problem, engine, nu
         self.floor = _floor(problem)
+        # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross.
+        self._jumps = np.array([p.name == "latency.current" for p in problem.parameters], bool)
         self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
         self._high = np.array([p.inner(p.high) for p in problem.parameters])
 
@@ -83,9 +100,15 @@ class Solver:
         for iteration in range(limit):
             normal = Normal(self, now)
             held, better = normal.held, False
-            while not better and normal.distance / (1.0 + damping) > (CLOSE if damping < FIRM else ENOUGH):
-                trial = self.state(normal.moved(damping), now.variance if self.nu else None)
+            still = held
+            while not better and normal.distance_without(still) / (1.0 + damping) > (
+                CLOSE if damping < FIRM else ENOUGH
+            ):
+                trial = self.state(normal.moved(damping, still), now.variance if self.nu else None)
                 better = trial.objective < now.objective
+                if not better and not (still | self._jumps == still).all():
+                    still = still | self._jumps  # once more, without what may have jumped
+                    continue
                 damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
                 now = trial if better else now
             if self.nu:
@@ -150,7 +173,7 @@ class Normal:
         self._add_priors()
         self.gradient, self.information = self._reduced(0.0)
         self.held = solver.at_bound(self.inner, self.gradient)
-        self.distance = self._distance()
+        self.distance = self.distance_without(self.held)
 
     def _add_priors(self) -> None:
         self.prior_gradient, self.prior_information = np.zeros(self._count), np.zeros(self._count)
@@ -174,8 +197,9 @@ class Normal:
                 information -= damped[:k, k:] @ lift
         return gradient, information
 
-    def _distance(self) -> float:
-        free = ~self.held
+    def distance_without(self, still: NDArray[np.bool_]) -> float:
+        """Squared length of the Gauss-Newton step in standard errors, over the parameters that are not `still`."""
+        free = ~still
         step = _solve(self.information[np.ix_(free, free)], self.gradient[free])
         total = float(step @ self.gradient[free])
         for grad, info in self.pieces:  # what the states alone would gain
@@ -195,10 +219,10 @@ class Normal:
             found.append(own)
         return np.concatenate(found)
 
-    def moved(self, damping: float) -> Point:
-        """The point of the damped step, within the bounds."""
+    def moved(self, damping: float, still: NDArray[np.bool_]) -> Point:
+        """The point of the damped step, within the bounds, without the parameters that are `still`."""
         gradient, information = self._reduced(damping)
-        free = ~self.held
+        free = ~still
         step = np.zeros(self._count)
         step[free] = _solve(information[np.ix_(free, free)], gradient[free])
         inner = self.solver.clipped(self.inner + step)
