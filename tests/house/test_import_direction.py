@@ -31,7 +31,8 @@ ORDER = {
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
         shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line
         study_table""",
-        motion nuisances uncertainty support breakaway resampling answer conclusion fit""",
+    "identification/output_error": """parameters primitives record problem kernel axis_kernel exact_engine
+        tangent_engine solver starts motion nuisances uncertainty support breakaway resampling answer conclusion fit""",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch
