@@ -121,7 +121,7 @@ def difference_noise(v: FloatArray) -> float:
 
 
 @maker
-def smoothed(y, axis, first, last, width):
+def _smoothed(y, axis, first, last, width):
     """(values, missing ones held; their centred mean over `width` rows, shorter at the ends) of rows first..last."""
     count = last - first + 1
     v, total, mean = np.empty(count), np.zeros(count + 1), np.empty(count)
@@ -140,14 +140,14 @@ def smoothed(y, axis, first, last, width):
 @kernel
 def count_far(y, axis, first, last, width, limit):
     """Rows first..last of column `axis` whose mean over `width` rows is beyond `limit`."""
-    _, mean = smoothed(y, axis, first, last, width)
+    _, mean = _smoothed(y, axis, first, last, width)
     return (np.abs(mean) > limit).sum()
 
 
 @kernel
 def window_sums(t, u, y, axis, first, last, drive, rows, clear):
     """(design (n, 3), change (n,), largest |g| in motion) of windows of `rows` rows, each half over the next."""
-    v, mean = smoothed(y, axis, first, last, max(rows // 2, 1))
+    v, mean = _smoothed(y, axis, first, last, max(rows // 2, 1))
     count, most = last - first + 1, 0.0
     side, total = np.empty(count), np.zeros((4, count + 1))
     sums, same = np.zeros(3), np.ones(count, np.int64)
