@@ -96,18 +96,19 @@ class Solver:
 
     def _descend(self, now: State, limit: int, watch: Callable[[State], None] | None) -> Solution:
         damping, change = DAMPING, 0.0
-        held = np.zeros(len(self.problem.parameters), bool)
+        held = blocked = np.zeros(len(self.problem.parameters), bool)
         for iteration in range(limit):
             normal = Normal(self, now)
             held, better = normal.held, False
-            still = held
+            still = held | blocked
             while not better and normal.distance_without(still) / (1.0 + damping) > (
                 CLOSE if damping < FIRM else ENOUGH
             ):
                 trial = self.state(normal.moved(damping, still), now.variance if self.nu else None)
                 better = trial.objective < now.objective
                 if not better and not (still | self._jumps == still).all():
-                    still = still | self._jumps  # once more, without what may have jumped
+                    blocked = self._jumps  # once more, and from here on, without what may have jumped
+                    still = still | blocked
                     continue
                 damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
                 now = trial if better else now
