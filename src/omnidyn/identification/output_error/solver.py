@@ -22,7 +22,8 @@ FloatArray = NDArray[np.float64]
 MAX_ITERATIONS = 60
 CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
 ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
-DAMPING, LEAST_DAMPING, FIRM = 1e-4, 1e-10, 1e-2  # FIRM: least after a step that failed
+DAMPING, LEAST_DAMPING = 1e-4, 1e-10
+FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked by a jump
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
 
@@ -97,6 +98,7 @@ class Solver:
     def _descend(self, now: State, limit: int, watch: Callable[[State], None] | None) -> Solution:
         damping, change = DAMPING, 0.0
         held = blocked = np.zeros(len(self.problem.parameters), bool)
+        released = False
         for iteration in range(limit):
             normal = Normal(self, now)
             held, better = normal.held, False
@@ -116,7 +118,9 @@ class Solver:
                 now, change = self._rescaled(now)
             if better and watch:
                 watch(now)
-            if not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
+            if not better and blocked.any() and not released:  # a shorter step may stay this side of the jump
+                blocked, released, damping = np.zeros_like(blocked), True, SHORT
+            elif not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
                 return Solution(now, held, iteration + 1, True)
         return Solution(now, held, limit, False)
 
