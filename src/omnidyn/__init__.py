@@ -28,7 +28,10 @@ _HOME = {
     "compare": "omnidyn.comparison.compare",
     "dead_zone_map": "omnidyn.model.deadzone",
     "fit_drive_lines": "omnidyn.identification.drive_line",
+    "fit_output_error": "omnidyn.identification.output_error.fit",
     "fit_steady_state": "omnidyn.identification.steady_state",
+    "identify": "omnidyn.identification.identify",
+    "identify_groups": "omnidyn.identification.joint_fit",
     "identify_steady": "omnidyn.identification.steady_study",
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
@@ -41,6 +44,7 @@ _HOME = {
     "save_robot": "omnidyn.model.robot_file",
     "simulate": "omnidyn.simulation.simulate",
     "state_space": "omnidyn.model.statespace",
+    "validate": "omnidyn.identification.validation",
     "write_run": "omnidyn.logs.run_file",
 }
 
@@ -52,8 +56,12 @@ if TYPE_CHECKING:
     from omnidyn.errors import OmnidynError
     from omnidyn.identification.drive_line import fit_drive_lines
     from omnidyn.identification.estimate import Estimate
+    from omnidyn.identification.identify import identify
+    from omnidyn.identification.joint_fit import identify_groups
+    from omnidyn.identification.output_error.fit import fit_output_error
     from omnidyn.identification.steady_state import fit_steady_state
     from omnidyn.identification.steady_study import identify_steady
+    from omnidyn.identification.validation import validate
     from omnidyn.logs.check import check
     from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.logs.read_log import load_log, read_log

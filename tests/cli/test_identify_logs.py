@@ -1,4 +1,4 @@
-"""omnidyn identify on logs: what it prints and writes, groups, and what it refuses."""
+"""omnidyn identify --method steady-state on logs: what it prints and writes, groups, and what it refuses."""
 
 import json
 
@@ -33,7 +33,7 @@ def call(floors, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(floors)
 
     def run(*arguments):
-        code = main(["identify", *arguments])
+        code = main(["identify", *arguments, "--method", "steady-state"])
         return code, *capsys.readouterr()
 
     return run

@@ -29,21 +29,22 @@ ORDER = {
     "logs/check": """robust work time_base reference values limits wirings frame floor motors wiring slip mistakes
         scale lag energy motion oddities excitation""",
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
-        shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line
-        study_table""",
+        shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table
+        identify joint_fit as_fitted validation motor_fit fit_words best_so_far""",
     "identification/output_error": """parameters primitives record problem kernel axis_kernel exact_engine
         tangent_engine solver starts motion nuisances uncertainty support breakaway resampling answer conclusion fit""",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch
         claims""",
-    "report": "style figures html page steady_page",
-    "report/figures": """robot traces friction steps dead_zone dead_zone_map reconcile overlay shapes drive_lines
-        raw_log""",
+    "report": "style figures html page steady_page fit_page",
+    "report/figures": """robot traces friction steps dead_zone dead_zone_map reconcile overlay shapes drive_lines raw_log
+        residuals correlation""",
     "export": "",
     "interop": "",
-    "cli": """streams numbers session progress log_options init check plan identify_logs identify simulate friction
-        deadzone compare track tune sweep export robots demo_folder claims_table demo app outcome""",
+    "cli": """streams numbers session progress log_options init check plan identify_logs identify_fit identify
+        simulate friction deadzone compare track tune sweep export robots demo_folder claims_table demo app
+        outcome""",
     "studio": "",
 }
 

@@ -18,7 +18,10 @@ PUBLIC = [
     "compare",
     "dead_zone_map",
     "fit_drive_lines",
+    "fit_output_error",
     "fit_steady_state",
+    "identify",
+    "identify_groups",
     "identify_steady",
     "load_log",
     "load_robot",
@@ -31,6 +34,7 @@ PUBLIC = [
     "save_robot",
     "simulate",
     "state_space",
+    "validate",
     "write_run",
 ]
 

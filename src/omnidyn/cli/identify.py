@@ -1,4 +1,4 @@
-"""omnidyn identify LOG...: friction, or the lines of motors, from logs or from a table of steady points."""
+"""omnidyn identify LOG...: a robot from whole logs, or from steady stretches, or from a table of steady points."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from omnidyn.cli.progress import progress
 from omnidyn.cli.streams import say, show, show_json
 
 if TYPE_CHECKING:
+    from omnidyn.cli.identify_fit import Ask, Out
     from omnidyn.cli.identify_logs import Loaded
     from omnidyn.identification.drive_line import DriveStudy
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.steady_study import SteadyStudy
     from omnidyn.model.robot import Robot
 
-STEADY_STATE = "steady-state"
+OUTPUT_ERROR, STEADY_STATE = "output-error", "steady-state"
 FRICTION, MOTORS, LINE = "friction", "motors", "line"
 
 
@@ -26,7 +27,20 @@ def identify(
         metavar="LOG...", help="Logs (CSV, Parquet) or folders of them; or one table axis,speed,force."
     ),
     robot: str = typer.Option("", metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
-    method: str = typer.Option(STEADY_STATE, help="How: steady-state is the paper's, eqs (15)-(17)."),
+    method: str = typer.Option("", help="output-error (whole logs; the default) or steady-state (the paper's)."),
+    free: list[str] = typer.Option([], metavar="KEY", help="Fit this; friction is all six. Repeatable."),
+    fix: list[str] = typer.Option([], metavar="KEY", help="Leave this as the robot file has it. Repeatable."),
+    nuisance: list[str] = typer.Option(
+        [], metavar="NAME", help="Fit what the log does: latency, gain, dead_band, fade. Repeatable."
+    ),
+    loss: str = typer.Option("", help="gaussian, or student-t for logs with outliers."),
+    use_priors: bool = typer.Option(False, "--use-priors", help="A std in the robot file counts as a prior."),
+    hold_out: list[str] = typer.Option([], metavar="GLOB", help="Do not fit these logs: predict them. Repeatable."),
+    per: list[str] = typer.Option([], metavar="NAME=GLOB", help="A group with friction of its own. Repeatable."),
+    per_free: list[str] = typer.Option([], metavar="KEY", help="What each group has for itself instead. Repeatable."),
+    profile: list[str] = typer.Option([], metavar="KEY", help="Interval by profile of the likelihood. Repeatable."),
+    bootstrap: int = typer.Option(0, min=0, metavar="N", help="Intervals from N draws of whole runs instead."),
+    between: str = typer.Option("", help="Of the motors: hold, or mean: of the input of neighbouring rows."),
     what: str = typer.Option(FRICTION, help="friction, or motors: the line of each motor, wheels off the ground."),
     shape: str = typer.Option(
         "auto", help="box, disc, ellipse, wheel, wheels, disc+wheel, ...; auto: the best; line: per axis, the paper."
@@ -51,47 +65,129 @@ def identify(
     skip_bad_rows: bool = options.SKIP_BAD_ROWS,
     current_unsigned: bool = options.CURRENT_UNSIGNED,
 ) -> None:
-    """Identify friction from logs at steady speeds, or from a table of steady points.
+    """Identify a robot from its logs: friction, and what --free names.
 
-    The answer carries standard errors, 95 % intervals and warnings in words, and says what the data cannot tell.
+    By default the model runs freely under the logged voltages or duties, and the numbers are those that come nearest
+    to all that was measured (output error). Where robot or logs do not allow that: friction from stretches of constant
+    speed, or from a table of steady points. The answer carries standard errors, 95 % intervals and warnings in words,
+    and says what the data cannot tell.
     """
-    from omnidyn.cli.identify_logs import is_steady_table, load_runs
+    from omnidyn.cli.identify_fit import Ask, Out
+    from omnidyn.cli.identify_logs import is_steady_table
 
-    _refuse_words(method, what)
+    ask = Ask(free, fix, nuisance, loss, use_priors, hold_out, per, per_free, profile, bootstrap, between)
+    steady = _given(shape=shape != "auto", window=window, group=group, rest=rest != "bound", force_from=force_from,
+                    speed=speed != "wheel" and what == FRICTION)  # fmt: skip
+    method = _method(method, what, ask, steady)
     if not robot and what == FRICTION:
         raise typer.BadParameter("Missing option '--robot'.")
     _refuse_places(out, report, force)
     if what == FRICTION and len(logs) == 1 and is_steady_table(logs[0]):
+        _refuse_table(method)
         _from_table(logs[0], robot, rest, out, report, force, json)
         return
     maps = options.Maps(save_map, force)
+    how = options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
+    places = Out(report, out, force, json)
     with progress("reading") as now:
         loaded_robot = _robot(robot)
-        how = options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
-        loaded = load_runs(logs, group, loaded_robot, how, sort=sort, maps=maps, now=now)
+        loaded = _loaded(logs, ask, group, loaded_robot, how, sort, maps, now, keep=what == FRICTION)
         now("identifying")
         record = _record(robot, loaded)
         if what == MOTORS:
-            drives = _drives(loaded, loaded_robot, input_, speed, window)
-            now("writing")
-            _tell_drives(drives, record, report, out, force, json)
-        elif shape == LINE:
-            assert loaded_robot is not None
+            _run_motors(method, loaded, loaded_robot, input_, speed, window, ask, record, places, now)
+            return
+        assert loaded_robot is not None
+        if (method or _default(loaded, loaded_robot, ask)) == OUTPUT_ERROR:
+            from omnidyn.cli.identify_fit import fit_logs
+
+            fit_logs(loaded, loaded_robot, ask, record, places, now)
+            return
+        loaded.logs.clear()
+        if shape == LINE:
             _tell_lines(_lines(loaded, loaded_robot, speed, force_from, window), record, report, out, force, json)
-        else:
-            assert loaded_robot is not None
-            study = _study(loaded, loaded_robot, shape, speed, force_from, window)
-            now("writing")
-            _tell_study(study, record, report, out, force, json)
+            return
+        study = _study(loaded, loaded_robot, shape, speed, force_from, window)
+        now("writing")
+        _tell_study(study, record, report, out, force, json)
 
 
-def _refuse_words(method: str, what: str) -> None:
-    from omnidyn.errors import InputError, UnsupportedError
+def _given(**options: Any) -> list[str]:
+    """Options of steady-state that were given, by their names."""
+    return [f"--{name.replace('_', '-')}" for name, value in options.items() if value]
 
-    if method != STEADY_STATE:
-        raise UnsupportedError("no such method yet", got=method, expected=STEADY_STATE, where="--method")
+
+def _method(method: str, what: str, ask: Ask, steady: list[str]) -> str:
+    """The method asked for, by its name or by its options; "" where neither is there. Refuses options of another."""
+    from omnidyn.errors import InputError
+
+    if method not in ("", OUTPUT_ERROR, STEADY_STATE):
+        raise InputError("no such method", got=method, expected=f"{OUTPUT_ERROR} or {STEADY_STATE}", where="--method")
     if what not in (FRICTION, MOTORS):
         raise InputError("nothing of that name", got=what, expected=f"{FRICTION} or {MOTORS}", where="--what")
+    own = ask.given()
+    if what == MOTORS:
+        other = [name for name in own if name not in ("--nuisance", "--loss", "--hold-out", "--between")]
+        if other:
+            raise InputError("not an option of the motors", got=other[0], where="--what motors")
+    elif "--between" in own:
+        raise InputError("an option of the motors", got="--between", expected="--what motors", where="--between")
+    if own and (method == STEADY_STATE or (steady and not method)):
+        remedy = "leave it out, or leave out " + (", ".join(steady) if steady else "--method")
+        raise InputError(
+            f"{STEADY_STATE} has no such option", got=own[0], expected=f"with {OUTPUT_ERROR}", remedy=remedy
+        )
+    if steady and method == OUTPUT_ERROR:
+        remedy = "for groups use --per" if steady[0] == "--group" else "leave it out"
+        raise InputError(
+            f"{OUTPUT_ERROR} has no such option", got=steady[0], expected=f"with {STEADY_STATE}", remedy=remedy
+        )
+    return method or (OUTPUT_ERROR if own else STEADY_STATE if steady else "")
+
+
+def _refuse_table(method: str) -> None:
+    from omnidyn.errors import InputError
+
+    if method == OUTPUT_ERROR:
+        raise InputError("a table of steady points has no time in it", got="a table axis,speed,force",
+                         expected=f"logs, or --method {STEADY_STATE}", where="--method")  # fmt: skip
+
+
+def _loaded(
+    logs: list[str], ask: Ask, group: list[str], robot: Robot | None, how: Any, sort: bool, maps: options.Maps,
+    now: Any, keep: bool,
+) -> Loaded:  # fmt: skip
+    from omnidyn.cli.identify_logs import load_runs
+
+    patterns, option = (list(ask.per), "--per") if ask.per else (group, "--group")
+    return load_runs(logs, patterns, robot, how, sort=sort, maps=maps, now=now, option=option, keep=keep)
+
+
+def _default(loaded: Loaded, robot: Robot, ask: Ask) -> str:
+    """Output error where robot and logs support it, else steady state with one line that says why."""
+    from omnidyn.identification.identify import why_not_output_error
+
+    why = why_not_output_error(loaded.runs, robot)
+    if why:
+        say(f"omnidyn: {STEADY_STATE}, not {OUTPUT_ERROR}: {why}")
+    return STEADY_STATE if why else OUTPUT_ERROR
+
+
+def _run_motors(
+    method: str, loaded: Loaded, robot: Robot | None, input_: str, speed: str, window: str, ask: Ask,
+    record: dict[str, Any], places: Out, now: Any,
+) -> None:  # fmt: skip
+    if method == OUTPUT_ERROR:
+        from omnidyn.cli.identify_fit import fit_motors
+        from omnidyn.errors import InputError
+
+        if speed != "wheel":
+            raise InputError(f"{OUTPUT_ERROR} has no such option", got="--speed", expected=f"with {STEADY_STATE}")
+        fit_motors(loaded, input_, ask, record, places, now)
+        return
+    drives = _drives(loaded, robot, input_, speed, window)
+    now("writing")
+    _tell_drives(drives, record, places.report, places.out, places.force, places.json)
 
 
 def _refuse_places(out: str, report: str, force: bool) -> None:

@@ -11,6 +11,7 @@ from omnidyn.cli.log_options import Maps, load_logs, log_files, matches
 from omnidyn.cli.streams import say
 
 if TYPE_CHECKING:
+    from omnidyn.logs.log import Log
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
     from omnidyn.run import Run
@@ -24,6 +25,7 @@ class Loaded(NamedTuple):
     runs: list[Run]
     groups: list[str] | None
     inputs: list[dict[str, str]]
+    logs: list[Log]
 
 
 def is_steady_table(path: str) -> bool:
@@ -47,58 +49,64 @@ def is_steady_table(path: str) -> bool:
 
 def load_runs(
     arguments: Sequence[str], patterns: Sequence[str], robot: Robot | None, options: LogOptions, *, sort: bool,
-    maps: Maps, now: Any,
+    maps: Maps, now: Any, option: str = "--group", keep: bool = False,
 ) -> Loaded:  # fmt: skip
-    """The runs of LOG..., with their groups; what the readers had to decide is said once on stderr."""
+    """The runs of LOG..., with their groups; what the readers had to decide is said once on stderr.
+
+    option: where `patterns` come from; folders are groups of --group alone. keep: keep the logs too.
+    """
     files = log_files(arguments)
-    names = _groups(files, arguments, patterns)
+    names = _groups(files, arguments, patterns, option)
     used = files if names is None else [path for path in files if path in names]
-    runs, inputs, said = [], [], {}
+    runs, inputs, logs, said = [], [], [], {}
     for path, log in load_logs(used, robot, options, now):
         maps.show(path, log.columns)
         run = log.to_run(sort=sort)
         for words in run.warnings:
             said.setdefault(words, []).append(path)
         runs.append(run)
+        logs += [log] if keep else []
         inputs.append({"role": "log", "name": path, "sha256": log.sha256})
     _say_notes(said, len(used))
-    return Loaded(runs, None if names is None else [names[path] for path in used], inputs)
+    return Loaded(runs, None if names is None else [names[path] for path in used], inputs, logs)
 
 
-def _groups(files: Sequence[str], arguments: Sequence[str], patterns: Sequence[str]) -> dict[str, str] | None:
+def _groups(
+    files: Sequence[str], arguments: Sequence[str], patterns: Sequence[str], option: str
+) -> dict[str, str] | None:
     """File -> group, by --group, else by folder where several folders are given; None where there are no groups."""
     from omnidyn.errors import InputError
 
     folders = [each for each in arguments if os.path.isdir(each)]
     if not patterns:
-        if len(folders) < 2 or len(folders) < len(arguments):
+        if option != "--group" or len(folders) < 2 or len(folders) < len(arguments):
             return None
         patterns = [f"{Path(os.path.abspath(folder)).name}={folder}" for folder in folders]
-    pairs = [_pair(text) for text in patterns]
+    pairs = [_pair(text, option) for text in patterns]
     found: dict[str, str] = {}
     for path in files:
         mine = [name for name, pattern in pairs if matches(path, pattern)]
         if len(set(mine)) > 1:
             raise InputError("a log belongs to two groups", got=" and ".join(mine), where=path,
-                             remedy="make the patterns of --group narrower")  # fmt: skip
+                             remedy=f"make the patterns of {option} narrower")  # fmt: skip
         if mine:
             found[path] = mine[0]
     for name, pattern in pairs:
         if name not in found.values():
             raise InputError("no log belongs to this group", got=pattern, expected="a glob or a folder of LOG...",
-                             where=f"--group {name}")  # fmt: skip
+                             where=f"{option} {name}")  # fmt: skip
     if len(found) < len(files):
         say(f"omnidyn: {len(files) - len(found)} of {len(files)} logs belong to no group and are not used")
     return found
 
 
-def _pair(text: str) -> tuple[str, str]:
+def _pair(text: str, option: str) -> tuple[str, str]:
     from omnidyn.errors import InputError
 
     name, equals, pattern = text.partition("=")
     if not equals or not name.strip() or not pattern.strip():
         raise InputError("cannot read the group", got=text, expected="NAME=GLOB, such as gray=gray_surface",
-                         where="--group")  # fmt: skip
+                         where=option)  # fmt: skip
     return name.strip(), pattern.strip()
 
 

@@ -1,0 +1,293 @@
+"""The part of `omnidyn identify` that fits whole logs: output error of a robot, in groups or not, and of motors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from omnidyn.cli.identify_logs import Loaded, outputs
+from omnidyn.cli.log_options import matches
+from omnidyn.cli.streams import say, show, show_json
+
+if TYPE_CHECKING:
+    from omnidyn.identification.motor_fit import MotorFit
+    from omnidyn.identification.output_error.answer import OutputErrorEstimate
+    from omnidyn.identification.output_error.solver import State
+    from omnidyn.identification.study_parts import Difference
+    from omnidyn.identification.validation import Validation
+    from omnidyn.logs.findings import Verdict
+    from omnidyn.model.robot import Robot
+    from omnidyn.run import Run
+
+CHECKED = 1_000_000  # rows that are checked on the way
+WHOLE = "all"
+INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class Ask:
+    """The options of output error, as they stand on the command line."""
+
+    free: Sequence[str] = ()
+    fix: Sequence[str] = ()
+    nuisances: Sequence[str] = ()
+    loss: str = ""
+    use_priors: bool = False
+    hold_out: Sequence[str] = ()
+    per: Sequence[str] = ()
+    per_free: Sequence[str] = ()
+    profile: Sequence[str] = ()
+    bootstrap: int = 0
+    between: str = ""
+
+    def given(self) -> list[str]:
+        """The names of the options that were given."""
+        names = {"nuisances": "--nuisance"}
+        return [names.get(n, f"--{n.replace('_', '-')}") for n, value in vars(self).items() if value]
+
+
+@dataclass(frozen=True)
+class Out:
+    """Where results go."""
+
+    report: str
+    out: str
+    force: bool
+    json: bool
+
+
+class _Part:
+    """Runs that are fitted and runs that are held out, with the group of each."""
+
+    def __init__(self, loaded: Loaded, patterns: Sequence[str]):
+        groups = loaded.groups or [WHOLE] * len(loaded.runs)
+        held = held_out([each["name"] for each in loaded.inputs], patterns)
+        pairs = list(zip(loaded.runs, groups, held, strict=True))
+        self.runs = [run for run, _, out in pairs if not out]
+        self.groups = [group for _, group, out in pairs if not out]
+        self.held = [(run, group) for run, group, out in pairs if out]
+
+    def of(self, group: str) -> tuple[list[Run], list[Run]]:
+        """(fitted, held out) of one group."""
+        fitted = [run for run, own in zip(self.runs, self.groups, strict=True) if own == group]
+        return fitted, [run for run, own in self.held if own == group]
+
+
+def held_out(paths: Sequence[str], patterns: Sequence[str]) -> list[bool]:
+    """Which logs are held out. Raises InputError for a pattern that none matches, and where nothing is left."""
+    from omnidyn.errors import InputError
+
+    for pattern in patterns:
+        if not any(matches(path, pattern) for path in paths):
+            raise InputError(
+                "no log to hold out", got=pattern, expected="a glob or a folder of LOG...", where="--hold-out"
+            )
+    held = [any(matches(path, pattern) for pattern in patterns) for path in paths]
+    if all(held):
+        raise InputError(
+            "every log is held out", got=", ".join(patterns), expected="one or more to fit", where="--hold-out"
+        )
+    return held
+
+
+def fit_logs(loaded: Loaded, robot: Robot, ask: Ask, record: dict[str, Any], out: Out, now: Any) -> None:
+    """Fit, validate, write, tell. An interrupt during the fit leaves the best so far, and ends with exit code 130."""
+    part = _Part(loaded, ask.hold_out)
+    verdicts = _verdicts(loaded, robot, now)
+    now("fitting")
+    fits, differences, cut = _fitted(part, robot, ask, now)
+    validations: dict[str, Validation] = {}
+    if not cut:
+        from omnidyn.identification.validation import validate
+
+        for group, fit in fits.items():
+            fitted, held = part.of(group)
+            validations[group] = validate(fit, fitted, held, now)
+    now("writing")
+    files = _written(fits, validations, verdicts, differences, record, out)
+    _tell(fits, validations, verdicts, differences, record, out, files)
+    if cut:
+        say("omnidyn: interrupted: the numbers are the best so far, not the best there are")
+        raise typer.Exit(INTERRUPTED)
+
+
+def _verdicts(loaded: Loaded, robot: Robot, now: Any) -> list[Verdict]:
+    """What check says of the logs, where they are not too long; fatal findings are said at once."""
+    from omnidyn.logs.check import check
+
+    if sum(len(log) for log in loaded.logs) > CHECKED:
+        say("omnidyn: the logs are long: not checked on the way (omnidyn check does)")
+        return []
+    found = []
+    for k, log in enumerate(loaded.logs):
+        now(f"checking {k + 1} of {len(loaded.logs)}")
+        found.append(check(log, robot))
+        for finding in found[-1].findings:
+            if finding.level == "fatal":
+                say(f"omnidyn: warning: {log.source}: {finding.message}: {finding.remedy}")
+    return found
+
+
+class _Watch:
+    """Tells how far a fit is, and keeps the best state so far."""
+
+    def __init__(self, now: Any):
+        self.now, self.count, self.best = now, 0, None
+
+    def __call__(self, state: State) -> None:
+        self.count, self.best = self.count + 1, state
+        self.now(f"fitting, step {self.count}, -log likelihood {state.objective:.6g}")
+
+
+def _fitted(
+    part: _Part, robot: Robot, ask: Ask, now: Any
+) -> tuple[dict[str, OutputErrorEstimate], Sequence[Difference], bool]:
+    """(fits by group, differences, whether it was interrupted)."""
+    from omnidyn.identification.joint_fit import expand_keys, identify_groups
+
+    options: dict[str, Any] = {
+        "free": expand_keys(ask.free) if ask.free else None, "fixed": expand_keys(ask.fix),
+        "nuisances": list(ask.nuisances), "loss": ask.loss or "gaussian", "use_priors": ask.use_priors,
+    }  # fmt: skip
+    watch = _Watch(now)
+    if len(set(part.groups)) > 1:
+        study = identify_groups(part.runs, robot, part.groups, per_free=ask.per_free, watch=watch, **options)
+        return dict(study.estimates), study.differences, False
+    from omnidyn.identification.output_error.fit import fit_output_error
+
+    group = part.groups[0]
+    try:
+        more: dict[str, Any] = {"profile": expand_keys(ask.profile), "bootstrap": ask.bootstrap}
+        return {group: fit_output_error(part.runs, robot, watch=watch, **options, **more)}, (), False
+    except KeyboardInterrupt:
+        if watch.best is None:
+            raise
+        from omnidyn.identification.best_so_far import best_so_far
+
+        return {group: best_so_far(watch.best, part.runs, robot, options)}, (), True
+
+
+def _written(
+    fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], verdicts: Sequence[Verdict],
+    differences: Sequence[Difference], record: dict[str, Any], out: Out,
+) -> dict[str, str]:  # fmt: skip
+    """Write robot files and the report: group -> file."""
+    from omnidyn.files import check_output, write_atomic
+    from omnidyn.model.robot_file import save_robot
+
+    files = outputs(out.out, list(fits))
+    for path in files.values():
+        check_output(path, out.force)
+    if out.report and validations:
+        from omnidyn.report.fit_page import render_fit
+
+        write_atomic(out.report, render_fit(fits, validations, verdicts, record, differences), out.force)
+    for group, path in files.items():
+        save_robot(fits[group].robot, path, out.force)
+    return files
+
+
+def _tell(
+    fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], verdicts: Sequence[Verdict],
+    differences: Sequence[Difference], record: dict[str, Any], out: Out, files: Mapping[str, str],
+) -> None:  # fmt: skip
+    from omnidyn.identification.fit_words import advice, verdict_advice
+
+    report = out.report if out.report and validations else ""
+    next_ = verdict_advice(verdicts)
+    for group, fit in fits.items():
+        words = advice(fit, validations.get(group))
+        next_ += words if len(fits) == 1 else [f"{group}: {each}" for each in words]
+    if out.json:
+        for warning in dict.fromkeys(words for fit in fits.values() for words in fit.warnings):
+            say(f"omnidyn: warning: {warning}")
+        groups = {
+            g: {**fit.to_dict(), "validation": validations[g].to_dict() if g in validations else None}
+            for g, fit in fits.items()
+        }
+        show_json({
+            "method": "output-error", **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
+            "differences": [{**vars(d), "differs": d.differs} for d in differences], "next": next_,
+            "check": [{"source": v.source, "fatal": v.fatal, "counts": v.counts} for v in verdicts],
+            "output": dict(files) or None, "report": report or None, "provenance": record,
+        })  # fmt: skip
+    else:
+        show(_text(fits, validations, differences, next_))
+    for path in (*files.values(), report):
+        if path:
+            say(f"omnidyn: wrote {path}")
+
+
+def _text(
+    fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], differences: Sequence[Difference],
+    next_: Sequence[str],
+) -> str:  # fmt: skip
+    import textwrap
+
+    from omnidyn.identification.fit_words import DIFFERENCE_HEAD, difference_rows
+    from omnidyn.identification.study_table import table_text
+
+    lines = []
+    for group, fit in fits.items():
+        lines += [f"group {group}", ""] if len(fits) > 1 else []
+        lines += [fit.summary().rstrip("\n"), ""]
+        if group in validations:
+            lines += [validations[group].summary(), ""]
+    if differences:
+        lines += [*table_text(DIFFERENCE_HEAD, difference_rows(differences)), ""]
+    if next_:
+        lines.append("next:")
+        lines += [text for words in next_ for text in textwrap.wrap(f"- {words}", 100, subsequent_indent="  ")]
+    return "\n".join(line.encode("ascii", "backslashreplace").decode() for line in lines).rstrip("\n")
+
+
+def fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out: Out, now: Any) -> None:
+    """One output-error fit per motor, with and without a dead band, and free runs on what was held out."""
+    import numpy as np
+
+    from omnidyn.identification.motor_fit import fit_motor, fit_rmse
+
+    part = _Part(loaded, ask.hold_out)
+    counts = [run.wheels or 1 for run in part.runs]
+    other = [name for name in ask.nuisances if name.partition(".")[0] != "latency"]
+    if other:
+        from omnidyn.errors import InputError
+
+        raise InputError("of the motors only latency can be fitted", got=other[0], where="--nuisance")
+    if out.out:
+        say("omnidyn: the numbers of the motors do not go into a robot file; -o is not used")
+    found: list[tuple[MotorFit, MotorFit, float, float]] = []
+    for motor in range(min(counts)):
+        now(f"fitting motor {motor + 1} of {min(counts)}")
+        how: dict[str, Any] = {"kind": kind, "between": ask.between or "hold", "latency": bool(ask.nuisances),
+                               "loss": ask.loss or "gaussian"}  # fmt: skip
+        band, plain = (fit_motor(part.runs, motor, dead_band=with_band, **how) for with_band in (True, False))
+        held = [run for run, _ in part.held]
+        errors = [fit_rmse(fit, held) if held else np.nan for fit in (band, plain)]
+        found.append((band, plain, float(errors[0]), float(errors[1])))
+    _tell_motors(found, record, out)
+
+
+def _tell_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], record: dict[str, Any], out: Out) -> None:
+    if out.report:
+        from omnidyn.files import write_atomic
+        from omnidyn.report.fit_page import render_motors
+
+        write_atomic(out.report, render_motors(found, record), out.force)
+    if out.json:
+        motors = [
+            {**band.to_dict(), "held_out_rmse_rad_s": held, "without_dead_band":
+             {**plain.to_dict(), "held_out_rmse_rad_s": held_plain}}
+            for band, plain, held, held_plain in found
+        ]  # fmt: skip
+        show_json({"method": "output-error", "motors": motors, "report": out.report or None, "provenance": record})
+    else:
+        from omnidyn.identification.fit_words import MOTOR_HEAD, motor_rows
+        from omnidyn.identification.study_table import table_text
+
+        show("\n".join([*table_text(MOTOR_HEAD, motor_rows(found)), "", *(f"- {f[0].statement()}" for f in found)]))
+    if out.report:
+        say(f"omnidyn: wrote {out.report}")

@@ -1,0 +1,152 @@
+"""Validation: the fitted robot as a free run beside the logs it was fitted to, and beside logs it never saw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from omnidyn.comparison.compare import compare
+from omnidyn.comparison.result import Comparison
+from omnidyn.comparison.traces import unit
+from omnidyn.identification.as_fitted import as_fitted
+from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.logs.channels import place
+from omnidyn.run import Run
+
+STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
+HEAD = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
+FITTED, HELD_OUT = "fitted", "held out"
+FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
+NOT_WHITE = 0.01
+SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted to Gaussian noise of std 1
+TO_STD = 1.4826  # median size to standard deviation, for Gaussian noise
+
+
+@dataclass(frozen=True)
+class Score:
+    """One component of some logs. rmse in SI; fit_percent [%] and whiteness as in comparison.Metrics; chi2: mean square
+    of the error over the noise that the fit found, 1 where the model leaves nothing but noise, None without a noise; after
+    a fit by Student's t from the median size of the error, for outliers have no part in that noise.
+    """
+
+    samples: int
+    rmse: float
+    fit_percent: float | None
+    chi2: float | None
+    whiteness: float | None
+    lag: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Comparisons with the fitted robot, and the scores in them: "fitted" and "held out" -> component -> Score.
+
+    held_out is None where no log was held out. All are free runs from the measured start.
+    """
+
+    fitted: Comparison
+    held_out: Comparison | None
+    scores: dict[str, dict[str, Score]]
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Cells under HEAD."""
+        return [
+            (which, name, unit(name), str(s.samples), f"{s.rmse:.4g}", _cell(s.fit_percent, ".1f"),
+             _cell(s.chi2, ".3g"), _cell(s.whiteness, ".3f"), _cell(s.lag, "+.3f"))
+            for which, found in self.scores.items() for name, s in found.items()
+        ]  # fmt: skip
+
+    def statements(self) -> Iterator[str]:
+        """What they say, in words."""
+        found = self.scores.get(HELD_OUT)
+        if found is None:
+            yield "nothing was held out: how well the model predicts logs that it never saw is not known (--hold-out)"
+            return
+        far = [name for name, s in found.items() if s.chi2 is not None and s.chi2 > FAR]
+        if far:
+            worst = max(found[name].chi2 or 0.0 for name in far)
+            yield (
+                f"on held-out logs the errors of {', '.join(far)} are larger than noise (chi2 up to {worst:.3g}): the "
+                "model misses something that differs between the logs"
+            )
+            return
+        coloured = [name for name, s in found.items() if s.whiteness is not None and s.whiteness < NOT_WHITE]
+        if coloured:
+            yield (
+                f"on held-out logs the errors of {', '.join(coloured)} are no larger than noise, but not white: the "
+                "model misses something small that lasts"
+            )
+        else:
+            yield "held-out logs are predicted as well as the noise allows"
+
+    def summary(self) -> str:
+        """A plain table, for reading."""
+        table = [HEAD, *self.rows()]
+        widths = [max(len(row[k]) for row in table) for k in range(len(HEAD))]
+        lines = []
+        for row in table:
+            cells = (c.ljust(w) if k < 3 else c.rjust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))
+            lines.append("  ".join(cells).rstrip())
+        return "\n".join([*lines, *(f"- {words}" for words in self.statements())])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            which.replace(" ", "_"): {
+                "logs": [run.source for run in comparison.measured],
+                "components": {name: asdict(s) | {"unit": unit(name)} for name, s in self.scores[which].items()},
+            }
+            for which, comparison in ((FITTED, self.fitted), (HELD_OUT, self.held_out)) if comparison is not None
+        }  # fmt: skip
+
+
+def validate(
+    fit: OutputErrorEstimate, runs: Sequence[Run], held_out: Sequence[Run] = (),
+    progress: Callable[[str], object] | None = None,
+) -> Validation:  # fmt: skip
+    """Run the fitted robot freely beside the logs it was fitted to and beside those held out, nuisances included.
+
+    Raises InputError and InsufficientDataError as `compare` does.
+    """
+    fitted = _compared(fit, runs, progress)
+    other = _compared(fit, held_out, progress) if held_out else None
+    scores = {FITTED: _scores(fit, fitted)} | ({HELD_OUT: _scores(fit, other)} if other else {})
+    return Validation(fitted, other, scores)
+
+
+def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[[str], object] | None) -> Comparison:
+    return compare(fit.robot, [as_fitted(run, fit) for run in runs], progress=progress)
+
+
+def _scores(fit: OutputErrorEstimate, found: Comparison) -> dict[str, Score]:
+    """The score of each component. Where the log has a pose, only the heading has a noise."""
+    scores = {}
+    for name, each in found.overall[found.robots[0]].items():
+        chi2 = _chi2(fit, found, name, each.rmse)
+        scores[name] = Score(each.samples, each.rmse, each.fit_percent, chi2, each.whiteness, each.lag)
+    return scores
+
+
+def _chi2(fit: OutputErrorEstimate, found: Comparison, name: str, rmse: float) -> float | None:
+    noise = fit.noise.get(output_name(name))
+    if not noise:
+        return None
+    if STUDENT_WORDS not in fit.method:
+        return rmse**2 / noise**2
+    errors = np.concatenate([found.trace(found.robots[0], name, segment).error for segment in found.segments])
+    return float((TO_STD * np.nanmedian(np.abs(errors)) * SCALE_OF_T / noise) ** 2)
+
+
+def output_name(component: str) -> str:
+    """A component by the name that a fit gives its output: "w2" is "wheel_speed[1]"."""
+    if component == "heading":
+        return "heading[0]"
+    found = place(component)
+    return f"{found[0]}[{found[1]}]" if found else component
+
+
+def _cell(value: float | None, form: str) -> str:
+    return "-" if value is None else f"{value:{form}}"

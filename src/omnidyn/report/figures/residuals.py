@@ -1,0 +1,75 @@
+"""What the model leaves: its size beside the normal curve, and how long it remembers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.comparison.aligned import errors_for_whiteness
+from omnidyn.comparison.result import Comparison
+from omnidyn.comparison.traces import unit
+from omnidyn.comparison.whiteness import whiteness
+from omnidyn.report.style import BLUE, GREY, INK, PALE, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
+
+FloatArray = NDArray[np.float64]
+
+MOST, LAGS, BINS, SPAN = 4, 20, 41, 4.5
+HEIGHT = 1.55  # inch, of a row
+
+
+def draw_residuals(comparison: Comparison, noise: dict[str, float], name: str = "residuals", of: str = "") -> Picture:
+    """A row per component: histogram of the errors over the noise of the fit, and their correlation over rows.
+
+    noise: component -> std; without one the errors are divided by their own. of: which logs, in words.
+    """
+    robot = comparison.robots[0]
+    traces = {key: [comparison.trace(robot, key, s) for s in comparison.segments] for key in comparison.channels}
+    shown = comparison.channels[:MOST]
+    height = HEIGHT * len(shown) + 0.75
+    with look():
+        figure = new_figure(WIDTH, height)
+        panels = figure.subplots(len(shown), 2, squeeze=False)
+        figure.subplots_adjust(
+            left=0.1, right=0.975, top=1.0 - 0.3 / height, bottom=0.5 / height, hspace=0.32, wspace=0.24
+        )
+        for (left, right), key in zip(panels, shown, strict=True):
+            errors = errors_for_whiteness(key, traces)
+            known = np.concatenate([e[np.isfinite(e)] for e in errors])
+            std = noise.get(key) or float(np.std(known)) or 1.0
+            _histogram(left, known / std)
+            left.set_ylabel(key)
+            found = whiteness(errors, LAGS)
+            if found is not None:
+                lags = np.arange(1, len(found.correlation) + 1)
+                right.fill_between(lags, -found.bound, found.bound, color=PALE, linewidth=0.0)
+                right.bar(lags, found.correlation, width=0.5, color=BLUE)
+                most = 1.2 * max(float(np.abs(found.correlation).max()), float(found.bound.max()), 0.05)
+                right.set_ylim(-most, most)
+            right.axhline(0.0, color=GREY, linewidth=0.8)
+            right.set_xlim(0.2, LAGS + 0.8)
+            thin_out(right, y=4)
+        panels[0][0].set_title("error / noise, log scale")
+        panels[0][1].set_title("correlation with later rows")
+        panels[-1][0].set_xlabel("standard deviations")
+        panels[-1][1].set_xlabel("rows later")
+        sizes = ", ".join(f"{key} {noise[key]:.3g} {unit(key)}" for key in shown if key in noise)
+        caption = (
+            f"Errors of the free run{of}. Left: their histogram (blue) and the normal curve that the intervals assume "
+            "(dashed); wider shoulders mean outliers. Right: bars beyond the grey band mean that errors last, so that "
+            f"the model misses something. Noise of the fit: {sizes or 'not known'}."
+        )
+        return picture(name, f"What the model leaves{of}", caption, figure)
+
+
+def _histogram(axes, scaled: FloatArray) -> None:
+    edges = np.linspace(-SPAN, SPAN, BINS)
+    density, _ = np.histogram(np.clip(scaled, -SPAN, SPAN), edges, density=True)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    axes.bar(middle, density, width=edges[1] - edges[0], color=BLUE, alpha=0.75)
+    axes.plot(middle, np.exp(-0.5 * middle**2) / np.sqrt(2.0 * np.pi), "--", color=VERMILLION, linewidth=1.6)
+    axes.set_yscale("log")
+    axes.set_ylim(1e-4, 1.0)
+    axes.set_xlim(-SPAN, SPAN)
+    axes.set_yticks([1e-4, 1e-2, 1.0])
+    axes.minorticks_off()
+    axes.tick_params(colors=INK)
