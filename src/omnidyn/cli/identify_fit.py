@@ -153,6 +153,7 @@ def _fitted(
         "nuisances": list(ask.nuisances), "loss": ask.loss or "gaussian", "use_priors": ask.use_priors,
     }  # fmt: skip
     watch = _Watch(now)
+    _refuse_groups(part, ask)
     if len(set(part.groups)) > 1:
         study = identify_groups(part.runs, robot, part.groups, per_free=ask.per_free, watch=watch, **options)
         return dict(study.estimates), study.differences, False
@@ -168,6 +169,20 @@ def _fitted(
         from omnidyn.identification.best_so_far import best_so_far
 
         return {group: best_so_far(watch.best, part.runs, robot, options)}, (), True
+
+
+def _refuse_groups(part: _Part, ask: Ask) -> None:
+    """Options of groups where there are none, and options that groups do not have."""
+    from omnidyn.errors import InputError
+
+    count = len(set(part.groups))
+    if ask.per and count == 1:
+        raise InputError("the logs have only one group", got=part.groups[0], expected="two or more", where="--per")
+    if ask.per_free and count == 1:
+        raise InputError("there are no groups", got=ask.per_free[0], expected="with --per", where="--per-free")
+    if count > 1 and (ask.profile or ask.bootstrap):
+        name = "--profile" if ask.profile else "--bootstrap"
+        raise InputError("groups have intervals by the information only", got=name, expected="without --per")
 
 
 def _written(

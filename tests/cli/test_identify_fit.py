@@ -1,0 +1,194 @@
+"""omnidyn identify by output error: the default method, groups, held-out logs, the report, refusals, an interrupt."""
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks.identify import excitation, noisy
+from omnidyn.cli import main
+from omnidyn.identification.output_error.solver import Solver
+from omnidyn.logs.run_file import write_run
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+from omnidyn.simulation.tangent import with_parameter
+
+ROUGH = 2.6  # N along x; the preset has 2.2
+COULOMB = "friction.axes.coulomb[0]"
+
+
+@pytest.fixture(scope="session")
+def logs(tmp_path_factory):
+    """Two logs of 20 s on each of two floors, and one without inputs."""
+    folder, axebot = tmp_path_factory.mktemp("logs"), load_robot("axebot")
+    for k, name in enumerate(("smooth", "smooth", "rough", "rough")):
+        robot = axebot if name == "smooth" else with_parameter(axebot, COULOMB, ROUGH)
+        write_run(noisy(simulate(robot, excitation(20.0, seed=k), 0.01), k), folder / f"{name}{k}.csv")
+    speeds = simulate(axebot, excitation(5.0), 0.01)
+    write_run(Run(t=speeds.t, wheel_speed=speeds.wheel_speed), folder / "inputless.csv")
+    return folder
+
+
+@pytest.fixture
+def call(logs, tmp_path, monkeypatch, capsys):
+    """Run a command in the folder of the logs: (exit code, stdout, stderr)."""
+    monkeypatch.chdir(logs)
+
+    def run(*arguments):
+        code = main(["identify", *arguments])
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def strict(text):
+    def refuse(name):
+        raise AssertionError(name)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_output_error_is_the_default_and_predicts_a_log_it_never_saw(call, tmp_path):
+    arguments = ("smooth0.csv", "smooth1.csv", "--robot", "axebot", "--hold-out", "smooth1.csv")
+    code, out, err = call(*arguments, "-o", str(tmp_path / "fit.toml"), "--report", str(tmp_path / "r.html"))
+    assert code == 0
+    assert "output error, maximum likelihood" in out
+    assert "held-out logs are predicted as well as the noise allows" in out
+    assert f"wrote {tmp_path / 'fit.toml'}" in err
+    robot = load_robot(tmp_path / "fit.toml")
+    prior = robot.priors[COULOMB]
+    assert abs(robot.friction.axes.coulomb[0] - 2.2) < 4.0 * prior.std
+    page = (tmp_path / "r.html").read_text("utf-8")
+    for anchor in ("numbers", "data", "runs", "residuals", "correlation", "doubts", "next", "made"):
+        assert f'id="{anchor}"' in page
+    assert "on a log held out" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_json_has_the_validation_and_is_the_same_again(call):
+    arguments = ("smooth0.csv", "smooth1.csv", "--robot", "axebot", "--hold-out", "smooth1*", "--json")
+    first, again = (strict(call(*arguments)[1]) for _ in range(2))
+    assert first == again
+    assert first["method"] == "output-error"
+    assert first["validation"]["held_out"]["logs"] == ["smooth1.csv"]
+    vx = first["validation"]["held_out"]["components"]["vx"]
+    assert vx["rmse"] == pytest.approx(0.02, rel=0.05)  # the noise of the log
+    assert vx["chi2"] == pytest.approx(1.0, abs=0.1)
+    assert len(first["provenance"]["inputs"]) == 3
+    assert first["check"][0]["fatal"] is False
+
+
+def test_a_log_of_another_floor_is_not_predicted(call):
+    out = call("smooth0.csv", "rough2.csv", "--robot", "axebot", "--hold-out", "rough2.csv")[1]
+    assert "on held-out logs the errors of vx" in out
+    assert "the model misses something that differs between the logs" in out
+
+
+def test_groups_share_the_motor_and_have_their_own_friction(call, tmp_path):
+    code, out, _ = call(
+        ".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--free", "friction",
+        "--free", "motor.torque_constant_Nm_A", "--json", "-o", str(tmp_path / "f.toml"),
+    )  # fmt: skip
+    assert code == 0
+    result = strict(out)
+    motors = {g["parameters"]["motor.torque_constant_Nm_A"]["value"] for g in result["groups"].values()}
+    assert len(motors) == 1
+    found = {d["key"]: d for d in result["differences"]}
+    assert found[COULOMB]["differs"]
+    change = ROUGH - 2.2 if found[COULOMB]["first"] == "smooth" else 2.2 - ROUGH
+    assert found[COULOMB]["low"] < change < found[COULOMB]["high"]
+    assert sum(d["differs"] for d in found.values()) <= 2  # one for certain; another by chance, one in 20 each
+    assert load_robot(tmp_path / "f-rough.toml").friction.axes.coulomb[0] == pytest.approx(ROUGH, abs=0.1)
+
+
+def test_without_inputs_it_is_steady_state_and_says_why(call):
+    code, _, err = call("inputless.csv", "--robot", "axebot")
+    assert code in (3, 4)
+    assert "omnidyn: steady-state, not output-error: inputless.csv holds no voltage and no duty" in err
+
+
+def test_a_robot_without_an_exact_engine_is_steady_state_too(call):
+    _, _, err = call("smooth0.csv", "--robot", "robotino")
+    assert "steady-state, not output-error: " in err
+    assert "the fit needs the exact engine" in err
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["--method", "output-error", "--shape", "disc"], "output-error has no such option; got --shape"),
+        (["--method", "output-error", "--group", "a=*"], "for groups use --per"),
+        (["--method", "steady-state", "--free", "friction"], "steady-state has no such option; got --free"),
+        (["--method", "steady-state", "--nuisance", "gain"], "steady-state has no such option; got --nuisance"),
+        (["--shape", "disc", "--loss", "student-t"], "steady-state has no such option; got --loss"),
+        (["--between", "mean"], "--between: an option of the motors"),
+        (["--what", "motors", "--free", "friction"], "--what motors: not an option of the motors; got --free"),
+        (["--hold-out", "none*"], "--hold-out: no log to hold out; got none*"),
+        (["--hold-out", "*.csv"], "--hold-out: every log is held out"),
+        (["--per", "a=smooth0*"], "the logs have only one group"),
+        (["--free", "body.weight"], "body.weight"),
+        (["--nuisance", "wind"], "no such nuisance; got wind"),
+        (["--loss", "huber"], "unknown loss; got huber"),
+        (["--method", "magic"], "no such method; got magic"),
+        (["--per-free", "body.mass_kg"], "--per-free: there are no groups"),
+    ],
+)  # fmt: skip
+def test_what_does_not_belong_is_refused_by_name(call, arguments, words):
+    code, out, err = call("smooth0.csv", "--robot", "axebot", *arguments)
+    assert (code, out) == (3, "")
+    assert words in err
+
+
+def test_an_interrupt_leaves_the_best_so_far(call, tmp_path, monkeypatch):
+    seen, state = [], Solver.state
+
+    def interrupted(self, *arguments):
+        seen.append(1)
+        if len(seen) == 6:
+            raise KeyboardInterrupt
+        return state(self, *arguments)
+
+    monkeypatch.setattr(Solver, "state", interrupted)
+    code, out, err = call("smooth0.csv", "--robot", "axebot", "-o", str(tmp_path / "fit.toml"))
+    assert code == 130
+    assert "the fit was interrupted: the numbers are the best so far" in out.replace("\n  ", " ")
+    assert "interrupted" in err
+    assert load_robot(tmp_path / "fit.toml").friction.axes.coulomb[0] == pytest.approx(2.2, abs=0.3)
+
+
+def test_a_log_without_motion_is_exit_4(call, tmp_path):
+    rest = simulate(load_robot("axebot"), np.full((200, 3), 0.05), 0.01)
+    noise = np.random.default_rng(1).normal(size=rest.twist.shape) * 0.02
+    write_run(Run(t=rest.t, voltage=rest.voltage, twist=rest.twist + noise), tmp_path / "rest.csv")
+    code, out, err = call(str(tmp_path / "rest.csv"), "--robot", "axebot", "-o", str(tmp_path / "fit.toml"))
+    assert (code, out) == (4, "")
+    assert "never visibly moved" in err
+    assert not (tmp_path / "fit.toml").exists()
+
+
+# ---- motors ---------------------------------------------------------------------------------------------
+
+
+def test_motors_by_output_error(call, tmp_path):
+    """One motor with k = 0.5 V s/rad, a dead band of 0.4 V and a lag of 0.05 s, by its closed form; noise 0.05 rad/s."""
+    t, rng = np.arange(2001) * 0.01, np.random.default_rng(0)
+    for log in (1, 2):
+        level = np.repeat(rng.uniform(-4.0, 4.0, 40), 50)
+        speed, decay = [0.0], np.exp(-0.01 / 0.05)
+        for u in level:
+            # Levels of one sign of motion at a time: |u| > 0.4 V drives; else it stops, and stays where it stops.
+            aim = (u - 0.4 * np.sign(u)) / 0.5 if abs(u) > 0.4 else 0.0
+            speed.append(aim + (speed[-1] - aim) * decay)
+        measured = np.array(speed) + 0.05 * rng.standard_normal(2001)
+        write_run(Run(t=t, voltage=np.append(level, level[-1])[:, None], wheel_speed=measured[:, None]), tmp_path / f"{log}.csv")
+    code, out, _ = call(
+        str(tmp_path / "1.csv"), str(tmp_path / "2.csv"), "--what", "motors", "--method", "output-error",
+        "--hold-out", "2.csv", "--json", "--report", str(tmp_path / "m.html"),
+    )  # fmt: skip
+    assert code == 0
+    (motor,) = strict(out)["motors"]
+    assert motor["parameters"]["slope"]["value"] == pytest.approx(0.5, rel=0.05)
+    assert motor["without_dead_band"]["held_out_rmse_rad_s"] > motor["held_out_rmse_rad_s"]
+    assert motor["dead_band_seen"]
+    assert "Motors from whole logs" in (tmp_path / "m.html").read_text("utf-8")
