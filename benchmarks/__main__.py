@@ -18,6 +18,7 @@ NAMES = {
     "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
     "big_log": "a log of 1 GB in pieces, CSV and Parquet: processor time and memory (writes it to a temporary folder)",
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
+    "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
     "identify": "output error on simulated logs: coverage, efficiency, nuisances, starts, time (ten minutes)",
 }
 GOAL_MISSED = 5

@@ -38,8 +38,8 @@ ORDER = {
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch
         claims""",
     "report": "style figures html page steady_page fit_page",
-    "report/figures": """robot traces friction steps dead_zone dead_zone_map reconcile overlay shapes drive_lines raw_log
-        residuals correlation""",
+    "report/figures": """robot traces friction steps dead_zone dead_zone_map reconcile overlay shapes drive_lines
+        raw_log residuals correlation""",
     "export": "",
     "interop": "",
     "cli": """streams numbers session progress log_options init check plan identify_logs identify_fit identify

@@ -31,7 +31,9 @@ def identify(
     free: list[str] = typer.Option([], metavar="KEY", help="Fit this; friction is all six. Repeatable."),
     fix: list[str] = typer.Option([], metavar="KEY", help="Leave this as the robot file has it. Repeatable."),
     nuisance: list[str] = typer.Option(
-        [], metavar="NAME", help="Fit what the log does: latency, gain, dead_band, fade. Repeatable."
+        [],
+        metavar="NAME",
+        help="Fit what the log does: latency, gain, dead_band, fade, none; default: auto. Repeatable.",
     ),
     loss: str = typer.Option("", help="gaussian, or student-t for logs with outliers."),
     use_priors: bool = typer.Option(False, "--use-priors", help="A std in the robot file counts as a prior."),
@@ -40,7 +42,7 @@ def identify(
     per_free: list[str] = typer.Option([], metavar="KEY", help="What each group has for itself instead. Repeatable."),
     profile: list[str] = typer.Option([], metavar="KEY", help="Interval by profile of the likelihood. Repeatable."),
     bootstrap: int = typer.Option(0, min=0, metavar="N", help="Intervals from N draws of whole runs instead."),
-    between: str = typer.Option("", help="Of the motors: hold, or mean: of the input of neighbouring rows."),
+    between: str = typer.Option("", help="Of the motors: input holds, or mean of two rows; default: auto."),
     what: str = typer.Option(FRICTION, help="friction, or motors: the line of each motor, wheels off the ground."),
     shape: str = typer.Option(
         "auto", help="box, disc, ellipse, wheel, wheels, disc+wheel, ...; auto: the best; line: per axis, the paper."

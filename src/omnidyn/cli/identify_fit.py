@@ -131,15 +131,27 @@ def _verdicts(loaded: Loaded, robot: Robot, now: Any) -> list[Verdict]:
     return found
 
 
+def nuisances(names: Sequence[str]) -> str | list[str]:
+    """What --nuisance means: nothing given is automatic, "none" is none."""
+    from omnidyn.errors import InputError
+
+    if "none" in names or "auto" in names:
+        if len(set(names)) > 1:
+            raise InputError("none and auto stand alone", got=", ".join(names), where="--nuisance")
+        return [] if "none" in names else "auto"
+    return list(names) if names else "auto"
+
+
 class _Watch:
-    """Tells how far a fit is, and keeps the best state so far."""
+    """Tells how far a fit is, and keeps every better state."""
 
     def __init__(self, now: Any):
-        self.now, self.count, self.best = now, 0, None
+        self.now = now
+        self.states: list[State] = []
 
     def __call__(self, state: State) -> None:
-        self.count, self.best = self.count + 1, state
-        self.now(f"fitting, step {self.count}, -log likelihood {state.objective:.6g}")
+        self.states.append(state)
+        self.now(f"fitting, step {len(self.states)}, -log likelihood {state.objective:.6g}")
 
 
 def _fitted(
@@ -150,7 +162,7 @@ def _fitted(
 
     options: dict[str, Any] = {
         "free": expand_keys(ask.free) if ask.free else None, "fixed": expand_keys(ask.fix),
-        "nuisances": list(ask.nuisances), "loss": ask.loss or "gaussian", "use_priors": ask.use_priors,
+        "nuisances": nuisances(ask.nuisances), "loss": ask.loss or "gaussian", "use_priors": ask.use_priors,
     }  # fmt: skip
     watch = _Watch(now)
     _refuse_groups(part, ask)
@@ -164,11 +176,11 @@ def _fitted(
         more: dict[str, Any] = {"profile": expand_keys(ask.profile), "bootstrap": ask.bootstrap}
         return {group: fit_output_error(part.runs, robot, watch=watch, **options, **more)}, (), False
     except KeyboardInterrupt:
-        if watch.best is None:
+        if not watch.states:
             raise
         from omnidyn.identification.best_so_far import best_so_far
 
-        return {group: best_so_far(watch.best, part.runs, robot, options)}, (), True
+        return {group: best_so_far(watch.states, part.runs, robot, options)}, (), True
 
 
 def _refuse_groups(part: _Part, ask: Ask) -> None:
@@ -277,7 +289,7 @@ def fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out:
     found: list[tuple[MotorFit, MotorFit, float, float]] = []
     for motor in range(min(counts)):
         now(f"fitting motor {motor + 1} of {min(counts)}")
-        how: dict[str, Any] = {"kind": kind, "between": ask.between or "hold", "latency": bool(ask.nuisances),
+        how: dict[str, Any] = {"kind": kind, "between": ask.between or "auto", "latency": bool(ask.nuisances),
                                "loss": ask.loss or "gaussian"}  # fmt: skip
         band, plain = (fit_motor(part.runs, motor, dead_band=with_band, **how) for with_band in (True, False))
         held = [run for run, _ in part.held]

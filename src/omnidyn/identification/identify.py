@@ -56,12 +56,15 @@ def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()
 
 
 def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
-    """Why whole logs cannot be fitted by output error, in words; "" where they can."""
+    """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
     reasons = why_not_exact(robot)
     if robot.motor.electrical == DYNAMIC:
         reasons.append('winding inductance ([motor] electrical = "dynamic")')
     if reasons:
-        return f"{robot.name} has {'; '.join(reasons)}, and the fit needs the exact engine"
+        return (
+            f"{robot.name} has {'; '.join(reasons)}; whole logs can be fitted all the same, more slowly, where "
+            f"{OUTPUT_ERROR} is asked for by name"
+        )
     for run in runs:
         if run.voltage is None and run.duty is None:
             return f"{run.source or 'a log'} holds no voltage and no duty"

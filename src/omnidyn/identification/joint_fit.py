@@ -17,13 +17,14 @@ from omnidyn.identification.identify import why_not_output_error
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.exact_engine import ExactEngine, Weighting
-from omnidyn.identification.output_error.fit import GAUSS, NU, STUDENT, Options, first_point, make_problem
+from omnidyn.identification.output_error.fit import GAUSS, NU, STUDENT, Options, _names, first_point, make_problem
 from omnidyn.identification.output_error.motion import motion
-from omnidyn.identification.output_error.nuisances import AUTO
+from omnidyn.identification.output_error.nuisances import AUTO, automatic
 from omnidyn.identification.output_error.parameters import FRICTION, Parameter
 from omnidyn.identification.output_error.problem import PieceSums, Point, Problem
 from omnidyn.identification.output_error.record import Record, record
 from omnidyn.identification.output_error.solver import Solution, Solver, State
+from omnidyn.identification.output_error.support import supported
 from omnidyn.identification.output_error.uncertainty import SHARE, Trust, trust
 from omnidyn.identification.study_parts import Difference
 from omnidyn.logs.steady_table import AXES
@@ -82,9 +83,9 @@ class JointEngine(ExactEngine):
 
 def identify_groups(
     runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, per_free: Sequence[str] = (),
-    free: Sequence[str] | None = None, fixed: Sequence[str] = (), nuisances: Sequence[str] = (), start: str = AUTO,
-    use_priors: bool = False, outputs: Sequence[str] | None = None, loss: str = GAUSS, covariance: str = AUTO,
-    watch: Callable[[State], None] | None = None,
+    free: Sequence[str] | None = None, fixed: Sequence[str] = (), nuisances: str | Sequence[str] = AUTO,
+    start: str = AUTO, use_priors: bool = False, outputs: Sequence[str] | None = None, loss: str = GAUSS,
+    covariance: str = AUTO, watch: Callable[[State], None] | None = None,
 ) -> GroupFit:  # fmt: skip
     """Fit logs of several groups at once by output error.
 
@@ -102,7 +103,7 @@ def identify_groups(
         raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
     keys = None if free is None else tuple(expand_keys(free))
     given = Options(
-        keys, tuple(expand_keys(fixed)), tuple(nuisances), start, use_priors,
+        keys, tuple(expand_keys(fixed)), _names(nuisances), start, use_priors,
         None if outputs is None else tuple(outputs), loss, covariance,
     )  # fmt: skip
     parts = _parts(runs, groups, robot, given)
@@ -131,8 +132,11 @@ def _parts(
 ) -> list[tuple[str, list[Record], Problem, tuple[str, ...]]]:
     """(group, records, its problem alone, notes) of each; friction of an axis that never moved in a group stays out."""
     found = []
-    for name in dict.fromkeys(groups):
-        records = [record(run, robot, given.outputs) for run, own in zip(runs, groups, strict=True) if own == name]
+    of = {
+        name: [record(run, robot, given.outputs) for run, own in zip(runs, groups, strict=True) if own == name]
+        for name in dict.fromkeys(groups)
+    }
+    for name, records in of.items():
         moved = motion(records, robot).moved
         still = [key for key in FRICTION if not moved[int(key[-2])]]
         free = given.free if given.free is not None else FRICTION if not given.use_priors else None
@@ -145,8 +149,26 @@ def _parts(
             f"axis {AXES[axis]} never visibly moved in {name}: its friction is not fitted there"
             for axis in np.flatnonzero(~moved)
         )
-        found.append((name, records, make_problem(records, robot, options), notes))
-    return found
+        found.append((name, records, options, notes))
+    every = [each for records in of.values() for each in records]
+    kept = given.nuisances if given.nuisances is not None else _settled(found, robot, automatic(every))
+    return [
+        (name, records, make_problem(records, robot, replace(options, nuisances=kept)), notes)
+        for name, records, options, notes in found
+    ]
+
+
+def _settled(
+    parts: Sequence[tuple[str, list[Record], Options, tuple[str, ...]]], robot: Robot, names: tuple[str, ...]
+) -> tuple[str, ...]:
+    """The automatic nuisances that every group supports alone."""
+    kept: list[str] | None = None
+    for _, records, options, _ in parts:
+        problem = make_problem(records, robot, replace(options, nuisances=names))
+        solver = Solver(problem, ExactEngine(problem), NU if options.loss == STUDENT else 0.0)
+        mine = supported(solver, solver.minimise(first_point(solver, records)), names)
+        kept = [name for name in kept if name in mine] if kept is not None else list(mine)
+    return tuple(kept or ())
 
 
 def _own_names(

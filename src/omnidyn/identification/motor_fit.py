@@ -27,7 +27,7 @@ from omnidyn.identification.output_error.parameters import Parameter
 from omnidyn.identification.output_error.primitives import Primitives
 from omnidyn.identification.output_error.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.record import SHORTEST, Record
-from omnidyn.identification.output_error.solver import Solver, State
+from omnidyn.identification.output_error.solver import Solution, Solver, State
 from omnidyn.identification.output_error.uncertainty import Trust, trust
 from omnidyn.logs.segments import segments
 from omnidyn.model.robot_file import load_robot
@@ -36,8 +36,9 @@ from omnidyn.run import Run
 FloatArray = NDArray[np.float64]
 
 SLOPE, BAND, LAG = "slope", "dead_band", "lag"
+INNER = "motor."  # in the problem: the engine takes a bare "dead_band" for one of the driver
 AXIS = 2  # yaw: the axis whose travel is an output
-HOLD, MEAN = "hold", "mean"
+AUTO, HOLD, MEAN = "auto", "hold", "mean"
 INPUTS = {"voltage": "V", "duty": "1"}
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
 SPAN = 1e4
@@ -148,7 +149,7 @@ class MotorEngine(ExactEngine):
 
 
 def fit_motor(
-    runs: Run | Sequence[Run], motor: int = 0, *, dead_band: bool = True, kind: str = "", between: str = HOLD,
+    runs: Run | Sequence[Run], motor: int = 0, *, dead_band: bool = True, kind: str = "", between: str = AUTO,
     latency: bool = False, angle: bool = False, loss: str = GAUSS, covariance: str = "auto",
     watch: Callable[[State], None] | None = None,
 ) -> MotorFit:  # fmt: skip
@@ -156,22 +157,26 @@ def fit_motor(
 
     motor: its number from 0. dead_band: False leaves Coulomb friction out. kind: "voltage" or "duty"; "" takes the
     first that is there. between: "hold": the input of a row holds to the next; "mean": the mean of both rows applies,
-    where inputs are sampled as the speeds are. latency: fit how late speed and angle are [s]; with "hold" a lag and a
-    latency are told apart only by how the speed sets off. angle: whether the angle is an output, beside the speed.
+    where inputs are sampled as the speeds are; "auto": whichever fits better. latency: fit how late speed and angle
+    are [s]; a lag and a latency are told apart only by how the speed sets off. angle: the angle is an output too,
+    beside the speed; what the log does not resolve of the input adds up in it, and then looks like friction.
     Raises InputError for a run without the channels, InsufficientDataError where the motor says nothing.
     """
-    if between not in (HOLD, MEAN):
-        raise InputError("no such way", got=between, expected=f"{HOLD} or {MEAN}", where="between")
+    if between not in (AUTO, HOLD, MEAN):
+        raise InputError("no such way", got=between, expected=f"{AUTO}, {HOLD} or {MEAN}", where="between")
     if loss not in (GAUSS, STUDENT):
         raise InputError("unknown loss", got=loss, expected=f"{GAUSS} or {STUDENT}", where="loss")
     every = [runs] if isinstance(runs, Run) else list(runs)
-    records, unit = motor_records(every, motor, kind, between, angle)
-    problem = _problem(records, dead_band, latency)
     nu = NU if loss == STUDENT else 0.0
-    solver = Solver(problem, MotorEngine(problem), nu)
-    ends = [solver.minimise(_begin(problem, records, lag), watch=watch) for lag in LAGS]
-    best = min(ends, key=lambda end: end.state.objective)
-    return _answer(solver, best, trust(solver, best, covariance), motor, unit, between)
+    found: list[tuple[Solution, Solver, str, str]] = []
+    for way in (HOLD, MEAN) if between == AUTO else (between,):
+        records, unit = motor_records(every, motor, kind, way, angle)
+        problem = _problem(records, dead_band, latency)
+        solver = Solver(problem, MotorEngine(problem), nu)
+        ends = [solver.minimise(_begin(problem, records, lag), watch=watch) for lag in LAGS]
+        found += [(end, solver, way, unit) for end in ends]
+    best, solver, way, unit = min(found, key=lambda each: each[0].state.objective)
+    return _answer(solver, best, trust(solver, best, covariance), motor, unit, way)
 
 
 def motor_records(runs: Sequence[Run], motor: int, kind: str, between: str, angle: bool) -> tuple[list[Record], str]:
@@ -230,9 +235,9 @@ def _problem(records: Sequence[Record], dead_band: bool, latency: bool) -> Probl
     most = max(float(np.abs(r.voltage).max()) for r in records)
     if most == 0.0:
         raise InsufficientDataError("the motor was never driven", got="an input of 0 throughout", expected="an input")
-    numbers = [Parameter(SLOPE, 1.0, 1e-9, 1e9, True), Parameter(LAG, 0.1, 1e-5, 1e3, True)]
+    numbers = [Parameter(INNER + SLOPE, 1.0, 1e-9, 1e9, True), Parameter(INNER + LAG, 0.1, 1e-5, 1e3, True)]
     if dead_band:
-        numbers.append(Parameter(BAND, 0.0, 0.0, 0.5 * most))
+        numbers.append(Parameter(INNER + BAND, 0.0, 0.0, 0.5 * most))
     columns = dict.fromkeys(name for r in records for name, _ in r.columns)
     late = [Parameter(f"{LATENCY}.{name}", 0.0, EARLIEST, LATEST) for name in columns] if latency else []
     pieces = [_piece(r, first, last, latency) for r in records for first, last in r.pieces]
@@ -273,14 +278,15 @@ def _begin(problem: Problem, records: Sequence[Record], lag: float) -> Point:
     return replace(point, values=values)
 
 
-def _answer(solver: Solver, solution: Any, known: Trust, motor: int, unit: str, between: str) -> MotorFit:
+def _answer(solver: Solver, solution: Solution, known: Trust, motor: int, unit: str, between: str) -> MotorFit:
     problem, values = solver.problem, solution.state.point.values
     if known.blind[0]:
         raise InsufficientDataError(
             "the logs say nothing about this motor", got=f"motor {motor + 1}", expected="motion"
         )
     std, ci95 = intervals(problem, values, known)
-    own, names = problem.robot_count, problem.names
+    own, names = problem.robot_count, tuple(name.removeprefix(INNER) for name in problem.names)
+    std, ci95 = ({name.removeprefix(INNER): each for name, each in found.items()} for found in (std, ci95))
     noise = {column[0]: float(s) for column, s in zip(problem.columns, np.sqrt(solution.state.variance), strict=True)}
     back = {engine: channel for channel, engine in LATENCIES.items()}
     size = np.where(np.isfinite(known.std) & (known.std > 0.0), known.std, 1.0)
@@ -321,12 +327,11 @@ def run_motor(fit: MotorFit, runs: Run | Sequence[Run]) -> list[FloatArray]:
 
     Each piece starts at the measured speed; NaN outside of the pieces. Latencies are included.
     """
-    every = [runs] if isinstance(runs, Run) else list(runs)
+    every = [_with_speed(run) for run in ([runs] if isinstance(runs, Run) else runs)]
     kind = next(name for name, unit in INPUTS.items() if unit == fit.unit)
     records, _ = motor_records(every, fit.motor, kind, fit.between, angle=False)
-    records = [_speed_only(each) for each in records]
     problem = _problem(records, BAND in fit.value, bool(fit.nuisances))
-    values = [fit.value[name] for name in problem.names[: problem.robot_count]]
+    values = [fit.value[name.removeprefix(INNER)] for name in problem.names[: problem.robot_count]]
     values += [_late(fit) for _ in problem.names[problem.robot_count :]]
     engine = MotorEngine(problem)
     point = replace(problem.start(), values=np.array(values))
@@ -342,15 +347,11 @@ def _late(fit: MotorFit) -> float:
     return own.value
 
 
-def _speed_only(record: Record) -> Record:
-    """Only the speed; where there is none, NaN in its place."""
-    names = [name for name, _ in record.columns]
-    speed = (
-        record.outputs[:, [names.index("wheel_speed")]]
-        if "wheel_speed" in names
-        else np.full((len(record.t), 1), np.nan)
-    )
-    return replace(record, outputs=np.ascontiguousarray(speed), columns=(("wheel_speed", 0),))
+def _with_speed(run: Run) -> Run:
+    """The run with a speed; where only the angle is logged, by its slope: that is where a free run starts."""
+    if run.wheel_speed is not None or run.wheel_angle is None or len(run) < SHORTEST:
+        return run
+    return run.replace(wheel_speed=np.gradient(run.wheel_angle, run.t, axis=0))
 
 
 def fit_rmse(fit: MotorFit, runs: Run | Sequence[Run]) -> float:

@@ -28,8 +28,8 @@ TO_STD = 1.4826  # median size to standard deviation, for Gaussian noise
 @dataclass(frozen=True)
 class Score:
     """One component of some logs. rmse in SI; fit_percent [%] and whiteness as in comparison.Metrics; chi2: mean square
-    of the error over the noise that the fit found, 1 where the model leaves nothing but noise, None without a noise; after
-    a fit by Student's t from the median size of the error, for outliers have no part in that noise.
+    of the error over the noise that the fit found, 1 where the model leaves nothing but noise, None without a noise;
+    after a fit by Student's t from the median size of the error, for outliers have no part in that noise.
     """
 
     samples: int

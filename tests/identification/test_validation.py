@@ -1,0 +1,126 @@
+"""Validation and what the nuisances of a fit do to a run before it is compared; omnidyn.identify and its methods."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import omnidyn
+from benchmarks.identify import NOISE, excitation, noisy
+from omnidyn.errors import InputError
+from omnidyn.identification.as_fitted import as_fitted, at_motors, mean_before
+from omnidyn.identification.identify import choose_method, options_of
+from omnidyn.identification.output_error.fit import NU, fit_output_error
+from omnidyn.identification.validation import SCALE_OF_T, validate
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+from omnidyn.simulation.tangent import with_parameter
+
+AXEBOT = load_robot("axebot")
+LATE, GAIN, DEAD = 0.013, 0.95, 0.2
+
+
+def impaired(seed, seconds=20.0):
+    """A log whose twist is 13 ms late, whose driver has a dead band, and whose battery is at 95 %."""
+    put_in = excitation(seconds, seed=seed)
+    applied = GAIN * np.sign(put_in) * np.maximum(np.abs(put_in) - DEAD, 0.0)
+    fine = simulate(AXEBOT, np.repeat(applied, 10, axis=0), 1e-3)
+    seen = np.arange(len(put_in)) * 10 - round(LATE * 1e3)
+    twist = np.where((seen >= 0)[:, None], fine.twist[np.maximum(seen, 0)], 0.0)
+    twist = twist + NOISE * np.random.default_rng(seed).normal(size=twist.shape)
+    return Run(t=0.01 * np.arange(len(put_in)), voltage=put_in, twist=twist, source=f"log {seed}")
+
+
+@pytest.fixture(scope="module")
+def fit():
+    return fit_output_error(impaired(1), AXEBOT, nuisances=("latency", "gain", "dead_band"), start="rest")
+
+
+def test_a_held_out_log_is_compared_as_it_was_fitted(fit):
+    """With latency, gain and dead band in place the errors are the noise; without them they are not."""
+    found = validate(fit, [impaired(1)], [impaired(2)])
+    for name, std in zip(("vx", "vy", "omega"), NOISE, strict=True):
+        score = found.scores["held out"][name]
+        assert score.rmse == pytest.approx(std, rel=0.05)
+        assert score.chi2 == pytest.approx(1.0, abs=0.1)
+    assert omnidyn.compare(fit.robot, impaired(2)).rmse["vx"] > 1.2 * NOISE[0]
+    assert "held-out logs are predicted as well as the noise allows" in found.summary()
+
+
+def test_another_floor_is_seen(fit):
+    rough = with_parameter(AXEBOT, "friction.axes.coulomb[0]", 3.0)
+    plain = fit_output_error(noisy(simulate(AXEBOT, excitation(20.0), 0.01), 1), AXEBOT, nuisances=())
+    other = noisy(simulate(rough, excitation(20.0, seed=5), 0.01), 2)
+    found = validate(plain, [other], [other])
+    assert found.scores["held out"]["vx"].chi2 > 1.5
+    assert found.scores["held out"]["vy"].chi2 < 1.2
+    assert any("the errors of vx are larger than noise" in words for words in found.statements())
+
+
+def test_a_fit_by_students_t_has_a_chi2_of_one_too():
+    run = noisy(simulate(AXEBOT, excitation(20.0), 0.01), 1)
+    fit = fit_output_error(run, AXEBOT, nuisances=(), loss="student-t", start="rest")
+    for score in validate(fit, [run]).scores["fitted"].values():
+        assert score.chi2 == pytest.approx(1.0, abs=0.08)
+
+
+def test_scale_of_students_t_on_gaussian_noise():
+    """The scale s at which the mean of (nu + 1) z^2/(nu + z^2), z = x/s, is 1: the equation of its likelihood."""
+
+    def mean(x):
+        z2 = (x / SCALE_OF_T) ** 2
+        return (NU + 1.0) * z2 / (NU + z2) * np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
+
+    assert quad(mean, -12.0, 12.0)[0] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_without_nuisances_the_run_is_left_alone():
+    run = noisy(simulate(AXEBOT, excitation(5.0), 0.01), 1)
+    assert as_fitted(run, fit_output_error(run, AXEBOT, nuisances=())) is run
+
+
+def test_mean_of_a_held_voltage():
+    """u = 1, 2, 4 V held for 1 s each; the clock runs 0.25 s behind: three quarters of each row, a quarter of the last."""
+    mean = mean_before(np.array([0.0, 1.0, 2.0]), np.array([[1.0], [2.0], [4.0]]), 0.25)
+    assert mean[:, 0] == pytest.approx([1.0, 0.25 * 1.0 + 0.75 * 2.0, 0.25 * 2.0 + 0.75 * 4.0])
+
+
+def test_voltage_at_the_motors():
+    left = at_motors(
+        np.array([[3.0], [-3.0], [0.1]]), np.array([0.0, 1.0, 2.0]), {"gain": 0.5, "dead_band": 1.0, "fade": 0.2}
+    )
+    assert left[:, 0] == pytest.approx([1.0, -0.9, 0.0])
+
+
+# ---- omnidyn.identify -----------------------------------------------------------------------------------
+
+
+def test_identify_takes_output_error_where_it_can():
+    run = noisy(simulate(AXEBOT, excitation(10.0), 0.01), 1)
+    estimate = omnidyn.identify([run], AXEBOT)
+    assert estimate.method.startswith("output error")
+    assert estimate.value == fit_output_error(run, AXEBOT).value
+    assert omnidyn.identify(run, AXEBOT, method="output-error", nuisances=()).robot.name == "axebot"
+
+
+def test_what_decides_the_method():
+    run = noisy(simulate(AXEBOT, excitation(2.0), 0.01), 1)
+    assert choose_method([run], AXEBOT) == ("output-error", "")
+    assert choose_method([run], AXEBOT, ["shape"]) == ("steady-state", "")
+    assert choose_method([run], load_robot("robotino"), ["free"]) == ("output-error", "")
+    method, why = choose_method([run], load_robot("robotino"))
+    assert method == "steady-state"
+    assert "friction along the direction of travel" in why
+    assert "no voltage and no duty" in choose_method([run.replace(voltage=None)], AXEBOT)[1]
+    assert "no speed, current or pose" in choose_method([run.replace(twist=None)], AXEBOT)[1]
+
+
+def test_options_of_another_method_are_refused():
+    run = noisy(simulate(AXEBOT, excitation(2.0), 0.01), 1)
+    with pytest.raises(InputError, match=r"output-error has no such option; got shape; .*; it belongs to steady-state"):
+        omnidyn.identify(run, AXEBOT, method="output-error", shape="disc")
+    with pytest.raises(InputError, match="steady-state has no such option; got loss"):
+        omnidyn.identify(run, AXEBOT, method="steady-state", loss="student-t")
+    with pytest.raises(InputError, match="method: no such method; got magic; expected output-error or steady-state"):
+        omnidyn.identify(run, AXEBOT, method="magic")
+    assert "nuisances" in options_of("output-error")

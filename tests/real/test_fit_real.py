@@ -1,0 +1,73 @@
+"""Output error on real motors, fitted to some runs and run freely on others, beside the README of the data."""
+
+import numpy as np
+import pytest
+
+from benchmarks import real_fit
+from omnidyn.identification.motor_fit import fit_motor, fit_rmse
+
+TURN = 2.0 * np.pi
+
+
+@pytest.fixture(scope="module")
+def bench(data):
+    return real_fit.bench_runs()
+
+
+@pytest.fixture(scope="module")
+def fits(bench):
+    """With and without a dead band, fitted to step1 and chirp1."""
+    fitted = [runs[0] for runs in bench.values()]
+    return {dead_band: fit_motor(fitted, dead_band=dead_band) for dead_band in (True, False)}
+
+
+@pytest.mark.parametrize("kind, baseline", [("step", 0.044), ("chirp", 0.051)])
+@pytest.mark.parametrize("dead_band", [True, False])
+def test_the_bench_is_predicted_as_in_the_readme(bench, fits, dead_band, kind, baseline):
+    """The baseline is over both runs of a kind, fitted to them; here half of them were never seen."""
+    assert fit_rmse(fits[dead_band], bench[kind]) / TURN <= 1.1 * baseline
+
+
+def test_no_friction_is_invented_on_the_bench(fits):
+    """The negative control: Coulomb 0.35+-0.24 mV, that is none; viscous 0.05509+-0.00006 V/(turn/s)."""
+    fit = fits[True]
+    assert not fit.dead_band_seen
+    assert fit.ci95["dead_band"][0] <= 0.35e-3 <= fit.ci95["dead_band"][1]
+    assert fit.ci95["dead_band"][1] < 0.03 * 0.25  # of the voltage of the step
+    assert abs(TURN * fit.value["slope"] - 0.05509) <= 3.0 * np.hypot(TURN * fit.std["slope"], 6e-5)
+    assert fit.between == "mean"  # its voltages are samples, as the README has it
+
+
+def test_coulomb_does_not_help_on_logs_it_never_saw(bench, fits):
+    for runs in bench.values():
+        with_band, without = (fit_rmse(fits[dead_band], runs[1]) for dead_band in (True, False))
+        assert with_band == pytest.approx(without, rel=0.02)
+
+
+def test_lag_and_latency_together(bench):
+    """README: 1/a and the lag of the sensor are 5.3 ms together; only the sum is identifiable."""
+    fit = fit_motor([runs[0] for runs in bench.values()], between="mean", latency=True)
+    late = fit.nuisances["latency.wheel_speed"]
+    assert fit.value["lag"] + late.value == pytest.approx(5.3e-3, abs=0.5e-3)
+
+
+def test_the_robot_that_turns_on_the_spot(data):
+    """README, predicting w: 0.46 rad/s with a dead zone, 0.56 proportional. Half of the log predicts the other."""
+    run = real_fit.turning_run()
+    half = len(run) // 2
+    parts = [real_fit.part(run, slice(0, half)), real_fit.part(run, slice(half, None))]
+    for dead_band, baseline in ((True, 0.46), (False, 0.56)):
+        how = {"dead_band": dead_band, "kind": "duty", "angle": True, "latency": True}
+        errors = [real_fit.window_rmse(fit_motor(a, **how), [b]) for a, b in (parts, parts[::-1])]
+        assert np.sqrt(np.mean(np.square(errors))) < baseline
+
+
+def test_drives_with_noisy_encoders(data):
+    """README: 0.5 s means are predicted within 1.55 rad/s, fitted to all; here exp4 and exp5 from exp1 to exp3."""
+    runs = real_fit.drive_runs()
+    errors = []
+    for motor in range(3):
+        fit = fit_motor(runs[:3], motor, kind="duty", loss="student-t", between="hold")
+        errors.append(real_fit.window_rmse(fit, runs[3:], real_fit.SPAN))
+        assert 0.01 / fit.value["slope"] == pytest.approx(0.33, abs=0.035)
+    assert np.sqrt(np.mean(np.square(errors))) <= 1.55
