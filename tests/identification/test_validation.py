@@ -80,7 +80,7 @@ def test_without_nuisances_the_run_is_left_alone():
 
 
 def test_mean_of_a_held_voltage():
-    """u = 1, 2, 4 V held for 1 s each; the clock runs 0.25 s behind: three quarters of each row, a quarter of the last."""
+    """u = 1, 2, 4 V held for 1 s each; the clock runs 0.25 s behind: 3/4 of each row, 1/4 of the last."""
     mean = mean_before(np.array([0.0, 1.0, 2.0]), np.array([[1.0], [2.0], [4.0]]), 0.25)
     assert mean[:, 0] == pytest.approx([1.0, 0.25 * 1.0 + 0.75 * 2.0, 0.25 * 2.0 + 0.75 * 4.0])
 

@@ -103,6 +103,9 @@ def identify(
         if (method or _default(loaded, loaded_robot, ask)) == OUTPUT_ERROR:
             from omnidyn.cli.identify_fit import fit_logs
 
+            if loaded.groups and not per:
+                say("omnidyn: all folders are fitted together; --per NAME=GLOB makes groups of them")
+                loaded = loaded._replace(groups=None)
             fit_logs(loaded, loaded_robot, ask, record, places, now)
             return
         loaded.logs.clear()

@@ -70,6 +70,10 @@ class JointEngine(ExactEngine):
     def __init__(self, problem: Problem, groups: Sequence[_Group]):
         self.problem, self.groups = problem, tuple(groups)
 
+    def on(self, problem: Problem) -> JointEngine:
+        """Not on other pieces: which group they are of would not be known. Raises UnsupportedError."""
+        raise UnsupportedError("groups cannot be resampled", got="a bootstrap over runs", expected="one group")
+
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         found: list[PieceSums] = []
         for group in self.groups:

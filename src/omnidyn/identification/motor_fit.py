@@ -147,6 +147,10 @@ class MotorEngine(ExactEngine):
         self._columns = problem.columns
         self._axes_only = False
 
+    def on(self, problem: Problem) -> MotorEngine:
+        """The same engine on other pieces."""
+        return MotorEngine(problem)
+
 
 def fit_motor(
     runs: Run | Sequence[Run], motor: int = 0, *, dead_band: bool = True, kind: str = "", between: str = AUTO,
@@ -286,7 +290,8 @@ def _answer(solver: Solver, solution: Solution, known: Trust, motor: int, unit: 
         )
     std, ci95 = intervals(problem, values, known)
     own, names = problem.robot_count, tuple(name.removeprefix(INNER) for name in problem.names)
-    std, ci95 = ({name.removeprefix(INNER): each for name, each in found.items()} for found in (std, ci95))
+    std = {name.removeprefix(INNER): each for name, each in std.items()}
+    ci95 = {name.removeprefix(INNER): each for name, each in ci95.items()}
     noise = {column[0]: float(s) for column, s in zip(problem.columns, np.sqrt(solution.state.variance), strict=True)}
     back = {engine: channel for channel, engine in LATENCIES.items()}
     size = np.where(np.isfinite(known.std) & (known.std > 0.0), known.std, 1.0)
@@ -301,7 +306,7 @@ def _answer(solver: Solver, solution: Solution, known: Trust, motor: int, unit: 
             for name, v in zip(names[own:], values[own:], strict=True)
         },
         noise={back[name]: s for name, s in noise.items()},
-        rmse=motor_rmse(solver.engine, solution.state.point),
+        rmse=motor_rmse(MotorEngine(problem), solution.state.point),
         names=names, correlation=covariance / np.outer(size, size),
         at_bound=tuple(name for name, held in zip(names, known.held, strict=True) if held),
         unidentifiable=tuple(name for name, b in zip(names, known.blind, strict=True) if b),
