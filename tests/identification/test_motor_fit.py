@@ -129,3 +129,35 @@ def test_what_cannot_be_used_is_refused(clean):
         fit_motor(run, kind="current")
     with pytest.raises(InsufficientDataError, match="the motor was never driven"):
         fit_motor(run.replace(voltage=np.zeros_like(run.voltage)))
+
+
+def test_one_step_tells_no_dead_band():
+    """From rest to one speed: u - band and slope w balance, whatever the band; slope and band cannot be told apart."""
+    rng = np.random.default_rng(7)
+    u = np.where(np.arange(400) < 100, 0.0, 2.0)
+    w = [0.0]
+    for level in u[:-1]:
+        w.append(euler(w[-1], level, BAND, 0.01)[0])
+    run = Run(t=0.01 * np.arange(400), voltage=u[:, None], wheel_speed=(w + 0.01 * rng.standard_normal(400))[:, None])
+    for between in ("hold", "mean"):
+        fit = fit_motor(run, between=between)
+        low, high = fit.ci95["dead_band"]
+        assert not fit.dead_band_seen
+        assert "dead_band" in fit.unidentifiable or low <= 0.0 < high
+
+
+def test_an_input_that_outruns_the_rows_does_not_count():
+    """A motor without dead band under a chirp that ends at 3 rows a swing: what the rows do not show is no friction."""
+    rng, fine = np.random.default_rng(8), 20
+    t = np.arange(0.0, 8.0, 0.01 / fine)
+    u = np.sin(2.0 * np.pi * (0.5 * t + 2.0 * t**2))
+    w = [0.0]
+    for level in u[:-1]:
+        w.append(euler(w[-1], level, 0.0, 0.01 / fine, steps=5)[0])
+    rows = slice(None, None, fine)
+    speed = np.array(w)[rows] + 0.01 * rng.standard_normal(len(t[rows]))
+    fit = fit_motor(Run(t=t[rows], voltage=u[rows, None], wheel_speed=speed[:, None]))
+    assert fit.left_out > 100
+    assert "rows left out" in fit.statement()
+    assert not fit.dead_band_seen
+    assert fit.value["slope"] == pytest.approx(SLOPE, rel=0.1)

@@ -268,7 +268,7 @@ def _window(
         if not np.isfinite(own).all() or not np.isfinite(mean[motor]):
             continue
         put_in = _mean_input(run, motion, values[:, motor], window)
-        if _unresolved(values[:, motor], window, float(largest[motor])):
+        if unresolved_input(values[:, motor], window, float(largest[motor])):
             counts["unresolved"] += 1
             continue
         sides = _sides(motion, window, motor, usual, float(error[motor]), put_in)
@@ -298,15 +298,19 @@ def _mean_input(run: Run, motion: _Motion, whole: FloatArray, window: slice) -> 
     return float(CubicSpline(run.t[near], whole[near]).integrate(t[0], t[-1]) / (t[-1] - t[0]))
 
 
-def _unresolved(whole: FloatArray, window: slice, largest: float) -> bool:
-    """Whether the input jumps about so much between rows that what happened there is not in the log."""
+def unresolved_input(whole: FloatArray, window: slice, largest: float, jitter: float = JITTER) -> bool:
+    """Whether the input jumps about so much between rows that what happened there is not in the log.
+
+    whole: the input of one motor, shape (rows,); largest: its largest size in the run. jitter: how much from
+    row to row is too much, as a share of the spread.
+    """
     more = max(0, CONTEXT_ROWS - (window.stop - window.start)) // 2
     own = whole[max(0, window.start - more) : window.stop + more]
     spread = float(np.std(own))
     jumps = np.abs(np.diff(own))
     size = float(np.sqrt(np.mean(jumps**2)))
     many = np.mean(jumps > spread / 10.0) > 2.0 * STEPWISE  # a step alone is no jitter
-    return bool(many) and spread > JITTER_SIZE * largest and size > JITTER * spread
+    return bool(many) and spread > JITTER_SIZE * largest and size > jitter * spread
 
 
 def _sides(motion: _Motion, window: slice, motor: int, usual: float, error: float, put_in: float) -> FloatArray:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.drive_windows import CONTEXT_ROWS, unresolved_input
 from omnidyn.identification.output_error.answer import Nuisance
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.exact_engine import ExactEngine
@@ -42,6 +43,7 @@ AUTO, HOLD, MEAN = "auto", "hold", "mean"
 INPUTS = {"voltage": "V", "duty": "1"}
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
 SPAN = 1e4
+JITTER = 0.6  # of the spread of the input, from row to row: about ten rows a swing; what is faster is not in the log
 LATENCIES = {"wheel_speed": "wheel_speed", "wheel_angle": "heading"}  # channel -> its name in the engine
 
 
@@ -50,6 +52,7 @@ class MotorFit:
     """What whole logs say of one motor. value, std, ci95: slope [V s/rad], dead_band [V], lag [s] (with a duty: s/rad
     and 1). nuisances: latencies [s]. noise: of the speed [rad/s] and of the angle [rad]. rmse: of the speed [rad/s],
     over the logs fitted. correlation: of the numbers in the order of `names`. at_bound, unidentifiable: names.
+    left_out: rows whose speed does not count, because the log does not resolve the input there.
     """
 
     motor: int
@@ -68,19 +71,24 @@ class MotorFit:
     covariance: str
     converged: bool
     source: str
+    left_out: int = 0
 
     @property
     def dead_band_seen(self) -> bool:
         """Whether the interval of the dead band lies above 0."""
-        return BAND in self.ci95 and self.ci95[BAND][0] > 0.0
+        return BAND in self.ci95 and BAND not in self.unidentifiable and self.ci95[BAND][0] > 0.0
 
     def statement(self) -> str:
         """The fit in a sentence."""
         words = f"motor {self.motor + 1}: slope {self.value[SLOPE]:.5g} +- {self.std[SLOPE]:.2g} {self.unit} s/rad, "
         words += f"lag {self.value[LAG] * 1e3:.3g} ms"
+        if self.left_out:
+            words += f" ({self.left_out} rows left out: their input changes too much from row to row)"
         if BAND not in self.value:
             return f"{words}, no dead band asked for"
         low, high = self.ci95[BAND]
+        if BAND in self.unidentifiable:
+            return f"{words}, dead band not identifiable here: slope and dead band cannot be told apart"
         band = f"dead band {self.value[BAND]:.3g} +- {self.std[BAND]:.2g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
         return f"{words}, {band}{'' if self.dead_band_seen else ': none is seen'}"
 
@@ -99,7 +107,7 @@ class MotorFit:
             "nuisances": late,
             "noise": dict(self.noise), "rmse_rad_s": self.rmse, "dead_band_seen": self.dead_band_seen,
             "at_bound": list(self.at_bound), "unidentifiable": list(self.unidentifiable), "covariance": self.covariance,
-            "converged": self.converged, "data": self.source,
+            "converged": self.converged, "left_out": self.left_out, "data": self.source,
         }  # fmt: skip
 
 
@@ -212,6 +220,8 @@ def _record(run: Run, motor: int, put_in: FloatArray, between: str, angle: bool)
         raise InputError("the log has no speed and no angle of this motor", got=", ".join(run.channels),
                          expected="wheel_speed or wheel_angle", where=run.source)  # fmt: skip
     u = put_in[:, motor]
+    rough = unresolved_rows(u)
+    outputs = {name: np.where(rough, np.nan, column) for name, column in outputs.items()}
     if between == MEAN:
         u = np.append(0.5 * (u[1:] + u[:-1]), u[-1])
     pieces = [
@@ -227,6 +237,15 @@ def _record(run: Run, motor: int, put_in: FloatArray, between: str, angle: bool)
         run.t, np.ascontiguousarray(np.nan_to_num(u)[:, None]), np.stack([*outputs.values()], axis=1),
         tuple((name, 0) for name in outputs), tuple(pieces), run.source, False, (),
     )  # fmt: skip
+
+
+def unresolved_rows(u: FloatArray) -> NDArray[np.bool_]:
+    """Rows where the input changes too much from row to row to say what the motor got. u and result: shape (rows,)."""
+    rough, largest = np.zeros(len(u), dtype=bool), float(np.nanmax(np.abs(u), initial=0.0))
+    for first in range(0, len(u), CONTEXT_ROWS):
+        window = slice(first, min(first + CONTEXT_ROWS, len(u)))
+        rough[window] = unresolved_input(u, window, largest, JITTER)
+    return rough
 
 
 def _stretches(known: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -289,6 +308,13 @@ def _answer(solver: Solver, solution: Solution, known: Trust, motor: int, unit: 
             "the logs say nothing about this motor", got=f"motor {motor + 1}", expected="motion"
         )
     std, ci95 = intervals(problem, values, known)
+    blind = {name for name, b in zip(problem.names, known.blind, strict=True) if b}
+    for name, value, number in zip(problem.names, values, problem.parameters, strict=False):
+        if name == INNER + BAND and value >= 0.99 * number.high:
+            blind |= {name}
+            std[name], ci95[name] = float("nan"), (number.low, number.high)
+    records = {id(piece.record): piece.record for piece in problem.pieces}.values()
+    left_out = sum(int(unresolved_rows(record.voltage[:, 0]).sum()) for record in records)
     own, names = problem.robot_count, tuple(name.removeprefix(INNER) for name in problem.names)
     std = {name.removeprefix(INNER): each for name, each in std.items()}
     ci95 = {name.removeprefix(INNER): each for name, each in ci95.items()}
@@ -309,7 +335,8 @@ def _answer(solver: Solver, solution: Solution, known: Trust, motor: int, unit: 
         rmse=motor_rmse(MotorEngine(problem), solution.state.point),
         names=names, correlation=covariance / np.outer(size, size),
         at_bound=tuple(name for name, held in zip(names, known.held, strict=True) if held),
-        unidentifiable=tuple(name for name, b in zip(names, known.blind, strict=True) if b),
+        unidentifiable=tuple(name for name in names if {name, INNER + name} & blind),
+        left_out=left_out,
         covariance=known.kind, converged=solution.converged,
         source=sources[0] if len(sources) == 1 else f"{sources[0]} and {len(sources) - 1} more logs",
     )  # fmt: skip
@@ -360,10 +387,15 @@ def _with_speed(run: Run) -> Run:
 
 
 def fit_rmse(fit: MotorFit, runs: Run | Sequence[Run]) -> float:
-    """Root mean square error of the speed [rad/s] of free runs beside logs; NaN where none has a speed."""
+    """Root mean square error of the speed [rad/s] of free runs beside logs; NaN where none has a speed.
+
+    Rows whose input the log does not resolve do not count.
+    """
     every = [runs] if isinstance(runs, Run) else list(runs)
+    kind = next(name for name, unit in INPUTS.items() if unit == fit.unit)
     errors = [
-        ours - run.wheel_speed[:, fit.motor] for ours, run in zip(run_motor(fit, every), every, strict=True)
+        (ours - run.wheel_speed[:, fit.motor])[~unresolved_rows(getattr(run, kind)[:, fit.motor])]
+        for ours, run in zip(run_motor(fit, every), every, strict=True)
         if run.wheel_speed is not None
     ]  # fmt: skip
     known = np.concatenate(errors) if errors else np.zeros(0)

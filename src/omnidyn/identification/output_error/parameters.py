@@ -20,6 +20,8 @@ TORQUE, EMF = "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad"
 FRICTION_LIMIT = 1e6  # what a robot file takes
 SPAN = 1e4  # a number that must be positive stays within so many times its start, either way
 
+LARGEST = 700.0  # e^709 is the last float
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -43,7 +45,7 @@ class Parameter:
 
     def outer(self, inner: float) -> float:
         """The value behind the number that the solver sees."""
-        return math.exp(inner) if self.log else inner
+        return math.exp(min(inner, LARGEST)) if self.log else inner
 
     def slope(self, value: float) -> float:
         """d value / d inner."""
