@@ -130,6 +130,7 @@ def test_a_robot_without_an_exact_engine_is_steady_state_too(call):
         (["--free", "body.weight"], "body.weight"),
         (["--nuisance", "wind"], "no such nuisance; got wind"),
         (["--loss", "huber"], "unknown loss; got huber"),
+        (["--start", "moving"], "unknown start; got moving"),
         (["--method", "magic"], "no such method; got magic"),
         (["--per-free", "body.mass_kg"], "--per-free: there are no groups"),
     ],

@@ -42,6 +42,7 @@ def identify(
     per_free: list[str] = typer.Option([], metavar="KEY", help="What each group has for itself instead. Repeatable."),
     profile: list[str] = typer.Option([], metavar="KEY", help="Interval by profile of the likelihood. Repeatable."),
     bootstrap: int = typer.Option(0, min=0, metavar="N", help="Intervals from N draws of whole runs instead."),
+    start: str = typer.Option("", help="How logs begin: rest, free, or auto: at rest where that shows."),
     between: str = typer.Option("", help="Of the motors: input holds, or mean of two rows; default: auto."),
     what: str = typer.Option(FRICTION, help="friction, or motors: the line of each motor, wheels off the ground."),
     shape: str = typer.Option(
@@ -77,7 +78,7 @@ def identify(
     from omnidyn.cli.identify_fit import Ask, Out
     from omnidyn.cli.identify_logs import is_steady_table
 
-    ask = Ask(free, fix, nuisance, loss, use_priors, hold_out, per, per_free, profile, bootstrap, between)
+    ask = Ask(free, fix, nuisance, loss, use_priors, hold_out, per, per_free, profile, bootstrap, between, start)
     steady = _given(shape=shape != "auto", window=window, group=group, rest=rest != "bound", force_from=force_from,
                     speed=speed != "wheel" and what == FRICTION)  # fmt: skip
     method = _method(method, what, ask, steady)

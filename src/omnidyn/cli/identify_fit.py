@@ -42,6 +42,7 @@ class Ask:
     profile: Sequence[str] = ()
     bootstrap: int = 0
     between: str = ""
+    start: str = ""
 
     def given(self) -> list[str]:
         """The names of the options that were given."""
@@ -163,6 +164,7 @@ def _fitted(
     options: dict[str, Any] = {
         "free": expand_keys(ask.free) if ask.free else None, "fixed": expand_keys(ask.fix),
         "nuisances": nuisances(ask.nuisances), "loss": ask.loss or "gaussian", "use_priors": ask.use_priors,
+        "start": ask.start or "auto",
     }  # fmt: skip
     watch = _Watch(now)
     _refuse_groups(part, ask)

@@ -38,12 +38,13 @@ def best_so_far(
 ) -> OutputErrorEstimate:
     """The Estimate at the last of the states that `fit_output_error` told its `watch`, with the same runs and robot.
 
-    options: free, fixed, nuisances, loss, use_priors, as they were given there.
+    options: free, fixed, nuisances, start, loss, use_priors, as they were given there.
     """
     free = options.get("free")
     given = Options(
         None if free is None else tuple(free), tuple(options.get("fixed", ())), _names(options.get("nuisances", AUTO)),
-        loss=options.get("loss", "gaussian"), use_priors=options.get("use_priors", False),
+        start=options.get("start", AUTO), loss=options.get("loss", "gaussian"),
+        use_priors=options.get("use_priors", False),
     )  # fmt: skip
     records = _records(list(runs), robot, given)
     robot, given, still = _without_still_axes(motion(records, robot), records[0].source, robot, given)
