@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks import real_fit
+from benchmarks import real_logs as logs
 from omnidyn.identification.motor_fit import fit_motor, fit_rmse
 
 TURN = 2.0 * np.pi
@@ -36,6 +37,12 @@ def test_no_friction_is_invented_on_the_bench(fits):
     assert fit.ci95["dead_band"][1] < 0.03 * 0.25  # of the voltage of the step
     assert abs(TURN * fit.value["slope"] - 0.05509) <= 3.0 * np.hypot(TURN * fit.std["slope"], 6e-5)
     assert fit.between == "mean"  # its voltages are samples, as the README has it
+
+
+def test_a_chirp_that_outruns_the_rows_claims_nothing(data):
+    """README: beyond 4 s the chirp is faster than the rows, so what the motor got is not in the log."""
+    fit = fit_motor(logs.odrive(data, ("step", "chirp")))
+    assert not fit.dead_band_seen
 
 
 def test_coulomb_does_not_help_on_logs_it_never_saw(bench, fits):
