@@ -15,7 +15,7 @@ from scipy.stats import trim_mean
 from benchmarks import real_logs as logs
 from benchmarks.identify import excitation, noisy
 from benchmarks.table import Table, machine
-from omnidyn.identification.motor_fit import AUTO, HOLD, MEAN, MotorFit, fit_motor, fit_rmse, run_motor
+from omnidyn.identification.motor_fit import AUTO, HOLD, MotorFit, fit_motor, fit_rmse, run_motor
 from omnidyn.logs.read_log import read_log
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
@@ -116,7 +116,7 @@ def _band(table: Table, fit: MotorFit) -> None:
         )
         table.add(
             "0: none seen",
-            low <= 0.0 if fit.between == MEAN else None,
+            low <= 0.0,
             data="bench",
             what="... lower end of its 95 % interval",
             value=low,

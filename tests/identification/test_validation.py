@@ -10,7 +10,7 @@ from omnidyn.errors import InputError
 from omnidyn.identification.as_fitted import as_fitted, at_motors, mean_before
 from omnidyn.identification.identify import choose_method, options_of
 from omnidyn.identification.output_error.fit import NU, fit_output_error
-from omnidyn.identification.validation import SCALE_OF_T, validate
+from omnidyn.identification.validation import SCALE_OF_T, Score, coloured, validate
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -124,3 +124,10 @@ def test_options_of_another_method_are_refused():
     with pytest.raises(InputError, match="method: no such method; got magic; expected output-error or steady-state"):
         omnidyn.identify(run, AXEBOT, method="magic")
     assert "nuisances" in options_of("output-error")
+
+
+def test_one_component_of_many_is_coloured_by_chance_more_often():
+    """Bonferroni: at a level of 1 % for the log, each of three components has a third of it."""
+    score = Score(100, 0.1, 99.0, 1.0, 0.005, None)
+    assert coloured({"vx": score}) == ["vx"]
+    assert coloured({"vx": score, "vy": score, "omega": score}) == []

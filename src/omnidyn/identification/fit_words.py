@@ -9,7 +9,7 @@ from omnidyn.identification.estimate import Estimate, unit
 from omnidyn.identification.motor_fit import MotorFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.study_parts import Difference
-from omnidyn.identification.validation import FITTED, NOT_WHITE, Validation
+from omnidyn.identification.validation import FITTED, Validation, coloured
 from omnidyn.logs.findings import FATAL, WARN, Verdict
 from omnidyn.logs.steady_table import AXES
 
@@ -133,7 +133,7 @@ def _from_validation(fit: OutputErrorEstimate, validation: Validation | None) ->
     if late and not any(name.startswith("latency") for name in fit.nuisances):
         name, lag = next(iter(late.items()))
         yield f"{name} is {lag:+.3f} s behind the model: fit it with --nuisance latency"
-    if any(s.whiteness is not None and s.whiteness < NOT_WHITE for s in scores.values()) and not fit.nuisances:
+    if coloured(scores) and not fit.nuisances:
         yield (
             "errors are not white, so the model misses something: try --nuisance latency, gain or dead_band, or free "
             "motor.torque_constant_Nm_A"

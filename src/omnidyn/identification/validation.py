@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -40,6 +40,12 @@ class Score:
     lag: float | None
 
 
+def coloured(scores: Mapping[str, Score]) -> list[str]:
+    """Components whose errors are not white; one white log in a hundred has any, however many components it has."""
+    level = NOT_WHITE / max(len(scores), 1)
+    return [name for name, score in scores.items() if score.whiteness is not None and score.whiteness < level]
+
+
 @dataclass(frozen=True, eq=False)
 class Validation:
     """Comparisons with the fitted robot, and the scores in them: "fitted" and "held out" -> component -> Score.
@@ -73,10 +79,10 @@ class Validation:
                 "model misses something that differs between the logs"
             )
             return
-        coloured = [name for name, s in found.items() if s.whiteness is not None and s.whiteness < NOT_WHITE]
-        if coloured:
+        names = coloured(found)
+        if names:
             yield (
-                f"on held-out logs the errors of {', '.join(coloured)} are no larger than noise, but not white: the "
+                f"on held-out logs the errors of {', '.join(names)} are no larger than noise, but not white: the "
                 "model misses something small that lasts"
             )
         else:
