@@ -8,6 +8,7 @@ import pytest
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.identification.output_error.solver import of_states
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -247,3 +248,9 @@ def test_nuisances_by_default_are_those_that_a_log_supports(axebot, clean):
     assert float(words.split("gain = ")[1].split()[0]) == pytest.approx(0.96, abs=0.02)
     again = whole.fit_output_error(log.replace(voltage=log.voltage / 0.96), axebot, nuisances=["latency", "gain"])
     assert holds(again)
+
+
+def test_a_start_that_no_row_tells_of_stays_where_it_is():
+    """Two states, of which one leaves no trace: the other is solved for, and this one does not move."""
+    np.testing.assert_allclose(of_states(np.diag([4.0, 0.0]), np.array([2.0, 0.0])), [0.5, 0.0])
+    np.testing.assert_allclose(of_states(np.diag([4.0, 2.0]), np.array([2.0, 1.0])), [0.5, 0.5])

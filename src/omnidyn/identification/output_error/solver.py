@@ -197,7 +197,7 @@ class Normal:
             gradient += grad[:k]
             information = information + damped[:k, :k]
             if grad.shape[0] > k:
-                lift = np.linalg.solve(damped[k:, k:], damped[k:, :k])
+                lift = of_states(damped[k:, k:], damped[k:, :k])
                 gradient -= lift.T @ grad[k:]
                 information -= damped[:k, k:] @ lift
         return gradient, information
@@ -210,7 +210,7 @@ class Normal:
         for grad, info in self.pieces:  # what the states alone would gain
             if grad.shape[0] > self._count:
                 k = self._count
-                total += float(grad[k:] @ np.linalg.solve(info[k:, k:], grad[k:]))
+                total += float(grad[k:] @ of_states(info[k:, k:], grad[k:]))
         return total
 
     def scores(self) -> FloatArray:
@@ -220,7 +220,7 @@ class Normal:
             score = sums.score * np.concatenate([self.scale, np.ones(sums.score.shape[1] - k)])
             own = score[:, :k]
             if info.shape[0] > k:
-                own = own - score[:, k:] @ np.linalg.solve(info[k:, k:], info[k:, :k])
+                own = own - score[:, k:] @ of_states(info[k:, k:], info[k:, :k])
             found.append(own)
         return np.concatenate(found)
 
@@ -237,9 +237,20 @@ class Normal:
             new = old.copy()
             if grad.shape[0] > k:
                 damped = _damped(info, damping)
-                new += np.linalg.solve(damped[k:, k:], grad[k:] - damped[k:, :k] @ step)
+                new += of_states(damped[k:, k:], grad[k:] - damped[k:, :k] @ step)
             states.append(new)
         return Point(self.solver.outer(inner), tuple(states))
+
+
+def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
+    """information^-1 right for the start of a piece; a state that no row tells of stays where it is.
+
+    Such is the speed of a motor that sticks from the start, or whose outputs are missing until it has stopped.
+    """
+    try:
+        return np.asarray(np.linalg.solve(information, right), dtype=float)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(information, hermitian=True) @ right, dtype=float)
 
 
 def _weighted(sums: PieceSums, weight: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
