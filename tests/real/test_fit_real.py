@@ -78,3 +78,13 @@ def test_drives_with_noisy_encoders(data):
         errors.append(real_fit.window_rmse(fit, runs[3:], real_fit.SPAN))
         assert 0.01 / fit.value["slope"] == pytest.approx(0.33, abs=0.035)
     assert np.sqrt(np.mean(np.square(errors))) <= 1.55
+
+
+def test_one_step_of_the_bench_tells_no_dead_band(data):
+    """Rest, then one level: slope and dead band balance. The fit ends at the bound of the dead band, and must say so."""
+    run = logs.odrive(data, ["step"])[0]
+    fit = fit_motor([run], between="mean")
+    assert "dead_band" in fit.unidentifiable
+    assert not fit.dead_band_seen
+    assert fit.ci95["dead_band"][0] == 0.0
+    assert "not identifiable" in fit.statement()

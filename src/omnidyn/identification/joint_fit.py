@@ -75,6 +75,7 @@ class JointEngine(ExactEngine):
         raise UnsupportedError("groups cannot be resampled", got="a bootstrap over runs", expected="one group")
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """Sums of the pieces of all groups, each over all parameters: 0 for those of other groups."""
         found: list[PieceSums] = []
         for group in self.groups:
             own = replace(weighting, variance=weighting.variance[group.columns])

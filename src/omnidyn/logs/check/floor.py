@@ -129,12 +129,13 @@ def _axes_names(work: Work) -> tuple[str, tuple[str, ...]]:
 
 
 def axes_finding(work: Work, answer: Answer) -> Finding:
+    """Fatal: axes of what was measured over the floor are exchanged, or have the opposite sign."""
     channel, names = _axes_names(work)
     wrong = answer.best.touched(names)
     heading = wrong == ["heading"] or wrong == ["omega"]
     also = " (a positive speed of all wheels must turn the robot counter-clockwise)" if heading else ""
     return Finding(
-        "inverted" if all(k == j for k, j in enumerate(answer.best.order)) else "swapped", FATAL, " ".join(wrong),
+        code_of(answer.best), FATAL, " ".join(wrong),
         f"{channel} against the wheels: {answer.best.words(names)}{also}; as logged they share "
         f"{100 * (1 - answer.logged):.0f} % of their motion, put right {100 * (1 - answer.left):.0f} %"
         + (", or else all wheels have the opposite sign" if heading else ""),
@@ -144,6 +145,7 @@ def axes_finding(work: Work, answer: Answer) -> Finding:
 
 
 def mended_axes(work: Work, wiring: Wiring) -> Work:
+    """The log with these axes put right; NaN where a pose cannot be."""
     seen = ground(work)
     assert seen is not None
     values = work.channels[seen.name].copy()
@@ -158,6 +160,7 @@ def mended_axes(work: Work, wiring: Wiring) -> Work:
 
 
 def wheels_finding(work: Work, answer: Answer, blamed: str) -> Finding:
+    """Fatal: wheel speeds in another order, or of the opposite sign, than floor or commands say."""
     seen = ground(work)
     against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")
     names = components("wheel_speed", work.wheels)

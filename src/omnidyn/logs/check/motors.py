@@ -89,6 +89,7 @@ def by_likeness(work: Work, channel: str) -> Answer | None:
 
 
 def motor_finding(work: Work, channel: str, answer: Answer) -> Finding:
+    """Fatal: columns of one channel of the motors are exchanged, or have the opposite sign."""
     names = components(channel, work.wheels)
     wrong = answer.best.touched(names)
     against = "wheel_speed" if channel != "wheel_speed" else "voltage and current"
