@@ -81,7 +81,7 @@ def test_drives_with_noisy_encoders(data):
 
 
 def test_one_step_of_the_bench_tells_no_dead_band(data):
-    """Rest, then one level: slope and dead band balance. The fit ends at the bound of the dead band, and must say so."""
+    """Rest, then one level: slope and dead band balance. The fit ends at the bound of the dead band and must say so."""
     run = logs.odrive(data, ["step"])[0]
     fit = fit_motor([run], between="mean")
     assert "dead_band" in fit.unidentifiable
