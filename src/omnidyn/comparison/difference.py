@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from omnidyn.comparison.traces import Trace
 
@@ -66,7 +66,7 @@ def difference(
     # the mean and the share were fitted to the blocks: two degrees of freedom
     loss = np.sqrt(blocks / (blocks - 2.0))
     spread = loss * bootstrap_error(left, length, blocks, np.random.default_rng(seed)) / (one + two)
-    sure = float(student.ppf(1.0 - 0.5 * ALPHA / tests, blocks - 2)) * spread
+    sure = float(stdtrit(blocks - 2, 1.0 - 0.5 * ALPHA / tests)) * spread
     return Difference(gap, spread, (0 if gap < 0.0 else 1) if abs(gap) > sure else None, blocks)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 FloatArray = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def whiteness(errors: Sequence[FloatArray], lags: int = LAGS) -> Whiteness | Non
         return None
     statistic = float(np.sum(total**2 / squares))
     return Whiteness(
-        float(chi2.sf(statistic, lags)), statistic, total / (pairs * power), 1.96 * np.sqrt(squares) / (pairs * power)
+        float(chdtrc(lags, statistic)), statistic, total / (pairs * power), 1.96 * np.sqrt(squares) / (pairs * power)
     )
 
 

@@ -165,7 +165,8 @@ def _travel(start, end, event, before, after, rate, dt, nodes, weights):
 def _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, start, nodes, weights):
     """Pose after each step from the twists; the heading is a compensated sum of closed forms."""
     out = np.empty((len(drive) + 1, 3))
-    out[0] = start
+    for i in range(3):  # row by row, numba compiles the words of an error too: 1.2 s
+        out[0, i] = start[i]
     event, before, after = np.empty(3), np.empty(3), np.empty(3)
     lost = 0.0
     for k in range(len(drive)):
@@ -175,7 +176,8 @@ def _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, start, no
                 twists[k, axis], drive[k, axis], coulomb[axis], breakaway[axis], rate[axis], phi[which[k], axis], dt
             )
             moving |= (twists[k, axis] != 0.0) | (before[axis] != 0.0)
-        out[k + 1] = out[k]
+        for i in range(3):
+            out[k + 1, i] = out[k, i]
         if moving:
             x, y = _travel(twists[k], twists[k + 1], event, before, after, rate, dt, nodes, weights)
             turn = _turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2])

@@ -174,7 +174,7 @@ class ExactEngine:
         physics = Physics(
             np.stack([now.rate, now.coulomb, now.hold]), now.drive, maps[0], maps[1], maps[2], _wheel_of(columns),
             np.array([values[k] if k >= 0 else 0.0 for k in late]),
-            np.array([values[k] if k >= 0 else fixed[i] for i, k in enumerate(driver)]),
+            np.array([values[k] if k >= 0 else fixed[i] for i, k in enumerate(driver)]), bool(maps[1].any()),
         )  # fmt: skip
         state = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
         derivatives = Slopes(

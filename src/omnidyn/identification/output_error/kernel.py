@@ -43,6 +43,7 @@ class Physics(NamedTuple):
     input_wheel: IntArray  # (C,) w
     late: FloatArray  # (C,) latency [s]
     driver: FloatArray  # (3,) gain, dead band [V], fade over the run
+    travels: bool  # whether Q has an entry
 
 
 class Slopes(NamedTuple):
@@ -251,7 +252,7 @@ def march(t, u, y, first, last, origin, span, margin, start, offset, groups, phy
     """
     law, dlaw, size = physics.law, slopes.law, slopes.law.shape[2]
     speed_map, travel_map, d_speed, vary = physics.speed_map, physics.travel_map, slopes.speed_map, slopes.maps_vary
-    final, keep, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, np.abs(travel_map).max() > 0.0
+    final, keep, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, physics.travels
     v, s, g, v_now, s_now = start.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     dv, ds, dg, dv_now, ds_now = (
         np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)),
@@ -292,7 +293,8 @@ def march(t, u, y, first, last, origin, span, margin, start, offset, groups, phy
                         row[at_offset[c]] += 1.0
                     if keep:
                         predicted[sample, c] = value
-                        kept[sample, c, :] = row[: kept.shape[2]]
+                        for i in range(kept.shape[2]):  # a slice compiles the words of its error too: 1.5 s
+                            kept[sample, c, i] = row[i]
                     residual = y[sample, c] - value
                     if residual != residual:
                         before[c] = 0.0
