@@ -21,8 +21,9 @@ from omnidyn.model.plant import plant
 from omnidyn.model.rest import new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
-from omnidyn.simulation.implicit import no_loop, run_implicit
+from omnidyn.simulation.implicit import run_implicit
 from omnidyn.simulation.simulate import simulate
+from omnidyn.simulation.speed_loop import no_loop
 from tests.reference.make import FILE
 from tests.reference.robots import TABLE_3, robot_of, table_3_voltages
 

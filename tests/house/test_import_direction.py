@@ -20,8 +20,8 @@ ORDER = {
         forces face holding inclusion rest dynamics statespace deadzone""",
     "model/friction": "law axes direction wheels",
     "simulation": """inputs commands exact_step exact_sensitivity travel exact exact_inductance_step
-        exact_inductance_travel exact_inductance implicit_step implicit simulate tangent_step tangent_events
-        tangent_march tangent""",
+        exact_inductance_travel exact_inductance implicit_step speed_loop implicit simulate tangent_step tangent_events
+        tangent_march tangent_loop tangent""",
     "logs": """channels dialect header rows text_file table parquet_pages parquet tables run_file steady_table
         command_file words mapping clock guess log read_log segments average plateaus findings
         check""",

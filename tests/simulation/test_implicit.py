@@ -14,8 +14,9 @@ from omnidyn.model.layout import AXES, BOUND
 from omnidyn.model.plant import plant
 from omnidyn.model.rest import new_state
 from omnidyn.model.robot_file import load_robot
-from omnidyn.simulation.implicit import no_loop, run_implicit
+from omnidyn.simulation.implicit import run_implicit
 from omnidyn.simulation.simulate import simulate
+from omnidyn.simulation.speed_loop import no_loop
 from tests.reference.make import FILE as TABLE_3_FILE
 from tests.reference.modes import reference
 from tests.reference.modes_make import SEEDS, load

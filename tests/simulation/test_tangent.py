@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.tangent import derivatives, parameter, with_parameter
@@ -208,13 +208,6 @@ def test_duty_of_a_supply(axebot, off, electrical):
     if off == "coast":
         assert (found.run.current[:-1][duty == 0.0] == 0.0).all()
         assert (found.current[:-1][duty == 0.0] == 0.0).all()
-
-
-@pytest.mark.parametrize("command", ["wheel_speed_command", "twist_command"])
-def test_the_speed_loop_is_refused_by_name(axebot, command):
-    drive = axebot.drive.replace(kind="speed", kp=1.0, rate=100.0)
-    with pytest.raises(UnsupportedError, match=f"no derivatives through the speed loop.*{command}"):
-        derivatives(axebot.replace(drive=drive), dt=0.01, keys=["body.mass_kg"], **{command: [[1.0, 2.0, 3.0]]})
 
 
 @pytest.mark.parametrize("wheels", [0.0, 0.2])

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from omnidyn.compiled import kernel, part
 from omnidyn.model.forces import forces_at_work
 from omnidyn.model.inclusion import CAP
-from omnidyn.model.layout import AXES, BOUND, GX, GY, GZ, INDUCTANCE, LENGTH, MASS, NOW, TAU, VOLTAGE
+from omnidyn.model.layout import AXES, BOUND, INDUCTANCE, LENGTH, MASS, NOW, TAU, VOLTAGE
 from omnidyn.model.plant import Plant
 from omnidyn.model.rest import SIGNS, put, settle, sticks, with_given_currents
 from omnidyn.model.scratch import copy_row, scratch
 from omnidyn.simulation.implicit_step import GAMMA, step
+from omnidyn.simulation.speed_loop import Loop, close_loop
 
 FloatArray = NDArray[np.float64]
 
@@ -31,25 +32,6 @@ YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
 CURRENT_SHARE = 1e-2  # and 100 tol in A
 SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 5.0 / 24.0, 8.0 / 24.0, -1.0 / 24.0)
 STAGES = (0.0, 1.0 - GAMMA, GAMMA, 0.0, GAMMA, 0.0)
-
-
-class Loop(NamedTuple):
-    """The firmware's speed loop: PI on the wheel speed, saturating; without commands the voltages are given."""
-
-    kp: FloatArray  # (n,) [V s/rad]
-    ki: FloatArray  # (n,) [V/rad]
-    limit: FloatArray  # (n,) [V]
-    radius: FloatArray  # (n,) [m]
-    command: FloatArray  # (rows, n) [rad/s], or (0, n)
-    tick: NDArray[np.bool_]  # (rows,) whether the loop runs at the start of the row; else its voltage stays
-    period: float  # [s]
-    sum: FloatArray  # (n,) integral so far [V]
-
-
-def no_loop(wheels: int) -> Loop:
-    """No speed loop: voltages are given."""
-    zeros = np.zeros(wheels)
-    return Loop(zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy())
 
 
 class Outcome(NamedTuple):
@@ -87,23 +69,6 @@ def run_implicit(
         *plant, *bare, scratch(), spare, voltage, bound, dt, *loop, tol, out.pose, out.state, out.iterations, out.steps
     )
     return out
-
-
-@part
-def _close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total):
-    """One tick of the speed loop: u = clip(kp e + sum), sum += ki e dt unless that pushes further into the limit."""
-    for w in range(len(kp)):
-        if not tick[k]:
-            voltage[k, w] = voltage[k - 1, w]
-            continue
-        e = AXES + w
-        rim = element[e, GX] * state[0] + element[e, GY] * state[1] + element[e, GZ] * state[2]
-        error = command[k, w] - (rim / radius[w] if state[SIGNS + e] != 0.0 else 0.0)
-        more = total[w] + ki[w] * error * period
-        wanted = kp[w] * error + more
-        if abs(wanted) <= limit[w] or wanted * error < 0.0:
-            total[w] = more
-        voltage[k, w] = min(max(kp[w] * error + total[w], -limit[w]), limit[w])
 
 
 @part
@@ -207,7 +172,7 @@ def _march(
     for k in range(len(dt)):
         counts[0] = counts[1] = 0
         if len(command) > 0:
-            _close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total)
+            close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total)
         for w in range(voltage.shape[1]):
             element[AXES + w, VOLTAGE], element[AXES + w, BOUND] = voltage[k, w], bound[k, w]
         if tol > 0.0:

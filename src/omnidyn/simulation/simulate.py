@@ -14,10 +14,11 @@ from omnidyn.model.rest import SIGNS, start_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import Run
-from omnidyn.simulation.commands import Commands, as_floats, commands, loop_gains, on_ticks
+from omnidyn.simulation.commands import Commands, as_floats, commands, on_ticks
 from omnidyn.simulation.exact import simulate_exact, why_not_exact
 from omnidyn.simulation.exact_inductance import simulate_exact_inductance
-from omnidyn.simulation.implicit import Loop, Outcome, capped, no_loop, run_implicit
+from omnidyn.simulation.implicit import Outcome, capped, run_implicit
+from omnidyn.simulation.speed_loop import loop_of, no_loop
 
 FloatArray = NDArray[np.float64]
 TOLERANCE = 1e-6
@@ -89,7 +90,7 @@ def _implicit(
     else:
         dt, set_point, tick, keep = on_ticks(robot, given)
         voltage = np.zeros_like(set_point)
-        loop = Loop(*loop_gains(robot), set_point, tick, 1.0 / (robot.drive.rate or np.inf), np.zeros(n))
+        loop = loop_of(robot, set_point, tick)
     bound = current_bounds(robot, given, len(dt))
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
     kept = Outcome(outcome.pose[keep], outcome.state[keep], outcome.iterations, outcome.steps)

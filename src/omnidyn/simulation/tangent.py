@@ -7,7 +7,7 @@ a derivative of exactly 0 along what it holds; a stop, a reversal and a release 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,10 +27,14 @@ from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands
 from omnidyn.simulation.implicit import Outcome, begun, room
 from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, current_bounds, implicit_run
+from omnidyn.simulation.tangent_loop import run_tangent_loop
 from omnidyn.simulation.tangent_march import march_tangent
 from omnidyn.simulation.tangent_step import EPS, Ways
 
 FloatArray = NDArray[np.float64]
+
+RATE = "drive.rate_Hz"
+GAINS = ("drive.kp_V_s_rad", "drive.ki_V_rad")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,40 +59,52 @@ def derivatives(
 ) -> Derivatives:  # fmt: skip
     """Simulate and differentiate with respect to numbers of the robot file, such as "friction.axes.coulomb[1]".
 
-    robot, voltage or duty, dt, supply, twist, pose, tol: as for `simulate`; the implicit engine runs whatever the
-    robot. keys: numbers that the robot has; `with_parameter` says how they are named. tol None: derivatives of the
-    fixed-step map itself.
+    robot, voltage or duty or set points of a speed loop, dt, supply, twist, pose, tol: as for `simulate`; the implicit
+    engine runs whatever the robot. keys: numbers that the robot has; `with_parameter` says how they are named. tol
+    None: derivatives of the fixed-step map itself.
 
     They belong to the sequence of starts, stops and reversals that the run shows. Not differentiable, and not seen:
     whether something breaks away at all, a stop that only just happens, an ellipse crossing rest at an angle, a voltage
-    exactly at its limit. At tol 1e-6 a derivative is within 1e-5 of its largest value in the run, within 2e-4 after a
-    current has met its limit or passed 0 against a voltage drop.
+    exactly at its limit, a tick at which the integral of a speed loop begins or ceases to stand still. At tol 1e-6 a
+    derivative is within 1e-5 of its largest value in the run, within 2e-4 after a current has met its limit or passed 0
+    against a voltage drop.
     Raises InputError for what `simulate` refuses, for an unknown key, and for friction or a gear loss that is off;
-    UnsupportedError for set points of a speed loop.
+    UnsupportedError for the rate of a speed loop.
     """
-    for name, set_point in (("wheel_speed_command", wheel_speed_command), ("twist_command", twist_command)):
-        if set_point is not None:
-            raise UnsupportedError(
-                "no derivatives through the speed loop of the firmware", got=name, expected="voltage or duty",
-                remedy="differentiate under the voltages that simulate() recorded; the loop's answer is not in them",
-            )  # fmt: skip
 
     def applied(robot: Robot) -> Commands:
-        return commands(robot, voltage, dt, duty, None, None, supply)
+        return commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
 
+    return differentiate(robot, applied, keys, twist, pose, tol)
+
+
+def differentiate(
+    robot: Robot, applied: Callable[[Robot], Commands], keys: Sequence[str], twist: ArrayLike, pose: ArrayLike,
+    tol: float | None, settled: float = 0.0, travels: bool = True,
+) -> Derivatives:  # fmt: skip
+    """`derivatives` of what is `applied` to a robot. settled, travels: of a speed loop, see `run_tangent_loop`."""
     start, given = (as_start("twist", twist, 3), as_start("pose", pose, 3)), applied(robot)
-    assert given.voltage is not None
+    rows = given.voltage if given.set_point is None else given.set_point
+    assert rows is not None
+    if given.set_point is not None and RATE in keys:
+        raise UnsupportedError(
+            "no derivative by the rate of the speed loop", got=RATE, expected="other keys",
+            remedy="its ticks would move; try a few rates instead", where="keys",
+        )  # fmt: skip
     scale = np.array([_scale(robot, key) for key in keys])
     robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
-    rates = _difference(np.array([applied(r).voltage for r in robots]).reshape(-1, *given.voltage.shape))
-    return _derivatives(robot, robots, rates, given, tuple(keys), scale, start, as_tolerance(tol))
+    each = [one.voltage if given.set_point is None else one.set_point for one in map(applied, robots)]
+    rates = _difference(np.array(each, dtype=float).reshape(-1, *rows.shape))
+    return _derivatives(
+        robot, robots, rates, given, tuple(keys), scale, start, as_tolerance(tol), settled, travels
+    )  # fmt: skip
 
 
 def _derivatives(
     robot: Robot, robots: list[Robot], rates: FloatArray, given: Commands, keys: tuple[str, ...], scale: FloatArray,
-    start: tuple[FloatArray, FloatArray], tol: float,
+    start: tuple[FloatArray, FloatArray], tol: float, settled: float, travels: bool,
 ) -> Derivatives:  # fmt: skip
-    """`robots`: up and down each key by EPS scale, `rates`: derivatives of the voltages that they apply.
+    """`robots`: up and down each key by EPS scale, `rates`: derivatives of the voltages or set points that they apply.
 
     All derivatives are d/d(key / scale) up to the last line.
     """
@@ -101,16 +117,23 @@ def _derivatives(
     first = np.zeros((len(keys), AXES + numbers.wheels))
     first[:, 2] = start[0][2] * stretch
     bound = current_bounds(robot, given, len(given.dt))
-    outcome, ds, dposes = run_tangent(numbers, ways, given, bound, start, first, tol)
-    assert given.voltage is not None
-    run = implicit_run(robot, given, given.voltage, outcome, tol)
+    if given.set_point is None:
+        outcome, ds, dposes = run_tangent(numbers, ways, given, bound, start, first, tol)
+        voltage, slopes_of_voltage = given.voltage, rates
+    else:
+        state = start_state(numbers, start[0], np.zeros(numbers.wheels)), start[1]
+        outcome, ds, dposes, voltage, slopes_of_voltage = run_tangent_loop(
+            robots, robot, numbers, ways, given, rates, bound[0], state, first, tol, settled, travels
+        )
+    assert voltage is not None
+    run = implicit_run(robot, given, voltage, outcome, tol)
     assert run.twist is not None
     slopes = ds[..., :AXES].copy()
     slopes[..., 2] = (slopes[..., 2] - run.twist[:, 2, None] * stretch) / length
     if robot.motor.electrical == DYNAMIC:
         currents = ds[..., AXES:]
     else:
-        currents = _settled(robots, run, slopes, ways.voltage)
+        currents = _settled(robots, run, slopes, slopes_of_voltage)
     currents = currents * (np.append(bound, bound[-1:], axis=0)[:, None] > 0.0)  # none while a motor coasts
     parts = (np.moveaxis(part, 1, 2) / scale for part in (slopes, dposes, currents))
     return Derivatives(run, keys, *parts)
@@ -237,7 +260,7 @@ def _find(robot: Robot, key: str) -> tuple[Value, str, int | None]:
 
 def _one_per_wheel(path: list[str]) -> bool:
     """Whether a list under this key means one value per wheel."""
-    return path[0] in ("wheels", "motor") or path[:2] == ["friction", "wheels"]
+    return path[0] in ("wheels", "motor") or path[:2] == ["friction", "wheels"] or ".".join(path) in GAINS
 
 
 def _set(robot: Robot, key: str, value: float, checked: bool) -> Robot:

@@ -43,7 +43,9 @@ def advance_pose_tangent(ways, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
 
 
 @part
-def _row(body, element, bare_body, bare_element, s, spare, ways, state, dt, tol, h, pose, d, dnext, dpose, counts):
+def row_tangent(
+    body, element, bare_body, bare_element, s, spare, ways, state, dt, tol, h, pose, d, dnext, dpose, counts
+):
     """`implicit._row` with derivatives: the half steps that count are done again with theirs."""
     middle, two, inner, m, left = spare[1], spare[2], spare[3], len(element), dt
     counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
@@ -81,7 +83,7 @@ def march_tangent(
                 ways.element[2 * k, e, VOLTAGE] = voltage[r, w] + EPS * ways.voltage[k, r, w]
                 ways.element[2 * k + 1, e, VOLTAGE] = voltage[r, w] - EPS * ways.voltage[k, r, w]
         if tol > 0.0:
-            h = _row(
+            h = row_tangent(
                 body, element, bare_body, bare_element, s, spare, ways, state, dt[r], tol, h, pose, d, dnext, dpose,
                 counts,
             )  # fmt: skip

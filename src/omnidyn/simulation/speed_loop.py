@@ -1,0 +1,83 @@
+"""The firmware's speed loop: PI on the speed of each wheel, once per tick, saturating.
+
+    e = set speed - speed,  u = clip(kp e + sum, +-limit),  sum += ki e period unless that pushes further into the limit
+
+Between ticks the voltage stays. The branch of a tick is told apart from what it gives, so that the derivative of the
+loop is taken of the same lines, on the branch that the run took.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.compiled import part
+from omnidyn.model.layout import AXES, GX, GY, GZ
+from omnidyn.model.rest import SIGNS
+from omnidyn.model.robot import Robot
+from omnidyn.simulation.commands import loop_gains
+
+FloatArray = NDArray[np.float64]
+
+
+class Loop(NamedTuple):
+    """Gains and set points of a speed loop; without commands the voltages are given."""
+
+    kp: FloatArray  # (n,) [V s/rad]
+    ki: FloatArray  # (n,) [V/rad]
+    limit: FloatArray  # (n,) [V]
+    radius: FloatArray  # (n,) [m]
+    command: FloatArray  # (rows, n) [rad/s], or (0, n)
+    tick: NDArray[np.bool_]  # (rows,) whether the loop runs at the start of the row; else its voltage stays
+    period: float  # [s]
+    sum: FloatArray  # (n,) integral so far [V]
+
+
+def no_loop(wheels: int) -> Loop:
+    """No speed loop: voltages are given."""
+    zeros = np.zeros(wheels)
+    return Loop(zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy())
+
+
+def loop_of(robot: Robot, set_point: FloatArray, tick: NDArray[np.bool_]) -> Loop:
+    """The loop of a robot at rest. set_point [rad/s], shape (rows, n), and tick, shape (rows,): see `on_ticks`."""
+    return Loop(*loop_gains(robot), set_point, tick, 1.0 / (robot.drive.rate or np.inf), np.zeros(robot.wheels.count))
+
+
+@part
+def seen_speed(element, e, state, radius, moves):
+    """Speed of the wheel of element e as the encoder shows it [rad/s]: exactly 0 where it sticks."""
+    rim = element[e, GX] * state[0] + element[e, GY] * state[1] + element[e, GZ] * state[2]
+    return rim / radius if moves else 0.0
+
+
+@part
+def tick_branch(kp, ki, limit, period, error, total):
+    """(whether the integral takes its step, side of the limit at which the voltage stands: -1, 0 or 1)."""
+    more = total + ki * error * period
+    wanted = kp * error + more
+    takes = (abs(wanted) <= limit) | (wanted * error < 0.0)
+    volts = wanted if takes else kp * error + total
+    return takes, (1.0 if volts > limit else (-1.0 if volts < -limit else 0.0))
+
+
+@part
+def tick_answer(kp, ki, limit, period, error, total, takes, side):
+    """(voltage [V], integral [V]) after a tick on that branch."""
+    total = total + ki * error * period if takes else total
+    return (side * limit if side != 0.0 else kp * error + total), total
+
+
+@part
+def close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total):
+    """One tick of all wheels: row k of the voltages, and the integrals in place."""
+    for w in range(len(kp)):
+        if not tick[k]:
+            voltage[k, w] = voltage[k - 1, w]
+            continue
+        e = AXES + w
+        error = command[k, w] - seen_speed(element, e, state, radius[w], state[SIGNS + e] != 0.0)
+        takes, side = tick_branch(kp[w], ki[w], limit[w], period, error, total[w])
+        voltage[k, w], total[w] = tick_answer(kp[w], ki[w], limit[w], period, error, total[w], takes, side)
