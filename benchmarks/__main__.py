@@ -19,6 +19,7 @@ NAMES = {
     "big_log": "a log of 1 GB in pieces, CSV and Parquet: processor time and memory (writes it to a temporary folder)",
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
+    "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
     "identify": "output error on simulated logs: coverage, efficiency, nuisances, starts, time (ten minutes)",
 }
 GOAL_MISSED = 5

@@ -157,6 +157,44 @@ def test_an_interrupt_leaves_the_best_so_far(call, tmp_path, monkeypatch):
     assert load_robot(tmp_path / "fit.toml").friction.axes.coulomb[0] == pytest.approx(2.2, abs=0.3)
 
 
+def test_an_interrupt_of_groups_leaves_the_best_so_far_and_the_same_again(call, tmp_path, monkeypatch):
+    told = _Watch.__call__
+
+    def interrupted(self, state):
+        told(self, state)
+        if len(self.states) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(_Watch, "__call__", interrupted)
+    arguments = (".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--free", "friction",
+                 "--free", "motor.torque_constant_Nm_A", "--json")  # fmt: skip
+    found = []
+    for name in ("a.toml", "b.toml"):
+        code, out, err = call(*arguments, "-o", str(tmp_path / name))
+        assert code == 130
+        assert "interrupted" in err
+        result = strict(out)
+        del result["output"], result["provenance"]
+        found.append(result)
+        for group, level in (("smooth", 2.2), ("rough", ROUGH)):
+            robot = load_robot(tmp_path / f"{name[0]}-{group}.toml")
+            assert robot.friction.axes.coulomb[0] == pytest.approx(level, abs=0.3)
+    assert found[0] == found[1]
+    assert (tmp_path / "a-rough.toml").read_bytes() == (tmp_path / "b-rough.toml").read_bytes()
+
+
+def test_groups_have_profiles_and_say_where_there_are_too_few_runs_to_draw(call):
+    arguments = (".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--nuisance", "none")
+    code, out, _ = call(*arguments, "--profile", COULOMB, "--json")
+    assert code == 0
+    low, high = strict(out)["groups"]["rough"]["parameters"][COULOMB]["ci95"]
+    assert low < ROUGH + 0.05
+    assert high > ROUGH - 0.05
+    code, _, err = call(*arguments, "--bootstrap", "20")
+    assert code == 4
+    assert "too few runs for a bootstrap; got 2 in rough; expected 5 or more" in err
+
+
 def test_a_log_without_motion_is_exit_4(call, tmp_path):
     rest = simulate(load_robot("axebot"), np.full((200, 3), 0.05), 0.01)
     noise = np.random.default_rng(1).normal(size=rest.twist.shape) * 0.02

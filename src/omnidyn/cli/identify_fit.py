@@ -159,7 +159,7 @@ def _fitted(
     part: _Part, robot: Robot, ask: Ask, now: Any
 ) -> tuple[dict[str, OutputErrorEstimate], Sequence[Difference], bool]:
     """(fits by group, differences, whether it was interrupted)."""
-    from omnidyn.identification.joint_fit import expand_keys, identify_groups
+    from omnidyn.identification.joint_fit import expand_keys
 
     options: dict[str, Any] = {
         "free": expand_keys(ask.free) if ask.free else None, "fixed": expand_keys(ask.fix),
@@ -167,15 +167,14 @@ def _fitted(
         "start": ask.start or "auto",
     }  # fmt: skip
     watch = _Watch(now)
+    more: dict[str, Any] = {"profile": expand_keys(ask.profile), "bootstrap": ask.bootstrap}
     _refuse_groups(part, ask)
     if len(set(part.groups)) > 1:
-        study = identify_groups(part.runs, robot, part.groups, per_free=ask.per_free, watch=watch, **options)
-        return dict(study.estimates), study.differences, False
+        return _fitted_groups(part, robot, ask.per_free, watch, options, more)
     from omnidyn.identification.output_error.fit import fit_output_error
 
     group = part.groups[0]
     try:
-        more: dict[str, Any] = {"profile": expand_keys(ask.profile), "bootstrap": ask.bootstrap}
         return {group: fit_output_error(part.runs, robot, watch=watch, **options, **more)}, (), False
     except KeyboardInterrupt:
         if not watch.states:
@@ -185,8 +184,28 @@ def _fitted(
         return {group: best_so_far(watch.states, part.runs, robot, options)}, (), True
 
 
+def _fitted_groups(
+    part: _Part, robot: Robot, per_free: Sequence[str], watch: _Watch, options: Mapping[str, Any],
+    more: Mapping[str, Any],
+) -> tuple[dict[str, OutputErrorEstimate], Sequence[Difference], bool]:  # fmt: skip
+    """The same of groups: numbers and differences, or both at the best point so far."""
+    from omnidyn.identification.joint_fit import join_groups
+
+    watch.now("fitting each group alone")
+    joint = join_groups(part.runs, robot, part.groups, per_free=per_free, **options)
+    try:
+        study, cut = joint.answer(joint.solve(watch), **more), False
+    except KeyboardInterrupt:
+        if not watch.states:
+            raise
+        from omnidyn.identification.best_so_far import best_groups_so_far
+
+        study, cut = best_groups_so_far(joint, watch.states), True
+    return dict(study.estimates), study.differences, cut
+
+
 def _refuse_groups(part: _Part, ask: Ask) -> None:
-    """Options of groups where there are none, and options that groups do not have."""
+    """Options of groups where there are none."""
     from omnidyn.errors import InputError
 
     count = len(set(part.groups))
@@ -194,9 +213,6 @@ def _refuse_groups(part: _Part, ask: Ask) -> None:
         raise InputError("the logs have only one group", got=part.groups[0], expected="two or more", where="--per")
     if ask.per_free and count == 1:
         raise InputError("there are no groups", got=ask.per_free[0], expected="with --per", where="--per-free")
-    if count > 1 and (ask.profile or ask.bootstrap):
-        name = "--profile" if ask.profile else "--bootstrap"
-        raise InputError("groups have intervals by the information only", got=name, expected="without --per")
 
 
 def _written(

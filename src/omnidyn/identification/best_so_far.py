@@ -6,26 +6,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from omnidyn.identification.joint_fit import GroupFit, JointFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
-from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.fit import (
-    FINE,
-    NU,
-    STUDENT,
     Options,
-    _names,
-    _records,
-    _without_still_axes,
-    is_exact,
+    degrees,
+    loss_words,
+    make_engine,
     make_problem,
+    nuisance_names,
+    read_records,
+    without_still_axes,
 )
 from omnidyn.identification.output_error.motion import motion
 from omnidyn.identification.output_error.nuisances import AUTO, automatic
 from omnidyn.identification.output_error.record import Record
 from omnidyn.identification.output_error.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.support import supported
-from omnidyn.identification.output_error.tangent_engine import TangentEngine
 from omnidyn.identification.output_error.uncertainty import trust
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -40,14 +38,14 @@ def best_so_far(
 
     options: free, fixed, nuisances, start, loss, use_priors, as they were given there.
     """
-    free = options.get("free")
+    free, names = options.get("free"), nuisance_names(options.get("nuisances", AUTO))
     given = Options(
-        None if free is None else tuple(free), tuple(options.get("fixed", ())), _names(options.get("nuisances", AUTO)),
+        None if free is None else tuple(free), tuple(options.get("fixed", ())), names,
         start=options.get("start", AUTO), loss=options.get("loss", "gaussian"),
         use_priors=options.get("use_priors", False),
     )  # fmt: skip
-    records = _records(list(runs), robot, given)
-    robot, given, still = _without_still_axes(motion(records, robot), records[0].source, robot, given)
+    records = read_records(list(runs), robot, given)
+    robot, given, still = without_still_axes(motion(records, robot), records[0].source, robot, given)
     solver = _solver(records, robot, given)
     state = states[-1]
     if len(state.point.values) != len(solver.problem.parameters):  # automatic nuisances had been settled
@@ -57,10 +55,15 @@ def best_so_far(
     solution = Solution(state, Normal(solver, state).held, 0, True)
     bounds = {key: bound for key, bound, _ in still}
     words = [WORDS, *(each for _, _, each in still)]
-    return conclude(solver, solution, trust(solver, solution), records, given.loss, words, bounds, ())
+    return conclude(solver, solution, trust(solver, solution), records, loss_words(given.loss), words, bounds, ())
+
+
+def best_groups_so_far(joint: JointFit, states: Sequence[State]) -> GroupFit:
+    """The same for groups: what `joint` says at the last of the states that it told its `watch`."""
+    state = states[-1]
+    return joint.answer(Solution(state, Normal(joint.solver, state).held, 0, True), words=[WORDS])
 
 
 def _solver(records: Sequence[Record], robot: Robot, given: Options) -> Solver:
     problem = make_problem(records, robot, given)
-    engine = ExactEngine(problem) if is_exact(robot) else TangentEngine(problem, FINE)
-    return Solver(problem, engine, NU if given.loss == STUDENT else 0.0)
+    return Solver(problem, make_engine(problem), degrees(given.loss))

@@ -57,11 +57,9 @@ def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()
 
 def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
-    for run in runs:
-        if run.voltage is None and run.duty is None:
-            return f"{run.source or 'a log'} holds no voltage and no duty"
-        if all(getattr(run, name) is None for name in OUTPUTS):
-            return f"{run.source or 'a log'} holds no speed, current or pose"
+    why = why_no_inputs(runs)
+    if why:
+        return why
     reasons = why_not_exact(robot)
     if robot.motor.electrical == DYNAMIC:
         reasons.append('winding inductance ([motor] electrical = "dynamic")')
@@ -70,6 +68,16 @@ def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
             f"{robot.name} has {'; '.join(reasons)}; whole logs can be fitted all the same, more slowly, where "
             f"{OUTPUT_ERROR} is asked for by name"
         )
+    return ""
+
+
+def why_no_inputs(runs: Sequence[Run]) -> str:
+    """Which log has no input or no output, in words; "" where all have both."""
+    for run in runs:
+        if run.voltage is None and run.duty is None:
+            return f"{run.source or 'a log'} holds no voltage and no duty"
+        if all(getattr(run, name) is None for name in OUTPUTS):
+            return f"{run.source or 'a log'} holds no speed, current or pose"
     return ""
 
 

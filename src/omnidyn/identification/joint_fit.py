@@ -10,29 +10,43 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.identification.identify import why_not_output_error
+from omnidyn.identification.identify import why_no_inputs
+from omnidyn.identification.joint_problem import (
+    AT,
+    JointEngine,
+    Member,
+    join,
+    joint_start,
+    own_names,
+    read_parts,
+)
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
-from omnidyn.identification.output_error.exact_engine import ExactEngine, Weighting
-from omnidyn.identification.output_error.fit import GAUSS, NU, STUDENT, Options, _names, first_point, make_problem
-from omnidyn.identification.output_error.motion import motion
-from omnidyn.identification.output_error.nuisances import AUTO, automatic
-from omnidyn.identification.output_error.parameters import FRICTION, Parameter
-from omnidyn.identification.output_error.problem import PieceSums, Point, Problem
-from omnidyn.identification.output_error.record import Record, record
+from omnidyn.identification.output_error.fit import (
+    FINE,
+    GAUSS,
+    Options,
+    degrees,
+    is_exact,
+    loss_words,
+    nuisance_names,
+)
+from omnidyn.identification.output_error.nuisances import AUTO
+from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.identification.output_error.resampling import (
+    Resampled,
+    draw_interval,
+    least_runs,
+    resampled,
+    widening_of_std,
+)
 from omnidyn.identification.output_error.solver import Solution, Solver, State
-from omnidyn.identification.output_error.support import supported
 from omnidyn.identification.output_error.uncertainty import SHARE, Trust, trust
 from omnidyn.identification.study_parts import Difference
-from omnidyn.logs.steady_table import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 FRICTION_KEYS = "friction"  # stands for all six
 
@@ -51,76 +65,155 @@ class GroupFit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Group:
-    """One group: its part of the problem, which joint parameters and columns that concerns, which pieces are its."""
+class JointFit:
+    """Groups made one problem, ready to be solved. own: names that each group has for itself."""
 
-    name: str
-    records: list[Record]
-    problem: Problem
-    engine: ExactEngine
-    at: IntArray
-    columns: IntArray
-    pieces: slice
-    notes: tuple[str, ...]
+    solver: Solver
+    engine: JointEngine
+    own: tuple[str, ...]
+    loss: str
+    covariance: str
 
+    def solve(self, watch: Callable[[State], None] | None = None) -> Solution:
+        """The best point; `watch` sees every better state on the way."""
+        start = joint_start(self.engine, self.solver.nu)
+        robot = self.engine.problem.robot
+        if not is_exact(robot):  # first with a step a row, as a fit of one group does
+            coarse = join([m.part for m in self.engine.members], self.own, tol=None)
+            start = Solver(coarse.problem, coarse, self.solver.nu).minimise(start).state.point
+        return self.solver.minimise(start, watch=watch)
 
-class JointEngine(ExactEngine):
-    """The engines of all groups as one: sums of each group, put where its parameters stand among all."""
+    def answer(
+        self, solution: Solution, profile: Sequence[str] = (), bootstrap: int = 0, words: Sequence[str] = ()
+    ) -> GroupFit:
+        """What a solution says. profile, bootstrap: see `identify_groups`; words: warnings for every group.
 
-    def __init__(self, problem: Problem, groups: Sequence[_Group]):
-        self.problem, self.groups = problem, tuple(groups)
+        Raises InputError for a name that is not free, InsufficientDataError where a group has too few runs to draw.
+        """
+        known = trust(self.solver, solution, self.covariance)
+        strata = {id(record): member.name for member in self.engine.members for record in member.part.records}
+        again = resampled(self.solver, solution, known.std, self._joint_names(profile), bootstrap, strata)
+        estimates = {m.name: self._estimate(m, solution, known, again, words) for m in self.engine.members}
+        shared = tuple(name for name in self.engine.problem.names if AT not in name)
+        return GroupFit(estimates, self.own, shared, tuple(self._differences(solution, known, again, strata)))
 
-    def on(self, problem: Problem) -> JointEngine:
-        """Not on other pieces: which group they are of would not be known. Raises UnsupportedError."""
-        raise UnsupportedError("groups cannot be resampled", got="a bootstrap over runs", expected="one group")
+    def _joint_names(self, names: Sequence[str]) -> list[str]:
+        """Names with those of each group written out: KEY stands for KEY@GROUP of all groups."""
+        every = self.engine.problem.names
+        found: list[str] = []
+        for name in names:
+            found += [each for each in every if each.startswith(f"{name}{AT}")] or [name]
+        return list(dict.fromkeys(found))
 
-    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
-        """Sums of the pieces of all groups, each over all parameters: 0 for those of other groups."""
-        found: list[PieceSums] = []
-        for group in self.groups:
-            own = replace(weighting, variance=weighting.variance[group.columns])
-            found += [
-                _widened(sums, group, len(self.problem.parameters))
-                for sums in group.engine.sums(_own_point(point, group), own)
-            ]
+    def _estimate(
+        self, member: Member, solution: Solution, known: Trust, again: Resampled, words: Sequence[str]
+    ) -> OutputErrorEstimate:
+        """What the joint fit says of one group."""
+        problem, at, columns = member.part.problem, member.at, self.engine.columns_of(member)
+        alone = Solver(problem, member.engine, self.solver.nu)
+        now = solution.state
+        state = State(
+            member.point(now.point), [now.sums[k] for k in member.places], now.objective, now.variance[columns]
+        )
+        found = Solution(state, solution.held[at], solution.iterations, solution.converged)
+        own = replace(
+            known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
+            free_step=known.free_step[at], neighbours=known.neighbours[columns],
+            directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
+        )  # fmt: skip
+        names = [self.engine.problem.names[k] for k in at]
+        better = {
+            p.name: again.intervals[name]
+            for p, name in zip(problem.parameters, names, strict=True) if name in again.intervals
+        }  # fmt: skip
+        estimate = conclude(
+            alone, found, own, member.part.records, loss_words(self.loss), [*words, *member.part.notes], {}, (), better
+        )
+        others = ", ".join(each.name for each in self.engine.members if each is not member)
+        return replace(estimate, method=f"{estimate.method}; fitted together with {others}")
+
+    def _differences(
+        self, solution: Solution, known: Trust, again: Resampled, strata: Mapping[int, str]
+    ) -> list[Difference]:
+        """Second group minus first: from the draws of a bootstrap, else to first order in the joint covariance."""
+        names, values, found = self.engine.problem.names, solution.state.point.values, []
+        groups = [member.name for member in self.engine.members]
+        for key in self.own:
+            there = [group for group in groups if f"{key}{AT}{group}" in names]
+            for i, first in enumerate(there):
+                for second in there[i + 1 :]:
+                    a, b = names.index(f"{key}{AT}{first}"), names.index(f"{key}{AT}{second}")
+                    if known.blind[a] or known.blind[b]:
+                        continue
+                    change = float(values[b] - values[a])
+                    if again.draws is not None:
+                        drawn = again.draws[:, b] - again.draws[:, a]
+                        std = widening_of_std(least_runs(self.solver, strata)) * float(drawn.std(ddof=1))
+                        low, high = draw_interval(change, drawn, again.widening)
+                    else:
+                        std = self._std_of_change(a, b, solution, known)
+                        low, high = change - known.quantile * std, change + known.quantile * std
+                    pair = float(values[a]), float(values[b])
+                    found.append(Difference(key, first, second, pair, change, std, low, high))
         return found
+
+    def _std_of_change(self, a: int, b: int, solution: Solution, known: Trust) -> float:
+        parameters, values = self.engine.problem.parameters, solution.state.point.values
+        slope = np.zeros(len(parameters))
+        slope[a], slope[b] = -parameters[a].slope(float(values[a])), parameters[b].slope(float(values[b]))
+        covariance = np.where(np.isfinite(known.covariance), known.covariance, 0.0)
+        return float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
 
 
 def identify_groups(
     runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, per_free: Sequence[str] = (),
     free: Sequence[str] | None = None, fixed: Sequence[str] = (), nuisances: str | Sequence[str] = AUTO,
     start: str = AUTO, use_priors: bool = False, outputs: Sequence[str] | None = None, loss: str = GAUSS,
-    covariance: str = AUTO, watch: Callable[[State], None] | None = None,
+    covariance: str = AUTO, profile: Sequence[str] = (), bootstrap: int = 0,
+    watch: Callable[[State], None] | None = None,
 ) -> GroupFit:  # fmt: skip
     """Fit logs of several groups at once by output error.
 
     groups: name of each run's group. free, fixed, ...: as in `fit_output_error`. per_free: which of the free numbers,
     or of the nuisances, each group has for itself; the others are shared. By default all friction that is free. A key
     may stand for several: "friction", "friction.axes.coulomb".
-    Raises InputError for what cannot be used, InsufficientDataError where a group says nothing about its numbers,
-    UnsupportedError for robots and logs that output error does not take.
+    profile: names whose interval comes from the profile of the likelihood of all logs; one that each group has for
+    itself is profiled in each. bootstrap: draws of whole runs, each group's among themselves, from which std and
+    intervals of all come, those of the differences too; deterministic.
+    Raises InputError for what cannot be used, InsufficientDataError where a group says nothing about its numbers, or
+    has too few runs for a bootstrap, UnsupportedError for robots and logs that output error does not take.
+    """
+    joint = join_groups(
+        runs, robot, groups, per_free=per_free, free=free, fixed=fixed, nuisances=nuisances, start=start,
+        use_priors=use_priors, outputs=outputs, loss=loss, covariance=covariance,
+    )  # fmt: skip
+    return joint.answer(joint.solve(watch), expand_keys(profile), bootstrap)
+
+
+def join_groups(
+    runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, per_free: Sequence[str] = (),
+    free: Sequence[str] | None = None, fixed: Sequence[str] = (), nuisances: str | Sequence[str] = AUTO,
+    start: str = AUTO, use_priors: bool = False, outputs: Sequence[str] | None = None, loss: str = GAUSS,
+    covariance: str = AUTO,
+) -> JointFit:  # fmt: skip
+    """The first part of `identify_groups`: what is shared and what is own, not yet solved. Options and errors as there.
+
+    Automatic nuisances are settled here, by a fit of each group alone.
     """
     if len(groups) != len(runs) or len(set(groups)) < 2:
         got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
         raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
-    why = why_not_output_error(runs, robot)
+    why = why_no_inputs(runs)
     if why:
         raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
-    keys = None if free is None else tuple(expand_keys(free))
     given = Options(
-        keys, tuple(expand_keys(fixed)), _names(nuisances), start, use_priors,
-        None if outputs is None else tuple(outputs), loss, covariance,
+        None if free is None else tuple(expand_keys(free)), tuple(expand_keys(fixed)), nuisance_names(nuisances),
+        start, use_priors, None if outputs is None else tuple(outputs), loss, covariance,
     )  # fmt: skip
-    parts = _parts(runs, groups, robot, given)
-    own = _own_names(per_free, parts)
-    problem, joined = _joined(parts, own)
-    solver = Solver(problem, JointEngine(problem, joined), NU if loss == STUDENT else 0.0)
-    solution = solver.minimise(_start(problem, joined, solver.nu), watch=watch)
-    known = trust(solver, solution, covariance)
-    words = "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
-    shared = tuple(name for name in problem.names if "@" not in name)
-    estimates = {group.name: _estimate(group, solution, known, solver, words, joined) for group in joined}
-    return GroupFit(estimates, tuple(own), shared, tuple(_differences(problem, solution, known, joined, own)))
+    parts = read_parts(runs, groups, robot, given)
+    own = own_names(expand_keys(per_free), parts)
+    engine = join(parts, own, FINE)
+    return JointFit(Solver(engine.problem, engine, degrees(loss)), engine, tuple(own), loss, covariance)
 
 
 def expand_keys(keys: Sequence[str]) -> list[str]:
@@ -130,169 +223,3 @@ def expand_keys(keys: Sequence[str]) -> list[str]:
         many = [each for each in FRICTION if key == FRICTION_KEYS or each.startswith(f"{key}[")]
         found += many or [key]
     return list(dict.fromkeys(found))
-
-
-def _parts(
-    runs: Sequence[Run], groups: Sequence[str], robot: Robot, given: Options
-) -> list[tuple[str, list[Record], Problem, tuple[str, ...]]]:
-    """(group, records, its problem alone, notes) of each; friction of an axis that never moved in a group stays out."""
-    found = []
-    of = {
-        name: [record(run, robot, given.outputs) for run, own in zip(runs, groups, strict=True) if own == name]
-        for name in dict.fromkeys(groups)
-    }
-    for name, records in of.items():
-        moved = motion(records, robot).moved
-        still = [key for key in FRICTION if not moved[int(key[-2])]]
-        free = given.free if given.free is not None else FRICTION if not given.use_priors else None
-        options = given
-        if still and free is not None:
-            options = replace(given, free=tuple(k for k in free if k not in still and k not in given.fixed), fixed=())
-        elif still:
-            options = replace(given, fixed=tuple({*given.fixed, *still}))
-        notes = tuple(
-            f"axis {AXES[axis]} never visibly moved in {name}: its friction is not fitted there"
-            for axis in np.flatnonzero(~moved)
-        )
-        found.append((name, records, options, notes))
-    every = [each for records in of.values() for each in records]
-    kept = given.nuisances if given.nuisances is not None else _settled(found, robot, automatic(every))
-    return [
-        (name, records, make_problem(records, robot, replace(options, nuisances=kept)), notes)
-        for name, records, options, notes in found
-    ]
-
-
-def _settled(
-    parts: Sequence[tuple[str, list[Record], Options, tuple[str, ...]]], robot: Robot, names: tuple[str, ...]
-) -> tuple[str, ...]:
-    """The automatic nuisances that every group supports alone."""
-    kept: list[str] | None = None
-    for _, records, options, _ in parts:
-        problem = make_problem(records, robot, replace(options, nuisances=names))
-        solver = Solver(problem, ExactEngine(problem), NU if options.loss == STUDENT else 0.0)
-        mine = supported(solver, solver.minimise(first_point(solver, records)), names)
-        kept = [name for name in kept if name in mine] if kept is not None else list(mine)
-    return tuple(kept or ())
-
-
-def _own_names(
-    per_free: Sequence[str], parts: Sequence[tuple[str, list[Record], Problem, tuple[str, ...]]]
-) -> list[str]:
-    """The numbers that each group has for itself. Raises InputError where one is not free, or where there is none."""
-    names = list(dict.fromkeys(name for _, _, problem, _ in parts for name in problem.names))
-    own = expand_keys(per_free) if per_free else [name for name in names if name in FRICTION]
-    unknown = [name for name in own if name not in names]
-    if unknown:
-        raise InputError(
-            "not free, so no group can have its own", got=unknown[0], expected=", ".join(names), where="per_free"
-        )
-    if not own:
-        raise InputError(
-            "nothing differs between the groups", got=", ".join(names), expected="per_free", where="groups"
-        )
-    return own
-
-
-def _joined(
-    parts: Sequence[tuple[str, list[Record], Problem, tuple[str, ...]]], own: Sequence[str]
-) -> tuple[Problem, list[_Group]]:
-    """One problem with each shared number once and each own number once a group, named KEY@GROUP."""
-    robots: dict[str, Parameter] = {}
-    extras: dict[str, Parameter] = {}
-    names: list[list[str]] = []
-    for group, _, problem, _ in parts:
-        mine = []
-        for k, p in enumerate(problem.parameters):
-            name = f"{p.name}@{group}" if p.name in own else p.name
-            (robots if k < problem.robot_count else extras).setdefault(name, replace(p, name=name))
-            mine.append(name)
-        names.append(mine)
-    pieces = tuple(piece for _, _, problem, _ in parts for piece in problem.pieces)
-    joint = Problem(parts[0][2].robot, (*robots.values(), *extras.values()), len(robots), pieces)
-    found, first = [], 0
-    for (group, records, problem, notes), mine in zip(parts, names, strict=True):
-        last = first + len(problem.pieces)
-        found.append(
-            _Group(
-                group, records, problem, ExactEngine(problem), np.array([joint.where(name) for name in mine]),
-                np.array([joint.columns.index(column) for column in problem.columns]), slice(first, last), notes,
-            )
-        )  # fmt: skip
-        first = last
-    return joint, found
-
-
-def _start(problem: Problem, groups: Sequence[_Group], nu: float) -> Point:
-    """Each group begins where it would alone; shared numbers at the median of the groups."""
-    values: list[list[float]] = [[] for _ in problem.parameters]
-    states: list[FloatArray] = []
-    for group in groups:
-        point = first_point(Solver(group.problem, group.engine, nu), group.records)
-        for k, value in zip(group.at, point.values, strict=True):
-            values[k].append(float(value))
-        states += point.states
-    return Point(np.array([float(np.median(each)) for each in values]), tuple(states))
-
-
-def _own_point(point: Point, group: _Group) -> Point:
-    return Point(point.values[group.at], point.states[group.pieces])
-
-
-def _widened(sums: PieceSums, group: _Group, count: int) -> PieceSums:
-    """The sums of a piece with the parameters of all groups; those of the others have no slope."""
-    own, more = len(group.at), sums.grad.shape[1] - len(group.at)
-    at = np.concatenate([group.at, count + np.arange(more)])
-    total = count + more
-    grad, score = np.zeros((len(sums.grad), total)), np.zeros((len(sums.score), total))
-    info = np.zeros((len(sums.info), total, total))
-    grad[:, at], score[:, at] = sums.grad, sums.score
-    info[:, at[:, None], at] = sums.info
-    assert own + more == len(at)
-    return replace(sums, columns=group.columns[sums.columns], grad=grad, info=info, score=score)
-
-
-def _estimate(
-    group: _Group, solution: Solution, known: Trust, solver: Solver, words: str, groups: Sequence[_Group]
-) -> OutputErrorEstimate:
-    """What the joint fit says of one group."""
-    alone = Solver(group.problem, group.engine, solver.nu)
-    variance = solution.state.variance[group.columns]
-    state = State(
-        _own_point(solution.state.point, group), solution.state.sums[group.pieces], solution.state.objective, variance
-    )
-    found = Solution(state, solution.held[group.at], solution.iterations, solution.converged)
-    own = replace(
-        known, covariance=known.covariance[np.ix_(group.at, group.at)], held=known.held[group.at],
-        blind=known.blind[group.at], free_step=known.free_step[group.at], neighbours=known.neighbours[group.columns],
-        directions=tuple((v, way[group.at]) for v, way in known.directions if np.abs(way[group.at]).max() > SHARE),
-    )  # fmt: skip
-    estimate = conclude(alone, found, own, group.records, words, group.notes, {}, ())
-    others = ", ".join(each.name for each in groups if each is not group)
-    return replace(estimate, method=f"{estimate.method}; fitted together with {others}")
-
-
-def _differences(
-    problem: Problem, solution: Solution, known: Trust, groups: Sequence[_Group], own: Sequence[str]
-) -> list[Difference]:
-    """Second group minus first, to first order in the joint covariance."""
-    values = solution.state.point.values
-    scale = np.array([p.slope(float(v)) for p, v in zip(problem.parameters, values, strict=True)])
-    names, found = problem.names, []
-    for key in own:
-        there = [g.name for g in groups if f"{key}@{g.name}" in names]
-        for i, first in enumerate(there):
-            for second in there[i + 1 :]:
-                a, b = names.index(f"{key}@{first}"), names.index(f"{key}@{second}")
-                if known.blind[a] or known.blind[b]:
-                    continue
-                slope = np.zeros(len(names))
-                slope[a], slope[b] = -scale[a], scale[b]
-                covariance = np.where(np.isfinite(known.covariance), known.covariance, 0.0)
-                std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
-                change, half = float(values[b] - values[a]), known.quantile * std
-                found.append(
-                    Difference(key, first, second, (float(values[a]), float(values[b])), change, std, change - half,
-                               change + half)
-                )  # fmt: skip
-    return found

@@ -60,7 +60,7 @@ class ExactEngine:
     def on(self, problem: Problem) -> ExactEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
-        engine.problem = problem
+        engine.problem, engine._columns = problem, problem.columns
         return engine
 
     def with_breakaway(self, breakaway: FloatArray) -> ExactEngine:

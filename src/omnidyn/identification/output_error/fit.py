@@ -26,13 +26,12 @@ from omnidyn.identification.output_error.nuisances import (
 from omnidyn.identification.output_error.parameters import FRICTION, robot_parameters
 from omnidyn.identification.output_error.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.record import Record, record
-from omnidyn.identification.output_error.resampling import bootstrap as resample
-from omnidyn.identification.output_error.resampling import profile_interval
+from omnidyn.identification.output_error.resampling import resampled
 from omnidyn.identification.output_error.solver import Solution, Solver, State
 from omnidyn.identification.output_error.starts import friction_values, integral_start
 from omnidyn.identification.output_error.support import supported, wanted
 from omnidyn.identification.output_error.tangent_engine import TangentEngine
-from omnidyn.identification.output_error.uncertainty import Trust, trust
+from omnidyn.identification.output_error.uncertainty import trust
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -107,12 +106,12 @@ def fit_output_error(
     only, and start at rest; UnsupportedError for more.
     """
     given = Options(
-        None if free is None else tuple(free), tuple(fixed), _names(nuisances), start, use_priors,
+        None if free is None else tuple(free), tuple(fixed), nuisance_names(nuisances), start, use_priors,
         None if outputs is None else tuple(outputs), loss, covariance,
     )  # fmt: skip
-    records = _records([runs] if isinstance(runs, Run) else list(runs), robot, given)
+    records = read_records([runs] if isinstance(runs, Run) else list(runs), robot, given)
     motion_of = motion(records, robot)
-    robot, given, still = _without_still_axes(motion_of, records[0].source, robot, given)
+    robot, given, still = without_still_axes(motion_of, records[0].source, robot, given)
     solver, solution = _solve(records, robot, given, watch)
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
     levels: list[Breakaway] = []
@@ -124,37 +123,17 @@ def fit_output_error(
         )  # fmt: skip
     if axes:
         solver, solution, levels = find_breakaway(solver, solution, axes)
-    words = "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
     known = trust(solver, solution, covariance)
     more, bounds = (
         [*(words for _, _, words in still), *hints],
         {key: bound for key, bound, _ in still if bound > NOTHING},
     )
-    better = _resampled(solver, solution, known, tuple(profile), bootstrap)
-    return conclude(solver, solution, known, records, words, more, bounds, levels, better)
+    better = resampled(solver, solution, known.std, profile, bootstrap).intervals
+    return conclude(solver, solution, known, records, loss_words(loss), more, bounds, levels, better)
 
 
-def _resampled(
-    solver: Solver, solution: Solution, known: Trust, profile: tuple[str, ...], draws: int
-) -> dict[str, tuple[float | None, tuple[float, float]]]:
-    """Name -> (std or None, interval) where a profile or a bootstrap was asked for."""
-    names = solver.problem.names
-    unknown = [name for name in profile if name not in names]
-    if unknown:
-        raise InputError("not a free number", got=unknown[0], expected=", ".join(names), where="profile")
-    found: dict[str, tuple[float | None, tuple[float, float]]] = {}
-    if draws:
-        values = resample(solver, solution, draws)
-        ends = np.quantile(values, [0.025, 0.975], axis=0)
-        for j, name in enumerate(names):
-            found[name] = (float(values[:, j].std(ddof=1)), (float(ends[0, j]), float(ends[1, j])))
-    for name in profile:
-        j = names.index(name)
-        found[name] = (None, profile_interval(solver, solution, j, float(known.std[j])))
-    return found
-
-
-def _names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:
+def nuisance_names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:
+    """The nuisances asked for; None where those are meant that the logs support."""
     if nuisances == AUTO:
         return None
     return (nuisances,) if isinstance(nuisances, str) else tuple(nuisances)
@@ -163,7 +142,7 @@ def _names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:
 def _solve(
     records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None
 ) -> tuple[Solver, Solution]:
-    problem, nu = make_problem(records, robot, given), NU if given.loss == STUDENT else 0.0
+    problem, nu = make_problem(records, robot, given), degrees(given.loss)
     if is_exact(robot):
         solver = Solver(problem, ExactEngine(problem), nu)
         return solver, solver.minimise(first_point(solver, records), watch=watch)
@@ -171,6 +150,21 @@ def _solve(
     first = coarse.minimise(problem.start())
     fine = Solver(problem, TangentEngine(problem, FINE), nu)
     return fine, fine.minimise(first.state.point, watch=watch)
+
+
+def degrees(loss: str) -> float:
+    """Degrees of freedom of a loss; 0 for Gaussian noise."""
+    return NU if loss == STUDENT else 0.0
+
+
+def loss_words(loss: str) -> str:
+    """A loss as an answer names it."""
+    return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
+
+
+def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | TangentEngine:
+    """The engine of the robot; tol [m/s]: of the implicit one, None for a step a row."""
+    return ExactEngine(problem) if is_exact(problem.robot) else TangentEngine(problem, tol)
 
 
 def is_exact(robot: Robot) -> bool:
@@ -193,7 +187,8 @@ def _settled(
     return solver, solution, given, wanted(solver, solution, Solver(wider, ExactEngine(wider), solver.nu))
 
 
-def _records(runs: list[Run], robot: Robot, given: Options) -> list[Record]:
+def read_records(runs: Sequence[Run], robot: Robot, given: Options) -> list[Record]:
+    """The runs as a fit sees them. Raises InputError for unknown words among the options, and where there is no run."""
     for value, known, where in (
         (given.loss, (GAUSS, STUDENT), "loss"),
         (given.covariance, (AUTO, "white", "sandwich"), "covariance"),
@@ -205,7 +200,7 @@ def _records(runs: list[Run], robot: Robot, given: Options) -> list[Record]:
     return [record(run, robot, given.outputs) for run in runs]
 
 
-def _without_still_axes(
+def without_still_axes(
     found: Motion, source: str, robot: Robot, given: Options
 ) -> tuple[Robot, Options, list[tuple[str, float, str]]]:
     """Take the friction of axes that never visibly moved out of the fit: (robot, options, (key, bound, words) each).

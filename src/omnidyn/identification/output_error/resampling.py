@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
+from scipy.special import chdtri, ndtri, stdtrit
 
-from omnidyn.errors import InsufficientDataError
+from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.problem import Point
 from omnidyn.identification.output_error.solver import Solution, Solver
 
@@ -18,6 +19,71 @@ RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
 LEAST_RUNS = 5
 SEED = 20120101
+TAIL = 0.975
+
+Strata = Mapping[int, str]  # id of a record -> the group it belongs to
+
+
+@dataclass(frozen=True, eq=False)
+class Resampled:
+    """intervals: name -> (std, None to keep that of the covariance; 95 % interval) of what was asked for.
+
+    draws (N, P): the values of every draw of the bootstrap; None without one. widening: see `draw_interval`.
+    """
+
+    intervals: Mapping[str, tuple[float | None, tuple[float, float]]] = field(default_factory=dict)
+    draws: FloatArray | None = None
+    widening: float = 1.0
+
+
+def resampled(
+    solver: Solver, solution: Solution, std: FloatArray, profile: Sequence[str] = (), draws: int = 0,
+    strata: Strata | None = None,
+) -> Resampled:  # fmt: skip
+    """Intervals by bootstrap of all numbers, and by profile of those named.
+
+    std (P,): standard errors in the numbers that the solver sees. strata: groups whose runs are drawn apart.
+    Raises InputError for a name that is not free, InsufficientDataError for too few runs.
+    """
+    names, values = solver.problem.names, solution.state.point.values
+    unknown = [name for name in profile if name not in names]
+    if unknown:
+        raise InputError("not a free number", got=unknown[0], expected=", ".join(names), where="profile")
+    found: dict[str, tuple[float | None, tuple[float, float]]] = {}
+    drawn, widening = None, 1.0
+    if draws:
+        drawn = bootstrap(solver, solution, draws, strata=strata)
+        widening = small_sample(least_runs(solver, strata))
+        for j, p in enumerate(solver.problem.parameters):
+            inner = np.array([p.inner(float(v)) for v in drawn[:, j]])
+            low, high = draw_interval(p.inner(float(values[j])), inner, widening)
+            low = max(low, p.inner(p.low)) if not p.log else low
+            spread = widening_of_std(least_runs(solver, strata)) * float(drawn[:, j].std(ddof=1))
+            found[p.name] = (spread, (p.outer(low), p.outer(high)))
+    for name in profile:
+        j = names.index(name)
+        found[name] = (None, profile_interval(solver, solution, j, float(std[j])))
+    return Resampled(found, drawn, widening)
+
+
+def draw_interval(value: float, draws: FloatArray, widening: float) -> tuple[float, float]:
+    """95 % interval of draws (N,) around a value: their quantiles, as much farther away as few runs ask for."""
+    low, high = np.quantile(draws, [1.0 - TAIL, TAIL])
+    return value + widening * (float(low) - value), value + widening * (float(high) - value)
+
+
+def widening_of_std(runs: int) -> float:
+    """sqrt(n/(n - 1)): draws with replacement scatter about the mean of n runs, which is itself one of their sums."""
+    return float(np.sqrt(runs / (runs - 1.0)))
+
+
+def small_sample(runs: int) -> float:
+    """What quantiles of draws from n runs are too narrow by: sqrt(n/(n - 1)) t/z.
+
+    Hesterberg, "What teachers should know about the bootstrap", Am. Stat. 69 (2015), the expanded percentile interval,
+    here as a factor.
+    """
+    return widening_of_std(runs) * float(stdtrit(runs - 1.0, TAIL) / ndtri(TAIL))
 
 
 def profile_interval(solver: Solver, solution: Solution, index: int, std: float) -> tuple[float, float]:
@@ -66,25 +132,42 @@ def _rise(solver: Solver, solution: Solution, index: int, inner: float, point: P
     return 2.0 * (found.state.objective - solution.state.objective), found.state.point
 
 
-def bootstrap(solver: Solver, solution: Solution, draws: int, seed: int = SEED) -> FloatArray:
-    """Fits to runs drawn with replacement. Shape (draws, P).
+def bootstrap(
+    solver: Solver, solution: Solution, draws: int, seed: int = SEED, strata: Strata | None = None
+) -> FloatArray:
+    """Fits to runs drawn with replacement, those of each group among themselves. Shape (draws, P).
 
     Runs are the blocks: whatever their residuals remember, from one run to the next they do not.
-    Raises InsufficientDataError for fewer than LEAST_RUNS runs.
+    Raises InsufficientDataError where there are fewer than LEAST_RUNS runs, or in one of the groups.
     """
     pieces, states = solver.problem.pieces, solution.state.point.states
-    runs = list(dict.fromkeys(id(piece.record) for piece in pieces))
-    if len(runs) < LEAST_RUNS:
-        raise InsufficientDataError(
-            "too few runs for a bootstrap", got=f"{len(runs)}", expected=f"{LEAST_RUNS} or more",
-            remedy="cut a long log into runs, or take the sandwich", where="bootstrap",
-        )  # fmt: skip
+    of_group = runs_by_group(solver, strata)
+    for group, runs in of_group.items():
+        if len(runs) < LEAST_RUNS:
+            raise InsufficientDataError(
+                "too few runs for a bootstrap", got=f"{len(runs)}{f' in {group}' if group else ''}",
+                expected=f"{LEAST_RUNS} or more", remedy="cut a long log into runs, or take the sandwich",
+                where="bootstrap",
+            )  # fmt: skip
     rng, found = np.random.default_rng(seed), []
     for _ in range(draws):
-        drawn = [runs[k] for k in rng.integers(len(runs), size=len(runs))]
+        drawn = [runs[k] for runs in of_group.values() for k in rng.integers(len(runs), size=len(runs))]
         chosen = [k for run in drawn for k, piece in enumerate(pieces) if id(piece.record) == run]
         problem = replace(solver.problem, pieces=tuple(pieces[k] for k in chosen))
         again = Solver(problem, solver.engine.on(problem), solver.nu)
         point = Point(solution.state.point.values, tuple(states[k] for k in chosen))
         found.append(again.minimise(point).state.point.values)
     return np.array(found)
+
+
+def least_runs(solver: Solver, strata: Strata | None = None) -> int:
+    """How many runs the smallest group has."""
+    return min(len(runs) for runs in runs_by_group(solver, strata).values())
+
+
+def runs_by_group(solver: Solver, strata: Strata | None) -> dict[str, list[int]]:
+    """Group -> its runs, each by the id of its record; without groups all are in one."""
+    found: dict[str, list[int]] = {}
+    for run in dict.fromkeys(id(piece.record) for piece in solver.problem.pieces):
+        found.setdefault(strata[run] if strata else "", []).append(run)
+    return found

@@ -54,7 +54,7 @@ class TangentEngine:
     def on(self, problem: Problem) -> TangentEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
-        engine.problem = problem
+        engine.problem, engine._columns = problem, problem.columns
         return engine
 
     def robot_at(self, values: FloatArray) -> Robot:

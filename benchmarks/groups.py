@@ -1,0 +1,100 @@
+"""Two floors that share a motor, 200 pairs of simulated logs: do the intervals of the differences hold the truth?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.identify import NOISE, excitation, noisy
+from benchmarks.table import Table, machine
+from omnidyn.identification.joint_fit import GroupFit, identify_groups
+from omnidyn.model.robot import Robot
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+from omnidyn.simulation.tangent import with_parameter
+
+PAIRS, SECONDS = 200, 20.0
+MEMORY = 0.9  # correlation of neighbours of coloured noise
+COULOMB, VISCOUS, TORQUE = "friction.axes.coulomb[0]", "friction.axes.viscous[1]", "motor.torque_constant_Nm_A"
+ROUGH = {COULOMB: 2.6, VISCOUS: 1.2}  # of the second floor; the preset has 2.2 N and 0.96 N s/m
+RUNS, DRAWS = 10, 200  # a floor, and of them
+
+
+def measure() -> Table:
+    """Both parts, about two minutes."""
+    table = Table("groups: two floors in one likelihood", ["what", "noise", "value"])
+    table.notes += [machine(), f"{PAIRS} pairs of logs of {SECONDS:g} s at 100 Hz, six differences each; 95 % wanted"]
+    for words, noise in (("white", noisy), ("coloured", coloured)):
+        _coverage(table, words, noise)
+    _bootstrap(table)
+    return table
+
+
+def coloured(run: Run, seed: int) -> Run:
+    """The run with noise of the same size that remembers: each row takes MEMORY of the last one."""
+    assert run.twist is not None
+    fresh = np.random.default_rng(5000 + seed).normal(size=run.twist.shape) * NOISE
+    errors = np.empty_like(fresh)
+    errors[0] = fresh[0]
+    for k in range(1, len(fresh)):
+        errors[k] = MEMORY * errors[k - 1] + np.sqrt(1.0 - MEMORY**2) * fresh[k]
+    return Run(t=run.t, voltage=run.voltage, twist=run.twist + errors, source="simulated")
+
+
+def floors() -> dict[str, Robot]:
+    """The preset on its floor and on a rough one."""
+    smooth = rough = load_robot("axebot")
+    for key, value in ROUGH.items():
+        rough = with_parameter(rough, key, value)
+    return {"smooth": smooth, "rough": rough}
+
+
+def pair(seed: int, noise: Callable[[Run, int], Run]) -> GroupFit:
+    """A log on each floor, fitted together; the magnet is fitted too, and shared."""
+    runs = [
+        noise(simulate(robot, excitation(SECONDS, seed=2 * seed + k), 0.01), 2 * seed + k)
+        for k, robot in enumerate(floors().values())
+    ]
+    free = ["friction", TORQUE]
+    return identify_groups(runs, load_robot("axebot"), [*floors()], free=free, nuisances=(), start="rest")
+
+
+def true_differences() -> dict[str, float]:
+    """What the floors differ by: second minus first."""
+    robot = load_robot("axebot").friction.axes
+    return {COULOMB: ROUGH[COULOMB] - robot.coulomb[0], VISCOUS: ROUGH[VISCOUS] - robot.viscous[1]}
+
+
+def _coverage(table: Table, words: str, noise: Callable[[Run, int], Run]) -> None:
+    true, held, scaled = true_differences(), [], []
+    for seed in range(PAIRS):
+        for d in pair(seed, noise).differences:
+            error = d.difference - true.get(d.key, 0.0)
+            held.append(d.low <= true.get(d.key, 0.0) <= d.high)
+            scaled.append(error / d.std)
+    share = float(np.mean(held))
+    band = 2.6 * np.sqrt(0.95 * 0.05 / (3 * PAIRS))  # of counting: B and C of an axis go together, axes do not
+    what = "share of intervals of differences that hold the truth"
+    table.add(f"0.95 +- {band:.3f}", abs(share - 0.95) <= band, what=what, noise=words, value=share)
+    table.add("1", None, what="... scatter of differences over std", noise=words, value=float(np.std(scaled)))
+
+
+def _bootstrap(table: Table) -> None:
+    """RUNS coloured logs a floor: std of the differences by bootstrap over runs beside that of the sandwich."""
+    runs, names = [], []
+    for g, (name, robot) in enumerate(floors().items()):
+        for k in range(RUNS):
+            seed = RUNS * g + k
+            runs.append(coloured(simulate(robot, excitation(SECONDS, seed=seed), 0.01), seed))
+            names.append(name)
+    how = {"nuisances": (), "start": "rest"}
+    plain = identify_groups(runs, load_robot("axebot"), names, **how)
+    drawn = identify_groups(runs, load_robot("axebot"), names, bootstrap=DRAWS, **how)
+    ratio = [b.std / a.std for a, b in zip(plain.differences, drawn.differences, strict=True)]
+    mean = float(np.exp(np.mean(np.log(ratio))))
+    what = f"std of differences, bootstrap over {RUNS} runs a floor / sandwich, mean"
+    table.add("0.8 to 1.25", 0.8 <= mean <= 1.25, noise="coloured", what=what, value=mean)
+    for words, value in (("smallest", min(ratio)), ("largest", max(ratio))):
+        table.add("", None, what=f"... {words}", noise="coloured", value=float(value))
