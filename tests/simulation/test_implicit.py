@@ -116,6 +116,19 @@ def test_the_error_follows_the_tolerance(seed):
         assert worst(simulate(robot, voltage, dt, tol=tol), truth) <= tol, tol
 
 
+@pytest.mark.parametrize("seed", [15, 31])
+def test_a_current_that_reverses_under_a_voltage_drop_is_no_floor(seed):
+    """Where i passes 0 its slope jumps by 2 V_d/L; step doubling does not see it early in a step (DOP853 does)."""
+    robot, truth = random_robot(seed), truth_of(seed)
+    voltage, dt = random_voltages(robot, seed)
+    assert robot.motor.electrical == "dynamic"
+    assert np.all(robot.motor.voltage_drop)
+    for tol in (1e-7, 1e-8):
+        run = simulate(robot, voltage, dt, tol=tol)
+        assert worst(run, truth) <= tol
+        assert np.abs(run.current - truth.current).max() <= 100 * tol
+
+
 def test_a_release_inside_a_row_is_found_at_every_tolerance():
     """Currents rise slowly and breakaway, above Coulomb, is met inside a row; judge: the exact engine.
 

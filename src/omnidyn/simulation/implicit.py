@@ -16,7 +16,20 @@ from numpy.typing import NDArray
 from omnidyn.compiled import kernel, part
 from omnidyn.model.forces import forces_at_work
 from omnidyn.model.inclusion import CAP
-from omnidyn.model.layout import AXES, BOUND, INDUCTANCE, LENGTH, MASS, NOW, TAU, VOLTAGE
+from omnidyn.model.layout import (
+    AXES,
+    BOUND,
+    DROP,
+    EFFICIENCY,
+    GAIN,
+    INDUCTANCE,
+    LENGTH,
+    MASS,
+    NOW,
+    RESISTANCE,
+    TAU,
+    VOLTAGE,
+)
 from omnidyn.model.plant import Plant
 from omnidyn.model.rest import SIGNS, put, settle, sticks, with_given_currents
 from omnidyn.model.scratch import copy_row, scratch
@@ -125,6 +138,23 @@ def _unresolved(body, element, state, h):
 
 
 @part
+def _reverses(body, element, a, b, h):
+    """A bound of how far currents that leave or meet 0 inside a step of length h can lead astray [m/s]; else 0.
+
+    A voltage drop bends such a current by 2 V_d/L. In the first gamma/2 of a step doubling is blind to the bend: every
+    first stage ends behind it. The current, wrong by 2 h V_d/L, goes on pushing for L/R.
+    """
+    worst, first = 0.0, SIGNS + 1 + len(element)
+    for e in range(AXES, len(element)):
+        i, j = a[first + e - AXES], b[first + e - AXES]
+        if element[e, DROP] > 0.0 and element[e, INDUCTANCE] > 0.0 and i * j <= 0.0 and i != j:
+            push = element[e, GAIN] / element[e, EFFICIENCY] / element[e, RESISTANCE] / body[MASS]
+            each = push * max(1.0, YAW_SHARE / body[LENGTH]) + CURRENT_SHARE / element[e, INDUCTANCE]
+            worst = max(worst, 2.0 * h * element[e, DROP] * each)
+    return worst
+
+
+@part
 def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
     """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
 
@@ -139,8 +169,11 @@ def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
         third = step(body, element, s, middle, two, inner, 0.5 * h)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
         ratio = _error(body, element, one, two) / (tol * max(h / MEMORY, FLOOR))
+        astray = max(_reverses(body, element, state, middle, h), _reverses(body, element, middle, two, h))
         if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
-            ratio = max(ratio, 64.0) if _unresolved(body, element, state, h) > tol else 0.5
+            astray = max(astray, _unresolved(body, element, state, h))
+        if astray > 0.0:
+            ratio = max(ratio, 64.0) if astray > tol else 0.5
         if ratio <= 1.0 or h <= SHORTEST:
             return h, h * min(4.0, max(1.0, 0.9 / math.sqrt(ratio + 1e-12)))
         h = max(SHORTEST, h * max(0.125, min(0.5, 0.9 / math.sqrt(ratio))))
