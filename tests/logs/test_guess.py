@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn import load_robot
+from omnidyn import load_robot, read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.guess import guess_columns
 from omnidyn.logs.mapping import Column, ColumnMap, load_map, map_to_toml, parse_column, save_map
@@ -255,3 +255,31 @@ def test_the_text_of_a_map_is_stable():
 @pytest.mark.parametrize("name", ["", " ", "\x00", "ü" * 300, "1" * 50, "_" * 80, "a_b_c_d_e_f_g_h"])
 def test_any_name_can_be_read(name):
     read_name(name)
+
+
+@pytest.mark.parametrize("cell", ["#N/A", "NA", "None", "0x10", "1_000", "true", "-", "\u22125.0", "1.5D+00"])
+def test_one_word_in_a_column_of_numbers_is_refused_and_drops_no_wheel(tmp_path, cell):
+    path = tmp_path / "log.csv"
+    rows = [f"{0.01 * k:.2f},{cell if k == 7 else k},{2 * k}" for k in range(ROWS)]
+    path.write_text("\n".join(["t_s,w1_rad_s,w2_rad_s", *rows]), "utf-8")
+    with pytest.raises(InputError, match=r"log.csv:9, column w1_rad_s: not a number; got "):
+        read_log(path)
+    assert len(read_log(path, skip_bad_rows=True)) == ROWS - 1
+    columns = read_log(path, columns={"w1": "w2_rad_s:rad/s"}).wheel_speed
+    np.testing.assert_array_equal(columns[:, 0], 2.0 * np.arange(ROWS))
+
+
+def test_cells_with_their_unit_are_doubted_in_words(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t_s,u1,w1_rad_s,mode1\n" + "".join(f"{0.01 * k:.2f},{k}.5V,{k},fast\n" for k in range(ROWS)))
+    columns = guess_columns(read_table(path))
+    assert columns.doubts == ("u1 looks like u1, but cells such as 0.5V are no numbers: not taken",)
+    assert columns.unused == ("u1", "mode1")
+
+
+@pytest.mark.parametrize("cells", ["11/20/2026 10:00:{:02d} AM", "{:02d} sec", '"1,0{:02d}.0"'])
+def test_a_time_in_words_that_are_not_known_is_refused_with_a_cell(tmp_path, cells):
+    path = tmp_path / "log.csv"
+    path.write_text("time,w1_rad_s\n" + "".join(f"{cells.format(k)},{k}\n" for k in range(ROWS)))
+    with pytest.raises(InputError, match=r"time looks like t, but cells such as .*; write seconds, or dates such as"):
+        read_log(path)

@@ -16,6 +16,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs import words
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.clock import is_dates
+from omnidyn.logs.dialect import is_number_or_missing, looks_like_number, to_float
 from omnidyn.logs.mapping import MOTOR_SIDE, SIDED, WHEEL_SIDE, Column, ColumnMap, component_channel, quantity_of
 from omnidyn.logs.table import Table
 from omnidyn.logs.words import Words, read_name
@@ -102,10 +103,11 @@ def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str,
     """
     assumed = {name: parse_unit(text).text for name, text in (assume or {}).items()}
     found = _Guess()
-    names = [name for name in table.names if not isinstance(table.columns[name], tuple)]
+    names = [name for name in table.names if _is_numeric(table.columns[name])]
     numbers = _wheel_numbers(names, found)
     for name in names:
         _take(table, name, numbers, assumed, robot, found)
+    _doubt_words(table, numbers, found)
     _take_time(table, assumed, found)
     if not numbers:
         _take_bench(table, names, assumed, found)
@@ -114,6 +116,21 @@ def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str,
     unused = tuple(name for name in table.names if name not in used)
     ordered = dict(sorted(found.columns.items(), key=lambda item: _order(item[0])))
     return ColumnMap(ordered, unused, found.doubt_words(), found.note_words())
+
+
+def _is_numeric(cells: FloatArray | tuple[str, ...]) -> bool:
+    """Whether a column holds numbers, be it with words among them: those are refused where the column is used."""
+    if not isinstance(cells, tuple):
+        return True
+    there = [cell for cell in cells if cell]
+    return 2 * sum(map(looks_like_number, there)) > len(there)
+
+
+def _floats(cells: FloatArray | tuple[str, ...]) -> FloatArray:
+    """The numbers of a column, NaN in the place of a word."""
+    if not isinstance(cells, tuple):
+        return cells
+    return np.array([to_float(cell) if is_number_or_missing(cell) else np.nan for cell in cells])
 
 
 def _order(component: str) -> tuple[int, str, int]:
@@ -167,6 +184,20 @@ def _take(
         unit = _unit_of(table, name, component, robot, found)
     if unit is not None:
         _enter(name, component, unit, parts, found)
+
+
+def _doubt_words(table: Table, numbers: Mapping[int, int], found: _Guess) -> None:
+    """Columns that are called like a component, and whose cells begin like numbers but are none: 5.0V, 1.250.000."""
+    for name in table.names:
+        cells = table.columns[name]
+        component = None if _is_numeric(cells) else _exact(name) or _component(read_name(name), None, numbers)
+        if component is not None and (cell := _first_word(cells)).lstrip("+-.")[:1].isdigit():
+            found.doubts.append(_Doubt(name, component, f"but cells such as {cell} are no numbers", ()))
+
+
+def _first_word(cells: FloatArray | tuple[str, ...]) -> str:
+    """The first cell that is no number."""
+    return next(cell for cell in cells if isinstance(cell, str) and cell and not looks_like_number(cell))
 
 
 def _exact(name: str) -> str | None:
@@ -235,7 +266,7 @@ def _unit_of(table: Table, name: str, component: str, robot: Robot | None, found
     """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
     suffix = si_suffix(component)
     if suffix in ("V", "duty") and component != "supply":
-        return _command_unit(table.columns[name], name, component, robot, found)
+        return _command_unit(_floats(table.columns[name]), name, component, robot, found)
     found.si[name] = SI.get(suffix, suffix)
     return parse_unit(found.si[name])
 
@@ -264,12 +295,17 @@ def _take_time(table: Table, assumed: Mapping[str, str], found: _Guess) -> None:
     """The column of time and its unit, which must be given or unmistakable."""
     candidates = [name for name in table.names if words.TIME in read_name(name).roles]
     dates = [name for name in candidates if is_dates(table.columns[name])]
-    candidates = [name for name in candidates if not isinstance(table.columns[name], tuple)]
+    wordy = [name for name in candidates if not _is_numeric(table.columns[name]) and name not in dates]
+    candidates = [name for name in candidates if _is_numeric(table.columns[name])]
     candidates = [name for name in candidates if not read_name(name).roles - {words.TIME, words.BODY, words.MEASURED}]
     candidates.sort(key=lambda name: (_exact(name) != TIME, table.names.index(name)))
     if dates and not candidates:
         found.columns[TIME] = Column(dates[0], "s")
         found.notes.append(f"{dates[0]} holds dates: time begins at 0 with the first")
+        return
+    if not candidates and wordy:
+        cell = _first_word(table.columns[wordy[0]])
+        found.doubts.append(_Doubt(wordy[0], TIME, f"but cells such as {cell} are no numbers and no known dates", ()))
         return
     if not candidates:
         increasing = [name for name in table.names if _increases(table.columns[name])]
@@ -280,7 +316,7 @@ def _take_time(table: Table, assumed: Mapping[str, str], found: _Guess) -> None:
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
     unit = known_unit(text) or read_name(name).unit
     if unit is None:
-        unit = _plausible_time(table.numbers(name, missing=True), name, text, found)
+        unit = _plausible_time(_floats(table.columns[name]), name, text, found)
     if unit is not None and unit.quantity == TIME_UNIT:
         found.columns[TIME] = Column(name, unit.text)
     elif unit is not None:
@@ -289,8 +325,7 @@ def _take_time(table: Table, assumed: Mapping[str, str], found: _Guess) -> None:
 
 def _increases(values: FloatArray | tuple[str, ...]) -> bool:
     """Whether nearly every row is later than the one before: it may be a clock."""
-    if isinstance(values, tuple):
-        return False
+    values = _floats(values)
     known = values[np.isfinite(values)]
     return len(known) > 1 and float(np.mean(known[1:] > known[:-1])) > 0.9
 
@@ -375,6 +410,8 @@ def refuse_doubtful(columns: ColumnMap, where: str) -> None:
     """Raises InputError where nothing tells the time: without it there is no log."""
     if TIME not in columns.columns:
         doubt = next((doubt for doubt in columns.doubts if f" {TIME}, " in doubt), "")
-        remedy = doubt.rpartition("; ")[2] or "say which column it is: --column t=COLUMN:s"
+        settled = doubt.rpartition("; ")[2] if "; " in doubt else ""
+        written = "write seconds, or dates such as 2026-11-20T10:00:00.125" if doubt else ""
+        remedy = settled or written or "say which column it is: --column t=COLUMN:s"
         got = doubt.partition(": not taken")[0] or "no column that looks like a time"
         raise InputError("cannot tell the time of the rows", got=got, remedy=remedy, where=where)

@@ -252,4 +252,4 @@ def _hint(cell: str) -> str:
         return "write plain decimal digits"
     if "," in cell:
         return "write a decimal point, and no separator of thousands"
-    return "correct or remove the row"
+    return "correct or remove the row; where a number is missing, leave the cell blank"
