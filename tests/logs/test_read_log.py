@@ -5,8 +5,9 @@ import pytest
 
 from omnidyn import load_robot
 from omnidyn.errors import InputError
+from omnidyn.logs.check import check_blocks
 from omnidyn.logs.log import component
-from omnidyn.logs.read_log import LogOptions, load_log, read_log
+from omnidyn.logs.read_log import LogOptions, iter_logs, load_log, read_log
 from omnidyn.logs.run_file import write_run
 from omnidyn.run import Run
 
@@ -164,3 +165,32 @@ def test_a_component_of_a_log(tmp_path):
     assert component(log, "x") is None
     assert component(log, "u1") is None
     assert component(log, "nonsense") is None
+
+
+@pytest.mark.parametrize(
+    ("form", "separator"),
+    [("20.11.2026 10:00:{}", ","), ("20.11.2026 9:59:{}", ";"), ("10:00:{}", ","), ("9:00:{}", ",")],
+)
+def test_german_dates_and_times_of_day_are_a_clock(tmp_path, form, separator):
+    point = "," if separator == ";" else "."
+    stamps = [form.format(s).replace(".250", f"{point}250") for s in ("00", "00.250", "01")]
+    path = write(tmp_path, f"Uhrzeit{separator}w1_rad_s\n" + "".join(f"{s}{separator}1\n" for s in stamps))
+    np.testing.assert_allclose(read_log(path).t, [0.0, 0.25, 1.0], atol=1e-9)
+
+
+def test_a_time_of_day_may_pass_midnight(tmp_path):
+    path = write(tmp_path, "time,w1_rad_s\n23:59:59.5,1\n00:00:00.0,2\n00:00:00.5,3\n")
+    np.testing.assert_allclose(read_log(path).t, [0.0, 0.5, 1.0], atol=1e-9)
+    with pytest.raises(InputError, match=r"time goes back; got -1 s after 0 s"):
+        read_log(write(tmp_path, "time,w1_rad_s\n10:00:01,1\n10:00:00,2\n10:00:02,3\n"))
+
+
+@pytest.mark.parametrize("form", ["{:.2f}", "2026-11-20T10:00:{:05.2f}", "10:00:{:05.2f}"])
+def test_pieces_of_a_log_count_from_the_first_row_of_all(tmp_path, form):
+    start = 1.7e9 if form == "{:.2f}" else 0.0
+    rows = [f"{form.format(start + 0.25 * k)},{k}" for k in range(40)]
+    path = write(tmp_path, "timestamp,w1_rad_s\n" + "\n".join(rows))
+    pieces = list(iter_logs(path, rows=16, options=LogOptions(assume={"t": "s"})))
+    assert len(pieces) == 3
+    np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), 0.25 * np.arange(40), atol=1e-6)
+    assert not check_blocks(iter(pieces)).of("time_back")

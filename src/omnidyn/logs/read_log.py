@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
-from omnidyn.logs.clock import clock
+from omnidyn.logs.clock import Clock
 from omnidyn.logs.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.log import Log
 from omnidyn.logs.mapping import MOTOR_SIDE, Column, ColumnMap, component_channel, load_map, parse_column
@@ -115,9 +115,12 @@ def _delayed(columns: ColumnMap, latency: Mapping[str, float]) -> ColumnMap:
     return replace(columns, columns={**columns.columns, **late}) if late else columns
 
 
-def log_from_table(table: Table, columns: ColumnMap, robot: Robot | None, options: LogOptions) -> Log:
-    """The Log of a table under a map. Raises InputError for text where numbers are needed, and for a robot with
-    another number of wheels.
+def log_from_table(
+    table: Table, columns: ColumnMap, robot: Robot | None, options: LogOptions, clock: Clock | None = None
+) -> Log:
+    """The Log of a table under a map; `clock` has seen the pieces before this one.
+
+    Raises InputError for text where numbers are needed, and for a robot with another number of wheels.
     """
     notes = [*table.notes, *columns.notes]
     counts = [found[1] + 1 for key in columns.columns if (found := place(key)) and CHANNELS[found[0]] == WHEEL]
@@ -145,7 +148,7 @@ def log_from_table(table: Table, columns: ColumnMap, robot: Robot | None, option
         channels["pose"][:, 2] = _unwrapped(channels["pose"][:, 2])
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
-    t = clock(table, columns.columns[TIME], notes)
+    t = (clock or Clock()).times(table, columns.columns[TIME], notes)
     log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes))
     return _signed(log, robot) if options.current_unsigned else log
 
@@ -201,8 +204,8 @@ def iter_logs(
 
     progress(bytes_done, bytes_total) is called now and then. Time counts from the first piece. Raises InputError.
     """
-    options, columns = options or LogOptions(), None
+    options, columns, clock = options or LogOptions(), None, Clock()
     how = {"header": options.header, "skip_bad_rows": options.skip_bad_rows}
     for table in iter_tables(path, rows, progress=progress, **how):
         columns = columns or map_columns(table, robot, options)
-        yield log_from_table(table, columns, robot, options)
+        yield log_from_table(table, columns, robot, options, clock)

@@ -14,7 +14,7 @@ TIME, SUPPLY, VOLTAGE, CURRENT, DUTY, RATE, ANGLE, COMMAND, MOTOR, WHEEL, BODY, 
 )  # fmt: skip
 
 _WORDS = {
-    TIME: "t time stamp timestamp clock zeit",
+    TIME: "t time stamp timestamp clock zeit uhrzeit",
     SUPPLY: "bat batt battery supply vbat vbatt vcc vin vbus bus akku",
     VOLTAGE: "u volt volts voltage ua spannung",
     CURRENT: "i cur curr current currents amp amps ia strom",
