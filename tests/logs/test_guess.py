@@ -51,6 +51,57 @@ def test_a_column_is_known_by_its_name_and_unit(tmp_path, name, component):
     assert columns.unused == ()
 
 
+@pytest.mark.parametrize(
+    ("names", "components"),
+    [
+        (["/odom/twist/twist/linear/x", "/odom/twist/twist/linear/y", "/odom/twist/twist/angular/z"], "vx vy omega"),
+        (["twist.twist.linear.x", "twist.twist.angular.z", "pose.pose.position.y"], "vx omega y"),
+        (["/cmd_vel/linear/x", "/cmd_vel/linear/y", "/cmd_vel/angular/z"], "vx_cmd vy_cmd omega_cmd"),
+        (["/joint_states/wheel_1_joint/velocity", "/joint_states/wheel_2_joint/position"], "w1 a2"),
+        (["/joint_states/velocity[0]", "/joint_states/velocity[1]", "/joint_states/velocity[2]"], "w1 w2 w3"),
+        (["/imu/angular_velocity/z"], "omega"),
+        (["robot2/wheel1/speed", "robot2/wheel2/speed", "robot2/wheel3/speed"], "w1 w2 w3"),
+        (["imu0_gyro_z", "w1_rad_s", "w2_rad_s"], "omega w1 w2"),
+        (["battery0_voltage", "w1_rad_s"], "supply w1"),
+    ],
+)
+def test_the_names_of_topics_are_known(tmp_path, names, components):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), **dict.fromkeys(names, 0.5)})).columns
+    assert {columns[key].name: key for key in columns if key != "t"} == dict(
+        zip(names, components.split(), strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "twist/linear/z",
+        "twist/angular/x",
+        "/imu/angular_velocity/y",
+        "pose/orientation/z",
+        "vz",
+        "imu/linear_acceleration/x",
+    ],
+)
+def test_what_a_topic_says_of_other_axes_is_left_alone(tmp_path, name):
+    assert list(guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 0.5})).columns) == ["t"]
+
+
+def test_wheels_named_by_their_place_are_no_log_of_one_motor(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "fl_vel": 1, "fr_vel": 2, "rear_vel": 3}))
+    assert list(columns.columns) == ["t"]
+    assert columns.doubts == (
+        "fl_vel, fr_vel, rear_vel look like w1, but no number says which wheel each is (say --column w1=fl_vel and so "
+        "on): not taken",
+    )
+
+
+@pytest.mark.parametrize("name", ["temps [s]", "tiempo (ms)", "X_Value [us]"])
+def test_the_only_column_with_a_unit_of_time_is_the_clock(tmp_path, name):
+    columns = guess_columns(table_of(tmp_path, {name: clock(1.0), "w1_rad_s": 1}))
+    assert columns.columns["t"].name == name.partition(" ")[0]
+
+
 @pytest.mark.parametrize("name", ["ax", "temperature1", "motor_1_temp", "dx", "torque2", "index", "foo", "err1"])
 def test_what_no_run_holds_is_left_alone(tmp_path, name):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 0.5}))

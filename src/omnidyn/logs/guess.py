@@ -4,10 +4,7 @@ the words that would settle it. What was guessed is always shown.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +12,8 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError
 from omnidyn.logs import words
 from omnidyn.logs.channels import TIME, place, si_suffix
-from omnidyn.logs.clock import is_dates
-from omnidyn.logs.dialect import is_number_or_missing, looks_like_number, to_float
+from omnidyn.logs.guess_time import take_time
+from omnidyn.logs.guessed import Doubt, Guess, first_word, floats, is_numeric, letter_of
 from omnidyn.logs.mapping import MOTOR_SIDE, SIDED, WHEEL_SIDE, Column, ColumnMap, component_channel, quantity_of
 from omnidyn.logs.table import Table
 from omnidyn.logs.words import Words, read_name
@@ -25,14 +22,11 @@ from omnidyn.model.wheels import MAX_WHEELS, per_wheel, wheel_speed
 from omnidyn.units import COUNT, Unit, known_unit, parse_unit
 from omnidyn.units import CURRENT as CURRENT_UNIT
 from omnidyn.units import DUTY as DUTY_UNIT
-from omnidyn.units import TIME as TIME_UNIT
 from omnidyn.units import TURN_RATE as TURN_RATE_UNIT
 from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
 
 FloatArray = NDArray[np.float64]
 
-SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0  # [s] between rows: what a log of a robot may have
-TIME_NAMES = ("s", "ms", "us", "ns")
 SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
 SI = {"rad_s": "rad/s", "m_s": "m/s"}
 
@@ -45,56 +39,6 @@ NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPL
 _BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
 
 
-class _Doubt(NamedTuple):
-    """A column that was not taken: what it looks like, why not, and the unit that would settle it."""
-
-    name: str
-    component: str
-    why: str
-    units: tuple[str, ...] = ("UNIT",)
-
-
-@dataclass
-class _Guess:
-    """What is found so far. si: columns without a unit, and the SI unit they are taken in."""
-
-    columns: dict[str, Column] = field(default_factory=dict)
-    doubts: list[_Doubt] = field(default_factory=list)
-    si: dict[str, str] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-
-    def doubt_words(self) -> tuple[str, ...]:
-        """The doubts, columns of one kind in one sentence."""
-        groups: dict[tuple, list[_Doubt]] = {}
-        for doubt in self.doubts:
-            groups.setdefault((_letter(doubt.component), doubt.why, doubt.units), []).append(doubt)
-        return tuple(_doubt_sentence(letter, why, units, each) for (letter, why, units), each in groups.items())
-
-    def note_words(self) -> tuple[str, ...]:
-        if not self.si:
-            return tuple(self.notes)
-        units = ", ".join(dict.fromkeys(self.si.values()))
-        return (*self.notes, f"no unit is given for {', '.join(self.si)}: taken as SI ({units})")
-
-
-def _letter(component: str) -> str:
-    """ "u" of "u2": what --assume takes for all of its kind."""
-    return re.sub(r"[0-9]+", "", component)
-
-
-def _doubt_sentence(letter: str, why: str, units: tuple[str, ...], doubts: list[_Doubt]) -> str:
-    names = ", ".join(doubt.name for doubt in doubts)
-    like = ", ".join(dict.fromkeys(doubt.component for doubt in doubts))
-    looks = "looks" if len(doubts) == 1 else "look"
-    if not units:
-        return f"{names} {looks} like {like}, {why}: not taken"
-    if len(doubts) == 1 and letter == doubts[0].component:
-        remedy = " or ".join(f'--column "{like}={names}:{unit}"' for unit in units)
-    else:
-        remedy = " or ".join(f"--assume {letter}={unit}" for unit in units)
-    return f"{names} {looks} like {like}, but {why}: not taken; say {remedy}"
-
-
 def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str, str] | None = None) -> ColumnMap:
     """Guess the map of a table. robot: settles what a name leaves open (volts or duty, which side of the gear).
 
@@ -102,13 +46,13 @@ def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str,
     a units row or its own ending gives a unit needs none. Raises InputError for an unknown unit in `assume`.
     """
     assumed = {name: parse_unit(text).text for name, text in (assume or {}).items()}
-    found = _Guess()
-    names = [name for name in table.names if _is_numeric(table.columns[name])]
+    found = Guess()
+    names = [name for name in table.names if is_numeric(table.columns[name])]
     numbers = _wheel_numbers(names, found)
     for name in names:
         _take(table, name, numbers, assumed, robot, found)
     _doubt_words(table, numbers, found)
-    _take_time(table, assumed, found)
+    take_time(table, assumed, found)
     if not numbers:
         _take_bench(table, names, assumed, found)
     _settle_side(table, robot, found)
@@ -118,27 +62,12 @@ def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str,
     return ColumnMap(ordered, unused, found.doubt_words(), found.note_words())
 
 
-def _is_numeric(cells: FloatArray | tuple[str, ...]) -> bool:
-    """Whether a column holds numbers, be it with words among them: those are refused where the column is used."""
-    if not isinstance(cells, tuple):
-        return True
-    there = [cell for cell in cells if cell]
-    return 2 * sum(map(looks_like_number, there)) > len(there)
-
-
-def _floats(cells: FloatArray | tuple[str, ...]) -> FloatArray:
-    """The numbers of a column, NaN in the place of a word."""
-    if not isinstance(cells, tuple):
-        return cells
-    return np.array([to_float(cell) if is_number_or_missing(cell) else np.nan for cell in cells])
-
-
 def _order(component: str) -> tuple[int, str, int]:
     found = place(component)
     return (0, "", 0) if found is None else (1, found[0], found[1])
 
 
-def _wheel_numbers(names: list[str], found: _Guess) -> dict[int, int]:
+def _wheel_numbers(names: list[str], found: Guess) -> dict[int, int]:
     """Number in a name -> number of the wheel from 1; a log that counts from 0 is shifted."""
     numbers = {read_name(name).number for name in names if _numbered_kind(read_name(name), None) is not None}
     plain = sorted(number for number in numbers if number is not None)
@@ -161,7 +90,7 @@ def _numbered_kind(name: Words, unit: Unit | None) -> str | None:
 
 
 def _take(
-    table: Table, name: str, numbers: Mapping[int, int], assumed: Mapping[str, str], robot: Robot | None, found: _Guess
+    table: Table, name: str, numbers: Mapping[int, int], assumed: Mapping[str, str], robot: Robot | None, found: Guess
 ) -> None:
     """One column: which component it is, in which unit; or a doubt."""
     given = table.units.get(name, "")
@@ -171,14 +100,14 @@ def _take(
     if component is None:
         return
     if component in found.columns:
-        found.doubts.append(_Doubt(name, component, f"which is {found.columns[component].name} already", ()))
+        found.doubts.append(Doubt(name, component, f"which is {found.columns[component].name} already", ()))
         return
     assumption = assumed.get(component) or assumed.get(component.rstrip("0123456789"))
     if assumption is not None:
         unit = parse_unit(assumption)
     unit = unit or parts.unit
     if unit is None and given and given not in ("-", "SI"):
-        found.doubts.append(_Doubt(name, component, f"the unit {given} is unknown"))
+        found.doubts.append(Doubt(name, component, f"the unit {given} is unknown"))
         return
     if unit is None:
         unit = _unit_of(table, name, component, robot, found)
@@ -186,18 +115,13 @@ def _take(
         _enter(name, component, unit, parts, found)
 
 
-def _doubt_words(table: Table, numbers: Mapping[int, int], found: _Guess) -> None:
+def _doubt_words(table: Table, numbers: Mapping[int, int], found: Guess) -> None:
     """Columns that are called like a component, and whose cells begin like numbers but are none: 5.0V, 1.250.000."""
     for name in table.names:
         cells = table.columns[name]
-        component = None if _is_numeric(cells) else _exact(name) or _component(read_name(name), None, numbers)
-        if component is not None and (cell := _first_word(cells)).lstrip("+-.")[:1].isdigit():
-            found.doubts.append(_Doubt(name, component, f"but cells such as {cell} are no numbers", ()))
-
-
-def _first_word(cells: FloatArray | tuple[str, ...]) -> str:
-    """The first cell that is no number."""
-    return next(cell for cell in cells if isinstance(cell, str) and cell and not looks_like_number(cell))
+        component = None if is_numeric(cells) else _exact(name) or _component(read_name(name), None, numbers)
+        if component is not None and (cell := first_word(cells)).lstrip("+-.")[:1].isdigit():
+            found.doubts.append(Doubt(name, component, f"but cells such as {cell} are no numbers", ()))
 
 
 def _exact(name: str) -> str | None:
@@ -228,24 +152,29 @@ def _body_component(name: Words, unit: Unit | None, command: str) -> str | None:
     roles = name.roles
     if roles & {words.CURRENT, words.VOLTAGE, words.DUTY, words.TIME, words.MOTOR}:
         return None
+    rate = bool(roles & {words.RATE, words.ANGULAR})
+    turning = unit is None or unit.quantity == TURN_RATE_UNIT
+    if words.ANGULAR in roles and roles & {words.X, words.Y}:
+        return None  # roll and pitch
+    if words.LINEAR in roles and words.YAW in roles:  # linear.z goes up; v_theta turns
+        return "omega" + command if unit is not None and turning else None
     for letter, (speed, position) in _BODY.items():
         if speed in roles or (letter in roles and roles & {words.RATE, words.LINEAR}):
             return speed + command
         if letter in roles and not command:
             return position
-    turning = unit is None or unit.quantity == TURN_RATE_UNIT
-    if words.RATE in roles and turning and (words.YAW in roles or words.BODY in roles or command):
+    if rate and turning and (words.YAW in roles or words.BODY in roles or command):
         return "omega" + command
-    if words.YAW in roles and words.RATE not in roles and not command:
+    if words.YAW in roles and not rate and not command:
         return "heading"
-    if words.LINEAR in roles and words.RATE not in roles:
+    if words.LINEAR in roles and not rate:
         return "vx" + command  # the paper's v
-    if words.RATE in roles and not command and turning and words.ANGLE not in roles:
+    if rate and not command and turning and words.ANGLE not in roles:
         return "omega"
     return "heading" if roles == {words.ANGLE} and unit is not None and unit.quantity == "angle" else None
 
 
-def _enter(name: str, component: str, unit: Unit, parts: Words, found: _Guess) -> None:
+def _enter(name: str, component: str, unit: Unit, parts: Words, found: Guess) -> None:
     """Take a column, where its unit measures what the component is."""
     wanted = quantity_of(component)
     if unit.quantity == DUTY_UNIT and wanted == VOLTAGE_UNIT and component != "supply":
@@ -253,25 +182,25 @@ def _enter(name: str, component: str, unit: Unit, parts: Words, found: _Guess) -
     elif unit.quantity == VOLTAGE_UNIT and wanted == DUTY_UNIT:
         component = "u" + component[1:]
     elif unit.quantity == COUNT:
-        found.doubts.append(_Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
+        found.doubts.append(Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
         return
     elif unit.quantity != wanted:
-        found.doubts.append(_Doubt(name, component, f"{unit.text} is no unit of a {wanted}"))
+        found.doubts.append(Doubt(name, component, f"{unit.text} is no unit of a {wanted}"))
         return
     side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in parts.roles else WHEEL_SIDE
     found.columns[component] = Column(name, unit.text, side)
 
 
-def _unit_of(table: Table, name: str, component: str, robot: Robot | None, found: _Guess) -> Unit | None:
+def _unit_of(table: Table, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:
     """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
     suffix = si_suffix(component)
     if suffix in ("V", "duty") and component != "supply":
-        return _command_unit(_floats(table.columns[name]), name, component, robot, found)
+        return _command_unit(floats(table.columns[name]), name, component, robot, found)
     found.si[name] = SI.get(suffix, suffix)
     return parse_unit(found.si[name])
 
 
-def _command_unit(values, name: str, component: str, robot: Robot | None, found: _Guess) -> Unit | None:
+def _command_unit(values, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:
     """Volts or duty? Volts where the largest lies between 1 and the robot's limit; nothing else is certain."""
     finite = np.abs(values[np.isfinite(values)])
     largest = float(finite.max()) if finite.size else 0.0
@@ -283,7 +212,7 @@ def _command_unit(values, name: str, component: str, robot: Robot | None, found:
         return parse_unit("V")
     looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else "a PWM value of 0..255"
     why = f"no unit is given, and up to {largest:.3g} may be volts or {looks}"
-    found.doubts.append(_Doubt(name, component, why, ("V", "duty", "%", "duty/255")))
+    found.doubts.append(Doubt(name, component, why, ("V", "duty", "%", "duty/255")))
     return None
 
 
@@ -291,92 +220,57 @@ def _limit(robot: Robot) -> float:
     return float(np.max(per_wheel(robot.motor.voltage_limit, robot.wheels.count)))
 
 
-def _take_time(table: Table, assumed: Mapping[str, str], found: _Guess) -> None:
-    """The column of time and its unit, which must be given or unmistakable."""
-    candidates = [name for name in table.names if words.TIME in read_name(name).roles]
-    dates = [name for name in candidates if is_dates(table.columns[name])]
-    wordy = [name for name in candidates if not _is_numeric(table.columns[name]) and name not in dates]
-    candidates = [name for name in candidates if _is_numeric(table.columns[name])]
-    candidates = [name for name in candidates if not read_name(name).roles - {words.TIME, words.BODY, words.MEASURED}]
-    candidates.sort(key=lambda name: (_exact(name) != TIME, table.names.index(name)))
-    if dates and not candidates:
-        found.columns[TIME] = Column(dates[0], "s")
-        found.notes.append(f"{dates[0]} holds dates: time begins at 0 with the first")
-        return
-    if not candidates and wordy:
-        cell = _first_word(table.columns[wordy[0]])
-        found.doubts.append(_Doubt(wordy[0], TIME, f"but cells such as {cell} are no numbers and no known dates", ()))
-        return
-    if not candidates:
-        increasing = [name for name in table.names if _increases(table.columns[name])]
-        if increasing:
-            found.doubts.append(_Doubt(increasing[0], TIME, "its name and unit do not say how long one count is"))
-        return
-    name = candidates[0]
-    text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
-    unit = known_unit(text) or read_name(name).unit
-    if unit is None:
-        unit = _plausible_time(_floats(table.columns[name]), name, text, found)
-    if unit is not None and unit.quantity == TIME_UNIT:
-        found.columns[TIME] = Column(name, unit.text)
-    elif unit is not None:
-        found.doubts.append(_Doubt(name, TIME, f"{unit.text} is no unit of time"))
+def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], found: Guess) -> None:
+    """A log of one motor, whose columns need no number: voltage, current, velocity, position.
 
-
-def _increases(values: FloatArray | tuple[str, ...]) -> bool:
-    """Whether nearly every row is later than the one before: it may be a clock."""
-    values = _floats(values)
-    known = values[np.isfinite(values)]
-    return len(known) > 1 and float(np.mean(known[1:] > known[:-1])) > 0.9
-
-
-def _plausible_time(values: FloatArray, name: str, given: str, found: _Guess) -> Unit | None:
-    """The one unit under which rows are 0.1 ms to 1 s apart; None where there are two or none."""
-    finite = values[np.isfinite(values)]
-    steps = np.diff(finite)
-    steps = steps[steps > 0.0]
-    step = float(np.median(steps)) if steps.size else 0.0
-    units = [parse_unit(text) for text in TIME_NAMES]
-    possible = [unit for unit in units if SHORTEST_STEP <= step * unit.size <= LONGEST_STEP]
-    if given and given not in ("-", "SI"):
-        found.doubts.append(_Doubt(name, TIME, f"the unit {given} is unknown"))
-        return None
-    if len(possible) != 1:
-        texts = tuple(unit.text for unit in possible)
-        found.doubts.append(_Doubt(name, TIME, f"no unit is given and rows are {step:.4g} apart", texts or ("UNIT",)))
-        return None
-    found.notes.append(
-        f"{name} has no unit: taken as {possible[0].text}, rows are {step * possible[0].size:.4g} s apart"
-    )
-    return possible[0]
-
-
-def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], found: _Guess) -> None:
-    """A log of one motor, whose columns need no number: voltage, current, velocity, position."""
-    body = {component for component in found.columns if component not in (TIME, "supply")}
-    if body - {"omega", "heading"}:
-        return
+    Several columns of one kind, such as left_speed and right_speed, are wheels, and nobody knows which is which.
+    """
+    alike: dict[str, list[str]] = {}
     for name in names:
-        parts = read_name(name)
-        letter = _numbered_kind(parts._replace(number=1), known_unit(table.units.get(name, "")))
-        if letter is None or parts.number is not None or parts.roles & NOT_OF_A_MOTOR:
-            continue
-        for component in [key for key, column in found.columns.items() if column.name == name]:
-            del found.columns[component]
-        found.doubts = [doubt for doubt in found.doubts if doubt.name != name]
-        found.si.pop(name, None)
-        single = read_name(name)._replace(number=1)
-        unit = known_unit(assumed.get(name) or assumed.get(letter) or table.units.get(name, "")) or parts.unit
-        command = "_cmd" if words.COMMAND in single.roles and letter == "w" else ""
-        component = f"{letter}1{command}"
-        unit = unit or _unit_of(table, name, component, None, found)
-        if unit is not None and component not in found.columns:
-            _enter(name, component, unit, single, found)
-    if any(place(component) and component.endswith("1") for component in found.columns):
+        component = _bench_component(table, name)
+        if component:
+            alike.setdefault(component, []).append(name)
+    body = {component for component in found.columns if component not in (TIME, "supply")} - {"omega", "heading"}
+    for component, mine in alike.items():
+        if len(mine) > 1:
+            _forget(mine, found)
+            why = f"but no number says which wheel each is (say --column {component}={mine[0]} and so on)"
+            found.doubts += [Doubt(name, component, why, ()) for name in mine]
+        elif not body:
+            _forget(mine, found)
+            _take_single(table, mine[0], component, assumed, found)
+    if any(place(component) and component.endswith(("1", "1_cmd")) for component in found.columns):
         found.notes.append("no wheel has a number: taken as a log of one motor")
 
 
-def _settle_side(table: Table, robot: Robot | None, found: _Guess) -> None:
+def _bench_component(table: Table, name: str) -> str:
+    """The component of a motor that a name without a number says, "" where it says none."""
+    parts = read_name(name)
+    letter = _numbered_kind(parts._replace(number=1), known_unit(table.units.get(name, "")))
+    command = words.COMMAND in parts.roles
+    if letter is None or parts.number is not None or parts.roles & NOT_OF_A_MOTOR or (command and letter in "ia"):
+        return ""
+    return f"{letter}1_cmd" if command and letter == "w" else f"{letter}1"
+
+
+def _forget(names: list[str], found: Guess) -> None:
+    """Take back what was said about some columns."""
+    for component in [key for key, column in found.columns.items() if column.name in names]:
+        del found.columns[component]
+    found.doubts = [doubt for doubt in found.doubts if doubt.name not in names]
+    for name in names:
+        found.si.pop(name, None)
+
+
+def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, str], found: Guess) -> None:
+    parts = read_name(name)
+    text = assumed.get(name) or assumed.get(letter_of(component)) or table.units.get(name, "")
+    unit = known_unit(text) or parts.unit or _unit_of(table, name, component, None, found)
+    if unit is not None:
+        _enter(name, component, unit, parts._replace(number=1), found)
+
+
+def _settle_side(table: Table, robot: Robot | None, found: Guess) -> None:
     """Commands of body and of wheels tell the side of the gear: they differ by the gear ratio on the other one."""
     if robot is None:
         return

@@ -8,28 +8,33 @@ from typing import NamedTuple
 
 from omnidyn.units import Unit, known_unit
 
-TIME, SUPPLY, VOLTAGE, CURRENT, DUTY, RATE, ANGLE, COMMAND, MOTOR, WHEEL, BODY, X, Y, YAW, LINEAR, OTHER, MEASURED = (
+(
+    TIME, SUPPLY, VOLTAGE, CURRENT, DUTY, RATE, ANGLE, COMMAND, MOTOR, WHEEL, BODY, X, Y, YAW, LINEAR, ANGULAR, OTHER,
+    MEASURED,
+) = (
     "time", "supply", "voltage", "current", "duty", "rate", "angle", "command", "motor", "wheel", "body", "x", "y",
-    "yaw", "linear", "other", "measured",
+    "yaw", "linear", "angular", "other", "measured",
 )  # fmt: skip
 
 _WORDS = {
     TIME: "t time stamp timestamp clock zeit uhrzeit",
     SUPPLY: "bat batt battery supply vbat vbatt vcc vin vbus bus akku",
-    VOLTAGE: "u volt volts voltage ua spannung",
+    VOLTAGE: "u volt volts voltage voltages ua spannung",
     CURRENT: "i cur curr current currents amp amps ia strom",
     DUTY: "duty pwm throttle",
-    RATE: "w omega vel velocity speed spd rpm rate dps qd gyro drehzahl",
-    ANGLE: "pos position angle ang enc encoder tick ticks count counts pulses q winkel",
+    RATE: "w omega vel velocity velocities speed speeds spd rpm rate dps qd gyro twist drehzahl",
+    ANGLE: "pos position positions angle angles ang enc encoder tick ticks count counts pulses q winkel",
     COMMAND: "set sp setpoint cmd command commanded ref reference desired des target goal req soll",
-    MOTOR: "m motor mot mtr",
+    MOTOR: "m motor motors mot mtr",
     WHEEL: "wheel wheels whl rad",
-    BODY: "b body base robot chassis odom ground cam camera imu world global",
+    BODY: "b body base robot chassis odom odometry pose ground cam camera imu world global",
     X: "x vx",
     Y: "y vy vn",
     YAW: "theta yaw heading phi psi alpha th rot z wz gz",
     LINEAR: "v lin linear",
-    MEASURED: "meas measured act actual fb feedback ist est filt filtered raw",
+    ANGULAR: "angular",
+    # Words that change nothing: joint_states/wheel_1_joint/velocity is the speed of wheel 1.
+    MEASURED: "meas measured act actual fb feedback ist est filt filtered raw joint joints states",
     # Quantities that a log may hold and a Run does not, and differences from row to row.
     OTHER: """ax ay az acc accel acceleration torque tau temp temperature power force f d dx dy dz dang dt delta error
         err state mode id index row mag roll pitch integral index seq frame std var cov step timestep sample""",
@@ -52,11 +57,25 @@ def read_name(name: str) -> Words:
     """The words of a column's name. A word that is not known counts as "other"."""
     stem, unit = _split_unit(name.strip().replace("v_n", "vn"))
     spread = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower()
-    numbers = re.findall(r"\d+", spread)
-    number = int(numbers[0]) if numbers and len(numbers[0]) <= 2 else None
     words = re.findall(r"[^\W\d_]+", spread)
     roles = {role for word in words for role in _roles(word)}
-    return Words(frozenset(roles), number, unit)
+    return Words(frozenset(roles), _number(spread), unit)
+
+
+_OF_A_WHEEL = {MOTOR, WHEEL, VOLTAGE, CURRENT, DUTY, RATE, ANGLE}
+_OF_NO_WHEEL = {BODY, SUPPLY, TIME}
+
+
+def _number(text: str) -> int | None:
+    """The number of the wheel: the one behind a word of wheels, as in robot2/wheel1/speed, else the first.
+
+    That of an imu0 or a robot2 is none.
+    """
+    numbers = re.findall(r"([^\W\d_]*)[\W_]*(\d+)", text)
+    roles = [(set(_roles(word)) if word else set(), digits) for word, digits in numbers]
+    behind = [digits for each, digits in roles if each & _OF_A_WHEEL]
+    chosen = next(iter([*behind, *(digits for each, digits in roles if not each & _OF_NO_WHEEL)]), "")
+    return int(chosen) if 0 < len(chosen) <= 2 else None
 
 
 def _split_unit(name: str) -> tuple[str, Unit | None]:
