@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock import Clock
+from omnidyn.logs.counters import unrolled
 from omnidyn.logs.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.log import Log
 from omnidyn.logs.mapping import MOTOR_SIDE, Column, ColumnMap, component_channel, load_map, parse_column
@@ -137,7 +138,12 @@ def log_from_table(
         found = place(key)
         if found is None:
             continue
-        values = table.numbers(column.name, missing=True) * column.factor
+        values = table.numbers(column.name, missing=True)
+        if found[0] == "wheel_angle":
+            values, period = unrolled(values, column.unit, f"{table.source}, column {column.name}")
+            if period is not None:
+                notes.append(f"{column.name} starts over after {period:.6g} {_bare(column.unit)}: it is taken to go on")
+        values = values * column.factor
         if column.side == MOTOR_SIDE:
             values = values / _gear(robot, found[1])
         width = len(components(found[0], wheels))
@@ -151,6 +157,11 @@ def log_from_table(
     t = (clock or Clock()).times(table, columns.columns[TIME], notes)
     log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes))
     return _signed(log, robot) if options.current_unsigned else log
+
+
+def _bare(unit: str) -> str:
+    """ticks of ticks/2000."""
+    return unit.partition("/")[0]
 
 
 def _gear(robot: Robot | None, wheel: int) -> float:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.check_logs import clean
 from omnidyn.errors import InputError
 from omnidyn.logs.check import check, check_blocks
 from omnidyn.logs.log import Log
@@ -123,3 +124,17 @@ def test_a_gap_where_two_blocks_meet_is_found():
     (finding,) = check_blocks([log.rows(slice(0, 500)), log.rows(slice(500, None))]).of("gap")
     assert finding.rows == ((501, 502),)
     assert finding.numbers["lost_rows"] == 20
+
+
+def test_angles_without_speeds_are_checked_as_speeds():
+    """Two encoders exchanged, in a log that has angles only."""
+    log, robot, _ = clean(7)
+    speed = log.channels["wheel_speed"]
+    angle = np.cumsum(speed * np.gradient(log.t)[:, None], axis=0)
+    channels = {name: values for name, values in log.channels.items() if name != "wheel_speed"}
+    good = replace(log, channels={**channels, "wheel_angle": angle})
+    assert check(good, robot).of("speed_from_angle")
+    assert not [finding for finding in check(good, robot).findings if finding.level != "note"]
+    swapped = replace(log, channels={**channels, "wheel_angle": angle[:, [1, 0, *range(2, angle.shape[1])]]})
+    (finding,) = check(swapped, robot).of("swapped")
+    assert set(finding.where.split()) == {"w1", "w2"}

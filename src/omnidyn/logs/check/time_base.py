@@ -38,8 +38,24 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], Work]:
     chosen = log.rows(rows)
     # As in a Run: what is recorded on change is filled in, latencies that are known are taken out.
     channels = {name: chosen.aligned(name, values, []) for name, values in chosen.channels.items()} if len(t) else {}
-    work = Work(log, robot, rows, t, step, pieces, channels)
+    work = _with_speed(Work(log, robot, rows, t, step, pieces, channels), found)
     return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
+
+
+def _with_speed(work: Work, found: list[Finding]) -> Work:
+    """Where angles of wheels were logged and no speed, the work with their differences as speed, which is said."""
+    angle = work.get("wheel_angle")
+    if angle is None or work.get("wheel_speed") is not None or len(work) < MIN_ROWS:
+        return work
+    speed = np.full(angle.shape, np.nan)
+    for piece in work.pieces:
+        if piece.stop - piece.start > 2:
+            speed[piece] = np.gradient(angle[piece], work.t[piece], axis=0)
+    found.append(Finding(
+        "speed_from_angle", NOTE, "", "no speed of wheels was logged: w1, .. are differences of the angles a1, ..", "",
+        (), 0, {},
+    ))  # fmt: skip
+    return work.replace(wheel_speed=speed)
 
 
 def _empty_rows(log: Log, empty: NDArray[np.bool_]) -> list[Finding]:
