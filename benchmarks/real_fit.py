@@ -6,17 +6,20 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from scipy.stats import trim_mean
 
 from benchmarks import real_logs as logs
+from benchmarks import udea
 from benchmarks.identify import excitation, noisy
 from benchmarks.table import Table, machine
-from omnidyn.identification.motor_fit import AUTO, HOLD, MotorFit, fit_motor, fit_rmse, run_motor
-from omnidyn.logs.read_log import read_log
+from omnidyn.identification.motor_choice import choose_motor
+from omnidyn.identification.motor_fit import AUTO, MotorFit, fit_motor
+from omnidyn.identification.motor_log import HOLD
+from omnidyn.identification.motor_run import fit_rmse, run_motor
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -26,9 +29,6 @@ TURN = 2.0 * np.pi
 CHIRP_END = 4.0  # [s] after it the chirp outruns the rows
 RMSE = {"step": 0.044, "chirp": 0.051}  # [turns/s], README, over both runs of a kind
 VISCOUS, COULOMB, LAG = (0.05509, 0.00006), (0.35e-3, 0.24e-3), 5.3e-3  # V/(turn/s), V, s
-TURNING, TURNING_PROPORTIONAL, DRIVES = 0.46, 0.56, 1.55  # [rad/s], README, means over 0.5 s
-WINDOW = 0.5  # [s]
-TRIM, SPAN = 0.15, 0.12  # of the samples at each end; largest change of the duty in a window
 
 
 def measure() -> Table:
@@ -41,8 +41,10 @@ def measure() -> Table:
         table.notes.append(f"no real logs in {data}: set OMNIDYN_DATA")
         return table
     bench(table)
-    turning(table)
-    drives(table)
+    exam(table)
+    chirp_alone(table)
+    udea.turning(table)
+    udea.drives(table)
     return table
 
 
@@ -103,6 +105,45 @@ def bench(table: Table) -> None:
             _band(table, fit)
 
 
+def exam(table: Table) -> None:
+    """Clean: input, latency and dead band are chosen on step1 and chirp1 alone, each predicted by the other.
+
+    Only then are step2 and chirp2 run, once.
+    """
+    runs = bench_runs()
+    choice = choose_motor([each[0] for each in runs.values()])
+    for way, error in choice.errors:
+        table.add("", None, data="bench, choice", what=f"left out of training: {_words(way)}", value=error / TURN,
+                  unit="turns/s")  # fmt: skip
+    for kind, each in runs.items():
+        value = fit_rmse(choice.fit, each[1]) / TURN
+        table.add(f"<= 1.1 x {RMSE[kind]}, both {kind}s", value <= 1.1 * RMSE[kind], data="bench, choice",
+                  what=f"chosen: {_words(choice.way)}; rmse {kind}2", value=value, unit="turns/s")  # fmt: skip
+
+
+def chirp_alone(table: Table) -> None:
+    """The control at its hardest: one chirp, and nothing beside it. Intervals are about noise, not the model."""
+    runs = bench_runs()["chirp"]
+    fits = [fit_motor(run) for run in runs]
+    for k, fit in enumerate(fits):
+        low = 1e3 * fit.ci95["dead_band"][0]
+        table.add("0: none seen", low <= 0.0, data="bench, chirp alone", value=low, unit="mV",
+                  what=f"Coulomb of chirp{k + 1} alone, lower end of its 95 % interval")  # fmt: skip
+    errors = [(run_motor(fits[0], run)[0] - run.wheel_speed[:, 0], run.t - run.t[0]) for run in runs]  # type: ignore[index]
+    (first, t), (second, other) = errors
+    known = np.isfinite(second)
+    again = np.interp(t, other[known], second[known])
+    both = np.isfinite(first) & (t > 0.1)
+    table.add("0 for noise", None, data="bench, chirp alone", what="correlation of the errors of chirp1 and chirp2",
+              value=float(np.corrcoef(first[both], again[both])[0, 1]), unit="")  # fmt: skip
+
+
+def _words(way: Mapping[str, Any]) -> str:
+    """A way of fitting in a few words."""
+    late = "latency" if way["latency"] else "no latency"
+    return f"{way['between']}, {late}, {'with' if way['dead_band'] else 'without'} Coulomb"
+
+
 def _band(table: Table, fit: MotorFit) -> None:
     late = sum(n.value for n in fit.nuisances.values())
     table.add(
@@ -122,97 +163,3 @@ def _band(table: Table, fit: MotorFit) -> None:
             value=low,
             unit="mV",
         )
-
-
-def turning(table: Table) -> None:
-    """The robot that turns on the spot: fitted to one half of the log, run on the other, and the whole."""
-    run = turning_run()
-    half = len(run) // 2
-    parts = [part(run, slice(0, half)), part(run, slice(half, None))]
-    for dead_band, baseline in ((True, TURNING), (False, TURNING_PROPORTIONAL)):
-        words = "with dead zone" if dead_band else "proportional"
-        how = {"dead_band": dead_band, "kind": "duty", "angle": True, "latency": True}
-        whole = fit_motor(run, **how)
-        own = window_rmse(whole, [run])
-        table.add(f"<= {baseline}", own <= baseline, data="udea turning", what=f"rmse of w, {words}, fitted to all",
-                  value=own, unit="rad/s")  # fmt: skip
-        crossed = [window_rmse(fit_motor(a, **how), [b]) for a, b in (parts, parts[::-1])]
-        other = float(np.sqrt(np.mean(np.square(crossed))))
-        table.add(f"<= {baseline}", other <= baseline, data="udea turning",
-                  what=f"... halves, each by the other, {words}", value=other, unit="rad/s")  # fmt: skip
-        table.add("README 0.51", None, data="udea turning", what="... 1/slope", value=0.01 / whole.value["slope"],
-                  unit="(rad/s)/%", **{"+-": 0.01 * whole.std["slope"] / whole.value["slope"] ** 2})  # fmt: skip
-        if dead_band:
-            table.add("README 0.85 +- 0.54", None, data="udea turning", what="... dead zone",
-                      value=100.0 * whole.value["dead_band"], unit="%",
-                      **{"+-": 100.0 * whole.std["dead_band"]})  # fmt: skip
-
-
-def turning_run() -> Run:
-    """One motor in place of three: the mean PWM, and the angle that the wheels turned by the heading of the robot."""
-    robot, run = logs.udea_turning(logs.folder())
-    assert run.duty is not None
-    assert run.pose is not None
-    lever = float(np.mean(robot.wheels.robot_radius)) / float(np.mean(robot.wheels.wheel_radius))
-    angle = lever * run.pose[:, [2]]
-    return Run(t=run.t, duty=run.duty.mean(axis=1, keepdims=True), wheel_angle=angle, source=run.source)
-
-
-def window_rmse(fit: MotorFit, runs: Sequence[Run], most_span: float = np.inf) -> float:
-    """Root mean square over windows of 0.5 s of mean model speed minus measured one [rad/s].
-
-    Measured: by the angle turned where it is logged, else the trimmed mean of the speed. most_span: windows in which
-    the input changes by more are left out.
-    """
-    errors = []
-    for run, speed in zip(runs, run_motor(fit, runs), strict=True):
-        starts = np.arange(run.t[0], run.t[-1] - WINDOW, WINDOW)
-        for begin in starts:
-            rows = np.flatnonzero((run.t >= begin) & (run.t < begin + WINDOW))
-            assert run.duty is not None
-            if np.ptp(run.duty[rows, fit.motor]) >= most_span:
-                continue
-            errors.append(float(np.mean(speed[rows])) - _measured(run, rows, fit.motor))
-    return float(np.sqrt(np.nanmean(np.square(errors))))
-
-
-def _measured(run: Run, rows: np.ndarray, motor: int) -> float:
-    if run.wheel_angle is not None:
-        first, last = rows[0], rows[-1]
-        return float((run.wheel_angle[last, motor] - run.wheel_angle[first, motor]) / (run.t[last] - run.t[first]))
-    assert run.wheel_speed is not None
-    return float(trim_mean(run.wheel_speed[rows, motor], TRIM))
-
-
-def drives(table: Table) -> None:
-    """Closed-loop drives with very noisy encoders: fitted to exp1..3, run on exp4 and exp5; errors of 0.5 s means."""
-    runs = drive_runs()
-    for dead_band in (True, False):
-        words = "with dead zone" if dead_band else "proportional"
-        own, other = [], []
-        for motor in range(3):
-            fit = fit_motor(runs[:3], motor, dead_band=dead_band, kind="duty", loss="student-t", between=HOLD)
-            own.append(window_rmse(fit, runs[:3], SPAN))
-            other.append(window_rmse(fit, runs[3:], SPAN))
-            if dead_band:
-                table.add("README 1.0, none visible", None, data="udea drives", what=f"dead zone, motor {motor + 1}",
-                          value=100.0 * fit.value["dead_band"], unit="%",
-                          **{"+-": 100.0 * fit.std["dead_band"]})  # fmt: skip
-            table.add("README 0.32 to 0.33", None, data="udea drives", what=f"1/slope, motor {motor + 1}, {words}",
-                      value=0.01 / fit.value["slope"], unit="(rad/s)/%")  # fmt: skip
-        rms = [float(np.sqrt(np.mean(np.square(each)))) for each in (own, other)]
-        table.add(f"README {DRIVES}, fitted to all", None, data="udea drives", what=f"rmse of w, {words}, exp1..3",
-                  value=rms[0], unit="rad/s")  # fmt: skip
-        table.add(f"README {DRIVES}, fitted to all", None, data="udea drives", what=f"rmse of w, {words}, exp4, exp5",
-                  value=rms[1], unit="rad/s")  # fmt: skip
-
-
-def drive_runs() -> list[Run]:
-    """exp1 to exp5."""
-    folder = logs.folder() / "udea_three_omni" / "sensor_data"
-    return [read_log(folder / f"exp{k}.txt", assume={"u": "%"}) for k in range(1, 6)]
-
-
-def part(run: Run, rows: slice) -> Run:
-    """Some rows of a run."""
-    return Run(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()}, source=run.source)

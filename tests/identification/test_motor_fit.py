@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motor_fit import MotorMapping, fit_motor, fit_rmse, run_motor
+from omnidyn.identification.motor_choice import choose_motor
+from omnidyn.identification.motor_engine import MotorMapping
+from omnidyn.identification.motor_fit import fit_motor
+from omnidyn.identification.motor_run import fit_rmse, run_motor
 from omnidyn.run import Run
 
 SLOPE, BAND, LAG = 0.5, 0.4, 0.05
@@ -78,6 +81,41 @@ def test_the_angle_alone_is_enough(clean):
 
 def test_how_the_input_goes_between_rows_is_found(clean):
     assert fit_motor(run_of(clean, BAND, 1)).between == "hold"
+
+
+def test_a_refuted_way_widens_the_intervals_and_says_so(clean):
+    """The input is held. Asked for the mean of two rows, the fit must say that the logs are met better otherwise."""
+    asked, right = fit_motor(run_of(clean, BAND, 1), between="mean"), fit_motor(run_of(clean, BAND, 1))
+    assert "met better where the input is held from row to row" in asked.doubts[0]
+    assert right.doubts == ()
+    for name, true in TRUE.items():
+        assert asked.ci95[name][0] <= right.ci95[name][0] < right.ci95[name][1] <= asked.ci95[name][1]
+        assert asked.ci95[name][0] - 2e-3 * true <= true <= asked.ci95[name][1] + 2e-3 * true
+        assert asked.std[name] >= abs(asked.value[name] - right.value[name])
+
+
+def test_a_true_way_is_as_sure_as_before(clean):
+    """Held inputs, asked for as held: nothing is widened, and the dead band that is there is seen."""
+    fit = fit_motor(run_of(clean, BAND, 1), between="hold")
+    assert fit.doubts == ()
+    assert fit.dead_band_seen
+
+
+@pytest.mark.parametrize("band", [BAND, 0.0])
+def test_the_way_chosen_by_logs_left_out_is_the_true_one(clean, band):
+    """Held inputs, no latency; a dead band only where there is one. One log is predicted by its parts."""
+    for runs in (run_of(clean, band, 2), [run_of(clean, band, seed) for seed in range(2)]):
+        choice = choose_motor(runs)
+        assert choice.way == {"between": "hold", "latency": False, "dead_band": band > 0.0}
+        assert len(choice.errors) == 8
+        assert min(error for _, error in choice.errors) == pytest.approx(0.05, rel=0.15)  # the noise
+
+
+def test_a_choice_needs_logs_that_can_be_predicted(clean):
+    run = run_of(clean, BAND, 2)
+    short = Run(t=run.t[:4], voltage=run.voltage[:4], wheel_speed=run.wheel_speed[:4])
+    with pytest.raises(InsufficientDataError, match="no log can be predicted from the others; got 1 logs"):
+        choose_motor(short)
 
 
 def test_a_latency_is_found(clean):

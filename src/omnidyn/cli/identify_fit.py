@@ -293,7 +293,8 @@ def fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out:
     """One output-error fit per motor, with and without a dead band, and free runs on what was held out."""
     import numpy as np
 
-    from omnidyn.identification.motor_fit import fit_motor, fit_rmse
+    from omnidyn.identification.motor_fit import fit_motor
+    from omnidyn.identification.motor_run import fit_rmse
 
     part = _Part(loaded, ask.hold_out)
     counts = [run.wheels or 1 for run in part.runs]
@@ -333,6 +334,7 @@ def _tell_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], recor
         from omnidyn.identification.fit_words import MOTOR_HEAD, motor_rows
         from omnidyn.identification.study_table import table_text
 
-        show("\n".join([*table_text(MOTOR_HEAD, motor_rows(found)), "", *(f"- {f[0].statement()}" for f in found)]))
+        words = [each for band, *_ in found for each in (band.statement(), *band.doubts)]
+        show("\n".join([*table_text(MOTOR_HEAD, motor_rows(found)), "", *(f"- {each}" for each in words)]))
     if out.report:
         say(f"omnidyn: wrote {out.report}")

@@ -72,6 +72,7 @@ def render_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], prov
         f"motor {fit.motor + 1}: errors have a memory; the intervals allow for it" for fit, *_ in found
         if fit.covariance == "sandwich"
     ]  # fmt: skip
+    doubts += [f"motor {fit.motor + 1}: {words}" for fit, *_ in found for words in fit.doubts]
     sections = [
         Section("findings", "What the data say", bullets([fit.statement() for fit, *_ in found])),
         Section("numbers", "Numbers, with and without a dead band", table(MOTOR_HEAD, motor_rows(found))),
