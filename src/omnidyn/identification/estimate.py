@@ -76,9 +76,9 @@ class Estimate:
         """The estimate as JSON can hold it: no NaN, no infinity (null instead); the robot as the text of its file."""
         parameters = {
             name: {
-                "value": _finite(value),
-                "std": _finite(self.std[name]),
-                "ci95": [_finite(bound) for bound in self.ci95[name]],
+                "value": finite_or_none(value),
+                "std": finite_or_none(self.std[name]),
+                "ci95": [finite_or_none(bound) for bound in self.ci95[name]],
                 "degrees_of_freedom": int(self.degrees_of_freedom[name]),
                 "at_bound": name in self.at_bound,
                 "unit": unit(name),
@@ -87,10 +87,10 @@ class Estimate:
         }
         return {
             "parameters": parameters,
-            "lower_bound": {name: _finite(bound) for name, bound in self.lower_bound.items()},
+            "lower_bound": {name: finite_or_none(bound) for name, bound in self.lower_bound.items()},
             "correlation": {
                 "names": list(self.correlation.names),
-                "matrix": [[_finite(entry) for entry in row] for row in self.correlation.matrix.tolist()],
+                "matrix": [[finite_or_none(entry) for entry in row] for row in self.correlation.matrix.tolist()],
             },
             "warnings": list(self.warnings),
             "method": self.method,
@@ -100,27 +100,22 @@ class Estimate:
 
 
 def unit(name: str) -> str:
-    """The unit of a parameter: friction depends on where it acts; other keys end in their unit or have none."""
+    """The unit of a parameter by its key: friction depends on where it acts; other keys end in their unit, or it is 1.
+
+    A list as a whole, such as friction.axes.viscous, has the unit of its first item; a pure number has "".
+    """
     yaw = (name.startswith("friction.axes.") and name.endswith("[2]")) or ".yaw_" in name
     if name.startswith("friction."):
         return ("N m s" if yaw else "N s/m") if "viscous" in name else "N m" if yaw else "N"
-    return _KEY_UNITS.get(name.partition("[")[0].rpartition(".")[2], "")
+    key = name.partition("[")[0].rpartition(".")[2]
+    endings = [ending for ending in _ENDINGS if key.endswith(ending)]
+    return _ENDINGS[max(endings, key=len)] if endings else ""
 
 
-_KEY_UNITS = {
-    "mass_kg": "kg",
-    "inertia_kg_m2": "kg m^2",
-    "robot_radius_m": "m",
-    "wheel_radius_m": "m",
-    "resistance_ohm": "ohm",
-    "inductance_H": "H",
-    "torque_constant_Nm_A": "N m/A",
-    "emf_constant_Vs_rad": "V s/rad",
-    "voltage_limit_V": "V",
-    "current_limit_A": "A",
-    "azimuth_deg": "deg",
-    "roller_angle_deg": "deg",
-}
+_ENDINGS = {
+    "_kg": "kg", "_kg_m2": "kg m^2", "_m": "m", "_deg": "deg", "_ohm": "ohm", "_H": "H", "_Nm_A": "N m/A",
+    "_Vs_rad": "V s/rad", "_V": "V", "_A": "A", "_V_s_rad": "V s/rad", "_V_rad": "V/rad", "_Hz": "Hz",
+}  # fmt: skip
 
 
 def identified(std: float | None, source: str) -> Prior:
@@ -130,5 +125,6 @@ def identified(std: float | None, source: str) -> Prior:
     return Prior(std=float(std) if known else None, source=text)  # type: ignore[arg-type]
 
 
-def _finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
+    """The number as JSON can hold it."""
     return float(value) if math.isfinite(value) else None

@@ -81,4 +81,4 @@ def _folds(runs: Sequence[Run]) -> Iterator[tuple[list[Run], Run]]:
 
 
 def _rows(run: Run, rows: slice) -> Run:
-    return Run(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()}, source=run.source)
+    return run.replace(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()})

@@ -208,7 +208,7 @@ def with_parameter(robot: Robot, key: str, value: float) -> Robot:
     be changed as a whole or, as "motor.resistance_ohm[2]", for one wheel, the others keeping theirs.
     """
     try:
-        return _set(robot, key, value, checked=True)
+        return changed_parameter(robot, key, value, checked=True)
     except InputError as error:
         got, where = error.got or None, error.where if error.where.startswith(key) else key
         raise InputError(error.what, got=got, expected=error.expected, remedy=error.remedy, where=where) from None
@@ -228,7 +228,7 @@ def _scale(robot: Robot, key: str) -> float:
 
 def _moved(robot: Robot, key: str, scale: float, side: float) -> Robot:
     """The robot with one number changed a little; not checked, for it may be at the end of its range."""
-    return _set(robot, key, parameter(robot, key) + side * EPS * scale, checked=False)
+    return changed_parameter(robot, key, parameter(robot, key) + side * EPS * scale, checked=False)
 
 
 _KEY = re.compile(r"([a-z_]+(?:\.[A-Za-z_0-9]+)+)(?:\[(\d+)\])?")
@@ -263,7 +263,8 @@ def _one_per_wheel(path: list[str]) -> bool:
     return path[0] in ("wheels", "motor") or path[:2] == ["friction", "wheels"] or ".".join(path) in GAINS
 
 
-def _set(robot: Robot, key: str, value: float, checked: bool) -> Robot:
+def changed_parameter(robot: Robot, key: str, value: float, checked: bool) -> Robot:
+    """As `with_parameter`; not `checked` is quick, and takes values that no robot file may have."""
     table, field, index = _find(robot, key)
     content: Any = value
     if index is not None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.output_error.exact_engine import ExactEngine, Weighting
-from omnidyn.identification.output_error.fit import Options, _records, make_problem
+from omnidyn.identification.output_error.fit import Options, make_problem, read_records
 from omnidyn.identification.output_error.kernel import FINAL
 from omnidyn.identification.output_error.problem import Point, per_column
 from omnidyn.run import Run
@@ -37,7 +37,7 @@ def a_case(seed, steps=300):
 
 def problem_of(robot, run, free=ROBOT_KEYS, nuisances=(), outputs=("twist", "wheel_speed", "current", "heading")):
     given = Options(free=free, nuisances=nuisances, start="free", outputs=outputs)
-    return make_problem(_records([run], robot, given), robot, given)
+    return make_problem(read_records([run], robot, given), robot, given)
 
 
 def at_truth(problem, start, heading, nuisances=None):
@@ -162,7 +162,7 @@ def test_both_marches_add_up_the_same(axebot, nu):
     twist[7] = np.nan
     run = Run(t=run.t, voltage=run.voltage, twist=twist)
     given = Options(start="free")
-    problem = make_problem(_records([run], axebot, given), axebot, given)
+    problem = make_problem(read_records([run], axebot, given), axebot, given)
     weighting = Weighting(np.array([0.01, 0.02, 0.3]), nu, FINAL, 40)
     fast, slow = (ExactEngine(problem, fast).sums(problem.start(), weighting)[0] for fast in (True, False))
     for name in ("number", "square", "loss", "lag", "grad", "info", "score", "drift"):

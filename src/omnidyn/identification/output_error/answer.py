@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from omnidyn.identification.estimate import Estimate, _finite
+from omnidyn.identification.estimate import Estimate, finite_or_none
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,15 @@ class OutputErrorEstimate(Estimate):
         """The estimate as JSON can hold it."""
         nuisances = {
             name: {
-                "value": _finite(n.value), "std": _finite(n.std), "ci95": [_finite(b) for b in n.ci95], "unit": n.unit,
+                "value": finite_or_none(n.value), "std": finite_or_none(n.std),
+                "ci95": [finite_or_none(b) for b in n.ci95], "unit": n.unit,
             }
             for name, n in self.nuisances.items()
         }  # fmt: skip
         return {
             **super().to_dict(),
             "nuisances": nuisances,
-            "noise": {name: _finite(std) for name, std in self.noise.items()},
+            "noise": {name: finite_or_none(std) for name, std in self.noise.items()},
             "unidentifiable": list(self.unidentifiable),
             "blind": list(self.blind),
             "covariance": self.covariance,

@@ -114,15 +114,8 @@ def fit_output_error(
     robot, given, still = without_still_axes(motion_of, records[0].source, robot, given)
     solver, solution = _solve(records, robot, given, watch)
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
-    levels: list[Breakaway] = []
     axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in (free or ()) and motion_of.moved[axis]]
-    if axes and not is_exact(robot):
-        raise UnsupportedError(
-            "breakaway is profiled with the exact engine only", got=robot.name, expected="friction on the body axes",
-            where="free",
-        )  # fmt: skip
-    if axes:
-        solver, solution, levels = find_breakaway(solver, solution, axes)
+    solver, solution, levels = _levels_of(solver, solution, axes)
     known = trust(solver, solution, covariance)
     more, bounds = (
         [*(words for _, _, words in still), *hints],
@@ -130,6 +123,18 @@ def fit_output_error(
     )
     better = resampled(solver, solution, known.std, profile, bootstrap).intervals
     return conclude(solver, solution, known, records, loss_words(loss), more, bounds, levels, better)
+
+
+def _levels_of(solver: Solver, solution: Solution, axes: list[int]) -> tuple[Solver, Solution, list[Breakaway]]:
+    """Breakaway of the axes that were asked for, and the fit with it."""
+    if not axes:
+        return solver, solution, []
+    if not is_exact(solver.problem.robot):
+        raise UnsupportedError(
+            "breakaway is profiled with the exact engine only", got=solver.problem.robot.name,
+            expected="friction on the body axes", where="free",
+        )  # fmt: skip
+    return find_breakaway(solver, solution, axes)
 
 
 def nuisance_names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.tangent import _set, parameter
+from omnidyn.simulation.tangent import changed_parameter, parameter
 
 FloatArray = NDArray[np.float64]
 
@@ -53,9 +53,9 @@ class Parameter:
 
     def on(self, robot: Robot, value: float) -> Robot:
         """The robot with this number and those tied to it; not checked, for speed."""
-        robot = _set(robot, self.name, value, checked=False)
+        robot = changed_parameter(robot, self.name, value, checked=False)
         for key, factor in self.also:
-            robot = _set(robot, key, factor * value, checked=False)
+            robot = changed_parameter(robot, key, factor * value, checked=False)
         return robot
 
 
