@@ -33,7 +33,8 @@ ORDER = {
         identify joint_problem joint_fit as_fitted validation motor_engine motor_log motor_fit motor_run
         motor_choice fit_words best_so_far""",
     "identification/output_error": """parameters primitives record problem kernel axis_kernel exact_engine
-        tangent_engine solver starts motion nuisances uncertainty support breakaway resampling answer conclusion fit""",
+        tangent_engine loop_engine solver starts motion nuisances loop uncertainty support
+        breakaway resampling answer conclusion fit""",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch

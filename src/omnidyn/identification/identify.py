@@ -9,7 +9,9 @@ from typing import Any
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.record import LOOP_REMEDY
 from omnidyn.identification.steady_study import identify_steady
+from omnidyn.model.drive import SPEED
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -57,8 +59,8 @@ def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()
 
 def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
-    why = why_no_inputs(runs)
-    if why:
+    why = why_no_inputs(runs, robot)
+    if why or (robot.drive.kind == SPEED and any(run.voltage is None and run.duty is None for run in runs)):
         return why
     reasons = why_not_exact(robot)
     if robot.motor.electrical == DYNAMIC:
@@ -71,10 +73,14 @@ def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     return ""
 
 
-def why_no_inputs(runs: Sequence[Run]) -> str:
-    """Which log has no input or no output, in words; "" where all have both."""
+def why_no_inputs(runs: Sequence[Run], robot: Robot) -> str:
+    """Which log has no input that the robot follows, or no output, in words; "" where all have both."""
     for run in runs:
-        if run.voltage is None and run.duty is None:
+        none = run.voltage is None and run.duty is None
+        if none and (run.wheel_speed_command is not None or run.twist_command is not None):
+            if robot.drive.kind != SPEED:
+                return f"{run.source or 'a log'} holds set speeds only; to fit it whole, {LOOP_REMEDY}"
+        elif none:
             return f"{run.source or 'a log'} holds no voltage and no duty"
         if all(getattr(run, name) is None for name in OUTPUTS):
             return f"{run.source or 'a log'} holds no speed, current or pose"

@@ -29,10 +29,11 @@ from omnidyn.identification.output_error.fit import (
     GAUSS,
     Options,
     degrees,
-    is_exact,
+    fits_exactly,
     loss_words,
     nuisance_names,
 )
+from omnidyn.identification.output_error.loop import beyond_jumps, looped
 from omnidyn.identification.output_error.nuisances import AUTO
 from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.identification.output_error.resampling import (
@@ -77,11 +78,12 @@ class JointFit:
     def solve(self, watch: Callable[[State], None] | None = None) -> Solution:
         """The best point; `watch` sees every better state on the way."""
         start = joint_start(self.engine, self.solver.nu)
-        robot = self.engine.problem.robot
-        if not is_exact(robot):  # first with a step a row, as a fit of one group does
-            coarse = join([m.part for m in self.engine.members], self.own, tol=None)
+        members = self.engine.members
+        if not all(fits_exactly(member.part.problem) for member in members):  # first a step a row
+            coarse = join([m.part for m in members], self.own, tol=None)
             start = Solver(coarse.problem, coarse, self.solver.nu).minimise(start).state.point
-        return self.solver.minimise(start, watch=watch)
+        found = self.solver.minimise(start, watch=watch)
+        return beyond_jumps(self.solver, found, watch) if looped(members[0].part.records) else found
 
     def answer(
         self, solution: Solution, profile: Sequence[str] = (), bootstrap: int = 0, words: Sequence[str] = ()
@@ -203,7 +205,7 @@ def join_groups(
     if len(groups) != len(runs) or len(set(groups)) < 2:
         got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
         raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
-    why = why_no_inputs(runs)
+    why = why_no_inputs(runs, robot)
     if why:
         raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
     given = Options(

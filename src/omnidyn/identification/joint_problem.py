@@ -15,11 +15,14 @@ from omnidyn.identification.output_error.fit import (
     Options,
     degrees,
     first_point,
+    fits_exactly,
     is_exact,
+    loop_options,
     make_engine,
     make_problem,
     read_records,
 )
+from omnidyn.identification.output_error.loop import loop_start, looped
 from omnidyn.identification.output_error.motion import motion
 from omnidyn.identification.output_error.nuisances import automatic
 from omnidyn.identification.output_error.parameters import FRICTION, Parameter
@@ -34,6 +37,7 @@ from omnidyn.run import Run
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+ANY_FRICTION = "friction."
 AT = "@"  # KEY@GROUP is the number that a group has for itself
 
 
@@ -119,7 +123,7 @@ def read_parts(runs: Sequence[Run], groups: Sequence[str], robot: Robot, given: 
     }
     found = [(name, records, *_still(name, records, robot, given)) for name, records in of.items()]
     kept = given.nuisances
-    if kept is None and is_exact(robot):
+    if kept is None and is_exact(robot) and not any(looped(records) for records in of.values()):
         kept = _settled(found, robot, automatic([each for records in of.values() for each in records]))
     return [
         Part(name, records, make_problem(records, robot, replace(options, nuisances=kept)), notes)
@@ -129,7 +133,10 @@ def read_parts(runs: Sequence[Run], groups: Sequence[str], robot: Robot, given: 
 
 def _still(name: str, records: Sequence[Record], robot: Robot, given: Options) -> tuple[Options, tuple[str, ...]]:
     """The options of a group without the friction of axes that never moved there, and words of it."""
-    moved = motion(records, robot).moved
+    found = motion(records, robot)
+    moved = found.moved
+    if looped(records):
+        return loop_options(given, found, records, robot), ()
     still = [key for key in FRICTION if not moved[int(key[-2])]]
     notes = tuple(
         f"axis {AXES[axis]} never visibly moved in {name}: its friction is not fitted there"
@@ -160,7 +167,7 @@ def _settled(
 def own_names(asked: Sequence[str], parts: Sequence[Part]) -> list[str]:
     """The numbers that each group has for itself. Raises InputError where one is not free, or where there is none."""
     names = list(dict.fromkeys(name for part in parts for name in part.problem.names))
-    own = list(asked) or [name for name in names if name in FRICTION]
+    own = list(asked) or [name for name in names if name.startswith(ANY_FRICTION)]
     unknown = [name for name in own if name not in names]
     if unknown:
         raise InputError(
@@ -202,8 +209,10 @@ def joint_start(engine: JointEngine, nu: float) -> Point:
     states: list[FloatArray] = []
     for member in engine.members:
         problem = member.part.problem
-        if is_exact(problem.robot):
+        if fits_exactly(problem):
             point = first_point(Solver(problem, member.engine, nu), member.part.records)
+        elif looped(member.part.records):
+            point = loop_start(problem, nu)
         else:
             point = problem.start()
         for k, value in zip(member.at, point.values, strict=True):

@@ -7,7 +7,7 @@ a derivative of exactly 0 along what it holds; a stop, a reversal and a release 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,42 +75,55 @@ def derivatives(
     def applied(robot: Robot) -> Commands:
         return commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
 
-    return differentiate(robot, applied, keys, twist, pose, tol)
+    ready, given = prepared(robot, keys), applied(robot)
+    rows = given.voltage if given.set_point is None else given.set_point
+    assert rows is not None
+    each = [one.voltage if given.set_point is None else one.set_point for one in map(applied, ready.robots)]
+    rates = _difference(np.array(each, dtype=float).reshape(-1, *rows.shape))
+    return differentiate(
+        ready, given, rates, (as_start("twist", twist, 3), as_start("pose", pose, 3)), as_tolerance(tol)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A robot and its keys for any number of runs. robots, plants: up and down each key by EPS scale."""
+
+    robot: Robot
+    keys: tuple[str, ...]
+    scale: FloatArray
+    robots: list[Robot]
+    numbers: Plant
+    plants: list[Plant]
+
+
+def prepared(robot: Robot, keys: Sequence[str]) -> Prepared:
+    """Raises InputError for an unknown key, and for friction or a gear loss that is off."""
+    scale = np.array([_scale(robot, key) for key in keys])
+    robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
+    numbers, plants = plant(robot), [plant(r) for r in robots]
+    for j, key in enumerate(keys):
+        _refuse_switched_off(key, numbers, plants[2 * j])
+    return Prepared(robot, tuple(keys), scale, robots, numbers, plants)
 
 
 def differentiate(
-    robot: Robot, applied: Callable[[Robot], Commands], keys: Sequence[str], twist: ArrayLike, pose: ArrayLike,
-    tol: float | None, settled: float = 0.0, travels: bool = True,
+    ready: Prepared, given: Commands, rates: FloatArray, start: tuple[FloatArray, FloatArray], tol: float,
+    settled: float = 0.0, travels: bool = True,
 ) -> Derivatives:  # fmt: skip
-    """`derivatives` of what is `applied` to a robot. settled, travels: of a speed loop, see `run_tangent_loop`."""
-    start, given = (as_start("twist", twist, 3), as_start("pose", pose, 3)), applied(robot)
-    rows = given.voltage if given.set_point is None else given.set_point
-    assert rows is not None
+    """`derivatives` of one run.
+
+    rates: derivatives of the voltages or set points, shape (K, rows, n), by key / scale, as are all derivatives up to
+    the last line. start: twist and pose. tol: 0 for a fixed step. settled, travels: of a speed loop, see
+    `run_tangent_loop`.
+    """
+    robot, keys, scale, robots = ready.robot, ready.keys, ready.scale, ready.robots
     if given.set_point is not None and RATE in keys:
         raise UnsupportedError(
             "no derivative by the rate of the speed loop", got=RATE, expected="other keys",
             remedy="its ticks would move; try a few rates instead", where="keys",
         )  # fmt: skip
-    scale = np.array([_scale(robot, key) for key in keys])
-    robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
-    each = [one.voltage if given.set_point is None else one.set_point for one in map(applied, robots)]
-    rates = _difference(np.array(each, dtype=float).reshape(-1, *rows.shape))
-    return _derivatives(
-        robot, robots, rates, given, tuple(keys), scale, start, as_tolerance(tol), settled, travels
-    )  # fmt: skip
-
-
-def _derivatives(
-    robot: Robot, robots: list[Robot], rates: FloatArray, given: Commands, keys: tuple[str, ...], scale: FloatArray,
-    start: tuple[FloatArray, FloatArray], tol: float, settled: float, travels: bool,
-) -> Derivatives:  # fmt: skip
-    """`robots`: up and down each key by EPS scale, `rates`: derivatives of the voltages or set points that they apply.
-
-    All derivatives are d/d(key / scale) up to the last line.
-    """
-    numbers, plants = plant(robot), [plant(r) for r in robots]
-    for j, key in enumerate(keys):
-        _refuse_switched_off(key, numbers, plants[2 * j])
+    numbers, plants = ready.numbers, ready.plants
     ways = _ways(numbers, plants, rates)
     length = numbers.body[LENGTH]
     stretch = _difference(np.array([p.body[LENGTH] for p in plants]))

@@ -14,6 +14,14 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.breakaway import Breakaway, find_breakaway
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.exact_engine import ExactEngine
+from omnidyn.identification.output_error.loop import (
+    left_out,
+    loop_keys,
+    loop_pieces,
+    looped,
+    solve_loop,
+)
+from omnidyn.identification.output_error.loop_engine import LoopEngine
 from omnidyn.identification.output_error.motion import Motion, motion
 from omnidyn.identification.output_error.nuisances import (
     AUTO,
@@ -37,7 +45,7 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact import why_not_exact
-from omnidyn.simulation.tangent import parameter, with_parameter
+from omnidyn.simulation.tangent import GAINS, parameter, with_parameter
 
 FloatArray = NDArray[np.float64]
 
@@ -111,7 +119,11 @@ def fit_output_error(
     )  # fmt: skip
     records = read_records([runs] if isinstance(runs, Run) else list(runs), robot, given)
     motion_of = motion(records, robot)
-    robot, given, still = without_still_axes(motion_of, records[0].source, robot, given)
+    robot, given, still = (
+        (robot, loop_options(given, motion_of, records, robot), [])
+        if looped(records)
+        else without_still_axes(motion_of, records[0].source, robot, given)
+    )
     solver, solution = _solve(records, robot, given, watch)
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
     axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in (free or ()) and motion_of.moved[axis]]
@@ -129,7 +141,7 @@ def _levels_of(solver: Solver, solution: Solution, axes: list[int]) -> tuple[Sol
     """Breakaway of the axes that were asked for, and the fit with it."""
     if not axes:
         return solver, solution, []
-    if not is_exact(solver.problem.robot):
+    if not isinstance(solver.engine, ExactEngine):
         raise UnsupportedError(
             "breakaway is profiled with the exact engine only", got=solver.problem.robot.name,
             expected="friction on the body axes", where="free",
@@ -148,6 +160,8 @@ def _solve(
     records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None
 ) -> tuple[Solver, Solution]:
     problem, nu = make_problem(records, robot, given), degrees(given.loss)
+    if looped(records):
+        return solve_loop(problem, nu, watch)
     if is_exact(robot):
         solver = Solver(problem, ExactEngine(problem), nu)
         return solver, solver.minimise(first_point(solver, records), watch=watch)
@@ -167,9 +181,30 @@ def loss_words(loss: str) -> str:
     return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
 
 
-def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | TangentEngine:
-    """The engine of the robot; tol [m/s]: of the implicit one, None for a step a row."""
+def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | TangentEngine | LoopEngine:
+    """The engine of the robot and its logs; tol [m/s]: of the implicit one, None for a step a row."""
+    if looped([piece.record for piece in problem.pieces]):
+        return LoopEngine(problem, tol)
     return ExactEngine(problem) if is_exact(problem.robot) else TangentEngine(problem, tol)
+
+
+def loop_options(given: Options, found: Motion, records: Sequence[Record], robot: Robot) -> Options:
+    """By default friction of what moved, and the gains. Raises InsufficientDataError where nothing moved."""
+    if not found.moved.any():
+        raise InsufficientDataError(
+            "the robot never visibly moved: a speed loop shows its friction in motion only", got="rest",
+            expected="motion", remedy="ask for speeds at which it sets off", where=records[0].source,
+        )  # fmt: skip
+    if given.free is not None:
+        return given
+    keys = loop_keys(robot, found.moved)
+    more = [key for key in known_priors(robot) if key not in keys] if given.use_priors else []
+    return replace(given, free=tuple(key for key in (*keys, *more) if key not in given.fixed), fixed=())
+
+
+def fits_exactly(problem: Problem) -> bool:
+    """Whether the exact engine fits this problem."""
+    return is_exact(problem.robot) and not looped([piece.record for piece in problem.pieces])
 
 
 def is_exact(robot: Robot) -> bool:
@@ -182,6 +217,8 @@ def _settled(
     solution: Solution,
 ) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
     """Where the nuisances are automatic: without those that the logs do not support; and what they ask for beside."""
+    if looped(records):
+        return _settled_loop(records, robot, given, watch, solver, solution)
     if given.nuisances is not None or not isinstance(solver.engine, ExactEngine):
         return solver, solution, given, []
     kept = supported(solver, solution, automatic(records))
@@ -190,6 +227,20 @@ def _settled(
         solver, solution = _solve(records, robot, given, watch)
     wider = make_problem(records, robot, replace(given, nuisances=tuple(dict.fromkeys((*kept, *NUISANCES)))))
     return solver, solution, given, wanted(solver, solution, Solver(wider, ExactEngine(wider), solver.nu))
+
+
+def _settled_loop(
+    records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None, solver: Solver,
+    solution: Solution,
+) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
+    """Without the latencies that the logs do not determine, where they are automatic; and what is not used."""
+    words = left_out(records, solver.problem.pieces)
+    if given.nuisances is None:
+        kept = supported(solver, solution, (LATENCY,))
+        given = replace(given, nuisances=kept)
+        if len(kept) < len(solver.problem.parameters) - solver.problem.robot_count:
+            solver, solution = _solve(records, robot, given, watch)
+    return solver, solution, given, words
 
 
 def read_records(runs: Sequence[Run], robot: Robot, given: Options) -> list[Record]:
@@ -202,7 +253,14 @@ def read_records(runs: Sequence[Run], robot: Robot, given: Options) -> list[Reco
             raise InputError(f"unknown {where}", got=value, expected=" or ".join(known), where=where)
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
-    return [record(run, robot, given.outputs) for run in runs]
+    gains = any(key.startswith(GAINS) for key in given.free or ())
+    found = [record(run, robot, given.outputs, gains) for run in runs]
+    if len({each.set_point is None for each in found}) > 1:
+        raise InputError(
+            "some logs have voltages, others set speeds only", got=", ".join(each.source for each in found[:2]),
+            expected="logs of one kind", remedy="free a gain of the loop, or fit them apart", where="runs",
+        )  # fmt: skip
+    return found
 
 
 def without_still_axes(
@@ -248,11 +306,15 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     if not keys:
         raise InputError("nothing is free", got="no key", expected="at least one", where="free")
     own = robot_parameters(robot, keys, priors)
-    if not is_exact(robot):
+    exact = is_exact(robot) and not looped(records)
+    if not exact:
         own = [replace(p, low=LEAST * p.value) if p.low == 0.0 else p for p in own]
-    auto = automatic(records) if is_exact(robot) else (LATENCY,)
+    auto = automatic(records) if exact else (LATENCY,)
     more = nuisance_parameters(auto if given.nuisances is None else given.nuisances, records)
-    parts = pieces(records, robot, given.start, any(p.name.startswith(LATENCY) for p in more))
+    late = any(p.name.startswith(LATENCY) for p in more)
+    parts = (
+        loop_pieces(records, robot, given.start) if looped(records) else pieces(records, robot, given.start, late)
+    )  # fmt: skip
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
     if rows <= len(own) + len(more):
         raise InsufficientDataError(

@@ -10,14 +10,20 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.logs.segments import segments
+from omnidyn.model.drive import SPEED
 from omnidyn.model.motor import clip_voltage
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
 
 OUTPUTS = ("twist", "wheel_speed", "current", "heading")
 SHORTEST = 3  # rows of a piece that is used
+LOOP_REMEDY = (
+    'write the speed loop of the firmware into the robot file: [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz '
+    "(the gains may be guesses: they are fitted)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +31,8 @@ class Record:
     """One run. t (rows,); voltage (rows, W); outputs (rows, C), columns named by (channel, index).
 
     pieces: (first, last) rows of what has no gap. supplied: whether the voltage is a duty times a supply that was not
-    logged. notes: what a reader should know.
+    logged. notes: what a reader should know. set_point (rows, W): set speeds of the wheels [rad/s] where the loop in
+    the firmware makes the voltage, which is 0 here then; else None.
     """
 
     t: FloatArray
@@ -36,22 +43,28 @@ class Record:
     source: str
     supplied: bool
     notes: tuple[str, ...]
+    set_point: FloatArray | None = None
 
     @property
     def span(self) -> float:
         return float(self.t[-1] - self.t[0]) or 1.0
 
 
-def record(run: Run, robot: Robot, outputs: Sequence[str] | None = None) -> Record:
-    """Raises InputError for a run without inputs or outputs, InsufficientDataError where no piece is long enough."""
-    voltage, supplied, notes = _voltage(run, robot)
+def record(run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: bool = False) -> Record:
+    """Raises InputError for a run without inputs or outputs, InsufficientDataError where no piece is long enough.
+
+    loop: take the set speeds even where a voltage was logged, for its gains are asked for.
+    """
+    set_point = _set_point(run, robot, loop)
+    voltage, supplied, notes = _voltage(run, robot) if set_point is None else (np.zeros_like(set_point), False, [])
     clipped = clip_voltage(robot.motor, voltage)
     beyond = int((np.abs(clipped) < np.abs(voltage)).any(axis=1).sum())
     if beyond:
         notes.append(f"{beyond} rows ask for more than the voltage limit: they are clipped to it")
         voltage = clipped
     names, values = _outputs(run, robot, outputs)
-    known = np.asarray(np.isfinite(voltage).all(axis=1), dtype=bool)
+    inputs = voltage if set_point is None else set_point
+    known = np.asarray(np.isfinite(inputs).all(axis=1), dtype=bool)
     pieces = [piece for s in segments(run.t) for piece in _whole(known, s.start, s.stop)]
     if not pieces:
         raise InsufficientDataError(
@@ -61,7 +74,15 @@ def record(run: Run, robot: Robot, outputs: Sequence[str] | None = None) -> Reco
     if not known.all():
         notes.append(f"{int((~known).sum())} rows lack an input: the log is split there")
     return Record(
-        run.t, np.ascontiguousarray(voltage), values, names, tuple(pieces), run.source, supplied, tuple(notes)
+        run.t,
+        np.ascontiguousarray(voltage),
+        values,
+        names,
+        tuple(pieces),
+        run.source,
+        supplied,
+        tuple(notes),
+        set_point,
     )
 
 
@@ -87,10 +108,19 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
         return run.duty * nominal, True, [note]
     if run.wheel_speed_command is not None or run.twist_command is not None:
         raise UnsupportedError(
-            "only set speeds are logged: the firmware's loop would have to be fitted too", got=", ".join(run.channels),
-            expected="voltage or duty", where=run.source,
+            "only set speeds are logged, and the robot has no speed loop to follow them", got=", ".join(run.channels),
+            expected="voltage or duty, or the speed loop of the firmware", where=run.source, remedy=LOOP_REMEDY,
         )  # fmt: skip
     raise InputError("the log has no input", got=", ".join(run.channels), expected="voltage or duty", where=run.source)
+
+
+def _set_point(run: Run, robot: Robot, loop: bool) -> FloatArray | None:
+    """Set speeds of the wheels [rad/s] where the loop of the robot file has to follow them. Shape (rows, W)."""
+    if robot.drive.kind != SPEED or (not loop and (run.voltage is not None or run.duty is not None)):
+        return None
+    if run.wheel_speed_command is not None:
+        return np.ascontiguousarray(run.wheel_speed_command)
+    return None if run.twist_command is None else wheel_speed(robot.wheels, run.twist_command)
 
 
 def _outputs(run: Run, robot: Robot, wanted: Sequence[str] | None) -> tuple[tuple[tuple[str, int], ...], FloatArray]:
