@@ -1,4 +1,4 @@
-"""python -m benchmarks [NAME ...] [--json] [--check]"""
+"""python -m benchmarks [NAME ...] [--json] [--check] [--publish]"""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import argparse
 import importlib
 import json
 import sys
+
+from benchmarks.publish import begin, page_of, publish
 
 NAMES = {
     "accuracy": "exact engine against 50 digits: Table 3 and 50 random robots, 10,000 steps each (about a minute)",
@@ -20,7 +22,7 @@ NAMES = {
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
     "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
-    "identify": "output error on simulated logs: coverage, efficiency, nuisances, starts, time (ten minutes)",
+    "identify": "output error on simulated logs: coverage, starts, nuisances, time beside peers (fifteen minutes)",
 }
 GOAL_MISSED = 5
 
@@ -31,8 +33,15 @@ def arguments() -> argparse.Namespace:
         "names", nargs="*", metavar="NAME", choices=[*NAMES, "all", []], help=", ".join([*NAMES, "all"])
     )
     parser.add_argument("--json", action="store_true", help="the tables as JSON")
+    parser.add_argument(
+        "--publish", action="store_true", help="write the tables into their pages of docs/"
+    )
     parser.add_argument("--check", action="store_true", help=f"exit code {GOAL_MISSED} when a goal is missed")
-    return parser.parse_args()
+    asked = parser.parse_args()
+    for name in asked.names if asked.publish else []:
+        if page_of(name) is None:
+            parser.error(f"no page of docs/ shows {name}: --publish is for those with a place `{begin(name)}`")
+    return asked
 
 
 def main() -> int:
@@ -45,6 +54,8 @@ def main() -> int:
     for name in names:
         table = importlib.import_module(f"benchmarks.{name}").measure()
         done.append(table)
+        if asked.publish:
+            publish(name, table)
         if not asked.json:
             print(table.as_text(), flush=True)
     if asked.json:

@@ -1,0 +1,109 @@
+"""What a fit costs: one log, an hour at 1 kHz, and the whole command from CSV to report, start-up included."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.identify_log import cpu, excitation, fit_output_error, noisy
+from benchmarks.table import Table
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+
+FIRST = 10.0  # [s] of the command's first run
+
+
+def speed(table: Table, robot: Robot, clean: Run) -> None:
+    """One log of 60 s."""
+    log = noisy(clean, 0)
+    spent = cpu(lambda: fit_output_error(log, robot, start="rest"), 30)
+    table.add("<= 5", spent <= 5.0, what="fit of one log, six numbers", value=spent, unit="ms")
+
+
+_CHILD = """
+import json, resource, sys, time
+import numpy as np
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+with np.load(sys.argv[1]) as f:
+    run = Run(**{name: f[name] for name in f.files})
+robot, options = load_robot("axebot"), json.loads(sys.argv[2])
+short = Run(t=run.t[:2000], **{name: value[:2000] for name, value in run.channels.items()})
+fit_output_error(short, robot, **options)
+start = time.process_time()
+fit = fit_output_error(run, robot, **options)
+spent = time.process_time() - start
+try:  # on Linux the other counter begins at what the parent had
+    peak = next(int(line.split()[1]) * 1024 for line in open("/proc/self/status") if line.startswith("VmHWM"))
+except OSError:
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+print(spent, peak / 2**30, fit.iterations)
+"""
+
+
+def long(table: Table, robot: Robot, clean: Run) -> None:
+    """(b) One hour at 1 kHz, each in a process of its own for its memory."""
+    hour = simulate(robot, excitation(3600.0, 1000.0), 1e-3)
+    rng = np.random.default_rng(3)
+    plain = noisy(hour, 0)
+    every = plain.replace(
+        wheel_speed=hour.wheel_speed + 0.5 * rng.standard_normal(hour.wheel_speed.shape),
+        current=hour.current + 0.05 * rng.standard_normal(hour.current.shape),
+    )
+    del hour
+    options = {"nuisances": ["latency", "gain", "dead_band", "fade"], "start": "free"}
+    spent, memory = _in_child(plain, {"nuisances": [], "start": "rest"})
+    table.add("<= 5", spent <= 5.0, what="1 h at 1 kHz, six numbers", value=spent, unit="s")
+    table.add("<= 1", memory <= 1.0, what="... memory of the whole process", value=memory, unit="GiB")
+    spent, memory = _in_child(every, options)
+    table.add("<= 60", spent <= 60.0, what="1 h at 1 kHz, nine outputs, nine nuisances", value=spent, unit="s")
+    table.add(what="... memory of the whole process", value=memory, unit="GiB")
+
+
+def _in_child(run: Run, options: dict[str, object]) -> tuple[float, float]:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "run.npz"
+        np.savez(file, t=run.t, **run.channels)
+        out = subprocess.run(
+            [sys.executable, "-c", _CHILD, file, json.dumps(options)], capture_output=True, text=True, check=True
+        )
+    spent, memory, _ = out.stdout.split()
+    return float(spent), float(memory)
+
+
+def command(table: Table, robot: Robot, clean: Run) -> None:
+    """`omnidyn identify LOG --report`, as a child: with nothing compiled yet, three times, and then with everything."""
+    log = noisy(clean, 0)
+    assert log.voltage is not None
+    assert log.twist is not None
+    heads = ",".join(["t_s", *(f"u{k + 1}_V" for k in range(log.voltage.shape[1])), "vx_m_s,vy_m_s,omega_rad_s"])
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        rows = np.column_stack([log.t, log.voltage, log.twist])
+        np.savetxt(place / "log.csv", rows, delimiter=",", header=heads, comments="", fmt="%.6f")
+        first = [_command(place, f"cache{k}") for k in range(3)]
+        again = [_command(place, "cache0") for _ in range(3)]
+    table.add(f"<= {FIRST:g}", max(first) <= FIRST, what="CSV to report, one command, nothing compiled: worst of 3",
+              value=max(first), unit="s")  # fmt: skip
+    table.add(f"<= {FIRST:g}", max(again) <= FIRST, what="... compiled before: worst of 3", value=max(again), unit="s")
+
+
+def _command(place: Path, cache: str) -> float:
+    """Processor time of the command and its start-up [s]."""
+    before = sum(os.times()[2:4])
+    subprocess.run(
+        [
+            sys.executable, "-m", "omnidyn", "identify", "log.csv", "--robot", "axebot", "-o", "fit.toml",
+            "--report", "fit.html", "--force",
+        ],
+        cwd=place, env=os.environ | {"NUMBA_CACHE_DIR": str(place / cache)}, capture_output=True, check=True,
+    )  # fmt: skip
+    return sum(os.times()[2:4]) - before
