@@ -129,10 +129,8 @@ def fit_output_error(
     axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in (free or ()) and motion_of.moved[axis]]
     solver, solution, levels = _levels_of(solver, solution, axes)
     known = trust(solver, solution, covariance)
-    more, bounds = (
-        [*(words for _, _, words in still), *hints],
-        {key: bound for key, bound, _ in still if bound > NOTHING},
-    )
+    more = [*(words for _, _, words in still), *hints]
+    bounds = {key: bound for key, bound, _ in still if bound > NOTHING}
     better = resampled(solver, solution, known.std, profile, bootstrap).intervals
     return conclude(solver, solution, known, records, loss_words(loss), more, bounds, levels, better)
 
