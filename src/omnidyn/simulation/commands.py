@@ -133,7 +133,7 @@ def _steps(dt: ArrayLike, count: int) -> FloatArray:
     steps = as_floats("dt", dt)
     if steps.ndim > 1 or (steps.ndim == 1 and len(steps) != count):
         raise InputError("wrong shape", got=steps.shape, expected=f"a number or ({count},)", where="dt")
-    steps = np.ascontiguousarray(np.broadcast_to(steps, (count,)))
+    steps = np.array(np.broadcast_to(steps, (count,)))  # writable: kernels are compiled once for it
     bad = np.flatnonzero(~((steps >= MIN_DT) & (steps <= MAX_DT)))
     if bad.size:
         raise InputError(

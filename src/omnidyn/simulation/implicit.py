@@ -65,8 +65,8 @@ def begun(rows: int, state: FloatArray, pose: FloatArray) -> Outcome:
 
 
 def room(state: FloatArray) -> FloatArray:
-    """Room for the states inside a step: after the whole step, after one and two half steps, and within a step."""
-    return np.zeros((4, len(state)))
+    """Room for states: after a whole step, after one and two half steps, within a step, and after it has settled."""
+    return np.zeros((5, len(state)))
 
 
 def run_implicit(

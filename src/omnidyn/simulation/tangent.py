@@ -27,6 +27,7 @@ from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands
 from omnidyn.simulation.implicit import Outcome, begun, room
 from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, current_bounds, implicit_run
+from omnidyn.simulation.tangent_look import Looks, looks
 from omnidyn.simulation.tangent_loop import run_tangent_loop
 from omnidyn.simulation.tangent_march import march_tangent
 from omnidyn.simulation.tangent_step import EPS, Ways
@@ -79,7 +80,7 @@ def derivatives(
     rows = given.voltage if given.set_point is None else given.set_point
     assert rows is not None
     each = [one.voltage if given.set_point is None else one.set_point for one in map(applied, ready.robots)]
-    rates = _difference(np.array(each, dtype=float).reshape(-1, *rows.shape))
+    rates = difference(np.array(each, dtype=float).reshape(-1, *rows.shape))
     return differentiate(
         ready, given, rates, (as_start("twist", twist, 3), as_start("pose", pose, 3)), as_tolerance(tol)
     )
@@ -103,7 +104,7 @@ def prepared(robot: Robot, keys: Sequence[str]) -> Prepared:
     robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
     numbers, plants = plant(robot), [plant(r) for r in robots]
     for j, key in enumerate(keys):
-        _refuse_switched_off(key, numbers, plants[2 * j])
+        refuse_switched_off(key, numbers, plants[2 * j])
     return Prepared(robot, tuple(keys), scale, robots, numbers, plants)
 
 
@@ -124,9 +125,9 @@ def differentiate(
             remedy="its ticks would move; try a few rates instead", where="keys",
         )  # fmt: skip
     numbers, plants = ready.numbers, ready.plants
-    ways = _ways(numbers, plants, rates)
+    ways = ways_of(numbers, plants, rates)
     length = numbers.body[LENGTH]
-    stretch = _difference(np.array([p.body[LENGTH] for p in plants]))
+    stretch = difference(np.array([p.body[LENGTH] for p in plants]))
     first = np.zeros((len(keys), AXES + numbers.wheels))
     first[:, 2] = start[0][2] * stretch
     bound = current_bounds(robot, given, len(given.dt))
@@ -135,7 +136,7 @@ def differentiate(
         voltage, slopes_of_voltage = given.voltage, rates
     else:
         state = start_state(numbers, start[0], np.zeros(numbers.wheels)), start[1]
-        outcome, ds, dposes, voltage, slopes_of_voltage = run_tangent_loop(
+        outcome, ds, dposes, voltage, slopes_of_voltage, _ = run_tangent_loop(
             robots, robot, numbers, ways, given, rates, bound[0], state, first, tol, settled, travels
         )
     assert voltage is not None
@@ -154,28 +155,34 @@ def differentiate(
 
 def run_tangent(
     numbers: Plant, ways: Ways, given: Commands, bound: FloatArray, start: tuple[FloatArray, FloatArray],
-    first: FloatArray, tol: float,
+    first: FloatArray, tol: float, seen: Looks | None = None,
 ) -> tuple[Outcome, FloatArray, FloatArray]:  # fmt: skip
-    """The run of `run_implicit`, with derivatives of state (rows + 1, K, 3 + n) and pose (rows + 1, K, 3)."""
+    """The run of `run_implicit`, with derivatives of state (rows + 1, K, 3 + n) and pose (rows + 1, K, 3).
+
+    With `seen`, the run is looked at there instead: the derivatives by row are left out, both arrays are empty.
+    """
     assert given.voltage is not None
     rows, bare = len(given.dt), with_given_currents(numbers)
     state = start_state(numbers, start[0], np.zeros(numbers.wheels))
-    out = begun(rows, state, start[1])
-    ds, dposes = np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, len(first), 3))
-    ds[0] = first
+    out, kept = begun(rows, state, start[1]), rows + 1 if seen is None else 0
+    ds, dposes = np.zeros((kept, *first.shape)), np.zeros((kept, len(first), 3))
+    ds[:1] = first
     march_tangent(
         *numbers.copy(), *bare, scratch(), room(state), ways, given.voltage, bound, given.dt, tol, out.pose, out.state,
-        out.iterations, out.steps, ds, dposes,
+        out.iterations, out.steps, first, ds, dposes, seen or looks(np.zeros(1), np.zeros(0), AXES, len(first)),
     )  # fmt: skip
     return out, ds, dposes
 
 
-def _ways(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Ways:
-    """Tables of the plants up and down each key, the robot's own as the last one, and room to work in."""
+def ways_of(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Ways:
+    """Tables of the plants up and down each key, the robot's own as the last one, and room to work in.
+
+    rates: derivatives of the applied voltages, shape (K, rows, n).
+    """
     body = np.array([*(p.body for p in plants), numbers.body])
     element = np.array([*(p.element for p in plants), numbers.element])
     count, n = len(plants) // 2, numbers.wheels
-    arm = np.ascontiguousarray(np.swapaxes(_difference(element[:-1, :, GX : GZ + 1]), 0, 1))
+    arm = np.ascontiguousarray(np.swapaxes(difference(element[:-1, :, GX : GZ + 1]), 0, 1))
     work = np.zeros((4, count, AXES + n))
     return Ways(
         body=body, element=element, arm=arm, voltage=rates, scratch=np.array([scratch(), scratch()]),
@@ -185,7 +192,7 @@ def _ways(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Ways:
     )  # fmt: skip
 
 
-def _difference(values: FloatArray) -> FloatArray:
+def difference(values: FloatArray) -> FloatArray:
     """Derivatives from values up (even) and down (odd) each key. Shape (2 K, ...) -> (K, ...)."""
     return np.ascontiguousarray((values[0::2] - values[1::2]) / (2.0 * EPS))
 
@@ -199,10 +206,10 @@ def _settled(robots: list[Robot], run: Run, slopes: FloatArray, dvolts: FloatArr
         eps, more = EPS * (1 - 2 * (j % 2)), dvolts[j // 2]
         volts = run.voltage + eps * np.concatenate([more, more[-1:]])
         values.append(settled_currents(robot, run.twist + eps * slopes[:, j // 2], volts))
-    return np.moveaxis(_difference(np.array(values)), 0, 1)
+    return np.moveaxis(difference(np.array(values)), 0, 1)
 
 
-def _refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
+def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
     """Dry friction, or a gear loss, of 0 is not a number to differentiate by: where it is off nothing can stick."""
     levels = np.r_[SLIDE : HOLD + 2, EFFICIENCY]
     off = (numbers.element[:, levels] != up.element[:, levels]).any(axis=1) & (numbers.element[:, ACTIVE] == 0.0)

@@ -63,7 +63,7 @@ def _acceleration(body, element, s, state, x, out):
 
 
 @part
-def _differ(a, b, m):
+def differ(a, b, m):
     """Whether two states differ in what sticks or in a direction of sliding."""
     for e in range(SIGNS, SIGNS + m + 1):
         if a[e] != b[e]:
@@ -89,7 +89,8 @@ def _leap(body, element, s, ways, start, end, h, gained, d):
             element[e, SIGN] = end[SIGNS + e]
             _acceleration(body, element, s, start, end, after)
             _reverse(element[e, GX : GZ + 1], ways.arm[e], start, before, after, d)
-    if start[SIGNS + m] == 1.0 and end[SIGNS + m] == 1.0 and start[0] * end[0] + start[1] * end[1] <= 0.0:
+    crosses = start[SIGNS + m] == 1.0 and end[SIGNS + m] == 1.0 and (start[0] != 0.0 or start[1] != 0.0)
+    if crosses and start[0] * end[0] + start[1] * end[1] <= 0.0:
         after[0], after[1] = start[0], start[1]  # along its line
         _reverse(after, ways.arm[0], start, before, gained, d)
     put(body, element, end)
@@ -101,9 +102,13 @@ def _leap(body, element, s, ways, start, end, h, gained, d):
 
 @part
 def _reverse(g, arms, start, before, after, d):
-    """Derivatives d, in place, past the instant where g . x = 0; then `before` becomes `after`."""
+    """Derivatives d, in place, past the instant where g . x = 0; then `before` becomes `after`.
+
+    Where nothing brings x there, as from an ellipse that has only just been released, there is no such instant.
+    """
     speed = g[0] * before[0] + g[1] * before[1] + g[2] * before[2]
-    for k in range(len(d)):
+    there = 0.0 < abs(speed) < np.inf
+    for k in range(len(d) if there else 0):
         shift = 0.0
         for c in range(3):
             shift -= (g[c] * d[k, c] + arms[k, c] * start[c]) / speed
@@ -132,7 +137,8 @@ def _release_shift(body, element, s, ways, start, end, before, after, d):
     force = forces_at_work(body, element)
     if jump * body[MASS] > 1e-6 * force and _weakest(body, element, ways, start, force):
         later = _later(body, element, ways, start, before)
-        for k in range(len(d)):
+        there = 0.0 < abs(later) < np.inf
+        for k in range(len(d) if there else 0):
             up = _gap(ways.body[2 * k], ways.element[2 * k], ways, start, d[k], EPS)
             shift = -(up - _gap(ways.body[2 * k + 1], ways.element[2 * k + 1], ways, start, d[k], -EPS)) / (2.0 * EPS)
             for c in range(3):
@@ -204,7 +210,7 @@ def _later(body, element, ways, start, acceleration):
 
 
 @part
-def _bends(element, a, b):
+def bends(element, a, b):
     """Whether a current meets or leaves its limit or 0 between two states: the derivative bends there."""
     first = SIGNS + 1 + len(element)
     for w in range(len(element) - AXES):
@@ -260,13 +266,13 @@ def half_tangent(body, element, bare_body, bare_element, s, ways, start, end, mi
         settle(body, element, bare_body, bare_element, s, first, ways.gained)
     if sticks(end, m):
         settle(body, element, bare_body, bare_element, s, last, ways.gained)
-    if _differ(start, end, m) or _differ(start, first, m) or _differ(end, last, m):
+    if differ(start, end, m) or differ(start, first, m) or differ(end, last, m):
         if not sticks(end, m):
             settle(body, element, bare_body, bare_element, s, last, ways.gained)
         _leap(body, element, s, ways, first, last, h, ways.gained, d1)
         return
     copy_row(first, start)
-    pieces = PIECES if _bends(element, start, end) else 1
+    pieces = PIECES if bends(element, start, end) else 1
     for piece in range(pieces):
         copy_table(ways.kept, d1)
         step_tangent(body, element, s, ways, first, last, middle, h / pieces, d1, d1)

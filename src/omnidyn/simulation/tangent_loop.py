@@ -21,6 +21,7 @@ from omnidyn.model.scratch import copy_row, copy_table, scratch
 from omnidyn.simulation.commands import Commands, loop_gains, on_ticks
 from omnidyn.simulation.implicit import SIMPSON, STAGES, Outcome, advance_pose, begun, room
 from omnidyn.simulation.speed_loop import close_loop, loop_of, seen_speed, tick_answer, tick_branch
+from omnidyn.simulation.tangent_look import Looks, looks
 from omnidyn.simulation.tangent_march import advance_pose_tangent, row_tangent
 from omnidyn.simulation.tangent_step import EPS, Ways, step_tangent
 
@@ -47,6 +48,7 @@ class LoopRun(NamedTuple):
     pose: FloatArray  # (rows + 1, K, 3)
     voltage: FloatArray  # (rows, n)
     by_key: FloatArray  # (K, rows, n) derivative of the voltage
+    seen: Looks  # none
 
 
 def run_tangent_loop(
@@ -72,7 +74,7 @@ def run_tangent_loop(
     out = begun(rows, start[0], start[1])
     found = LoopRun(
         out, np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, count, 3)), np.zeros((rows, n)),
-        np.zeros((count, rows, n)),
+        np.zeros((count, rows, n)), looks(np.zeros(1), np.zeros(0), 3, count),
     )  # fmt: skip
     found.state[0] = first
     march_loop(
@@ -177,7 +179,7 @@ def march_loop(
             if tol > 0.0:
                 h = row_tangent(
                     body, element, bare_body, bare_element, s, spare, ways, state, dt[j], tol, h, pose, d, dnext,
-                    dpose, counts,
+                    dpose, counts, True, found.seen, 0.0,
                 )  # fmt: skip
             else:
                 counts[0] = step_tangent(body, element, s, ways, state, spare[2], spare[3], dt[j], d, dnext)

@@ -54,7 +54,9 @@ NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count,
 MANY = 100_000  # rows to which a long log is first fitted
 LATENCIES = 500  # steps for their median
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
-FINE = 1e-3  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
+FEW = 1500  # the same for the implicit engine
+NEAR, CLOSE = 0.1, 1e-4  # squared distance to the best point, in standard errors, at which that ends; and the whole
+FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 BREAKAWAY = "friction.axes.breakaway"
 IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
@@ -110,8 +112,8 @@ def fit_output_error(
     watch: is called with every better state on the way.
 
     Returns an Estimate with nuisances, noise and what is not identifiable. Raises InputError for options and logs that
-    cannot be used, InsufficientDataError where nothing can be learnt. Robots that need the implicit engine know latency
-    only, and start at rest; UnsupportedError for more.
+    cannot be used, InsufficientDataError where nothing can be learnt, UnsupportedError for what an engine does not
+    know. Of the nuisances, robots that need the implicit engine have latencies by default; they know the others.
     """
     given = Options(
         None if free is None else tuple(free), tuple(fixed), nuisance_names(nuisances), start, use_priors,
@@ -163,10 +165,18 @@ def _solve(
     if is_exact(robot):
         solver = Solver(problem, ExactEngine(problem), nu)
         return solver, solver.minimise(first_point(solver, records), watch=watch)
-    coarse = Solver(problem, TangentEngine(problem), nu)
-    first = coarse.minimise(problem.start())
-    fine = Solver(problem, TangentEngine(problem, FINE), nu)
-    return fine, fine.minimise(first.state.point, watch=watch)
+    fine = Solver(problem, TangentEngine(problem, FINE), nu, CLOSE)
+    return fine, fine.minimise(coarse_point(problem, nu), watch=watch)
+
+
+def coarse_point(problem: Problem, nu: float) -> Point:
+    """Near the best point, by one step a row; a long log is first fitted in part."""
+    solver, short, own = Solver(problem, TangentEngine(problem), nu, NEAR), problem.shortened(FEW), problem.start()
+    if short is problem:
+        return solver.minimise(own).state.point
+    found = Solver(short, TangentEngine(short), nu, NEAR).minimise(own).state.point
+    states = [solver.state(point) for point in (own, found)]
+    return solver.minimise(min(states, key=lambda state: state.objective).point).state.point
 
 
 def degrees(loss: str) -> float:

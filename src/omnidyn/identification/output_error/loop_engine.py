@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.exact_engine import LATE, Weighting
 from omnidyn.identification.output_error.problem import Piece, PieceSums, Point, Problem
-from omnidyn.identification.output_error.tangent_engine import MEET, _added, _grid, _of_twist
+from omnidyn.identification.output_error.sums import added
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.layout import AXES
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands
 from omnidyn.simulation.tangent import Derivatives, Prepared, differentiate, prepared
 
 FloatArray = NDArray[np.float64]
 
+MEET = 1e-7  # [s] times that differ by less are one
 SETTLED = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command
 
 
@@ -67,7 +69,9 @@ class LoopEngine:
             known = np.array([self._columns.index(column) for column in piece.record.columns])
             outputs, slopes = self.outputs(ready, piece, state, point.values)
             residual = piece.record.outputs[piece.first : piece.last + 1] - outputs
-            found.append(_added(residual, slopes, weighting.variance[known], weighting, known))
+            width = slopes.shape[2]
+            turned = np.ascontiguousarray(residual.T), np.ascontiguousarray(np.swapaxes(slopes, 0, 1))
+            found.append(added(*turned, np.arange(width), weighting, known, width))
         return found
 
     def outputs(
@@ -120,6 +124,19 @@ class LoopEngine:
                 out[:, j] += factor * by_key[:, k]
                 k += 1
         return out
+
+
+def _grid(t: FloatArray, seen: Sequence[FloatArray]) -> FloatArray:
+    """All times of rows and of what is seen, after the start, each once."""
+    times = np.unique(np.concatenate([t, *(row[(row > t[0]) & (row < t[-1])] for row in seen)]))
+    return times[np.concatenate([[True], np.diff(times) > MEET])]
+
+
+def _of_twist(robot: Robot, twist: FloatArray, name: str, i: int) -> FloatArray:
+    """What an output takes linearly from a twist; the heading takes its rate. Shape (rows,)."""
+    if name == "wheel_speed":
+        return wheel_speed(robot.wheels, twist)[:, i]
+    return twist[:, 2 if name == "heading" else i]
 
 
 def _keys(name: str, also: Sequence[tuple[str, float]]) -> list[str]:

@@ -63,10 +63,13 @@ class Solution:
 
 
 class Solver:
-    """Minimises F over a problem. `floor` (columns,): least variance of each column."""
+    """Minimises F over a problem. `floor` (columns,): least variance of each column.
 
-    def __init__(self, problem: Problem, engine: Engine, nu: float = 0.0):
-        self.problem, self.engine, self.nu = problem, engine, nu
+    close: squared distance to the best point, in standard errors, at which it ends.
+    """
+
+    def __init__(self, problem: Problem, engine: Engine, nu: float = 0.0, close: float = CLOSE):
+        self.problem, self.engine, self.nu, self.close = problem, engine, nu, close
         self.floor = _floor(problem)
         # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross.
         self._jumps = np.array([p.name == "latency.current" for p in problem.parameters], bool)
@@ -91,7 +94,7 @@ class Solver:
         """The best point from `start`; `watch` sees every better one on the way."""
         if not self.nu:
             return self._descend(self.state(self._inside(start)), limit, watch)
-        plain = Solver(self.problem, self.engine).minimise(start, limit)
+        plain = Solver(self.problem, self.engine, close=self.close).minimise(start, limit)
         now = self.state(plain.state.point, plain.state.variance)
         return self._descend(self._rescaled(now)[0], limit, watch)
 
@@ -104,7 +107,7 @@ class Solver:
             held, better = normal.held, False
             still = held | blocked
             while not better and normal.distance_without(still) / (1.0 + damping) > (
-                CLOSE if damping < FIRM else ENOUGH
+                self.close if damping < FIRM else max(ENOUGH, self.close)
             ):
                 trial = self.state(normal.moved(damping, still), now.variance if self.nu else None)
                 better = trial.objective < now.objective

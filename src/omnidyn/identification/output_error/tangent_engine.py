@@ -1,174 +1,178 @@
 """The second engine of a fit: robots that the exact step cannot simulate, by the derivatives of the implicit engine.
 
-The same interface as exact_engine.py, with arrays of the length of the log. It knows numbers of the robot file and the
-latency of channels: a latency is exact, for the run is simulated on a grid that has a row at every t - latency.
+The same interface as exact_engine.py, with arrays of the length of the log. A latency takes no steps of its own: the
+run is looked at between its rows (tangent_look.py).
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.exact_engine import LATE, Weighting
-from omnidyn.identification.output_error.kernel import FINAL
+from omnidyn.identification.output_error.driver import through_driver
+from omnidyn.identification.output_error.exact_engine import DEAD, FADE, GAIN, LATE, Weighting
+from omnidyn.identification.output_error.parameters import Parameter
 from omnidyn.identification.output_error.problem import Piece, PieceSums, Point, Problem
-from omnidyn.model.dynamics import acceleration
+from omnidyn.identification.output_error.sums import added
 from omnidyn.model.layout import AXES
+from omnidyn.model.motor import clip_voltage
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import wheel_speed
-from omnidyn.simulation.tangent import Derivatives, derivatives
+from omnidyn.simulation.tangent import difference
+from omnidyn.simulation.tangent_sight import Direction, Sight, sights
+from omnidyn.simulation.tangent_step import EPS
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Found = tuple[FloatArray, FloatArray, IntArray]
 
-KNOWN = ("twist", "wheel_speed", "heading")  # outputs that are linear in twist and pose, whatever is free
-MEET = 1e-7  # [s] times that differ by less are one
+DRIVER = {GAIN: 1.0, DEAD: 0.0, FADE: 0.0}  # in the order of kernel.py, with what leaves the voltages as they are
 
 
 class TangentEngine:
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
-    Raises UnsupportedError for nuisances and outputs that it does not know.
+    Raises UnsupportedError for nuisances that it does not know.
     """
 
     def __init__(self, problem: Problem, tol: float | None = None):
         self.problem, self.tol, self._columns = problem, tol, problem.columns
-        other = [p.name for p in problem.parameters[problem.robot_count :] if not p.name.startswith(LATE)]
-        other += sorted({name for name, _ in self._columns if name not in KNOWN})
-        if other or any(piece.free.any() for piece in problem.pieces):
+        nuisances = [p.name for p in problem.parameters[problem.robot_count :]]
+        other = [name for name in nuisances if not name.startswith(LATE) and name not in DRIVER]
+        if other:
             raise UnsupportedError(
                 "this robot is fitted by the implicit engine, which does not know all that is asked for",
-                got=", ".join(other) or "a start that is not at rest", where=problem.robot.name,
-                expected="nuisances: latency; outputs: twist and wheel_speed; start: rest",
+                got=", ".join(other), where=problem.robot.name, expected=f"nuisances: latency, {', '.join(DRIVER)}",
+                remedy="leave it out of the nuisances",
             )  # fmt: skip
+        self._known: dict[tuple[bytes, ...], list[Found]] = {}
 
     def at_tolerance(self, tol: float | None) -> TangentEngine:
         """The same engine with another tolerance."""
-        engine = copy.copy(self)
+        engine = self.on(self.problem)
         engine.tol = tol
         return engine
 
     def on(self, problem: Problem) -> TangentEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
-        engine.problem, engine._columns = problem, problem.columns
+        engine.problem, engine._columns, engine._known = problem, problem.columns, {}
         return engine
 
     def robot_at(self, values: FloatArray) -> Robot:
         """The robot with these values, not checked."""
         robot = self.problem.robot
-        for p, value in zip(self.problem.parameters[: self.problem.robot_count], values, strict=False):
+        for p, value in zip(self._own, values, strict=False):
             robot = p.on(robot, float(value))
         return robot
 
+    @property
+    def _own(self) -> tuple[Parameter, ...]:
+        """The parameters of the robot file."""
+        return self.problem.parameters[: self.problem.robot_count]
+
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the residuals of every piece add up to; see kernel.py."""
-        robot = self.robot_at(point.values)
+        found = []
+        for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True):
+            columns = piece.record.columns
+            known = np.array([self._columns.index(column) for column in columns])
+            found.append(added(*parts, weighting, known, len(self.problem.parameters) + AXES + len(columns)))
+        return found
+
+    def residuals(self, point: Point) -> list[Found]:
+        """(residuals, slopes, at) of every piece, see `_piece`; those of the last two points are kept.
+
+        A fit ends where it was, or at its last trial, and is then asked again with other weights.
+        """
+        asked = (point.values.tobytes(), *(state.tobytes() for state in point.states))
+        found = self._known.pop(asked, None) or self._simulated(point)
+        while len(self._known) > 1:
+            del self._known[next(iter(self._known))]
+        self._known[asked] = found
+        return found
+
+    def _simulated(self, point: Point) -> list[Found]:
+        robot, values = self.robot_at(point.values), point.values
+        scales = [abs(float(value)) or 1.0 for value in values]
+        moved = [
+            tuple(p.on(robot, float(value) + side * EPS * scale) for side in (1.0, -1.0))
+            for p, value, scale in zip(self._own, values, scales, strict=False)
+        ]
         return [
-            self._piece(robot, piece, state, point.values, weighting)
+            self._piece(robot, moved, scales, piece, state, values)
             for piece, state in zip(self.problem.pieces, point.states, strict=True)
         ]
 
     def _piece(
-        self, robot: Robot, piece: Piece, state: FloatArray, values: FloatArray, weighting: Weighting
-    ) -> PieceSums:
-        columns = piece.record.columns
-        known = np.array([self._columns.index(column) for column in columns])
-        outputs, slopes = self._outputs(robot, piece, state, values)
-        residual = piece.record.outputs[piece.first : piece.last + 1] - outputs
-        t = piece.record.t[piece.first : piece.last + 1]
-        residual[(t - t[0])[:, None] < piece.margin] = np.nan
-        return _added(residual, slopes, weighting.variance[known], weighting, known)
+        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
+        values: FloatArray,
+    ) -> Found:  # fmt: skip
+        """(residuals (C, rows), slopes (C, rows, U), index of each of the U among the P parameters and the states)."""
+        record, count = piece.record, len(self.problem.parameters)
+        t, measured = record.t[piece.first : piece.last + 1], record.outputs[piece.first : piece.last + 1].T
+        voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
+        where = [self.problem.where(LATE + name) for name, _ in record.columns]
+        late = [float(values[k]) if k >= 0 else 0.0 for k in where]
+        distinct = sorted(set(late))
+        seen, _ = sights(robot, t, voltage, directions, state[:AXES], distinct, self.tol)
+        residual = np.empty(measured.shape)
+        keys = len(at)
+        at += [*dict.fromkeys(k for k in where if k >= 0), *(count + AXES + np.flatnonzero(piece.free[AXES:]))]
+        slopes = np.zeros((*measured.shape, len(at)))
+        shown: dict[tuple[str, float], tuple[FloatArray, FloatArray, FloatArray]] = {}
+        for c, (name, i) in enumerate(record.columns):
+            key = (name, late[c])
+            if key not in shown:
+                shown[key] = _shown(seen[distinct.index(late[c])], name)
+            value, pace, by = shown[key]
+            residual[c] = measured[c] - value[:, i] - state[AXES + c]
+            residual[c][t - t[0] < piece.margin[c]] = np.nan
+            np.multiply(by[:, :, i], factors, out=slopes[c, :, :keys])
+            if where[c] >= 0:
+                slopes[c, :, at.index(where[c])] = -pace[:, i]
+            if piece.free[AXES + c]:
+                slopes[c, :, at.index(count + AXES + c)] = 1.0
+        return residual, slopes, np.array(at)
 
-    def _outputs(
-        self, robot: Robot, piece: Piece, state: FloatArray, values: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Outputs (rows, C) and slopes (rows, C, P + 3 + C); NaN before the start."""
-        columns, count = piece.record.columns, len(self.problem.parameters)
-        t, rows = piece.record.t[piece.first : piece.last + 1], slice(piece.first, piece.last + 1)
-        late = [self.problem.where(LATE + name) for name, _ in columns]
-        seen = [t - (values[k] if k >= 0 else 0.0) for k in late]
-        grid = _grid(t, seen)
-        voltage = piece.record.voltage[rows][np.maximum(np.searchsorted(t, grid[:-1] + MEET, side="right") - 1, 0)]
-        keys = [(p.name, *(key for key, _ in p.also)) for p in self.problem.parameters[: self.problem.robot_count]]
-        flat = [key for group in keys for key in group]
-        found = derivatives(robot, voltage, np.diff(grid), flat, twist=state[:AXES], tol=self.tol)
-        outputs = np.full((len(t), len(columns)), np.nan)
-        slopes = np.zeros((len(t), len(columns), count + AXES + len(columns)))
-        held = np.concatenate([voltage, voltage[-1:]])
-        for c, (name, i) in enumerate(columns):
-            at = np.searchsorted(grid, seen[c] - MEET)
-            used = (seen[c] >= t[0] - MEET) & (at < len(grid))
-            at = at[used]
-            outputs[used, c], by_key = _column(robot, found, name, i, at)
-            slopes[used, c, : self.problem.robot_count] = self._chained(by_key)
-            if late[c] >= 0:
-                assert found.run.twist is not None
-                pace = found.run.twist[at]
-                if name != "heading":
-                    pace = acceleration(robot, found.run.twist[at], held[at])
-                slopes[used, c, late[c]] = -_of_twist(robot, pace, name, i)
-        return outputs, slopes
-
-    def _chained(self, by_key: FloatArray) -> FloatArray:
-        """Derivatives by the parameters from those by all their keys. Shape (rows, robot_count)."""
-        out, k = np.zeros((len(by_key), self.problem.robot_count)), 0
-        for j, p in enumerate(self.problem.parameters[: self.problem.robot_count]):
-            for factor in (1.0, *(factor for _, factor in p.also)):
-                out[:, j] += factor * by_key[:, k]
-                k += 1
-        return out
+    def _directions(
+        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, values: FloatArray
+    ) -> tuple[FloatArray, list[Direction], list[int], FloatArray]:
+        """(voltages at the motors, directions, index of each among the slopes, what turns its derivative into that)."""
+        record, where, count = piece.record, self.problem.where, len(self.problem.parameters)
+        rows = slice(piece.first, piece.last)
+        at, directions = list(range(self.problem.robot_count)), []
+        logged = clip_voltage(robot.motor, record.voltage[rows])
+        found = [where(name) for name in DRIVER]
+        numbers = [float(values[k]) if k >= 0 else plain for k, plain in zip(found, DRIVER.values(), strict=True)]
+        share = (record.t[rows] - record.t[0]) / record.span
+        voltage, by = through_driver(logged, share, *numbers)
+        for p, (up, down) in zip(self._own, moved, strict=True):
+            rate = None
+            if up.motor.voltage_limit != down.motor.voltage_limit:
+                ends = [through_driver(clip_voltage(r.motor, logged), share, *numbers)[0] for r in (up, down)]
+                rate = difference(np.array(ends))[0]
+            directions.append(Direction(p.name, up, down, rate))
+        for name, k, rate in zip(DRIVER, found, by, strict=True):
+            if k >= 0:
+                directions.append(Direction(name, voltage=rate))
+                at.append(k)
+        for axis in np.flatnonzero(piece.free[:AXES]):
+            directions.append(Direction("start", start=np.eye(AXES)[axis]))
+            at.append(count + int(axis))
+        factors = np.ones(len(at))
+        factors[: self.problem.robot_count] = 1.0 / np.array(scales[: self.problem.robot_count])
+        return voltage, directions, at, factors
 
 
-def _grid(t: FloatArray, seen: Sequence[FloatArray]) -> FloatArray:
-    """All times of rows and of what is seen, after the start, each once."""
-    times = np.unique(np.concatenate([t, *(row[(row > t[0]) & (row < t[-1])] for row in seen)]))
-    return times[np.concatenate([[True], np.diff(times) > MEET])]
-
-
-def _of_twist(robot: Robot, twist: FloatArray, name: str, i: int) -> FloatArray:
-    """What an output takes linearly from a twist; the heading takes its rate. Shape (rows,)."""
+def _shown(seen: Sight, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(value (rows, m), its time derivative (rows, m), its derivatives (rows, K, m)) of a channel of m columns."""
     if name == "wheel_speed":
-        return wheel_speed(robot.wheels, twist)[:, i]
-    return twist[:, 2 if name == "heading" else i]
-
-
-def _column(robot: Robot, found: Derivatives, name: str, i: int, at: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-    """One output at rows `at` of the run, and its derivatives by key. Wheel radii and angles do not change."""
-    assert found.run.twist is not None
-    assert found.run.pose is not None
+        return seen.wheel_speeds()
+    if name == "current":
+        return seen.currents()
     if name == "heading":
-        return found.run.pose[at, 2], found.pose[at, 2]
-    turned = np.moveaxis(found.twist[at], 1, 2)
-    return _of_twist(robot, found.run.twist[at], name, i), _of_twist(robot, turned.reshape(-1, AXES), name, i).reshape(
-        len(at), -1
-    )
-
-
-def _added(
-    residual: FloatArray, slopes: FloatArray, variance: FloatArray, weighting: Weighting, known: NDArray[np.int64]
-) -> PieceSums:
-    """The sums of kernel.py from arrays: residual (rows, C), slopes (rows, C, P)."""
-    there = np.isfinite(residual) & np.isfinite(slopes).all(axis=2)  # at a kink a slope may not be a number
-    r, z2 = np.where(there, residual, 0.0), np.where(there, residual, 0.0) ** 2 / variance
-    nu, final = weighting.nu, bool(weighting.mode & FINAL)
-    weight, curvature, rho = np.ones_like(r), np.ones_like(r), 0.5 * z2
-    if nu:
-        weight, rho = (nu + 1.0) / (nu + z2), 0.5 * (nu + 1.0) * np.log1p(z2 / nu)
-        curvature = weight * ((nu - z2) / (nu + z2) if final else (nu + 1.0) / (nu + 3.0))
-    pull, j = weight * r, np.where(there[:, :, None], slopes, 0.0)
-    grad = np.einsum("kc,kcp->cp", pull, j)
-    info = np.stack([(j[:, c] * curvature[:, c, None]).T @ j[:, c] for c in range(r.shape[1])])
-    score, drift = np.zeros((0, j.shape[2])), np.zeros((0, r.shape[1]))
-    if final:
-        starts = np.arange(0, len(r), weighting.block)
-        score = np.add.reduceat(np.einsum("kc,kcp->kp", pull / variance, j), starts, axis=0)
-        drift = np.add.reduceat(pull, starts, axis=0)
-    lag = (pull[1:] * pull[:-1]).sum(axis=0)
-    return PieceSums(
-        known, there.sum(axis=0).astype(float), (pull * r).sum(axis=0), np.where(there, rho, 0.0).sum(axis=0), lag,
-        grad, info, score, drift,
-    )  # fmt: skip
+        return seen.heading[:, None], seen.twist[:, 2:], seen.heading_by[:, :, None]
+    return seen.twist, seen.pace, seen.twist_by
