@@ -19,9 +19,9 @@ ORDER = {
     "model": """frames value layout wheels motor drive friction robot robot_file starter plant scratch
         forces face holding inclusion rest dynamics statespace deadzone""",
     "model/friction": "law axes direction wheels",
-    "simulation": """inputs commands exact_step exact_sensitivity travel exact exact_inductance_step
-        exact_inductance_travel exact_inductance implicit_step speed_loop implicit simulate tangent_step tangent_events
-        tangent_look tangent_march tangent_loop tangent tangent_sight""",
+    "simulation": """inputs commands exact_step exact_sensitivity travel exact exact_position
+        exact_inductance_step exact_inductance_travel exact_inductance implicit_step speed_loop implicit simulate
+        tangent_step tangent_events tangent_look tangent_march tangent_loop tangent tangent_sight""",
     "logs": """channels dialect header rows text_file table parquet_pages parquet tables run_file steady_table
         command_file words mapping clock guessed guess_time guess counters log read_log segments average plateaus
         findings check""",
@@ -32,8 +32,8 @@ ORDER = {
         shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table
         identify joint_problem joint_fit as_fitted validation motor_engine motor_log motor_fit motor_run
         motor_choice fit_words best_so_far""",
-    "identification/output_error": """parameters primitives record problem kernel axis_kernel driver exact_engine
-        sums tangent_engine loop_engine solver starts motion nuisances loop uncertainty support
+    "identification/output_error": """parameters primitives counts doubled outputs record problem kernel axis_kernel
+        driver exact_engine sums tangent_engine loop_engine solver starts motion nuisances loop uncertainty support
         breakaway resampling answer conclusion fit""",
     "control": "",
     "campaigns": "",

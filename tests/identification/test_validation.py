@@ -9,8 +9,9 @@ from benchmarks.identify import NOISE, excitation, noisy
 from omnidyn.errors import InputError
 from omnidyn.identification.as_fitted import as_fitted, at_motors, mean_before
 from omnidyn.identification.identify import choose_method, options_of
+from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU, fit_output_error
-from omnidyn.identification.validation import SCALE_OF_T, Score, coloured, validate
+from omnidyn.identification.validation import Score, coloured, validate
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

@@ -8,14 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.nuisances import DEAD, FADE, GAIN, LATENCY
+from omnidyn.identification.output_error.nuisances import DEAD, FADE, GAIN, LATENCY, TILT
+from omnidyn.identification.output_error.primitives import primitives
 from omnidyn.identification.output_error.record import record
 from omnidyn.logs.segments import segments
+from omnidyn.logs.steady_table import AXES
+from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
 
-LATE = ("twist", "wheel_speed", "current", "heading")  # channels that may be late, the first one sets the clock
+LATE = (
+    "twist",
+    "wheel_speed",
+    "current",
+    "heading",
+    "position",
+    "wheel_angle",
+)  # channels that may be late, the first one sets the clock
 
 
 def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
@@ -23,12 +33,13 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
 
     Without nuisances it is the run itself. With a latency the clock is that of the first late channel, whose samples
     are left as they are; a voltage that changes within a row is the mean over it, and other channels are interpolated
-    by what they differ. At 100 Hz the mean is off by less than 1 % of what one row changes. A wheel angle is dropped.
+    by what they differ. At 100 Hz the mean is off by less than 1 % of what one row changes. A tilt becomes the volts
+    that push as hard; currents do not follow it. A wheel angle is dropped.
     """
     values = {name: nuisance.value for name, nuisance in fit.nuisances.items()}
     if not values:
         return run
-    voltage = at_motors(record(run, fit.robot).voltage, run.t, values)
+    voltage = at_motors(record(run, fit.robot).voltage, run.t, values) + pushing(fit.robot, values)
     late = {name: values.get(f"{LATENCY}.{name}", 0.0) for name in LATE}
     if not any(late.values()):
         return run.replace(voltage=voltage, duty=None, supply=None)
@@ -41,7 +52,9 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
         if own is not None:
             changes[name] = _shifted(run.t, own, late[name] - main, parts)
     if run.pose is not None:
-        changes["pose"] = _shifted(run.t, run.pose, late["heading"] - main, parts)
+        moved_by = [late["position"] - main, late["position"] - main, late["heading"] - main]
+        columns = [_shifted(run.t, run.pose[:, k : k + 1], by, parts) for k, by in enumerate(moved_by)]
+        changes["pose"] = np.hstack(columns)
     note = f"channels were moved back by the fitted latency of {main:.4g} s"
     return run.replace(
         t=run.t - main,
@@ -52,6 +65,14 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
         warnings=(*run.warnings, note),
         **changes,
     )
+
+
+def pushing(robot: Robot, values: Mapping[str, float]) -> FloatArray:
+    """The least volts that push as hard as the fitted tilt; shape (wheels,)."""
+    now, force = primitives(robot), np.array([values.get(f"{TILT}.{axis}", 0.0) for axis in AXES])
+    if not force.any():
+        return np.zeros(robot.wheels.count)
+    return np.asarray(np.linalg.lstsq(now.drive, now.per_force * force, rcond=None)[0], dtype=float)
 
 
 def at_motors(voltage: FloatArray, t: FloatArray, values: Mapping[str, float]) -> FloatArray:

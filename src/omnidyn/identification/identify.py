@@ -19,7 +19,7 @@ from omnidyn.simulation.exact import why_not_exact
 
 AUTO, OUTPUT_ERROR, STEADY_STATE = "auto", "output-error", "steady-state"
 METHODS = (OUTPUT_ERROR, STEADY_STATE)
-OUTPUTS = ("twist", "wheel_speed", "current", "pose")
+OUTPUTS = ("twist", "wheel_speed", "wheel_angle", "current", "pose")
 _FUNCTIONS: dict[str, Callable[..., Any]] = {OUTPUT_ERROR: fit_output_error, STEADY_STATE: identify_steady}
 
 

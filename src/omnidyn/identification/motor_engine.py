@@ -44,11 +44,12 @@ class MotorMapping:
 
         now = Primitives(
             axis(rate, 1.0), axis(band * gain, 0.0), axis(band * gain, 0.0), axis(gain, 0.0)[:, None],
-            np.array([[0.0, 0.0, 1.0]]), none, np.zeros(1),
+            np.array([[0.0, 0.0, 1.0]]), none, np.zeros(1), np.zeros(AXIS + 1),
         )  # fmt: skip
         derivatives = Primitives(
             slopes(by_rate), slopes(by_level), slopes(by_level), slopes(by_gain)[:, None, :],
             np.zeros((1, AXIS + 1, count)), np.zeros((1, AXIS + 1, count)), np.zeros((1, count)),
+            np.zeros((AXIS + 1, count)),
         )  # fmt: skip
         return now, derivatives
 

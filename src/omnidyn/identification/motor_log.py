@@ -70,7 +70,7 @@ def _record(run: Run, motor: int, put_in: FloatArray, between: str, angle: bool)
         )  # fmt: skip
     return Record(
         run.t, np.ascontiguousarray(np.nan_to_num(u)[:, None]), np.stack([*outputs.values()], axis=1),
-        tuple((name, 0) for name in outputs), tuple(pieces), run.source, False, (),
+        tuple((name, 0) for name in outputs), (0.0,) * len(outputs), tuple(pieces), run.source, False, (),
     )  # fmt: skip
 
 

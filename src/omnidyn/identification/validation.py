@@ -19,9 +19,9 @@ from omnidyn.run import Run
 STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
 HEAD = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
 FITTED, HELD_OUT = "fitted", "held out"
+POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
-SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted to Gaussian noise of std 1
 TO_STD = 1.4826  # median size to standard deviation, for Gaussian noise
 
 
@@ -128,7 +128,7 @@ def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[
 
 
 def _scores(fit: OutputErrorEstimate, found: Comparison) -> dict[str, Score]:
-    """The score of each component. Where the log has a pose, only the heading has a noise."""
+    """The score of each component. What was not fitted has no noise, and no chi2."""
     scores = {}
     for name, each in found.overall[found.robots[0]].items():
         chi2 = _chi2(fit, found, name, each.rmse)
@@ -143,13 +143,13 @@ def _chi2(fit: OutputErrorEstimate, found: Comparison, name: str, rmse: float) -
     if STUDENT_WORDS not in fit.method:
         return rmse**2 / noise**2
     errors = np.concatenate([found.trace(found.robots[0], name, segment).error for segment in found.segments])
-    return float((TO_STD * np.nanmedian(np.abs(errors)) * SCALE_OF_T / noise) ** 2)
+    return float((TO_STD * np.nanmedian(np.abs(errors)) / noise) ** 2)
 
 
 def output_name(component: str) -> str:
     """A component by the name that a fit gives its output: "w2" is "wheel_speed[1]"."""
-    if component == "heading":
-        return "heading[0]"
+    if component in POSE:
+        return POSE[component]
     found = place(component)
     return f"{found[0]}[{found[1]}]" if found else component
 

@@ -117,6 +117,25 @@ def _twists(drive, phi, which, rate, coulomb, breakaway, start):
 
 
 @part
+def turning(start, end, before, after, rate):
+    """How fast the heading turns in a step, as a rate [1/s] beside those of the axes; arguments as for the yaw axis.
+
+    A heading that speeds up is e^(i alpha t^2/2) to the nodes: sqrt(alpha) is a rate too.
+    """
+    return max(abs(start), abs(end)) + SPIN_UP * math.sqrt(max(abs(before - rate * start), abs(after)))
+
+
+@part
+def next_cut(left, dt, event, rate, spin):
+    """Where the quadrature that begins at `left` [s] ends: at the next event, sooner where the motion is fast."""
+    right = dt
+    for axis in range(3):
+        if left < event[axis] < right:
+            right = event[axis]
+    return min(right, left + PIECE / _fastest_rate(left, event, rate, spin))
+
+
+@part
 def _fastest_rate(t, event, rate, spin):
     """How fast the motion still changes at time t of a step: the fastest axis not yet settled, plus the turning."""
     fastest = 0.0
@@ -147,15 +166,9 @@ def _displacement(start, event, before, after, rate, left, right, nodes, weights
 def _travel(start, end, event, before, after, rate, dt, nodes, weights):
     """Displacement over a whole step in the body frame at its start: pieces between events, short where it is fast."""
     x = y = left = 0.0
-    spin = max(abs(start[2]), abs(end[2]))
-    # A heading that speeds up is e^(i alpha t^2/2) to the nodes: sqrt(alpha) is a rate too.
-    spin += SPIN_UP * math.sqrt(max(abs(before[2] - rate[2] * start[2]), abs(after[2])))
+    spin = turning(start[2], end[2], before[2], after[2], rate[2])
     while left < dt:
-        right = dt
-        for axis in range(3):
-            if left < event[axis] < right:
-                right = event[axis]
-        right = min(right, left + PIECE / _fastest_rate(left, event, rate, spin))
+        right = next_cut(left, dt, event, rate, spin)
         dx, dy = _displacement(start, event, before, after, rate, left, right, nodes, weights)
         x, y, left = x + dx, y + dy, right
     return x, y

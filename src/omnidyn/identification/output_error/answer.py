@@ -24,7 +24,8 @@ class Nuisance:
 class OutputErrorEstimate(Estimate):
     """An Estimate from whole logs. `correlation` covers the nuisances too.
 
-    nuisances: name -> Nuisance. noise: output -> std of what the model leaves, in the unit of the output.
+    nuisances: name -> Nuisance. noise: output -> std of what the model leaves, in the unit of the output; after
+    Student's t without its wild samples, of counts before the encoder rounds.
     unidentifiable: names of what the data do not determine; they keep what the robot had, std and interval are
     infinite. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
     iterations, converged: of the minimisation.

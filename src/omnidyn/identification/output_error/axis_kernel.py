@@ -35,10 +35,9 @@ def march_axis(t, u, y, axis, first, last, drive, rate, coulomb, hold, start, va
     for k in range(first, last + 1):
         residual = y[k, axis] - v
         if residual == residual:
-            weight, curvature, rho = loss_terms(residual, variance, nu, final)
-            pull = weight * residual
+            pull, more, curvature, rho = loss_terms(residual, variance, nu, final)
             count += 1.0
-            square += pull * residual
+            square += more
             total += rho
             lag += pull * before
             before = pull

@@ -13,14 +13,16 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.breakaway import Breakaway
-from omnidyn.identification.output_error.nuisances import LATENCY
-from omnidyn.identification.output_error.problem import Problem
+from omnidyn.identification.output_error.nuisances import LATENCY, TILT
+from omnidyn.identification.output_error.problem import Problem, per_column
 from omnidyn.identification.output_error.record import Record
 from omnidyn.identification.output_error.solver import Solution, Solver
 from omnidyn.identification.output_error.uncertainty import BLIND, SHARE, Trust
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]
+
+SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted to Gaussian noise of std 1
 
 
 def conclude(
@@ -66,13 +68,26 @@ def conclude(
             name: Nuisance(float(values[own + j]), std[name], ci95[name], _unit(name))
             for j, name in enumerate(names[own:])
         },
-        noise={_column(c): float(s) for c, s in zip(problem.columns, np.sqrt(solution.state.variance), strict=True)},
+        noise=noise_of(solver, solution),
         unidentifiable=blind,
         blind=tuple(_direction(problem, value, way) for value, way in known.directions),
         covariance=known.kind,
         iterations=solution.iterations,
         converged=solution.converged,
     )
+
+
+def noise_of(solver: Solver, solution: Solution) -> dict[str, float]:
+    """Output -> standard deviation of its noise; outputs without a measurement are left out.
+
+    After a fit by Student's t: of the Gaussian noise that has this scale, so that wild samples have no part in it. Of
+    counts: before the encoder rounds; at least LEAST_SHARE of a tick.
+    """
+    columns = solver.problem.columns
+    number = per_column(solution.state.sums, len(columns), "number")
+    robust = bool(solver.nu) & (solver.tick == 0.0)
+    std = np.sqrt(solution.state.variance) / np.where(robust, SCALE_OF_T, 1.0)
+    return {_column(c): float(s) for c, s, rows in zip(columns, std, number, strict=True) if rows}
 
 
 def intervals(
@@ -196,6 +211,8 @@ def _column(column: tuple[str, int]) -> str:
 
 
 def _unit(name: str) -> str:
+    if name.startswith(TILT):
+        return "N m" if name.endswith("yaw") else "N"
     return {LATENCY: "s", "dead_band": "V"}.get(name.partition(".")[0], "")
 
 

@@ -20,26 +20,35 @@ from omnidyn.identification.output_error.axis_kernel import (
     march_axis,
     spread,
 )
-from omnidyn.identification.output_error.kernel import FINAL, KEEP, Loss, Physics, Slopes, Sums, march
+from omnidyn.identification.output_error.counts import information
+from omnidyn.identification.output_error.kernel import FINAL, KEEP, PATH, Loss, Physics, Slopes, Sums, march
 from omnidyn.identification.output_error.primitives import Mapping, Primitives
 from omnidyn.identification.output_error.problem import Column, Piece, PieceSums, Point, Problem
 from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.frames import body_to_world
 from omnidyn.model.layout import AXES
+from omnidyn.simulation.exact_position import PLACE_SIZE
 
 FloatArray = NDArray[np.float64]
 
 VECTOR = 4  # rows of slopes are padded to a multiple
 LATE, GAIN, DEAD, FADE = "latency.", "gain", "dead_band", "fade"
+POSITION, HEADING = "position", ("heading", 0)
+TILT = ("tilt.x", "tilt.y", "tilt.yaw")
 
 
 @dataclass(frozen=True)
 class Weighting:
-    """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel.py."""
+    """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel.py.
+
+    counted: whether counts are taken as such, or like any other output.
+    """
 
     variance: FloatArray
     nu: float = 0.0
     mode: int = 0
     block: int = 1
+    counted: bool = False
 
 
 class ExactEngine:
@@ -82,8 +91,13 @@ class ExactEngine:
         for piece in self.problem.pieces:
             u, t = piece.record.voltage[piece.first : piece.last], piece.record.t[piece.first : piece.last]
             left = gain * (1.0 - fade * (t - piece.record.t[0]) / piece.record.span)
-            found.append((left[:, None] * np.sign(u) * np.maximum(np.abs(u) - dead, 0.0)) @ matrix.T)
+            applied = left[:, None] * np.sign(u) * np.maximum(np.abs(u) - dead, 0.0)
+            found.append(applied @ matrix.T + self._tilt(point.values))
         return found
+
+    def _tilt(self, values: FloatArray) -> FloatArray:
+        """The constant force on the axes [N, N, N m]."""
+        return np.array([values[k] if (k := self.problem.where(name)) >= 0 else 0.0 for name in TILT])
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the march over every piece adds up."""
@@ -139,15 +153,20 @@ class ExactEngine:
         known = np.array([self._columns.index(column) for column in columns])
         total = count + AXES + len(columns)
         used = np.concatenate([np.arange(count), count + np.flatnonzero(piece.free)])  # the kernel knows no others
-        physics, slopes, groups = self._numbers(piece, values, now, by, -(-len(used) // VECTOR) * VECTOR)
-        loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode)
+        physics, slopes, groups = self._numbers(piece, state, values, now, by, -(-len(used) // VECTOR) * VECTOR)
+        counted = weighting.counted and any(piece.record.ticks)
+        tick = np.array(piece.record.ticks) if counted else None
+        share = np.ones(len(known)) if tick is None else information(weighting.variance[known], tick)[0]
+        loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode, share)
+        moves = any(name == POSITION for name, _ in columns)
         sums = _empty(
             len(columns), slopes.law.shape[2], len(used), len(piece.record.t), weighting.mode, _blocks(piece, weighting)
         )
         march(
             piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
             float(piece.record.t[0]), piece.record.span, piece.margin, state[:AXES], state[AXES:], groups,
-            physics, slopes, loss, sums,
+            physics, slopes, loss, sums, tick, np.zeros((2, PLACE_SIZE)) if moves else None,
+            np.zeros((3, 3)) if moves else None,
         )  # fmt: skip
         grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
         info = np.zeros((len(columns), total, total))
@@ -156,7 +175,7 @@ class ExactEngine:
         return tight, (sums.predicted, _at(used, sums.slopes, total))
 
     def _numbers(
-        self, piece: Piece, values: FloatArray, now: Primitives, by: Primitives, padded: int
+        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, padded: int
     ) -> tuple[Physics, Slopes, NDArray[np.int64]]:
         """Physics and slopes of the outputs of one piece."""
         problem, columns = self.problem, piece.record.columns
@@ -167,36 +186,59 @@ class ExactEngine:
             out[..., :robot_count] = slope
             return out
 
-        maps, slopes = _maps(columns, now), _maps(columns, by, (robot_count,))
+        facing = state[AXES + columns.index(HEADING)] if HEADING in columns else 0.0
+        maps, slopes = _maps(columns, now, facing), _maps(columns, by, facing, (robot_count,))
         late = [problem.where(LATE + name) for name, _ in columns]
         driver = [problem.where(name) for name in (GAIN, DEAD, FADE)]
-        fixed = (1.0, 0.0, 0.0)
+        fixed, tilt = (1.0, 0.0, 0.0), self._tilt(values)
         physics = Physics(
-            np.stack([now.rate, now.coulomb, now.hold]), now.drive, maps[0], maps[1], maps[2], _wheel_of(columns),
-            np.array([values[k] if k >= 0 else 0.0 for k in late]),
+            np.stack([now.rate, now.coulomb, now.hold]), now.drive, now.per_force * tilt, maps[0], maps[1], maps[2],
+            _wheel_of(columns), np.array([values[k] if k >= 0 else 0.0 for k in late]),
             np.array([values[k] if k >= 0 else fixed[i] for i, k in enumerate(driver)]), bool(maps[1].any()),
         )  # fmt: skip
-        state = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
+        at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
+        push, travel = wide(by.per_force * tilt[:, None]), wide(slopes[1])
+        for axis, name in enumerate(TILT):
+            if (k := problem.where(name)) >= 0:
+                push[axis, k] = now.per_force[axis]
+        for c, (name, i) in enumerate(columns):
+            if name == POSITION:
+                travel[c, AXES:, at[AXES + columns.index(HEADING)]] = turned_by(facing)[i]
+        varies = np.array([bool(travel[c].any()) for c in range(width)])
         derivatives = Slopes(
-            wide(np.stack([by.rate, by.coulomb])), wide(by.drive), wide(slopes[0]), wide(slopes[2]),
-            not self.mapping.linear, np.array(late), np.array(driver), state[:AXES], state[AXES:],
+            wide(np.stack([by.rate, by.coulomb])), wide(by.drive), push, wide(slopes[0]), travel, wide(slopes[2]),
+            not self.mapping.linear, varies, np.array(late), np.array(driver), at[:AXES], at[AXES:],
         )  # fmt: skip
         starts = [c for c in range(width) if c == 0 or columns[c][0] != columns[c - 1][0]]
         return physics, derivatives, np.array([*starts, width])
 
 
-def _maps(columns: Sequence[Column], now: Primitives, more: tuple[int, ...] = ()) -> list[FloatArray]:
-    """(M, Q, E) of the outputs, or their derivatives where `more` is the shape of the parameters."""
-    speed, travel = np.zeros((len(columns), AXES, *more)), np.zeros((len(columns), AXES, *more))
+def _maps(columns: Sequence[Column], now: Primitives, facing: float, more: tuple[int, ...] = ()) -> list[FloatArray]:
+    """(M, Q, E) of the outputs, or their derivatives where `more` is the shape of the parameters.
+
+    facing: heading at the start of the piece [rad].
+    """
+    speed, travel = np.zeros((len(columns), AXES, *more)), np.zeros((len(columns), PATH, *more))
     volts = np.zeros((len(columns), *more))
     for c, (name, i) in enumerate(columns):
         if name == "wheel_speed":
             speed[c] = now.wheels[i]
+        elif name == "wheel_angle":
+            travel[c, :AXES] = now.wheels[i]
         elif name == "current":
             speed[c], volts[c] = now.braking[i], now.per_volt[i]
-        elif not more:  # the twist and the heading themselves
+        elif more:  # the twist and the pose themselves
+            continue
+        elif name == POSITION:
+            travel[c, AXES:] = body_to_world(facing)[i, : PATH - AXES]
+        else:
             (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
     return [speed, travel, volts]
+
+
+def turned_by(facing: float) -> FloatArray:
+    """d/d facing of what turns the displacement into the world: a quarter of a turn further. Shape (2, 2)."""
+    return body_to_world(facing + 0.5 * np.pi)[:2, :2]
 
 
 def _at(used: NDArray[np.int64], values: FloatArray, total: int) -> FloatArray:

@@ -74,6 +74,7 @@ class Options:
     outputs: tuple[str, ...] | None = None
     loss: str = GAUSS
     covariance: str = AUTO
+    tick_rad: float | None = None  # None: found in the logs
 
 
 def fit_output_error(
@@ -88,6 +89,7 @@ def fit_output_error(
     outputs: Sequence[str] | None = None,
     loss: str = GAUSS,
     covariance: str = AUTO,
+    tick_rad: float | None = None,
     profile: Sequence[str] = (),
     bootstrap: int = 0,
     watch: Callable[[State], None] | None = None,
@@ -98,14 +100,17 @@ def fit_output_error(
     free: keys of the robot file, such as "body.mass_kg"; by default B and C of the three axes. fixed: keys taken out.
     The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, or stays as
     the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval.
-    nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade". By default
-    latency and dead band, and the gain where the supply is only nominal, as far as the logs determine them; a warning
-    says what else would fit the logs better. () for none.
+    nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade", "tilt"
+    (or "tilt.x", "tilt.y", "tilt.yaw"). By default latency and dead band, and the gain where the supply is only
+    nominal, as far as the logs determine them; a warning says what else would fit the logs better. () for none.
     start: "rest", "free", or "auto": at rest where that shows.
     use_priors: a std in the robot file counts as a Gaussian prior of what is free, and what has one is free too. Off by
     default: a std that an earlier fit wrote from the same log would count the log twice; such ones ("identified: ...")
     are never used.
-    outputs: of "twist", "wheel_speed", "current", "heading"; by default all that the log has.
+    outputs: of "twist", "wheel_speed", "current", "pose" (or of "heading", "position"), "wheel_angle"; by default all
+    that the log has, but for what is computed from another one: that would count the same data twice.
+    tick_rad: of the encoders behind wheel angles [rad]; by default found in the log. Their likelihood is that of
+    counts; 0 takes them like any other output.
     loss: "gaussian", or "student-t" for logs with outliers. covariance: "white", "sandwich", or "auto".
     profile: names whose interval comes from the profile of the likelihood instead. bootstrap: draws of whole runs from
     which the std and intervals of all come instead; deterministic.
@@ -113,13 +118,22 @@ def fit_output_error(
 
     Returns an Estimate with nuisances, noise and what is not identifiable. Raises InputError for options and logs that
     cannot be used, InsufficientDataError where nothing can be learnt, UnsupportedError for what an engine does not
-    know. Of the nuisances, robots that need the implicit engine have latencies by default; they know the others.
+    know. Of the nuisances, robots that need the implicit engine have latencies by default; they know the others, but
+    no position and no wheel angle as outputs.
     """
     given = Options(
         None if free is None else tuple(free), tuple(fixed), nuisance_names(nuisances), start, use_priors,
-        None if outputs is None else tuple(outputs), loss, covariance,
+        None if outputs is None else tuple(outputs), loss, covariance, tick_rad,
     )  # fmt: skip
     records = read_records([runs] if isinstance(runs, Run) else list(runs), robot, given)
+    return _fitted(records, robot, given, tuple(free or ()), profile, bootstrap, watch)
+
+
+def _fitted(
+    records: Sequence[Record], robot: Robot, given: Options, free: tuple[str, ...], profile: Sequence[str],
+    bootstrap: int, watch: Callable[[State], None] | None,
+) -> OutputErrorEstimate:  # fmt: skip
+    """The fit of records; free: the keys that were asked for by name."""
     motion_of = motion(records, robot)
     robot, given, still = (
         (robot, loop_options(given, motion_of, records, robot), [])
@@ -128,13 +142,13 @@ def fit_output_error(
     )
     solver, solution = _solve(records, robot, given, watch)
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
-    axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in (free or ()) and motion_of.moved[axis]]
+    axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in free and motion_of.moved[axis]]
     solver, solution, levels = _levels_of(solver, solution, axes)
-    known = trust(solver, solution, covariance)
+    known = trust(solver, solution, given.covariance)
     more = [*(words for _, _, words in still), *hints]
     bounds = {key: bound for key, bound, _ in still if bound > NOTHING}
     better = resampled(solver, solution, known.std, profile, bootstrap).intervals
-    return conclude(solver, solution, known, records, loss_words(loss), more, bounds, levels, better)
+    return conclude(solver, solution, known, records, loss_words(given.loss), more, bounds, levels, better)
 
 
 def _levels_of(solver: Solver, solution: Solution, axes: list[int]) -> tuple[Solver, Solution, list[Breakaway]]:
@@ -262,7 +276,7 @@ def read_records(runs: Sequence[Run], robot: Robot, given: Options) -> list[Reco
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
     gains = any(key.startswith(GAINS) for key in given.free or ())
-    found = [record(run, robot, given.outputs, gains) for run in runs]
+    found = [record(run, robot, given.outputs, gains, given.tick_rad) for run in runs]
     if len({each.set_point is None for each in found}) > 1:
         raise InputError(
             "some logs have voltages, others set speeds only", got=", ".join(each.source for each in found[:2]),
@@ -318,7 +332,7 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     if not exact:
         own = [replace(p, low=LEAST * p.value) if p.low == 0.0 else p for p in own]
     auto = automatic(records) if exact else (LATENCY,)
-    more = nuisance_parameters(auto if given.nuisances is None else given.nuisances, records)
+    more = nuisance_parameters(auto if given.nuisances is None else given.nuisances, records, robot)
     late = any(p.name.startswith(LATENCY) for p in more)
     parts = (
         loop_pieces(records, robot, given.start) if looped(records) else pieces(records, robot, given.start, late)

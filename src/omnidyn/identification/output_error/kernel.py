@@ -5,6 +5,8 @@ Along the way grow, for every column c of the outputs, with r = y - f(p), J = df
     count  n      square  sum w r^2      loss  sum rho(r)      lag  sum w r w' r' of neighbours
     grad  sum w r J                      info  sum w J J'
 
+(w r is E x s and w r^2 is E x^2 s^2 for columns that are counts: counts.py)
+
 and, in a final march, for every block of rows: score, the sum of w r J/variance over all columns, and drift, the sum of
 w r of each column. Nothing is kept of the samples, so that memory does not grow with the log. Rows of J are padded to a
 multiple of 4 with zeros: the loops become the short vectors of the processor.
@@ -19,12 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled import kernel, part
+from omnidyn.identification.output_error.counts import count_terms
+from omnidyn.simulation.exact_position import move_on, put_displacement
 from omnidyn.simulation.exact_sensitivity import acceleration_at_end, hold_slopes, step_slopes, travel_slopes
+from omnidyn.simulation.travel import rotated
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 GAIN, DEAD, FADE = 0, 1, 2  # numbers of the driver
+PATH = 5  # integrals of the twist, then x and y of the displacement
 SAME = 1e-7  # times 1/a [s]: steps that differ by less share one exponential, to first order, which leaves 1e-15
 FINAL, KEEP = 1, 2  # what a march is for, beside the sums
 
@@ -32,13 +39,16 @@ FINAL, KEEP = 1, 2  # what a march is for, beside the sums
 class Physics(NamedTuple):
     """Numbers of the model. Axes 3, wheels W, output columns C; an output is
 
-    M v + Q s + E u_w + offset,   v the twist, s its integral since the start, u_w the voltage at wheel w.
+    M v + Q s + E u_w + offset,   v the twist, s the path since the start, u_w the voltage at wheel w.
+
+    The path (5,) is the integral of the twist, then the displacement in the body frame at the start.
     """
 
     law: FloatArray  # (3, 3) rows a, c, S of the axes
     drive: FloatArray  # (3, W) acceleration per volt
+    push: FloatArray  # (3,) acceleration by a constant force
     speed_map: FloatArray  # (C, 3) M
-    travel_map: FloatArray  # (C, 3) Q
+    travel_map: FloatArray  # (C, 5) Q
     input_map: FloatArray  # (C,) E
     input_wheel: IntArray  # (C,) w
     late: FloatArray  # (C,) latency [s]
@@ -51,9 +61,12 @@ class Slopes(NamedTuple):
 
     law: FloatArray  # (2, 3, P) of a and c
     drive: FloatArray  # (3, W, P)
+    push: FloatArray  # (3, P)
     speed_map: FloatArray  # (C, 3, P)
+    travel_map: FloatArray  # (C, 5, P)
     input_map: FloatArray  # (C, P)
     maps_vary: bool
+    travel_varies: BoolArray  # (C,)
     at_late: IntArray  # (C,)
     at_driver: IntArray  # (3,)
     at_start: IntArray  # (3,)
@@ -61,12 +74,16 @@ class Slopes(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """variance: of each column, shape (C,). nu: degrees of freedom of Student's t, 0 for Gauss. block: rows."""
+    """variance: of each column, shape (C,). nu: degrees of freedom of Student's t, 0 for Gauss. block: rows.
+
+    share (C,): Fisher's information of a row of counts, in 1/variance.
+    """
 
     variance: FloatArray
     nu: float
     block: int
     mode: int
+    share: FloatArray
 
 
 class Sums(NamedTuple):
@@ -86,7 +103,7 @@ class Sums(NamedTuple):
 
 @part
 def loss_terms(residual, variance, nu, final):
-    """(w, curvature, rho) of one residual: score w r / variance, curvature / variance for the information.
+    """(w r, w r^2, curvature, rho) of one residual: score w r/variance, curvature/variance for the information.
 
     Gauss: 1, 1, r^2/(2 variance). Student's t with nu degrees: w = (nu + 1)/(nu + z^2), rho = (nu + 1)/2
     log(1 + z^2/nu); its curvature may be negative: the solver takes w (nu + 1)/(nu + 3), which has the right mean where
@@ -94,10 +111,29 @@ def loss_terms(residual, variance, nu, final):
     """
     z2 = residual * residual / variance
     if nu == 0.0:
-        return 1.0, 1.0, 0.5 * z2
+        return residual, residual * residual, 1.0, 0.5 * z2
     weight = (nu + 1.0) / (nu + z2)
     curvature = weight * (nu - z2) / (nu + z2) if final else weight * (nu + 1.0) / (nu + 3.0)
-    return weight, curvature, 0.5 * (nu + 1.0) * math.log1p(z2 / nu)
+    pull = weight * residual
+    return pull, pull * residual, curvature, 0.5 * (nu + 1.0) * math.log1p(z2 / nu)
+
+
+@part
+def counted_terms(residual, variance, tick, share, final):
+    """The same of one count; its curvature jumps from row to row: the solver takes its mean, `share`, at least."""
+    deviation = math.sqrt(variance)
+    mean, square, spread, rho = count_terms(residual / deviation, 0.5 * tick / deviation)
+    curvature = 1.0 - spread
+    return deviation * mean, variance * square, (curvature if final else max(curvature, share)), rho
+
+
+@part
+def terms_of(residual, variance, nu, c, tick, share, final):
+    """The same of column c, whatever it is."""
+    if tick is not None:  # noqa: SIM102 alone, it is decided at compile time
+        if tick[c] > 0.0:
+            return counted_terms(residual, variance[c], tick[c], share[c], final)
+    return loss_terms(residual, variance[c], nu, final)
 
 
 @part
@@ -157,12 +193,12 @@ def put_volts(volts, u, k, worn, driver):
 
 
 @part
-def put_drive(g, dg, volts, drive, d_drive, at_driver, vary):
+def put_drive(g, dg, volts, drive, push, d_drive, d_push, at_driver, vary):
     """Drive of the axes and its slopes."""
     for axis in range(3):
         for i in range(dg.shape[1]):
-            dg[axis, i] = 0.0
-        g[axis] = 0.0
+            dg[axis, i] = d_push[axis, i]
+        g[axis] = push[axis]
         for w in range(volts.shape[1]):
             g[axis] += drive[axis, w] * volts[0, w]
             if vary:
@@ -174,8 +210,11 @@ def put_drive(g, dg, volts, drive, d_drive, at_driver, vary):
 
 
 @part
-def advance(v, s, g, dv, ds, dg, law, dlaw, dt, cache, travels):
-    """Move twist v and its integral s on by dt, and their slopes. law (3, 3): a, c, S; dlaw (2, 3, P)."""
+def advance(v, s, g, dv, ds, dg, law, dlaw, dt, cache, travels, place, pieces):
+    """Move twist v and path s on by dt, and their slopes. law (3, 3): a, c, S; dlaw (2, 3, P)."""
+    if place is not None:
+        put_displacement(place, pieces, v, g, law, dt)
+        move_on(s, ds, place, dv, dg, dlaw[1], dlaw[0])
     off = held(cache, law[0], dt)
     for axis in range(3):
         a, c, hold = law[0, axis], law[1, axis], law[2, axis]
@@ -191,8 +230,13 @@ def advance(v, s, g, dv, ds, dg, law, dlaw, dt, cache, travels):
 
 
 @part
-def copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels):
+def copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels, place):
     """The motion at the start of a step, to go on from."""
+    if place is not None:
+        for path in range(3, PATH):
+            s_now[path] = s[path]
+            for i in range(dv.shape[1]):
+                ds_now[path, i] = ds[path, i]
     for axis in range(3):
         v_now[axis], s_now[axis] = v[axis], s[axis]
         for i in range(dv.shape[1]):
@@ -203,32 +247,43 @@ def copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels):
 
 
 @part
-def put_row(row, c, v, s, dv, ds, physics_speed, physics_travel, d_speed, vary):
+def put_row(row, c, v, s, dv, ds, speed_map, travel_map, d_speed, d_travel, vary, travels, travel_varies):
     """What column c takes from the motion, and its slopes in `row`."""
     value, size = 0.0, len(row)
     for i in range(size):
         row[i] = 0.0
     for axis in range(3):
-        m, q = physics_speed[c, axis], physics_travel[c, axis]
-        value += m * v[axis] + q * s[axis]
+        m = speed_map[c, axis]
+        value += m * v[axis]
         if m != 0.0:
             for i in range(size):
                 row[i] += m * dv[axis, i]
-        if q != 0.0:
-            for i in range(size):
-                row[i] += q * ds[axis, i]
         if vary:
             for i in range(size):
                 row[i] += d_speed[c, axis, i] * v[axis]
+    if not travels:
+        return value
+    for path in range(PATH):
+        q = travel_map[c, path]
+        value += q * s[path]
+        if q != 0.0:
+            for i in range(size):
+                row[i] += q * ds[path, i]
+        if travel_varies[c]:
+            for i in range(size):
+                row[i] += d_travel[c, path, i] * s[path]
     return value
 
 
 @part
-def add_latency(row, c, at, v, g, law, speed_map, travel_map):
+def add_latency(row, c, at, v, s, g, law, speed_map, travel_map, place):
     """The slope of column c by its latency: what was earlier."""
     for axis in range(3):
         pace = acceleration_at_end(v[axis], g[axis], law[1, axis], law[2, axis], law[0, axis])
         row[at] -= speed_map[c, axis] * pace + travel_map[c, axis] * v[axis]
+    if place is not None:
+        east, north = rotated(s[2], v[0], v[1])
+        row[at] -= travel_map[c, 3] * east + travel_map[c, 4] * north
 
 
 @part
@@ -243,19 +298,24 @@ def add_input(row, volts, wheel, e, d_input, c, at_driver):
 
 
 @kernel
-def march(t, u, y, first, last, origin, span, margin, start, offset, groups, physics, slopes, loss, sums):
+def march(
+    t, u, y, first, last, origin, span, margin, start, offset, groups, physics, slopes, loss, sums, tick, place, pieces
+):
     """March from row `first` to row `last`, both of one piece without a gap, and add to `sums`.
 
     t (rows,), u (rows, W) voltages before the driver, y (rows, C) outputs, NaN where not measured. origin, span: of
     the whole run, for the fade. margin (C,): time after `first` before which outputs are not used. start (3,) twist;
     offset (C,). groups: first column of each group of one latency, and C.
+
+    tick (C,): of columns that are counts [rad], 0 for the others; place, pieces: room for `put_displacement`. Each of
+    these is None where there is no need: such a kernel is another one, and faster.
     """
     law, dlaw, size = physics.law, slopes.law, slopes.law.shape[2]
     speed_map, travel_map, d_speed, vary = physics.speed_map, physics.travel_map, slopes.speed_map, slopes.maps_vary
     final, keep, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, physics.travels
-    v, s, g, v_now, s_now = start.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    v, s, g, v_now, s_now = start.copy(), np.zeros(PATH), np.zeros(3), np.zeros(3), np.zeros(PATH)
     dv, ds, dg, dv_now, ds_now = (
-        np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)), np.zeros((3, size)),
+        np.zeros((3, size)), np.zeros((PATH, size)), np.zeros((3, size)), np.zeros((3, size)), np.zeros((PATH, size)),
     )  # fmt: skip
     for axis in range(3):
         if slopes.at_start[axis] >= 0:
@@ -265,11 +325,12 @@ def march(t, u, y, first, last, origin, span, margin, start, offset, groups, phy
     drive, d_drive, driver, at_driver = physics.drive, slopes.drive, physics.driver, slopes.at_driver
     lates, wheels, input_map, d_input = physics.late, physics.input_wheel, physics.input_map, slopes.input_map
     at_late, at_offset, variance, nu, block = slopes.at_late, slopes.at_offset, loss.variance, loss.nu, loss.block
+    d_travel, travel_varies, share = slopes.travel_map, slopes.travel_varies, loss.share
     number, square, total, lag, grad, info = sums.number, sums.square, sums.loss, sums.lag, sums.grad, sums.info
     score, drift, predicted, kept = sums.score, sums.drift, sums.predicted, sums.slopes
     for k in range(first, last + 1):
         put_volts(volts, u, k, (t[k] - origin) / span, driver)
-        put_drive(g, dg, volts, drive, d_drive, at_driver, vary)
+        put_drive(g, dg, volts, drive, physics.push, d_drive, slopes.push, at_driver, vary)
         dt = t[k + 1] - t[k] if k < last else math.inf
         for group in range(len(groups) - 1):
             late = lates[groups[group]]
@@ -279,16 +340,20 @@ def march(t, u, y, first, last, origin, span, margin, start, offset, groups, phy
                 into = t[sample] - late - t[k]
                 if into < 0.0 or t[sample] - t[first] < margin[groups[group]]:
                     continue
-                copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels)
+                copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels, place)
                 if into > 0.0:
-                    advance(v_now, s_now, g, dv_now, ds_now, dg, law, dlaw, into, parts[group], travels)
+                    advance(
+                        v_now, s_now, g, dv_now, ds_now, dg, law, dlaw, into, parts[group], travels, place, pieces,
+                    )  # fmt: skip
                 for c in range(groups[group], groups[group + 1]):
-                    value = offset[c]
-                    value += put_row(row, c, v_now, s_now, dv_now, ds_now, speed_map, travel_map, d_speed, vary)
+                    value = offset[c] + put_row(
+                        row, c, v_now, s_now, dv_now, ds_now, speed_map, travel_map, d_speed, d_travel, vary,
+                        travels, travel_varies,
+                    )  # fmt: skip
                     if wheels[c] >= 0:
                         value += add_input(row, volts, wheels[c], input_map[c], d_input, c, at_driver)
                     if at_late[c] >= 0:
-                        add_latency(row, c, at_late[c], v_now, g, law, speed_map, travel_map)
+                        add_latency(row, c, at_late[c], v_now, s_now, g, law, speed_map, travel_map, place)
                     if at_offset[c] >= 0:
                         row[at_offset[c]] += 1.0
                     if keep:
@@ -299,10 +364,9 @@ def march(t, u, y, first, last, origin, span, margin, start, offset, groups, phy
                     if residual != residual:
                         before[c] = 0.0
                         continue
-                    weight, curvature, rho = loss_terms(residual, variance[c], nu, final)
-                    pull = weight * residual
+                    pull, more, curvature, rho = terms_of(residual, variance, nu, c, tick, share, final)
                     number[c] += 1.0
-                    square[c] += pull * residual
+                    square[c] += more
                     total[c] += rho
                     lag[c] += pull * before[c]
                     before[c] = pull
@@ -312,4 +376,4 @@ def march(t, u, y, first, last, origin, span, margin, start, offset, groups, phy
                         for i in range(size):
                             score[(k - first) // block, i] += pull / variance[c] * row[i]
         if k < last:
-            advance(v, s, g, dv, ds, dg, law, dlaw, dt, steps, travels)
+            advance(v, s, g, dv, ds, dg, law, dlaw, dt, steps, travels, place, pieces)

@@ -3,8 +3,9 @@
 latency.CHANNEL   the channel shows what was t ago [s]; exact, by steps that end within a row
 gain              voltage at the motor = gain x logged; with a supply that is only nominal, a prior of 10 %
 dead_band         of the driver: (|u| - dead_band)+ sgn u reaches the motor [V]
+tilt.AXIS         constant force on x, y [N], yaw [N m] of the body: a floor that is not level, while the heading stays
 fade              share of the voltage lost from the start of a run to its end, evenly: a battery that sags
-start             twist at the start of each piece of the log, heading too
+start             twist at the start of each piece of the log; pose and angles of the wheels too
 """
 
 from __future__ import annotations
@@ -19,12 +20,15 @@ from omnidyn.identification.output_error.parameters import Parameter
 from omnidyn.identification.output_error.problem import Piece
 from omnidyn.identification.output_error.record import Record
 from omnidyn.identification.output_error.starts import measured_twist
+from omnidyn.logs.steady_table import AXES
 from omnidyn.model.robot import Robot
+from omnidyn.model.starter import GRAVITY
 
 FloatArray = NDArray[np.float64]
 
-LATENCY, GAIN, DEAD, FADE = "latency", "gain", "dead_band", "fade"
-NUISANCES = (LATENCY, GAIN, DEAD, FADE)
+LATENCY, GAIN, DEAD, FADE, TILT = "latency", "gain", "dead_band", "fade", "tilt"
+NUISANCES = (LATENCY, GAIN, DEAD, FADE, TILT)
+TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an unknown start
 EARLIEST, LATEST = -0.1, 0.3  # [s]
 SUPPLY_STD = 0.1  # of a nominal supply: a battery is full or it is not
 MOST_FADE = 0.9
@@ -34,12 +38,12 @@ CLEAR = 4.0  # standard errors from 0 that count as motion
 LEAD = 5  # rows whose mean is where a free start begins
 
 
-def nuisance_parameters(wanted: Sequence[str], records: Sequence[Record]) -> list[Parameter]:
+def nuisance_parameters(wanted: Sequence[str], records: Sequence[Record], robot: Robot) -> list[Parameter]:
     """The nuisances asked for as free parameters. Raises InputError for a name that is none."""
     unknown = [name for name in wanted if name.partition(".")[0] not in NUISANCES]
     if unknown:
         raise InputError("no such nuisance", got=unknown[0], expected=", ".join(NUISANCES), where="nuisances")
-    channels = dict.fromkeys(name for record in records for name, _ in record.columns)
+    channels = measured_channels(records)
     found: list[Parameter] = []
     for name in wanted:
         if name == LATENCY:
@@ -54,9 +58,32 @@ def nuisance_parameters(wanted: Sequence[str], records: Sequence[Record]) -> lis
         elif name == DEAD:
             most = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
             found.append(Parameter(DEAD, 0.0, 0.0, 0.5 * most))
+        elif name.partition(".")[0] == TILT:
+            found += _tilts(name, robot)
         else:
             found.append(Parameter(FADE, 0.0, -MOST_FADE, MOST_FADE))
     return list({p.name: p for p in found}.values())
+
+
+def measured_channels(records: Sequence[Record]) -> list[str]:
+    """Channels with any measurement, each once."""
+    return list(
+        dict.fromkeys(
+            name for record in records for c, (name, _) in enumerate(record.columns)
+            if np.isfinite(record.outputs[:, c]).any()
+        )
+    )  # fmt: skip
+
+
+def _tilts(name: str, robot: Robot) -> list[Parameter]:
+    """The force on one axis, or on all; at most what the robot weighs, at its wheels for yaw."""
+    weight = GRAVITY * robot.body.mass
+    most = (weight, weight, weight * float(np.max(robot.wheels.robot_radius)))
+    every = [Parameter(f"{TILT}.{axis}", 0.0, -own, own) for axis, own in zip(AXES, most, strict=True)]
+    found = [p for p in every if name in (TILT, p.name)]
+    if not found:
+        raise InputError("no such axis", got=name, expected=", ".join(p.name for p in every), where="nuisances")
+    return found
 
 
 def automatic(records: Sequence[Record]) -> tuple[str, ...]:
@@ -84,7 +111,7 @@ def _piece(
     record: Record, twist: FloatArray | None, first: int, last: int, rest: bool, decide: bool, late: bool
 ) -> Piece:
     columns = record.columns
-    travels = np.array([name == "heading" for name, _ in columns])
+    travels = np.array([name in TRAVELS for name, _ in columns])
     rows = slice(first, min(first + LEAD, last + 1))
     guess = np.zeros(3) if twist is None else np.array([_mean(twist[rows, axis]) for axis in range(3)])
     if decide:

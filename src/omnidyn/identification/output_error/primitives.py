@@ -31,7 +31,8 @@ class Primitives:
     """Numbers of the exact step, and linear maps from twist and voltage to wheel speed and current.
 
     rate, coulomb, hold (3,); drive (3, W); wheels (W, 3) [rad/s per twist]; braking (W, 3) [A per twist]; per_volt (W,)
-    [A/V]. As derivatives all arrays have one more axis, the parameter, at the end.
+    [A/V]; per_force (3,) [1/kg, 1/kg, 1/(kg m^2)]. As derivatives all arrays have one more axis, the parameter, at the
+    end.
     """
 
     rate: FloatArray
@@ -41,10 +42,11 @@ class Primitives:
     wheels: FloatArray
     braking: FloatArray
     per_volt: FloatArray
+    per_force: FloatArray
 
     @property
     def parts(self) -> tuple[FloatArray, ...]:
-        return self.rate, self.coulomb, self.hold, self.drive, self.wheels, self.braking, self.per_volt
+        return self.rate, self.coulomb, self.hold, self.drive, self.wheels, self.braking, self.per_volt, self.per_force
 
 
 def primitives(robot: Robot) -> Primitives:
@@ -56,6 +58,7 @@ def primitives(robot: Robot) -> Primitives:
         wheel_speed(robot.wheels, np.eye(3)).T,
         settled_currents(robot, np.eye(3), np.zeros(count)).T,
         np.diag(settled_currents(robot, np.zeros(3), np.eye(count))).copy(),
+        1.0 / mass_matrix(robot),
     )  # fmt: skip
 
 

@@ -50,6 +50,15 @@ class Problem:
         return tuple(dict.fromkeys(column for piece in self.pieces for column in piece.record.columns))
 
     @property
+    def tick(self) -> FloatArray:
+        """The largest tick of each column in any record, 0 where it is not counted. Shape (columns,)."""
+        most = dict.fromkeys(self.columns, 0.0)
+        for piece in self.pieces:
+            for column, tick in zip(piece.record.columns, piece.record.ticks, strict=True):
+                most[column] = max(most[column], tick)
+        return np.array(list(most.values()))
+
+    @property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 

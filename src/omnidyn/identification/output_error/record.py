@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.identification.output_error.outputs import outputs_of
 from omnidyn.logs.segments import segments
 from omnidyn.model.drive import SPEED
 from omnidyn.model.motor import clip_voltage
@@ -18,7 +19,6 @@ from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
 
-OUTPUTS = ("twist", "wheel_speed", "current", "heading")
 SHORTEST = 3  # rows of a piece that is used
 LOOP_REMEDY = (
     'write the speed loop of the firmware into the robot file: [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz '
@@ -30,15 +30,17 @@ LOOP_REMEDY = (
 class Record:
     """One run. t (rows,); voltage (rows, W); outputs (rows, C), columns named by (channel, index).
 
-    pieces: (first, last) rows of what has no gap. supplied: whether the voltage is a duty times a supply that was not
-    logged. notes: what a reader should know. set_point (rows, W): set speeds of the wheels [rad/s] where the loop in
-    the firmware makes the voltage, which is 0 here then; else None.
+    ticks (C,): of columns that are counts [rad], 0 for the others. pieces: (first, last) rows of what has no gap.
+    supplied: whether the voltage is a duty times a supply that was not logged. notes: what a reader should know.
+    set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
+    here then; else None.
     """
 
     t: FloatArray
     voltage: FloatArray
     outputs: FloatArray
     columns: tuple[tuple[str, int], ...]
+    ticks: tuple[float, ...]
     pieces: tuple[tuple[int, int], ...]
     source: str
     supplied: bool
@@ -50,10 +52,13 @@ class Record:
         return float(self.t[-1] - self.t[0]) or 1.0
 
 
-def record(run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: bool = False) -> Record:
+def record(
+    run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: bool = False, tick_rad: float | None = None
+) -> Record:
     """Raises InputError for a run without inputs or outputs, InsufficientDataError where no piece is long enough.
 
-    loop: take the set speeds even where a voltage was logged, for its gains are asked for.
+    loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad: as in
+    outputs.py.
     """
     set_point = _set_point(run, robot, loop)
     voltage, supplied, notes = _voltage(run, robot) if set_point is None else (np.zeros_like(set_point), False, [])
@@ -62,7 +67,7 @@ def record(run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: b
     if beyond:
         notes.append(f"{beyond} rows ask for more than the voltage limit: they are clipped to it")
         voltage = clipped
-    names, values = _outputs(run, robot, outputs)
+    found = outputs_of(run, robot, outputs, tick_rad, set_point is not None)
     inputs = voltage if set_point is None else set_point
     known = np.asarray(np.isfinite(inputs).all(axis=1), dtype=bool)
     pieces = [piece for s in segments(run.t) for piece in _whole(known, s.start, s.stop)]
@@ -74,16 +79,9 @@ def record(run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: b
     if not known.all():
         notes.append(f"{int((~known).sum())} rows lack an input: the log is split there")
     return Record(
-        run.t,
-        np.ascontiguousarray(voltage),
-        values,
-        names,
-        tuple(pieces),
-        run.source,
-        supplied,
-        tuple(notes),
-        set_point,
-    )
+        run.t, np.ascontiguousarray(voltage), found.values, found.columns, found.ticks, tuple(pieces), run.source,
+        supplied, (*notes, *found.notes), set_point,
+    )  # fmt: skip
 
 
 def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
@@ -121,28 +119,6 @@ def _set_point(run: Run, robot: Robot, loop: bool) -> FloatArray | None:
     if run.wheel_speed_command is not None:
         return np.ascontiguousarray(run.wheel_speed_command)
     return None if run.twist_command is None else wheel_speed(robot.wheels, run.twist_command)
-
-
-def _outputs(run: Run, robot: Robot, wanted: Sequence[str] | None) -> tuple[tuple[tuple[str, int], ...], FloatArray]:
-    unknown = [name for name in wanted or () if name not in OUTPUTS]
-    if unknown:
-        raise InputError("no such output", got=unknown[0], expected=", ".join(OUTPUTS), where="outputs")
-    found: dict[str, FloatArray] = {}
-    for name in OUTPUTS:
-        value = run.pose if name == "heading" else getattr(run, name)
-        if value is None or (wanted is not None and name not in wanted):
-            continue
-        value = value[:, 2:] if name == "heading" else value
-        if np.isfinite(value).any():
-            found[name] = value
-    if not found:
-        raise InputError(
-            "the log has no output to fit", got=", ".join(run.channels) or "no channels",
-            expected=", ".join(wanted or OUTPUTS), where=run.source,
-        )  # fmt: skip
-    names = tuple((name, i) for name, value in found.items() for i in range(value.shape[1]))
-    values = next(iter(found.values())) if len(found) == 1 else np.hstack(list(found.values()))
-    return names, np.ascontiguousarray(values)
 
 
 def _whole(known: NDArray[np.bool_], start: int, stop: int) -> list[tuple[int, int]]:

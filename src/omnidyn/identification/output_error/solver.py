@@ -2,7 +2,7 @@
 
 Gauss: the noise of each column is concentrated out, F = 1/2 sum n_c log(sum of r^2 / n_c), so that one minimisation
 finds parameters and noise together. Student's t: F = sum of rho + n_c log s_c, steps in the parameters and in the
-scales s_c in turn. A prior adds ((p - mean)/std)^2 / 2.
+scales s_c in turn. Counts (counts.py) are held like that too, beside the others. A prior adds ((p - mean)/std)^2 / 2.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.identification.output_error.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.exact_engine import Weighting
 from omnidyn.identification.output_error.problem import PieceSums, Point, Problem, per_column
 
@@ -65,37 +66,47 @@ class Solution:
 class Solver:
     """Minimises F over a problem. `floor` (columns,): least variance of each column.
 
-    close: squared distance to the best point, in standard errors, at which it ends.
+    close: squared distance to the best point, in standard errors, at which it ends. counted: whether counts have a
+    likelihood of their own.
     """
 
-    def __init__(self, problem: Problem, engine: Engine, nu: float = 0.0, close: float = CLOSE):
+    def __init__(self, problem: Problem, engine: Engine, nu: float = 0.0, close: float = CLOSE, counted: bool = True):
         self.problem, self.engine, self.nu, self.close = problem, engine, nu, close
-        self.floor = _floor(problem)
+        self.tick = problem.tick if counted else np.zeros(len(problem.columns))
+        self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
         # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross.
         self._jumps = np.array([p.name == "latency.current" for p in problem.parameters], bool)
         self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
         self._high = np.array([p.inner(p.high) for p in problem.parameters])
 
     def state(self, point: Point, variance: FloatArray | None = None) -> State:
-        """F and all sums at a point; at a fixed `variance` for Student's t."""
+        """F and all sums at a point; at a fixed `variance` for Student's t and counts, which are none without."""
         given = np.ones(len(self.problem.columns)) if variance is None else variance
-        sums = self.engine.sums(point, Weighting(given, self.nu))
+        scaled = self.scaled & (bool(self.nu) or variance is not None)
+        sums = self.engine.sums(
+            point, Weighting(given, self.nu, counted=bool(self.tick.any()) and variance is not None)
+        )
         count = per_column(sums, len(given), "number")
         mean = per_column(sums, len(given), "square") / np.maximum(count, 1.0)
-        if self.nu:
-            objective = float(per_column(sums, len(given), "loss").sum() + 0.5 * count @ np.log(given))
-            return State(point, sums, objective + self._prior(point), given)
-        now = np.maximum(mean, self.floor)
-        return State(point, sums, float(0.5 * count @ np.log(now)) + self._prior(point), now)
+        now = np.where(scaled, given, np.maximum(mean, self.floor))
+        objective = float(0.5 * count @ np.log(now))
+        if scaled.any():
+            objective += float(per_column(sums, len(given), "loss")[scaled].sum())
+        return State(point, sums, objective + self._prior(point), now)
+
+    @property
+    def scaled(self) -> NDArray[np.bool_]:
+        """Columns whose scale is a number of its own, not the mean square of their residuals. Shape (columns,)."""
+        return np.full(len(self.tick), True) if self.nu else self.tick > 0.0
 
     def minimise(
         self, start: Point, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None
     ) -> Solution:
         """The best point from `start`; `watch` sees every better one on the way."""
-        if not self.nu:
+        if not self.scaled.any():
             return self._descend(self.state(self._inside(start)), limit, watch)
-        plain = Solver(self.problem, self.engine, close=self.close).minimise(start, limit)
-        now = self.state(plain.state.point, plain.state.variance)
+        plain = Solver(self.problem, self.engine, close=self.close, counted=False).minimise(start, limit)
+        now = self.state(plain.state.point, np.maximum(plain.state.variance - self.tick**2 / 12.0, self.floor))
         return self._descend(self._rescaled(now)[0], limit, watch)
 
     def _descend(self, now: State, limit: int, watch: Callable[[State], None] | None) -> Solution:
@@ -109,7 +120,7 @@ class Solver:
             while not better and normal.distance_without(still) / (1.0 + damping) > (
                 self.close if damping < FIRM else max(ENOUGH, self.close)
             ):
-                trial = self.state(normal.moved(damping, still), now.variance if self.nu else None)
+                trial = self.state(normal.moved(damping, still), now.variance if self.scaled.any() else None)
                 better = trial.objective < now.objective
                 if not better and not (still | self._jumps == still).all():
                     blocked = self._jumps  # once more, and from here on, without what may have jumped
@@ -117,7 +128,7 @@ class Solver:
                     continue
                 damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
                 now = trial if better else now
-            if self.nu:
+            if self.scaled.any():
                 now, change = self._rescaled(now)
             if better and watch:
                 watch(now)
@@ -128,15 +139,18 @@ class Solver:
         return Solution(now, held, limit, False)
 
     def _rescaled(self, now: State) -> tuple[State, float]:
-        """The same point at a better scale of Student's t, and the relative change: one Newton step per column.
+        """The same point at better scales of Student's t and counts, and the largest relative change.
 
-        With m = mean w z^2, which is 1 at the right scale: log s += (nu + 3)/(2 nu) (m - 1), the information of log s
-        being 2 nu/(nu + 3) a row.
+        With m = mean w z^2, which is 1 at the right scale, one Newton step per column: log s += (m - 1)/information,
+        that of log s being 2 nu/(nu + 3) a row for Student's t, and as in counts.py for counts.
         """
         number = np.maximum(per_column(now.sums, len(now.variance), "number"), 1.0)
         mean = per_column(now.sums, len(now.variance), "square") / number / now.variance
-        step = np.clip((self.nu + 3.0) / self.nu * (mean - 1.0), -1.0, 1.0)
-        variance = np.maximum(now.variance * np.exp(step), self.floor)
+        known = information(now.variance, self.tick)[1]
+        if self.nu:
+            known = np.where(self.tick > 0.0, known, 2.0 * self.nu / (self.nu + 3.0))
+        step = np.where(self.scaled, np.clip(2.0 * (mean - 1.0) / known, -1.0, 1.0), 0.0)
+        variance = np.where(self.scaled, np.maximum(now.variance * np.exp(step), self.floor), now.variance)
         change = float(np.abs(np.log(variance / now.variance)).max())
         return (self.state(now.point, variance), change) if change >= SCALE_CHANGE else (now, change)
 

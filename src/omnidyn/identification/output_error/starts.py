@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from omnidyn.compiled import kernel, maker
 from omnidyn.identification.output_error.primitives import Mapping
 from omnidyn.identification.output_error.record import Record
+from omnidyn.model.frames import world_to_body
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 
@@ -26,6 +27,7 @@ WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
 CLEAR = 4.0  # standard errors of the noise that a speed must be away from 0
 LEAST_WINDOWS = 8
+SLOPE = 0.05  # [s] over which an angle or a position is differentiated
 ENOUGH = 200_000  # rows of a piece that are looked at
 SAMPLE = 1500  # rows for a median
 
@@ -40,7 +42,7 @@ class Windows:
 
 
 def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
-    """The twist of a record, measured or from its wheel speeds; None where neither is there. Shape (rows, 3)."""
+    """The twist of a record, measured or from wheel speeds, wheel angles or pose; None without. Shape (rows, 3)."""
     names = [name for name, _ in record.columns]
     if "twist" in names:
         first = names.index("twist")
@@ -48,7 +50,26 @@ def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
     if "wheel_speed" in names:
         first = names.index("wheel_speed")
         return twist_from_wheel_speed(robot.wheels, record.outputs[:, first : first + robot.wheels.count])
+    if "wheel_angle" in names:
+        first = names.index("wheel_angle")
+        return twist_from_wheel_speed(robot.wheels, _rates(record, slice(first, first + robot.wheels.count)))
+    if "position" in names and np.isfinite(heading := record.outputs[:, names.index("heading")]).any():
+        first = names.index("position")
+        rates = _rates(record, [first, first + 1, names.index("heading")])
+        return np.einsum("kij,kj->ki", world_to_body(heading), rates)
     return None
+
+
+def _rates(record: Record, columns: slice | list[int]) -> FloatArray:
+    """Slope of columns over a few rows, NaN outside of the pieces. Shape (rows, columns)."""
+    values, t = record.outputs[:, columns], record.t
+    found = np.full(values.shape, np.nan)
+    for first, last in record.pieces:
+        near = max(1, round(0.5 * SLOPE / float(np.median(np.diff(t[first : min(last, first + SAMPLE) + 1])))))
+        rows = np.arange(first, last + 1)
+        low, high = np.maximum(rows - near, first), np.minimum(rows + near, last)
+        found[rows] = (values[high] - values[low]) / (t[high] - t[low])[:, None]
+    return found
 
 
 def integral_start(mapping: Mapping, values: FloatArray, records: Sequence[Record]) -> FloatArray:

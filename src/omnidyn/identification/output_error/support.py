@@ -42,7 +42,9 @@ def wanted(solver: Solver, solution: Solution, wider: Solver) -> list[str]:
         k = solver.problem.where(name)
         if k >= 0:
             values[j] = solution.state.point.values[k]
-    state = wider.state(Point(values, solution.state.point.states), solution.state.variance if wider.nu else None)
+    state = wider.state(
+        Point(values, solution.state.point.states), solution.state.variance if wider.scaled.any() else None
+    )
     normal = Normal(wider, state)
     words, count = [], len(solver.problem.parameters)
     if wider.problem.names[:count] != solver.problem.names:

@@ -63,7 +63,8 @@ class Trust:
 def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     """The covariance at a solution; `kind`: "white", "sandwich" or "auto"."""
     rows = sum(piece.last - piece.first + 1 for piece in solver.problem.pieces)
-    weighting = Weighting(solution.state.variance, solver.nu, FINAL, max(LEAST_BLOCK, -(-rows // BLOCKS)))
+    counted = bool(solver.tick.any())
+    weighting = Weighting(solution.state.variance, solver.nu, FINAL, max(LEAST_BLOCK, -(-rows // BLOCKS)), counted)
     sums = solver.engine.sums(solution.state.point, weighting)
     normal = Normal(solver, State(solution.state.point, sums, solution.state.objective, solution.state.variance))
     relative = _relative(solver, solution)
@@ -72,7 +73,7 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     influence = normal.scores() @ plain  # what each block moves each parameter by
     coloured, neighbours = _coloured(solver, sums)
     if kind == "auto":  # a loss that is not the likelihood of the noise says nothing by its curvature alone
-        kind = SANDWICH if coloured or solver.nu else WHITE
+        kind = SANDWICH if coloured or solver.nu or counted else WHITE  # nor does an encoder at rest, which repeats
     wide = influence.T @ influence + plain @ np.diag(normal.prior_information) @ plain
     degrees = _degrees(influence, seen) if kind == SANDWICH else _rows(solver, sums) - int(seen.sum())
     if len(influence) <= len(plain):
