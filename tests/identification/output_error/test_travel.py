@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.output_error.exact_engine import ExactEngine
-from omnidyn.identification.output_error.fit import Options, _records, make_problem
+from omnidyn.identification.output_error.fit import Options, make_problem, read_records
 from omnidyn.identification.output_error.problem import Point
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
@@ -39,7 +39,7 @@ def problem_of(robot, voltage, dt, values, nuisances=(), free=ROBOT_KEYS):
     pose = np.column_stack([values[:, 1:3], values[:, :1]])
     run = Run(t=t, voltage=np.vstack([voltage, voltage[-1:]]), pose=pose, wheel_angle=values[:, 3 : 3 + count])
     given = Options(free=free, nuisances=nuisances, start="free", outputs=OUTPUTS, tick_rad=0.0)
-    return make_problem(_records([run], robot, given), robot, given)
+    return make_problem(read_records([run], robot, given), robot, given)
 
 
 def at_truth(problem, start, nuisances):

@@ -1,0 +1,136 @@
+"""Fits to positions, to logs that hold the same thing twice, and on floors that are not level."""
+
+import numpy as np
+import pytest
+
+from omnidyn.errors import InputError
+from omnidyn.identification.as_fitted import as_fitted
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+from tests.identification.output_error.test_axebot import NOISE, TRUTH, voltages
+
+TILTED = np.array([1.5 * 9.81 * np.sin(np.radians(1.0)), -0.1, 0.004])  # [N, N, N m]
+
+
+@pytest.fixture(scope="module")
+def clean(axebot):
+    voltage = voltages(np.random.default_rng(21))
+    return simulate(axebot, voltage, 0.01, pose=[1.0, -2.0, 0.5])
+
+
+def holds(fit, many=4.5):
+    return all(abs(fit.value[key] - true) <= many * fit.std[key] for key, true in TRUTH.items())
+
+
+def captured(run, seed, **channels):
+    """Its pose as motion capture has it: noise of 2 mm and 5 mrad that knows nothing of the rows before."""
+    noise = np.random.default_rng(seed).normal(size=run.pose.shape) * [0.002, 0.002, 0.005]
+    return Run(t=run.t, voltage=run.voltage, pose=run.pose + noise, **channels)
+
+
+def test_a_pose_alone(axebot, clean):
+    fit = fit_output_error(captured(clean, 1), axebot, nuisances=())
+    assert holds(fit)
+    assert list(fit.noise) == ["heading[0]", "position[0]", "position[1]"]
+    assert list(fit.noise.values()) == pytest.approx([0.005, 0.002, 0.002], rel=0.05)
+    assert fit.covariance == "white"
+
+
+def test_a_pose_beside_the_twist_narrows_the_intervals(axebot, clean):
+    twist = clean.twist + np.random.default_rng(2).normal(size=clean.twist.shape) * NOISE
+    both = fit_output_error(captured(clean, 3, twist=twist), axebot, nuisances=())
+    plain = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=twist), axebot, nuisances=())
+    assert holds(both)
+    assert len(both.noise) == 6
+    assert all(both.std[key] < 0.7 * std for key, std in plain.std.items())
+
+
+def test_a_position_without_heading_finds_where_the_robot_faced(axebot, clean):
+    log = captured(clean, 4)
+    pose = log.pose.copy()
+    pose[:, 2] = np.nan
+    fit = fit_output_error(log.replace(pose=pose), axebot, nuisances=("latency",))
+    assert holds(fit)
+    assert list(fit.nuisances) == ["latency.position"]
+    assert list(fit.noise) == ["position[0]", "position[1]"]
+
+
+@pytest.mark.parametrize("hold", ["before", "mean"])
+def test_odometry_that_is_the_integral_of_its_twist_is_left_out(axebot, clean, hold):
+    """Euler's rule from row to row, as firmware does it, from noisy twists."""
+    twist = clean.twist + np.random.default_rng(5).normal(size=clean.twist.shape) * NOISE
+    rate = twist[:-1] if hold == "before" else 0.5 * (twist[1:] + twist[:-1])
+    heading = 0.5 + np.concatenate([[0.0], np.cumsum(rate[:, 2] * 0.01)])
+    east = np.cos(heading[:-1]) * rate[:, 0] - np.sin(heading[:-1]) * rate[:, 1]
+    north = np.sin(heading[:-1]) * rate[:, 0] + np.cos(heading[:-1]) * rate[:, 1]
+    path = np.vstack([[0.0, 0.0], np.cumsum(np.column_stack([east, north]) * 0.01, axis=0)])
+    log = Run(t=clean.t, voltage=clean.voltage, twist=twist, pose=np.round(np.column_stack([path, heading]), 5))
+    fit = fit_output_error(log, axebot, nuisances=())
+    assert list(fit.noise) == ["twist[0]", "twist[1]", "twist[2]"]
+    assert sum("is the integral of its own twist" in words for words in fit.warnings) == 2
+    asked = fit_output_error(log, axebot, nuisances=(), outputs=["twist", "pose"])
+    assert len(asked.noise) == 6
+    assert any("the same data count twice" in words for words in asked.warnings)
+
+
+def test_an_unknown_output_is_refused(axebot, clean):
+    with pytest.raises(InputError, match="no such output"):
+        fit_output_error(captured(clean, 1), axebot, outputs=["place"])
+
+
+def tilted(robot, voltage, force, dt=0.01, **more):
+    """simulate on a floor that pulls: the volts that push as hard are added, the log does not hold them."""
+    mass = np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
+    from omnidyn.model.statespace import state_space
+
+    wide = robot.replace(motor=robot.motor.replace(voltage_limit=100.0))
+    run = simulate(wide, voltage + np.linalg.solve(state_space(robot).B, force / mass), dt, **more)
+    return run.replace(voltage=np.vstack([voltage, voltage[-1:]]))
+
+
+def test_a_tilted_floor_is_found_and_friction_with_it(axebot, clean):
+    run = tilted(axebot, clean.voltage[:-1], TILTED)
+    log = Run(
+        t=run.t, voltage=run.voltage, twist=run.twist + np.random.default_rng(6).normal(size=run.twist.shape) * NOISE
+    )
+    fit = fit_output_error(log, axebot, nuisances=("tilt",))
+    assert holds(fit)
+    for axis, true in zip(("x", "y", "yaw"), TILTED, strict=True):
+        own = fit.nuisances[f"tilt.{axis}"]
+        assert abs(own.value - true) <= 4.5 * own.std
+        assert own.unit == ("N m" if axis == "yaw" else "N")
+    assert fit.nuisances["tilt.x"].value > 10.0 * fit.nuisances["tilt.x"].std
+    again = simulate(fit.robot.replace(motor=fit.robot.motor.replace(voltage_limit=100.0)),
+                     as_fitted(log, fit).voltage[:-1], 0.01)  # fmt: skip
+    assert np.sqrt(np.mean((again.twist - run.twist) ** 2, axis=0)) == pytest.approx(np.zeros(3), abs=0.005)
+
+
+def test_a_tilted_floor_is_asked_for_in_words(axebot, clean):
+    run = tilted(axebot, clean.voltage[:-1], TILTED * [1.0, 0.0, 0.0])
+    log = Run(
+        t=run.t, voltage=run.voltage, twist=run.twist + np.random.default_rng(7).normal(size=run.twist.shape) * NOISE
+    )
+    fit = fit_output_error(log, axebot)
+    assert any('"tilt.x"' in words for words in fit.warnings)
+    assert "tilt.x" not in fit.nuisances
+    level = Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + (log.twist - run.twist))
+    assert not any("tilt" in words for words in fit_output_error(level, axebot).warnings)
+
+
+def test_an_axis_that_is_none_is_refused(axebot, clean):
+    with pytest.raises(InputError, match="no such axis"):
+        fit_output_error(captured(clean, 1), axebot, nuisances=("tilt.z",))
+
+
+def test_the_noise_of_a_student_t_fit_is_a_standard_deviation(axebot, clean):
+    """Of the Gaussian noise: 2 % wild samples change it by less than what they add to the plain one."""
+    rng = np.random.default_rng(8)
+    noise = rng.normal(size=clean.twist.shape) * NOISE
+    fit = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise), axebot, nuisances=(),
+                           loss="student-t")  # fmt: skip
+    assert list(fit.noise.values()) == pytest.approx(list(NOISE), rel=0.04)
+    noise += 1.0 * rng.normal(size=noise.shape) * (rng.random(noise.shape) < 0.02)
+    wild = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise), axebot, nuisances=(),
+                            loss="student-t")  # fmt: skip
+    assert list(wild.noise.values()) == pytest.approx(list(NOISE), rel=0.1)
