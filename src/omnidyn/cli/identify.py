@@ -19,7 +19,7 @@ def identify(
     nuisance: list[str] = typer.Option(
         [],
         metavar="NAME",
-        help="Fit what the log does: latency, gain, dead_band, fade, none; default: auto. Repeatable.",
+        help="Fit what the log does: latency, gain, dead_band, fade, tilt, none; default: auto. Repeatable.",
     ),
     loss: str = typer.Option("", help="gaussian, or student-t for logs with outliers."),
     use_priors: bool = typer.Option(False, "--use-priors", help="A std in the robot file counts as a prior."),
