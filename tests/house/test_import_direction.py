@@ -22,7 +22,7 @@ ORDER = {
     "simulation": """inputs commands exact_step exact_sensitivity travel exact exact_position
         exact_inductance_step exact_inductance_travel exact_inductance implicit_step speed_loop implicit simulate
         tangent_step tangent_events tangent_look tangent_march tangent_loop tangent tangent_sight""",
-    "logs": """channels dialect header rows text_file table parquet_pages parquet tables run_file steady_table
+    "logs": """channels dialect spaced header rows text_file table parquet_pages parquet tables run_file steady_table
         command_file words mapping clock guessed guess_time guess counters log read_log segments average plateaus
         findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",

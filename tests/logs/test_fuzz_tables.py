@@ -110,8 +110,13 @@ def test_read_table(path, content):
 LOGGED = b"%made by hand\r\nTime;Speed;mode;\r\nms;rad/s;;\r\nt;w1;m;\r\n0;1,5;go;\r\n10;2,500;stop;\r\n\r\n20;;go;\r\n"
 
 
-@settings(max_examples=400, deadline=None)
-@given(content=files(LOGGED), rows=st.integers(1, 5), header=st.booleans(), skip=st.booleans())
+SPACED = b'# a log\r\n  t "w 1"\tstate [x]\r\n 0  1.5 go\r\n0.1\t2,5  "all well"\r\n 0.2 nan go\r\n\r\n0.3 4 go\r\n'
+
+
+@settings(max_examples=600, deadline=None)
+@given(
+    content=st.one_of(files(LOGGED), files(SPACED)), rows=st.integers(1, 5), header=st.booleans(), skip=st.booleans()
+)
 def test_read_any_and_its_pieces(path, content, rows, header, skip):
     path.write_bytes(content)
     table, error = outcome(partial(read_any, path, header=header, skip_bad_rows=skip))

@@ -335,8 +335,8 @@ def test_nothing_left_is_refused(write):
         ("t;u,v\n0;1,5\n", r"table\.csv:1: cannot tell what separates the columns"),  # 6
         ("v\n1,5\n", r"table\.csv:1: cannot tell what separates the columns; got 1,5"),  # 6
         (
-            "t u\n0 1\n",
-            r"cannot tell what separates the columns; got 0 1; expected comma, semicolon or tab .*spaces do not",
+            "t u\n0 1 2\n",
+            r"cannot tell what separates the columns; got 0 1 2; expected comma, semicolon or tab .*between spaces",
         ),
         (b"PAR1\x00\x01", r"this is not a text file; got a Parquet file"),  # 37
         (b"PK\x03\x04\x00", r"this is not a text file; got a zip archive"),  # 37

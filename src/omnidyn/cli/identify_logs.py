@@ -42,7 +42,8 @@ def is_steady_table(path: str) -> bool:
             return False
         raise
     lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    cells = next(lines, "").replace(";", ",").replace("\t", ",").split(",")
+    first = next(lines, "").replace(";", ",").replace("\t", ",")
+    cells = first.split(",") if "," in first else first.split()
     names = {cell.strip().strip('"').lower() for cell in cells}
     return "axis" in names and bool(names & {"speed", "force"})
 

@@ -114,7 +114,7 @@ def _check_single_column(rows: Iterable[str], where: str) -> None:
             raise InputError(
                 "cannot tell what separates the columns",
                 got=row,
-                expected="comma, semicolon or tab in the header and in every row (spaces do not separate)",
+                expected="comma, semicolon or tab in header and rows, or as many cells between spaces in all",
                 remedy="write the table with commas and decimal points",
                 where=where,
             )

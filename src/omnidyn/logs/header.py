@@ -16,6 +16,7 @@ from omnidyn.logs import dialect
 from omnidyn.logs.dialect import SAMPLE_ROWS, SEPARATOR_WORDS, SEPARATORS
 
 MAX_COLUMNS = 1000
+TABS_NOTE = "columns are separated by " + SEPARATOR_WORDS["\t"]
 HEAD_ROWS = 3  # at most so many lines above the first row: titles, units, names
 
 _SEPARATOR_LINE = re.compile(r"sep=([,;\t])")  # Excel's own first line

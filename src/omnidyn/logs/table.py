@@ -2,7 +2,8 @@
 
 It takes a byte order mark, any end of line, comment lines (# or %), a header that stands in comments, a row of units
 under the header or a line of titles above it, separators comma, semicolon and tab, one at the end of every row too,
-and a decimal comma where it is unmistakable. What it had to decide stands in `Table.notes`.
+runs of spaces where nothing else separates, and a decimal comma where it is unmistakable. What it had to decide stands
+in `Table.notes`.
 It refuses, with file, line and column, what other readers swallow: ragged rows, a missing header, a quote that is
 never closed, 1e400, 1_000, 0x10, #N/A, blank cells where a number is needed.
 """
@@ -22,8 +23,9 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, too_large
 from omnidyn.logs import dialect
-from omnidyn.logs.header import Layout, find_layout
+from omnidyn.logs.header import TABS_NOTE, Layout, find_layout
 from omnidyn.logs.rows import Column, FloatArray, RowParser
+from omnidyn.logs.spaced import NOTE, is_spaced, tabbed
 from omnidyn.logs.text_file import TOO_LARGE_REMEDY, Piece, Progress, TextFile
 
 ROWS = 500_000
@@ -183,7 +185,13 @@ def _tables(file: TextFile, rows: int, header: bool, skip: bool) -> Iterator[Tab
     if rows < 1:
         raise InputError("no rows in a piece", got=rows, expected="1 or more")
     head, pieces = _head(file.pieces(rows))
+    spaced = is_spaced(head)
+    if spaced:
+        head, pieces = [tabbed(line) for line in head], _tabbed(pieces)
     layout = find_layout(head, file.source, header)
+    if spaced:
+        notes = [NOTE if note == TABS_NOTE else note for note in layout.notes]
+        layout = replace(layout, notes=tuple(notes))
     sample = _kept(Piece(1, head), layout.first)[0][: dialect.SAMPLE_ROWS]
     parser = RowParser(layout, file.source, skip, sample)
     waiting: Table | None = None
@@ -191,7 +199,9 @@ def _tables(file: TextFile, rows: int, header: bool, skip: bool) -> Iterator[Tab
         texts, lines = _kept(piece, layout.first)
         if not texts:
             continue
-        columns, lines = parser.parse(texts, lines, partial(_texts_from, file, layout, piece.first + len(piece.lines)))
+        columns, lines = parser.parse(
+            texts, lines, partial(_texts_from, file, layout, piece.first + len(piece.lines), spaced)
+        )
         if not len(lines):
             continue
         if waiting is not None:
@@ -225,6 +235,11 @@ def _cut(pieces: Iterable[Piece], rows: int) -> Iterator[Piece]:
         yield from (Piece(first + k, lines[k : k + rows]) for k in range(0, len(lines), rows))
 
 
+def _tabbed(pieces: Iterable[Piece]) -> Iterator[Piece]:
+    for first, lines in pieces:
+        yield Piece(first, [tabbed(line) if line else line for line in lines])
+
+
 def _kept(piece: Piece, first: int) -> tuple[list[str], NDArray[np.int64]]:
     """The rows in a piece, without blank lines, comments and what stands above line `first`; and their lines."""
     begin = max(0, first - piece.first)
@@ -238,9 +253,10 @@ def _is_comment(line: str) -> bool:
     return ("#" in line or "%" in line) and dialect.is_comment(line)
 
 
-def _texts_from(file: TextFile, layout: Layout, line: int) -> Iterator[str]:
+def _texts_from(file: TextFile, layout: Layout, line: int, spaced: bool) -> Iterator[str]:
     """The rows from a line on, read again from the file."""
-    for piece in TextFile(file.path).pieces(ROWS):
+    pieces = TextFile(file.path).pieces(ROWS)
+    for piece in _tabbed(pieces) if spaced else pieces:
         yield from _kept(piece, max(line, layout.first))[0]
 
 
