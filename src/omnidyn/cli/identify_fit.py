@@ -162,12 +162,12 @@ def _fitted(
     from omnidyn.identification.joint_fit import expand_keys
 
     options: dict[str, Any] = {
-        "free": expand_keys(ask.free) if ask.free else None, "fixed": expand_keys(ask.fix),
+        "free": expand_keys(ask.free, robot) if ask.free else None, "fixed": expand_keys(ask.fix, robot),
         "nuisances": nuisances(ask.nuisances), "loss": ask.loss or "gaussian", "use_priors": ask.use_priors,
         "start": ask.start or "auto",
     }  # fmt: skip
     watch = _Watch(now)
-    more: dict[str, Any] = {"profile": expand_keys(ask.profile), "bootstrap": ask.bootstrap}
+    more: dict[str, Any] = {"profile": expand_keys(ask.profile, robot), "bootstrap": ask.bootstrap}
     _refuse_groups(part, ask)
     if len(set(part.groups)) > 1:
         return _fitted_groups(part, robot, ask.per_free, watch, options, more)

@@ -9,9 +9,10 @@ from omnidyn.identification.estimate import Estimate, unit
 from omnidyn.identification.motor_fit import MotorFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.study_parts import Difference
-from omnidyn.identification.validation import FITTED, Validation, coloured
+from omnidyn.identification.validation import FITTED, HELD_OUT, Validation, coloured
 from omnidyn.logs.findings import FATAL, WARN, Verdict
 from omnidyn.logs.steady_table import AXES
+from omnidyn.model.starter import GUESS
 
 NUMBER_HEAD = ("number", "value", "std error", "95 % interval", "unit", "")
 DIFFERENCE_HEAD = ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "")
@@ -76,7 +77,8 @@ def interval(pair: tuple[float, float]) -> str:
 
 def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]:
     """What to measure or to ask for next, gravest first."""
-    words = [*_not_seen(fit), *_together(fit), *_wide(fit), *_from_validation(fit, validation)]
+    words = [*_not_seen(fit), *_guesses(fit, validation), *_together(fit), *_wide(fit)]
+    words += _from_validation(fit, validation)
     return list(dict.fromkeys(words))
 
 
@@ -104,6 +106,20 @@ def _remedy(name: str) -> str:
     return "fix it (--fix), or record what depends on it: currents, or another load"
 
 
+def _guesses(fit: OutputErrorEstimate, validation: Validation | None) -> Iterator[str]:
+    """What the robot file only guesses, where the model misses something: no friction makes up for a wrong motor."""
+    guessed = [
+        key for key, prior in fit.robot.priors.items()
+        if prior.source == GUESS and key not in fit.value and key.startswith(("motor.", "body."))
+    ]  # fmt: skip
+    missed = validation is not None and bool(coloured(validation.scores.get(HELD_OUT) or validation.scores[FITTED]))
+    if guessed and missed:
+        yield (
+            f"{', '.join(guessed)} are guesses of the robot file, and the errors are not white: put in what you can "
+            f"measure, or fit one of them too (--free friction --free {guessed[0]})"
+        )
+
+
 def _together(fit: OutputErrorEstimate) -> Iterator[str]:
     names, matrix = fit.correlation.names, fit.correlation.matrix
     for i, first in enumerate(names):
@@ -117,7 +133,8 @@ def _together(fit: OutputErrorEstimate) -> Iterator[str]:
 
 def _wide(fit: Estimate) -> Iterator[str]:
     for name, value in fit.value.items():
-        share = fit.std[name] / abs(value) if value and math.isfinite(fit.std[name]) else 0.0
+        told = value and math.isfinite(fit.std[name]) and name not in fit.at_bound
+        share = fit.std[name] / abs(value) if told else 0.0
         if share > WIDE:
             yield (
                 f"{name} is known within {100.0 * share:.0f} % only: a log {(share / GOAL) ** 2:.0f} times as long "

@@ -30,6 +30,7 @@ from omnidyn.identification.output_error.fit import (
     Options,
     degrees,
     fits_exactly,
+    free_by_default,
     loss_words,
     nuisance_names,
 )
@@ -189,7 +190,7 @@ def identify_groups(
         runs, robot, groups, per_free=per_free, free=free, fixed=fixed, nuisances=nuisances, start=start,
         use_priors=use_priors, outputs=outputs, loss=loss, covariance=covariance,
     )  # fmt: skip
-    return joint.answer(joint.solve(watch), expand_keys(profile), bootstrap)
+    return joint.answer(joint.solve(watch), expand_keys(profile, robot), bootstrap)
 
 
 def join_groups(
@@ -209,19 +210,23 @@ def join_groups(
     if why:
         raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
     given = Options(
-        None if free is None else tuple(expand_keys(free)), tuple(expand_keys(fixed)), nuisance_names(nuisances),
-        start, use_priors, None if outputs is None else tuple(outputs), loss, covariance,
+        None if free is None else tuple(expand_keys(free, robot)), tuple(expand_keys(fixed, robot)),
+        nuisance_names(nuisances), start, use_priors, None if outputs is None else tuple(outputs), loss, covariance,
     )  # fmt: skip
     parts = read_parts(runs, groups, robot, given)
-    own = own_names(expand_keys(per_free), parts)
+    own = own_names(expand_keys(per_free, robot), parts)
     engine = join(parts, own, FINE)
     return JointFit(Solver(engine.problem, engine, degrees(loss)), engine, tuple(own), loss, covariance)
 
 
-def expand_keys(keys: Sequence[str]) -> list[str]:
-    """Keys with those that stand for several written out: "friction" is all six of the axes, a list its items."""
+def expand_keys(keys: Sequence[str], robot: Robot | None = None) -> list[str]:
+    """Keys with those that stand for several written out: "friction" is what the robot has, a list its items.
+
+    Without a robot, or with one of the exact engine, "friction" is all six of the axes.
+    """
+    known = list(FRICTION) if robot is None else free_by_default(robot)
     found: list[str] = []
     for key in keys:
-        many = [each for each in FRICTION if key == FRICTION_KEYS or each.startswith(f"{key}[")]
-        found += many or [key]
+        many = [each for each in (*known, *FRICTION) if each.startswith(f"{key}[")]
+        found += known if key == FRICTION_KEYS else many or [key]
     return list(dict.fromkeys(found))

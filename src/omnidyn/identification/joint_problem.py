@@ -16,16 +16,17 @@ from omnidyn.identification.output_error.fit import (
     degrees,
     first_point,
     fits_exactly,
+    free_by_default,
     is_exact,
     loop_options,
     make_engine,
     make_problem,
     read_records,
 )
-from omnidyn.identification.output_error.loop import loop_start, looped
+from omnidyn.identification.output_error.loop import friction_of_axis, loop_start, looped
 from omnidyn.identification.output_error.motion import motion
 from omnidyn.identification.output_error.nuisances import automatic
-from omnidyn.identification.output_error.parameters import FRICTION, Parameter
+from omnidyn.identification.output_error.parameters import Parameter
 from omnidyn.identification.output_error.problem import PieceSums, Point, Problem
 from omnidyn.identification.output_error.record import Record
 from omnidyn.identification.output_error.solver import Engine, Solver
@@ -137,18 +138,25 @@ def _still(name: str, records: Sequence[Record], robot: Robot, given: Options) -
     moved = found.moved
     if looped(records):
         return loop_options(given, found, records, robot), ()
-    still = [key for key in FRICTION if not moved[int(key[-2])]]
+    usual = free_by_default(robot)
+    asked = usual if given.free is None else given.free
+    resting = [int(axis) for axis in np.flatnonzero(~moved)]
+    still = [key for key in {**dict.fromkeys(usual), **dict.fromkeys(asked)} if _of_any(key, resting)]
     notes = tuple(
         f"axis {AXES[axis]} never visibly moved in {name}: its friction is not fitted there"
-        for axis in np.flatnonzero(~moved)
-    )
+        for axis in resting if any(friction_of_axis(key, axis) for key in still)
+    )  # fmt: skip
     if not still:
         return given, notes
-    free = given.free if given.free is not None else FRICTION if not given.use_priors else None
+    free = given.free if given.free is not None else usual if not given.use_priors else None
     if free is None:
         return replace(given, fixed=tuple({*given.fixed, *still})), notes
     left = tuple(key for key in free if key not in still and key not in given.fixed)
     return replace(given, free=left, fixed=()), notes
+
+
+def _of_any(key: str, axes: Sequence[int]) -> bool:
+    return any(friction_of_axis(key, axis) for axis in axes)
 
 
 def _settled(

@@ -15,6 +15,8 @@ from omnidyn.identification.output_error.breakaway import Breakaway, find_breaka
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.loop import (
+    friction_keys,
+    friction_of_axis,
     left_out,
     loop_keys,
     loop_pieces,
@@ -97,7 +99,7 @@ def fit_output_error(
     """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
 
     runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
-    free: keys of the robot file, such as "body.mass_kg"; by default B and C of the three axes. fixed: keys taken out.
+    free: keys of the robot file, such as "body.mass_kg"; by default the friction that the robot has. fixed: taken out.
     The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, or stays as
     the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval.
     nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade", "tilt"
@@ -294,15 +296,17 @@ def without_still_axes(
     no axis moved.
     """
     still: list[tuple[str, float, str]] = []
-    fixed = set(given.fixed)
+    fixed, asked = set(given.fixed), given.free if given.free is not None else free_by_default(robot)
     for axis in np.flatnonzero(~found.moved):
-        keys = [f"friction.axes.{name}[{axis}]" for name in ("viscous", "coulomb")]
+        own = {key for key in (*asked, *FRICTION) if friction_of_axis(key, int(axis))}
+        fixed |= own
+        if not is_exact(robot) and not own & set(asked):
+            continue  # friction along the direction of travel: no axis has its own
         held, key = float(found.held[axis]), f"friction.axes.breakaway[{axis}]"
         what = f"it held {held:.4g} {unit(key)}" if held > NOTHING else "nothing drove it"
         still.append((key, held, f"axis {AXES[axis]} never visibly moved: its friction is not fitted; {what}"))
-        fixed |= set(keys)
-        if robot.friction.axes.levels[2][axis] < held:
-            robot = with_parameter(robot, keys[1], held)
+        if is_exact(robot) and robot.friction.axes.levels[2][axis] < held:
+            robot = with_parameter(robot, f"friction.axes.coulomb[{axis}]", held)
     if not found.moved.any():
         raise InsufficientDataError(
             "the robot never visibly moved: its friction is only bounded from below",
@@ -311,7 +315,7 @@ def without_still_axes(
         )  # fmt: skip
     if not still:
         return robot, given, still
-    free = [key for key in (given.free if given.free is not None else FRICTION) if key not in fixed]
+    free = [key for key in asked if key not in fixed]
     if given.free is None and given.use_priors:
         return robot, replace(given, fixed=tuple(fixed)), still
     return robot, replace(given, free=tuple(free), fixed=()), still
@@ -320,7 +324,8 @@ def without_still_axes(
 def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Problem:
     """What is free, and how the pieces start. Raises InputError for unknown keys, or where nothing is left free."""
     priors = known_priors(robot) if given.use_priors else {}
-    keys = list(given.free) if given.free is not None else [*FRICTION, *(key for key in priors if key not in FRICTION)]
+    usual = free_by_default(robot)
+    keys = list(given.free) if given.free is not None else [*usual, *(key for key in priors if key not in usual)]
     unknown = [key for key in given.fixed if key not in keys]
     if unknown and given.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
@@ -343,6 +348,13 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
             "too few measurements", got=f"{rows}", expected=f"more than {len(own) + len(more)}, one for each number"
         )
     return Problem(robot, (*own, *more), len(own), tuple(parts))
+
+
+def free_by_default(robot: Robot) -> list[str]:
+    """B and C of the axes; of a robot with friction elsewhere the levels that it has: one that is off has no slope."""
+    if is_exact(robot):
+        return list(FRICTION)
+    return [key for key in friction_keys(robot) if "viscous" in key or parameter(robot, key) > 0.0]
 
 
 def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:

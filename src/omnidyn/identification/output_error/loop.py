@@ -21,6 +21,7 @@ from omnidyn.identification.output_error.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.record import Record
 from omnidyn.identification.output_error.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.starts import measured_twist
+from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.tangent import GAINS, parameter
 
@@ -71,14 +72,16 @@ def friction_keys(robot: Robot) -> list[str]:
 
 def loop_keys(robot: Robot, moved: NDArray[np.bool_]) -> list[str]:
     """What is free by default: friction, of axes that moved only, and the gains."""
-    kept = [key for key in friction_keys(robot) if not _of_still(key, moved)]
+    still = np.flatnonzero(~moved)
+    kept = [key for key in friction_keys(robot) if not any(friction_of_axis(key, int(axis)) for axis in still)]
     return [*kept, *gain_keys(robot)]
 
 
-def _of_still(key: str, moved: NDArray[np.bool_]) -> bool:
+def friction_of_axis(key: str, axis: int) -> bool:
+    """Whether a number of friction acts along one axis alone."""
     if key in FRICTION:
-        return not moved[int(key[-2])]
-    return key.startswith("friction.direction.yaw") and not moved[2]
+        return int(key[-2]) == axis
+    return axis == YAW and key.startswith("friction.direction.yaw")
 
 
 def _each(key: str, value: float | tuple[float, ...]) -> list[str]:
