@@ -10,7 +10,7 @@ from omnidyn.identification.output_error.fit import fit_output_error, free_by_de
 from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.identification.validation import validate
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.starter import starter_robot
+from omnidyn.model.starter import first_guess
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.tangent import with_parameter
 
@@ -22,7 +22,7 @@ DIRECTION = [
 
 @pytest.fixture(scope="module")
 def robot():
-    return starter_robot("new", azimuth=(180.0, -60.0, 60.0), wheel_radius=0.035, robot_radius=0.1, mass=1.5)
+    return first_guess("new", load_robot("axebot").wheels, 1.5)
 
 
 def test_it_is_the_friction_that_the_robot_has(robot):
