@@ -11,7 +11,8 @@ from pathlib import Path
 from benchmarks.table import Table
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-FIGURES = "identify-figures.md"  # takes every `identify_...`, also one that it does not show yet
+FIGURES = "identify-figures.md"  # takes these and every `identify_...`, also one that it does not show yet:
+FAMILY = ("groups", "real_fit")
 VERSIONS = ("numpy", "scipy", "numba", "mujoco", "lmfit")
 
 
@@ -30,7 +31,7 @@ def page_of(name: str, docs: Path = DOCS) -> Path | None:
     for page in sorted(docs.glob("*.md")):
         if begin(name) in page.read_text("utf-8"):
             return page
-    return docs / FIGURES if name.startswith("identify_") else None
+    return docs / FIGURES if name.startswith("identify_") or name in FAMILY else None
 
 
 def publish(name: str, table: Table, docs: Path = DOCS) -> None:
