@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from omnidyn import load_robot, simulate
 from omnidyn.logs.check import check
 from omnidyn.logs.check.robust import quantum, white_noise
+from omnidyn.logs.log import Log
 
 
 def test_a_clean_log_says_nothing_above_a_note(log, robot, grave):
@@ -110,3 +112,17 @@ def test_a_slow_wheel_that_reads_zero(robot, log, with_channels):
     (finding,) = check(broken).of("reads_zero")
     assert finding.where == "w3"
     assert finding.numbers["step"] == pytest.approx(0.5)
+
+
+def test_kicks_of_a_current_recorded_now_and_then_are_no_spikes():
+    """Currents five times rarer than the rest, a kick of 30 ms after every command: seen once or never."""
+    robot = load_robot("axebot")
+    levels = np.random.default_rng(3).uniform(-5.0, 5.0, (25, 3)).repeat(100, axis=0)
+    run = simulate(robot, levels, 0.01)
+    current = np.full((len(run), 3), np.nan)
+    current[::5] = run.current[::5] + 0.01 * np.random.default_rng(4).normal(size=run.current[::5].shape)
+    log = Log(run.t, {"voltage": run.voltage, "current": current}, np.arange(len(run)) + 2)
+    assert not check(log, robot).of("spike")
+    current[250, 1] += 40.0 * np.nanstd(current[:, 1])
+    (finding,) = check(log, robot).of("spike")
+    assert (finding.where, finding.rows) == ("i2", ((252, 252),))

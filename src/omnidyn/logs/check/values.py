@@ -14,7 +14,7 @@ from omnidyn.logs.check.reference import expected_wheel_speed
 from omnidyn.logs.check.robust import MAD, quantum, runs, sample, smooth, spread, white_noise
 from omnidyn.logs.check.work import INPUTS, MIN_ROWS, Work
 from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
-from omnidyn.logs.log import MAX_MISSING
+from omnidyn.logs.log import MAX_MISSING, ON_CHANGE
 from omnidyn.logs.mapping import MOTOR_SIDE
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.units import known_unit
@@ -95,7 +95,10 @@ def _reads_zero(
 ) -> list[Finding]:
     """A wheel slower than its encoder can say."""
     width = max(3, round(0.1 / work.step) | 1)
-    turning, sure = np.abs(smooth(reference, width)), 5.0 * white_noise(reference) / np.sqrt(width)
+    # What lies between two measurements is no measurement, and a mean over such rows no better than they are.
+    own = _told(work, source)
+    turning = np.abs(smooth(reference, width))
+    sure = 5.0 * white_noise(reference[own]) / np.sqrt(max(1.0, width * len(own) / len(work)))
     slow = (values == 0.0) & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
     if slow.mean() < 0.2:
         return []
@@ -326,11 +329,13 @@ def _repeats_by_noise() -> tuple[FloatArray, FloatArray]:
 def _spikes(work: Work) -> tuple[list[Finding], Work]:
     """Single values (or two) far away from both neighbours, which agree with each other."""
     found = []
-    kicked = _kicked(work)
+    changed = _changed(work)
     for channel in MEASURED:
         for component, values in work.columns(channel):
             k = place(component)[1]  # type: ignore[index]
-            bad = _isolated(values) & ~kicked
+            own = _recorded(work, channel, k)
+            bad = np.zeros(len(work), dtype=bool)
+            bad[own] = _isolated(values[own]) & ~_kicked(changed[own])
             if not bad.any() or bad.mean() > 0.2:
                 continue
             worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
@@ -346,15 +351,37 @@ def _spikes(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _kicked(work: Work) -> NDArray[np.bool_]:
-    """Rows just after a change of a command, where a kick is no error; none where commands change all the time."""
-    near = np.zeros(len(work), dtype=bool)
+def _told(work: Work, source: str) -> NDArray[np.int64]:
+    """Rows in which what tells the speed of a wheel was recorded."""
+    if source not in MEASUREMENTS:
+        return np.arange(len(work))
+    return _recorded(work, "current" if source == "voltage and current" else source.removeprefix("the "), 0)
+
+
+def _recorded(work: Work, channel: str, k: int) -> NDArray[np.int64]:
+    """Rows in which a component was recorded; those between are no measurements where it is recorded on change."""
+    logged = work.log.channels.get(channel)
+    if logged is None:
+        return np.arange(len(work))
+    there = np.isfinite(logged.reshape(len(work.log), -1)[work.rows, k])
+    return np.flatnonzero(there) if 1.0 - there.mean() > ON_CHANGE else np.arange(len(work))
+
+
+def _changed(work: Work) -> NDArray[np.int64]:
+    """How often a command has changed up to each row."""
+    changed = np.zeros(len(work), dtype=bool)
     for channel in INPUTS:
         values = work.get(channel)
         if values is not None:
-            near[1:] |= (np.diff(values, axis=0) != 0.0).any(axis=1)
+            changed[1:] |= (np.diff(values, axis=0) != 0.0).any(axis=1)
+    return np.cumsum(changed)
+
+
+def _kicked(changed: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Rows just after a change of a command, where a kick is no error; none where commands change all the time."""
+    near = np.diff(changed, prepend=changed[:1]) > 0
     if near.mean() > 0.2:
-        return np.zeros(len(work), dtype=bool)
+        return np.zeros(len(near), dtype=bool)
     for _ in range(3):
         near[1:] |= near[:-1]
     near[:-1] |= near[1:]
