@@ -194,3 +194,26 @@ def test_pieces_of_a_log_count_from_the_first_row_of_all(tmp_path, form):
     assert len(pieces) == 3
     np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), 0.25 * np.arange(40), atol=1e-6)
     assert not check_blocks(iter(pieces)).of("time_back")
+
+
+@pytest.mark.parametrize(
+    ("unit", "period", "step"),
+    [("ms", 2.0**16, 10.0), ("us", 2.0**32, 1e4), ("ms", 2.0**32, 10.0), ("s", 86400.0, 0.01)],
+)
+def test_a_clock_whose_counter_is_full_goes_on(tmp_path, unit, period, step):
+    counts = np.mod(period - 200.5 * step + step * np.arange(500), period)
+    path = write(
+        tmp_path, f"t_{unit},w1_rad_s\n" + "".join(f"{count!r},{k}\n" for k, count in enumerate(counts.tolist()))
+    )
+    run = read_log(path)
+    size = {"s": 1.0, "ms": 1e-3, "us": 1e-6}[unit]
+    np.testing.assert_allclose(np.diff(run.t), step * size, rtol=1e-4)
+    assert any(f"starts over after {period:.6g} {unit}" in words for words in run.warnings)
+    pieces = list(iter_logs(path, rows=150))
+    np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), run.t, rtol=1e-12)
+
+
+def test_two_logs_in_one_file_are_no_full_counter(tmp_path):
+    t = [*np.arange(0, 500, 10), *np.arange(0, 500, 10)]
+    with pytest.raises(InputError, match=r"time goes back; got 0 s after 0.49 s"):
+        read_log(write(tmp_path, "t_ms,w1_rad_s\n" + "".join(f"{each},1\n" for each in t)))

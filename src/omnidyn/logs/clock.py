@@ -14,6 +14,9 @@ from omnidyn.logs.table import Table
 FloatArray = NDArray[np.float64]
 
 EPOCH = 1e8  # [s]; a later time counts from 1970: the start of the log is taken off, so that no digits are lost
+DAY = 86_400.0  # [s]
+COUNTERS = (2.0**16, 2.0**32)  # counts that fit into two and four bytes
+NEAR, LONG = 50.0, 1000.0  # usual steps: the rows about the jump are no farther apart; a period is longer
 HALF_A_DAY = timedelta(hours=12)
 DATES = "a date and time such as 2026-11-20T10:00:00.125"
 
@@ -27,6 +30,8 @@ class Clock:
 
     def __init__(self) -> None:
         self._start: float | datetime | None = None
+        self._count: float | None = None  # the last one read
+        self._passed = 0.0  # counts that a clock which started over has lost
         self._last: datetime | None = None
         self._days = 0  # midnights passed since the first time of day
 
@@ -38,7 +43,7 @@ class Clock:
         cells = table.columns[column.name]
         if isinstance(cells, tuple) and (isinstance(self._start, datetime) or is_dates(cells)):
             return self._from_dates(table, column.name, cells)
-        counts = table.numbers(column.name, missing=True)
+        counts = self._going_on(table.numbers(column.name, missing=True), column, notes)
         known = counts[np.isfinite(counts)]
         if self._start is None and known.size:
             self._start = float(known[0]) if abs(known[0] * column.factor) > EPOCH else 0.0
@@ -47,6 +52,26 @@ class Clock:
             notes.append(f"time starts at {start:.6f} s, counted from an epoch: it begins at 0 here")
             return (counts - self._start) * column.factor
         return counts * column.factor
+
+    def _going_on(self, counts: FloatArray, column: Column, notes: list[str]) -> FloatArray:
+        """The counts of a clock that starts over when its counter is full, or at midnight, as if it did not."""
+        rows = np.flatnonzero(np.isfinite(counts))
+        before = [] if self._count is None else [self._count]
+        read = np.concatenate([before, counts[rows]])
+        steps = np.diff(read)
+        self._count = float(read[-1]) if read.size else None
+        if not steps.size or not (steps < 0.0).any() or not (steps > 0.0).any():
+            return counts + self._passed
+        usual = float(np.median(steps[steps > 0.0]))
+        for period in (*COUNTERS, DAY / abs(column.factor)):
+            over = np.abs(steps + period) < NEAR * usual
+            if read.min() >= 0.0 and read.max() < period and (over == (steps < 0.0)).all() and LONG * usual < period:
+                notes.append(f"{column.name} starts over after {period:.6g} {column.unit}: it is taken to go on")
+                passed = self._passed + period * np.cumsum(np.concatenate([[0], over]))
+                self._passed, counts = float(passed[-1]), counts.copy()
+                counts[rows] += passed[len(before) :]
+                return counts
+        return counts + self._passed
 
     def _from_dates(self, table: Table, name: str, cells: tuple[str, ...]) -> FloatArray:
         t = np.full(len(cells), np.nan)
