@@ -157,3 +157,21 @@ def test_blocks_of_a_long_log_are_one_verdict(call, monkeypatch):
     (one,), (other,) = ([f for f in strict(out)["logs"][0]["findings"] if f["code"] == "gap"] for out in (whole, parts))
     assert one["rows"] == other["rows"]
     assert strict(parts)["logs"][0]["rows"] == strict(whole)["logs"][0]["rows"]
+
+
+def test_what_was_decided_in_reading_is_said(call):
+    lines = Path("clean.csv").read_text().splitlines()
+    Path("german.csv").write_text("\n".join(line.replace(",", ";").replace(".", ",") for line in lines), "utf-16")
+    code, _, err = call("german.csv", "--robot", "axebot")
+    assert code == 0
+    assert "german.csv: the encoding is UTF-16" in err
+    assert "german.csv: numbers have a decimal comma" in err
+    (log,) = json.loads(call("german.csv", "--json")[1])["logs"]
+    assert "columns are separated by a semicolon" in log["notes"]
+
+
+def test_a_log_of_which_nothing_is_known_is_not_fit_for_use(call):
+    Path("odd.csv").write_text("t_s,foo,bar\n" + "".join(f"{0.01 * k:.2f},{k},1\n" for k in range(100)))
+    code, out, _ = call("odd.csv")
+    assert code == 4
+    assert "no column but the time is known: nothing was checked of foo, bar" in out

@@ -34,6 +34,7 @@ class Checked:
     error: OmnidynError | None = None
     digest: str = ""
     sha256: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def check(
@@ -113,6 +114,7 @@ def _checked(
         blocks = kept.first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=said)))
         if kept.log is not None:
             maps.show(path, kept.log.columns)
+            done.notes = kept.log.notes
         done.verdict = check_log(kept.log, robot) if kept.only else check_blocks(blocks, robot)  # type: ignore[arg-type]
         if picture and kept.log is not None:
             _draw(kept.log, done.verdict, picture, force)
@@ -198,6 +200,8 @@ def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
     read = [each for each in done if each.verdict is not None]
     for each in read:
         assert each.verdict is not None
+        for note in each.notes if full or len(read) <= WHOLE else ():
+            say(f"omnidyn: {each.path}: {note}")
         show(each.verdict.as_text(width()) if full or len(read) <= WHOLE else _brief(each.verdict))
     if len(done) > 1:
         show(_summary(done, read))
@@ -206,7 +210,11 @@ def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
 def _document(done: list[Checked], robot: str) -> dict[str, Any]:
     from omnidyn.cli.session import provenance, robot_input
 
-    logs = [each.verdict.to_dict() | {"source": each.path} for each in done if each.verdict is not None]
+    logs = [
+        each.verdict.to_dict() | {"source": each.path, "notes": list(each.notes)}
+        for each in done
+        if each.verdict is not None
+    ]
     errors = [{"source": each.path, "error": str(each.error)} for each in done if each.error is not None]
     inputs = [{"role": "log", "name": each.path, "sha256": each.sha256} for each in done if each.verdict is not None]
     record = provenance([*([robot_input(robot)] if robot else []), *inputs])

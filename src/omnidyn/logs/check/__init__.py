@@ -23,7 +23,7 @@ from omnidyn.logs.check.time_base import begin, between
 from omnidyn.logs.check.values import check_values
 from omnidyn.logs.check.wiring import check_wiring
 from omnidyn.logs.check.work import Work
-from omnidyn.logs.findings import NOTE, Finding, Verdict, in_order, merged
+from omnidyn.logs.findings import FATAL, NOTE, Finding, Verdict, in_order, merged
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 
@@ -48,7 +48,7 @@ def check(log: Log, robot: Robot | None = None) -> Verdict:
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing: NaN is the answer wanted
         found, work = begin(log, robot)
-        found += _other_count(log, robot)
+        found += _no_channel(log) + _other_count(log, robot)
         for family in FAMILIES:
             more, work = family(work)
             found += more
@@ -63,6 +63,17 @@ def check(log: Log, robot: Robot | None = None) -> Verdict:
 def work_has(log: Log, channel: str) -> bool:
     """Whether a channel of the log holds any number."""
     return bool(np.isfinite(log.channels[channel]).any())
+
+
+def _no_channel(log: Log) -> list[Finding]:
+    if any(work_has(log, name) for name in log.channels) or not len(log):
+        return []
+    unused = log.columns.unused
+    names = f" of {', '.join(unused[:6])}{', ...' * (len(unused) > 6)}" if unused else ""
+    return [Finding(
+        "no_channel", FATAL, "", f"no column but the time is known: nothing was checked{names}",
+        "say which column is what: --column w1=NAME:rad/s, or --map FILE", (), 0, {},
+    )]  # fmt: skip
 
 
 def _other_count(log: Log, robot: Robot | None) -> list[Finding]:
