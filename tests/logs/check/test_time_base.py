@@ -138,3 +138,12 @@ def test_angles_without_speeds_are_checked_as_speeds():
     swapped = replace(log, channels={**channels, "wheel_angle": angle[:, [1, 0, *range(2, angle.shape[1])]]})
     (finding,) = check(swapped, robot).of("swapped")
     assert set(finding.where.split()) == {"w1", "w2"}
+
+
+def test_a_few_rows_at_rest_are_no_impossible_energy():
+    """One row a second is left of a log, the first at rest: noise of its speed is no back-EMF."""
+    log, robot, _ = clean(1)
+    few = log.rows(slice(0, None, round(1.0 / float(np.median(np.diff(log.t))))))
+    speed = few.channels["wheel_speed"].copy()
+    speed[0] = 0.01
+    assert not check(replace(few, channels={**few.channels, "wheel_speed": speed}), robot).of("energy")
