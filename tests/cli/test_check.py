@@ -175,3 +175,11 @@ def test_a_log_of_which_nothing_is_known_is_not_fit_for_use(call):
     code, out, _ = call("odd.csv")
     assert code == 4
     assert "no column but the time is known: nothing was checked of foo, bar" in out
+
+
+def test_a_map_never_replaces_a_log(call):
+    before = Path("clean.csv").read_bytes()
+    code, _, err = call(".", "--save-map", "clean.csv", "--force")
+    assert code == 3
+    assert "the result would replace a log" in err
+    assert Path("clean.csv").read_bytes() == before

@@ -193,3 +193,21 @@ def test_motors_in_words(call, bench):
     assert code == 0
     assert "motor 1: slope 2 +-" in out
     assert "-o is not used" in err
+
+
+@pytest.mark.parametrize("option", ["-o", "--report", "--save-map"])
+def test_no_result_replaces_a_log_even_when_forced(call, floors, tmp_path, option):
+    log = tmp_path / "drive.csv"
+    log.write_bytes((floors / "smooth" / "run0.csv").read_bytes())
+    before = log.read_bytes()
+    code, _, err = call(str(log), "--robot", "axebot", option, str(log), "--force")
+    assert code == 3
+    assert "the result would replace a log" in err
+    assert log.read_bytes() == before
+
+
+def test_a_log_of_one_row_is_exit_4_without_a_warning_of_numpy(call, tmp_path):
+    (tmp_path / "one.csv").write_text("t_s,u1_V,u2_V,u3_V,w1_rad_s,w2_rad_s,w3_rad_s\n0,1,1,1,2,2,2\n")
+    code, _, err = call(str(tmp_path / "one.csv"), "--robot", "axebot")
+    assert code == 4
+    assert "no steady window was found" in err

@@ -59,6 +59,7 @@ def check(
     needs none is checked. Exit code 4 when a finding is fatal, 3 when a log could not be read; the rest is still shown.
     """
     _refuse_picture(picture, force, log)
+    log_options.keep_logs(log, picture, save_map)
     options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
     maps = log_options.Maps(save_map, force)
     with progress("reading") as now:

@@ -53,6 +53,7 @@ def compare(
     if len(robot) > MOST_ROBOTS:
         raise typer.BadParameter(f"--robot may be given once or twice, not {len(robot)} times.")
     _refuse_picture(picture, force)
+    log_options.keep_logs(log, picture, save_map)
     rules = [parse_threshold(text) for text in fail_if]
     options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows)
     maps = log_options.Maps(save_map, force)

@@ -93,6 +93,7 @@ def run(asked: Asked) -> None:
     if not asked.robot and asked.what == FRICTION:
         raise typer.BadParameter("Missing option '--robot'.")
     _refuse_places(asked.out, asked.report, asked.force)
+    options.keep_logs(asked.logs, asked.out, asked.report, asked.save_map)
     if asked.what == FRICTION and len(asked.logs) == 1 and is_steady_table(asked.logs[0]):
         _refuse_table(method)
         steady.from_table(asked.logs[0], asked.robot, asked.rest, asked.places())

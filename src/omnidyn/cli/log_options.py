@@ -100,6 +100,17 @@ def log_files(arguments: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(files))
 
 
+def keep_logs(arguments: Sequence[str], *outputs: str) -> None:
+    """Refuse, --force or not, to write a result over one of the logs: a recording cannot be made again."""
+    from omnidyn.errors import InputError
+
+    there = [path for path in outputs if path and os.path.exists(path)]
+    for path in there:
+        for log in log_files(arguments):
+            if os.path.exists(log) and os.path.samefile(path, log):
+                raise InputError("the result would replace a log", got=log, expected="another name", where=path)
+
+
 def _natural(path: str) -> list[Any]:
     import re
 

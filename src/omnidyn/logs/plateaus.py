@@ -157,6 +157,8 @@ def _between_gaps(pieces: Sequence[slice], hold: slice) -> list[slice]:
 def _changes(run: Run) -> NDArray[np.bool_] | None:
     """Rows with another command than the row before; None where no command comes in steps."""
     changed, known = np.zeros(len(run), dtype=bool), False
+    if len(run) < 2:
+        return None
     for name in COMMANDS:
         values = run.channels.get(name)
         if values is None or not np.isfinite(values).any():
