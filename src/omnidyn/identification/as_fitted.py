@@ -15,6 +15,7 @@ from omnidyn.logs.segments import segments
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.simulation.tangent import GAINS
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +40,10 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
     values = {name: nuisance.value for name, nuisance in fit.nuisances.items()}
     if not values:
         return run
-    voltage = at_motors(record(run, fit.robot).voltage, run.t, values) + pushing(fit.robot, values)
+    read = record(run, fit.robot, loop=any(key.startswith(GAINS) for key in fit.value))
+    if read.set_point is not None:
+        return _set_points_as_fitted(run, read.set_point, values)
+    voltage = at_motors(read.voltage, run.t, values) + pushing(fit.robot, values)
     late = {name: values.get(f"{LATENCY}.{name}", 0.0) for name in LATE}
     if not any(late.values()):
         return run.replace(voltage=voltage, duty=None, supply=None)
@@ -75,29 +79,51 @@ def pushing(robot: Robot, values: Mapping[str, float]) -> FloatArray:
     return np.asarray(np.linalg.lstsq(now.drive, now.per_force * force, rcond=None)[0], dtype=float)
 
 
+def _set_points_as_fitted(run: Run, set_point: FloatArray, values: Mapping[str, float]) -> Run:
+    """The same where a speed loop makes the voltage: before the first row it had nothing to follow."""
+    late = {name: values.get(f"{LATENCY}.{name}", 0.0) for name in LATE}
+    main = next(late[name] for name in LATE if f"{LATENCY}.{name}" in values)
+    parts = segments(run.t)
+    moved = np.concatenate([mean_before(run.t[rows], set_point[rows], main, 0.0) for rows in parts])
+    shifted = {
+        name: _shifted(run.t, own, late[name] - main, parts)
+        for name in LATE[:3]
+        if (own := getattr(run, name)) is not None
+    }
+    return run.replace(
+        t=run.t - main, voltage=None, duty=None, supply=None, wheel_angle=None, twist_command=None,
+        wheel_speed_command=moved, **shifted,
+        warnings=(*run.warnings, f"channels were moved back by the fitted latency of {main:.4g} s"),
+    )  # fmt: skip
+
+
 def at_motors(voltage: FloatArray, t: FloatArray, values: Mapping[str, float]) -> FloatArray:
     """(|u| - dead_band)+ sgn u, times the gain, less the fade; t [s] (rows,), voltage [V] (rows, wheels)."""
     left = values.get(GAIN, 1.0) * (1.0 - values.get(FADE, 0.0) * (t - t[0]) / (float(t[-1] - t[0]) or 1.0))
     return left[:, None] * np.sign(voltage) * np.maximum(np.abs(voltage) - values.get(DEAD, 0.0), 0.0)
 
 
-def mean_before(t: FloatArray, voltage: FloatArray, late: float) -> FloatArray:
+def mean_before(t: FloatArray, voltage: FloatArray, late: float, before: float = 1.0) -> FloatArray:
     """Mean of a held voltage over each step of the clock t - late; before the first row its voltage, as after the last.
 
-    t [s], shape (rows,); voltage, shape (rows, wheels).
+    t [s], shape (rows,); voltage, shape (rows, wheels). before: share of the first voltage that is held before it.
     """
     if len(t) < 2:
         return voltage
     edges = np.concatenate([t - late, [2.0 * t[-1] - t[-2] - late]])
     total = np.vstack([np.zeros(voltage.shape[1]), np.cumsum(voltage[:-1] * np.diff(t)[:, None], axis=0)])
-    summed = np.stack([_extended(edges, t, total[:, k], voltage[:, k]) for k in range(voltage.shape[1])], axis=1)
+    summed = np.stack(
+        [_extended(edges, t, total[:, k], voltage[:, k], before) for k in range(voltage.shape[1])], axis=1
+    )
     return np.diff(summed, axis=0) / np.diff(edges)[:, None]
 
 
-def _extended(at: FloatArray, t: FloatArray, total: FloatArray, voltage: FloatArray) -> FloatArray:
+def _extended(
+    at: FloatArray, t: FloatArray, total: FloatArray, voltage: FloatArray, before: float
+) -> FloatArray:  # fmt: skip
     """The integral of a held voltage at any time."""
     inside = np.interp(at, t, total)
-    return inside + np.minimum(at - t[0], 0.0) * voltage[0] + np.maximum(at - t[-1], 0.0) * voltage[-1]
+    return inside + np.minimum(at - t[0], 0.0) * before * voltage[0] + np.maximum(at - t[-1], 0.0) * voltage[-1]
 
 
 def _shifted(t: FloatArray, values: FloatArray, by: float, parts: list[slice]) -> FloatArray:

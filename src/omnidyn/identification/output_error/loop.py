@@ -168,22 +168,25 @@ def shortened(problem: Problem, rows: int) -> Problem:
 def best_start(solver: Solver, watch: Callable[[State], None] | None = None) -> Point:
     """The best of several starts: all gains, all friction and all latencies by factors, then a few steps of each."""
     problem = solver.problem
-    own = problem.start()
-    states = []
-    for gain, level, late in itertools.product(
-        _if_any(problem, "drive.", GAIN_FACTORS), _if_any(problem, "friction.", LEVEL_FACTORS),
-        _if_any(problem, LATENCY, LATE, 0.0),
-    ):  # fmt: skip
-        values = own.values.copy()
-        for j, p in enumerate(problem.parameters):
-            if p.name.startswith(LATENCY):
-                values[j] = late
-            else:
-                values[j] = _within(p, p.value * (gain if p.name.startswith("drive.") else level))
-        states.append(solver.state(Point(values, own.states), np.ones(len(problem.columns)) if solver.nu else None))
+    late = min(_if_any(problem, LATENCY, LATE, 0.0), key=lambda late: _moved(solver, late, 1.0, 1.0).objective)
+    levels, gains = _if_any(problem, "friction.", LEVEL_FACTORS), _if_any(problem, "drive.", GAIN_FACTORS)
+    states = [_moved(solver, late, level, gain) for level, gain in itertools.product(levels, gains)]
     states.sort(key=lambda state: state.objective)
-    tried = [solver.minimise(state.point, FEW) for state in states[:BEST]]
+    tried = [solver.minimise(state.point, FEW, watch) for state in states[:BEST]]
     return min(tried, key=lambda solution: solution.state.objective).state.point
+
+
+def _moved(solver: Solver, late: float, level: float, gain: float) -> State:
+    """All latencies [s], all friction and all gains at once, by factors of where they start."""
+    problem = solver.problem
+    own = problem.start()
+    values = own.values.copy()
+    for j, p in enumerate(problem.parameters):
+        if p.name.startswith(LATENCY):
+            values[j] = late
+        else:
+            values[j] = _within(p, p.value * (gain if p.name.startswith("drive.") else level))
+    return solver.state(Point(values, own.states), np.ones(len(problem.columns)) if solver.nu else None)
 
 
 def beyond_jumps(solver: Solver, solution: Solution, watch: Callable[[State], None] | None = None) -> Solution:

@@ -27,6 +27,7 @@ FloatArray = NDArray[np.float64]
 
 MEET = 1e-7  # [s] times that differ by less are one
 SETTLED = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command
+STEEPEST = 1e8  # a loop that swings has derivatives that grow without bound: they are cut, for they mean nothing
 
 
 class LoopEngine:
@@ -105,7 +106,7 @@ class LoopEngine:
             if name == "heading":
                 outputs[:, c] += state[AXES + c]
                 slopes[:, c, len(problem.parameters) + AXES + c] = 1.0
-        return outputs, slopes
+        return outputs, np.clip(np.nan_to_num(slopes), -STEEPEST, STEEPEST)
 
     def _run(self, ready: Prepared, piece: Piece, t: FloatArray, grid: FloatArray) -> Derivatives:
         assert piece.record.set_point is not None
