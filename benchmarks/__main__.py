@@ -25,6 +25,7 @@ NAMES = {
     "outputs": "output error from counts of encoders, from positions, and on a tilted floor (four minutes)",
     "identify": "output error on simulated logs: coverage, starts, nuisances, time beside peers (ten minutes)",
     "identify_ellipse": "the same by the implicit engine: an ellipse of friction in a turning frame (four minutes)",
+    "identify_loop": "output error through a firmware's speed loop, simulated logs: coverage (a few minutes)",
 }
 GOAL_MISSED = 5
 

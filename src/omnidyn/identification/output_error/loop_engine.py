@@ -99,6 +99,8 @@ class LoopEngine:
             for c in own:
                 name, i = columns[c]
                 outputs[used, c], by_key = _column(robot, found, name, i, at)
+                if name == "current":  # at the very end the loop has not answered yet
+                    outputs[used, c] = np.where(at == len(grid) - 1, np.nan, outputs[used, c])
                 slopes[used, c, : problem.robot_count] = self._chained(by_key)
                 if pace is not None:
                     slopes[used, c, k] = -_rate(robot, found, pace, name, i, at, grid, period)
