@@ -12,7 +12,8 @@ MASS, LENGTH, TURNING = 0, 1, 2  # M [kg]; rho [m]; M/rho where the body frame t
 SLIDE_X, SLIDE_Y, HOLD_X, HOLD_Y = 3, 4, 5, 6  # the ellipse, Coulomb and breakaway levels [N]
 ELLIPSE = 7  # its sign: 1 slides, 0 stuck, 2 there is none
 TAU, GOAL, PUSH = 8, 9, 12  # length of the stage [s]; x* [m/s], 3 entries; constant wrench [N], 3 entries
-BODY_SIZE = 15
+MEMORY = 15  # [s] in which the slowest motion fades to 1/e, dry friction apart; (+1) where motors let go
+BODY_SIZE = 17
 
 # Element: columns of a table with one row per element.
 GX, GY, GZ, VISCOUS = 0, 1, 2, 3  # local speed = g . x; [N s/m]

@@ -26,9 +26,11 @@ from omnidyn.model.layout import (
     LENGTH,
     LIMIT,
     MASS,
+    MEMORY,
     RESISTANCE,
     SIGN,
     TURNING,
+    VISCOUS,
 )
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -68,7 +70,18 @@ def plant(robot: Robot) -> Plant:
     element[:, ACTIVE] = (element[:, HOLD] > 0.0) | (element[:, HOLD + 1] > 0.0)
     element[AXES:, ACTIVE] += element[AXES:, EFFICIENCY] < 1.0  # a lossy gear holds too
     element[:, SIGN] = np.where(element[:, ACTIVE] > 0.0, 0.0, 2.0)
+    body[MEMORY], body[MEMORY + 1] = _memory(body[MASS], element, True), _memory(body[MASS], element, False)
     return Plant(body, element)
+
+
+def _memory(mass: float, element: FloatArray, driven: bool) -> float:
+    """M over the least eigenvalue of sum_e g g^T (b + K E/R), plus the longest L/R of a motor [s]."""
+    motors, damping = element[AXES:], element[:, VISCOUS].copy()
+    if driven:
+        damping[AXES:] += motors[:, GAIN] * motors[:, EMF] / motors[:, RESISTANCE]
+    g = element[:, GX : GZ + 1]
+    least = np.linalg.eigvalsh((g.T * damping) @ g)[0]
+    return float(mass / max(least, 1e-9 * mass) + (motors[:, INDUCTANCE] / motors[:, RESISTANCE]).max())
 
 
 def _fill_motors(robot: Robot, element: FloatArray) -> None:

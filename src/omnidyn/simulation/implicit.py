@@ -25,6 +25,7 @@ from omnidyn.model.layout import (
     INDUCTANCE,
     LENGTH,
     MASS,
+    MEMORY,
     NOW,
     RESISTANCE,
     TAU,
@@ -38,8 +39,9 @@ from omnidyn.simulation.speed_loop import Loop, close_loop
 
 FloatArray = NDArray[np.float64]
 
-MEMORY = 0.15  # [s] a robot forgets an error in about this time
-FLOOR = 1e-3  # least share of tol a step is given
+FORGETS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its MEMORY, within these bounds
+SHORT = 1.5e-4  # [s] no step is given less than the share of tol of one so long
+ROUNDING = 1e-13  # [m/s] nor less than this
 SHORTEST = 1e-11  # [s]
 YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
 CURRENT_SHARE = 1e-2  # and 100 tol in A
@@ -155,12 +157,27 @@ def _reverses(body, element, a, b, h):
 
 
 @part
+def _share(body, element, state, tol):
+    """What may go wrong per second [m/s/s], so that all together stays within tol: tol over the memory of the robot.
+
+    A motor at its limit, or without current under its voltage drop, makes nothing fade.
+    """
+    memory, first = body[MEMORY], SIGNS + 1 + len(element)
+    for e in range(AXES, len(element)):
+        i = abs(state[first + e - AXES])
+        if i >= element[e, BOUND] or (i == 0.0 and element[e, DROP] > 0.0):
+            memory = body[MEMORY + 1]
+    return tol / min(max(memory, FORGETS[0]), FORGETS[1])
+
+
+@part
 def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
     """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
 
     spare[1] and spare[2] receive the states in the middle and at the end. Returns its length and the one to try next.
     """
     one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(element)
+    rate = _share(body, element, state, tol)
     while True:
         if left - h < 1e-9 * dt:
             h = left
@@ -168,7 +185,7 @@ def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
         second = step(body, element, s, state, middle, inner, 0.5 * h)
         third = step(body, element, s, middle, two, inner, 0.5 * h)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
-        ratio = _error(body, element, one, two) / (tol * max(h / MEMORY, FLOOR))
+        ratio = _error(body, element, one, two) / max(rate * max(h, SHORT), ROUNDING)
         astray = max(_reverses(body, element, state, middle, h), _reverses(body, element, middle, two, h))
         if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
             astray = max(astray, _unresolved(body, element, state, h))

@@ -43,7 +43,7 @@ from omnidyn.model.scratch import JACOBIAN, NEWTON, RESIDUAL
 from omnidyn.simulation.implicit_step import first_stage, last_stage
 
 FloatArray = NDArray[np.float64]
-EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10
+EPS = 1e-6  # relative change of a parameter: rounding 1e-10, curvature 1e-12; a kink nearer than this is straddled
 
 
 class Ways(NamedTuple):
