@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.exact_engine import Weighting
+from omnidyn.identification.output_error.first_point import first_point
 from omnidyn.identification.output_error.fit import (
     FINE,
     Options,
     degrees,
-    first_point,
     fits_exactly,
     free_by_default,
     is_exact,

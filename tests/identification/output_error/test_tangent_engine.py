@@ -67,6 +67,9 @@ def test_what_the_second_engine_does_not_know(ellipse, log):
     unknown = replace(problem, parameters=(*problem.parameters, Parameter("slip", 0.0, 0.0, 1.0)))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got slip.*leave it out"):
         TangentEngine(unknown)
+    placed = log.replace(pose=np.zeros((len(log), 3)))
+    with pytest.raises(UnsupportedError, match=r"by the exact engine only; got position.*leave it out of the outputs"):
+        fit_output_error(placed, ellipse, outputs=["twist", "position"], start="rest", nuisances=())
 
 
 def test_the_fast_fit_ends_where_an_independent_optimiser_does(ellipse, log):

@@ -14,6 +14,7 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.breakaway import Breakaway, find_breakaway
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.exact_engine import ExactEngine
+from omnidyn.identification.output_error.first_point import coarse_point, first_point
 from omnidyn.identification.output_error.loop import (
     friction_keys,
     friction_of_axis,
@@ -34,11 +35,10 @@ from omnidyn.identification.output_error.nuisances import (
     pieces,
 )
 from omnidyn.identification.output_error.parameters import FRICTION, robot_parameters
-from omnidyn.identification.output_error.problem import Point, Problem, per_column
+from omnidyn.identification.output_error.problem import Problem
 from omnidyn.identification.output_error.record import Record, record
 from omnidyn.identification.output_error.resampling import resampled
 from omnidyn.identification.output_error.solver import Solution, Solver, State
-from omnidyn.identification.output_error.starts import friction_values, integral_start
 from omnidyn.identification.output_error.support import supported, wanted
 from omnidyn.identification.output_error.tangent_engine import TangentEngine
 from omnidyn.identification.output_error.uncertainty import trust
@@ -53,11 +53,8 @@ FloatArray = NDArray[np.float64]
 
 GAUSS, STUDENT = "gaussian", "student-t"
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
-MANY = 100_000  # rows to which a long log is first fitted
-LATENCIES = 500  # steps for their median
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
-FEW = 1500  # the same for the implicit engine
-NEAR, CLOSE = 0.1, 1e-4  # squared distance to the best point, in standard errors, at which that ends; and the whole
+CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 BREAKAWAY = "friction.axes.breakaway"
@@ -183,16 +180,6 @@ def _solve(
         return solver, solver.minimise(first_point(solver, records), watch=watch)
     fine = Solver(problem, TangentEngine(problem, FINE), nu, CLOSE)
     return fine, fine.minimise(coarse_point(problem, nu), watch=watch)
-
-
-def coarse_point(problem: Problem, nu: float) -> Point:
-    """Near the best point, by one step a row; a long log is first fitted in part."""
-    solver, short, own = Solver(problem, TangentEngine(problem), nu, NEAR), problem.shortened(FEW), problem.start()
-    if short is problem:
-        return solver.minimise(own).state.point
-    found = Solver(short, TangentEngine(short), nu, NEAR).minimise(own).state.point
-    states = [solver.state(point) for point in (own, found)]
-    return solver.minimise(min(states, key=lambda state: state.objective).point).state.point
 
 
 def degrees(loss: str) -> float:
@@ -364,46 +351,3 @@ def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
         if prior.std is not None and not prior.source.startswith(IDENTIFIED):
             found[key] = (float(parameter(robot, key)), prior.std)
     return found
-
-
-def first_point(solver: Solver, records: Sequence[Record]) -> Point:
-    """The better one of the robot as it is and the integral form; for long logs, the fit to their first part."""
-    problem, engine = solver.problem, solver.engine
-    assert isinstance(engine, ExactEngine)
-    own = problem.start()
-    count = problem.robot_count
-    found = integral_start(engine.mapping, own.values[:count], records)
-    values = own.values.copy()
-    values[:count] = friction_values(engine.mapping, own.values[:count], found)
-    short = problem.shortened(MANY)
-    trial = solver if short is problem else Solver(short, ExactEngine(short))
-    states = [trial.state(own), trial.state(Point(values, own.states))]
-    best = _with_latencies(trial, min(states, key=lambda state: state.objective).point)
-    return best if trial is solver else trial.minimise(best).state.point
-
-
-def _with_latencies(solver: Solver, point: Point) -> Point:
-    """The point with the best of a few latencies for each channel.
-
-    A current follows the voltage at once, so that its likelihood jumps where a latency passes a row: no descent crosses
-    that. What a channel shows depends on its own latency only, so that one march tries a latency for all of them.
-    """
-    problem = solver.problem
-    own = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
-    if not own:
-        return point
-    row = float(np.median(np.diff(problem.pieces[0].record.t[: 2 * LATENCIES + 1])))
-    tried = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
-    costs = []
-    for late in tried:
-        values = point.values.copy()
-        values[own] = late
-        state = solver.state(Point(values, point.states), np.ones(len(problem.columns)) if solver.nu else None)
-        square = per_column(state.sums, len(problem.columns), "square")
-        number = np.maximum(per_column(state.sums, len(problem.columns), "number"), 1.0)
-        costs.append(np.log(np.maximum(square / number, solver.floor)))
-    values = point.values.copy()
-    for j in own:
-        mine = [k for k, (channel, _) in enumerate(problem.columns) if f"{LATENCY}.{channel}" == problem.names[j]]
-        values[j] = tried[int(np.argmin([cost[mine].sum() for cost in costs]))]
-    return Point(values, point.states)

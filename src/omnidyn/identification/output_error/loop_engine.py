@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.exact_engine import LATE, Weighting
+from omnidyn.identification.output_error.outputs import refuse_exact_only
 from omnidyn.identification.output_error.problem import Piece, PieceSums, Point, Problem
 from omnidyn.identification.output_error.sums import added
 from omnidyn.model.dynamics import acceleration
@@ -33,7 +34,7 @@ STEEPEST = 1e8  # a loop that swings has derivatives that grow without bound: th
 class LoopEngine:
     """Residuals and sensitivities of a problem through the speed loop. tol [m/s]: None is a step a tick.
 
-    Raises UnsupportedError for nuisances other than latencies.
+    Raises UnsupportedError for nuisances other than latencies, and for outputs that only the exact engine knows.
     """
 
     def __init__(self, problem: Problem, tol: float | None = None):
@@ -44,6 +45,7 @@ class LoopEngine:
                 "a log of set speeds has no voltage that could be changed on its way", got=", ".join(other),
                 expected="latency", where="nuisances",
             )  # fmt: skip
+        refuse_exact_only(problem.columns, problem.robot.name)
 
     def on(self, problem: Problem) -> LoopEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""

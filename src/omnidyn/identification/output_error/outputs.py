@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.output_error.counts import find_tick
 from omnidyn.identification.output_error.doubled import doubled
 from omnidyn.model.motor import DYNAMIC
@@ -100,3 +100,14 @@ def _without_doubles(
 
 def _tick(values: FloatArray, given: float | None) -> float:
     return find_tick(values) if given is None else given
+
+
+def refuse_exact_only(columns: Sequence[tuple[str, int]], where: str) -> None:
+    """Raises UnsupportedError for outputs that only the exact engine knows."""
+    found = sorted({name for name, _ in columns} & set(EXACT_ONLY))
+    if found:
+        raise UnsupportedError(
+            "this output is fitted by the exact engine only", got=", ".join(found), where=where,
+            expected=", ".join(name for name in OUTPUTS if name not in EXACT_ONLY),
+            remedy="leave it out of the outputs; twist, wheel speeds and heading tell of the same motion",
+        )  # fmt: skip

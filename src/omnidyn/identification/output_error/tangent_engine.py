@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.driver import through_driver
 from omnidyn.identification.output_error.exact_engine import DEAD, FADE, GAIN, LATE, Weighting
+from omnidyn.identification.output_error.outputs import refuse_exact_only
 from omnidyn.identification.output_error.parameters import Parameter
 from omnidyn.identification.output_error.problem import Piece, PieceSums, Point, Problem
 from omnidyn.identification.output_error.sums import added
@@ -34,7 +35,7 @@ DRIVER = {GAIN: 1.0, DEAD: 0.0, FADE: 0.0}  # in the order of kernel.py, with wh
 class TangentEngine:
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
-    Raises UnsupportedError for nuisances that it does not know.
+    Raises UnsupportedError for nuisances and outputs that it does not know.
     """
 
     def __init__(self, problem: Problem, tol: float | None = None):
@@ -47,6 +48,7 @@ class TangentEngine:
                 got=", ".join(other), where=problem.robot.name, expected=f"nuisances: latency, {', '.join(DRIVER)}",
                 remedy="leave it out of the nuisances",
             )  # fmt: skip
+        refuse_exact_only(problem.columns, problem.robot.name)
         self._known: dict[tuple[bytes, ...], list[Found]] = {}
 
     def at_tolerance(self, tol: float | None) -> TangentEngine:
