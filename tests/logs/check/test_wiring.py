@@ -1,10 +1,12 @@
 """Every order and every sign of the wheels is put in and named."""
 
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
 import pytest
 
+from benchmarks.check_logs import clean
 from omnidyn.logs.check import check
 from omnidyn.logs.check.wirings import Wiring, wirings
 from omnidyn.model.robot_file import load_robot
@@ -106,3 +108,18 @@ def test_what_the_log_cannot_tell_apart_is_said(robot, with_channels):
 def test_a_robot_with_another_number_of_wheels_is_said(log):
     (finding,) = check(log, load_robot("four-wheel")).of("wheel_count")
     assert "3 wheels" in finding.message
+
+
+@pytest.mark.parametrize("seed", [1, 4, 7])
+@pytest.mark.parametrize(("order", "sign", "code"), [((1, 0), 1.0, "swapped"), ((0, 1), -1.0, "inverted")])
+def test_two_wheels_exchanged_or_one_turned_about_in_rpm_are_both_said(seed, order, sign, code):
+    """Speeds 9.55 times too large are no excuse: order, sign and unit are each told, and nothing else."""
+    log, robot, _ = clean(seed)
+    speed = log.channels["wheel_speed"][:, [*order, *range(2, robot.wheels.count)]] * 60.0 / (2.0 * np.pi)
+    speed[:, 0] *= sign
+    verdict = check(replace(log, channels={**log.channels, "wheel_speed": speed}), robot)
+    grave = {finding.code: finding for finding in verdict.findings if finding.level != "note"}
+    assert set(grave) == {code, "unit"}
+    assert grave[code].where == ("w1 w2" if code == "swapped" else "w1")
+    assert "whole motor" not in grave[code].message
+    assert "rpm read as rad/s" in grave["unit"].message

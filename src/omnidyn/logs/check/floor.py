@@ -21,7 +21,9 @@ FloatArray = NDArray[np.float64]
 
 Moments = tuple[FloatArray, FloatArray, FloatArray]  # sums of v v', v w', w w'
 
-SEEN = 0.15  # of the motion of the wheels, that the floor must show to be a witness
+# Of the motion of the wheels, that the floor must show to be a witness, by the number of its axes. All three show all
+# motion there is: wheels in rpm or deg/s, read as rad/s, are 10 or 57 times too fast and may be exchanged as well.
+SEEN_BY = (0.0, 0.3, 0.15, 0.01)
 
 
 def by_floor(work: Work) -> tuple[str, Answer] | None:
@@ -52,7 +54,7 @@ def _within(work: Work, seconds: float) -> tuple[str, Answer] | None:
     if len(w) < 8:
         return None
     v = rest[0] if rest else np.zeros((len(w), 0))
-    rims, least = float(((w * robot.wheels.radii) ** 2).sum()), SEEN if len(axes) > 1 else 2.0 * SEEN
+    rims, least = float(((w * robot.wheels.radii) ** 2).sum()), SEEN_BY[len(axes)]
     if axes and (v**2).sum() < least**2 * rims * len(axes) / n:
         return None  # a robot that does not turn says nothing through its heading
     target = np.column_stack([v, np.zeros((len(w), len(null)))])

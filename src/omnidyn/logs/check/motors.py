@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from omnidyn.logs.channels import components
 from omnidyn.logs.check.reference import emf, ohmic, volts
-from omnidyn.logs.check.wirings import Answer, choose, code_of, means, rivals_of, wirings
+from omnidyn.logs.check.wirings import Answer, Wiring, choose, code_of, means, rivals_of, wirings
 from omnidyn.logs.check.work import Work
 from omnidyn.logs.findings import FATAL, Finding
 
 FloatArray = NDArray[np.float64]
 
+HOLDS = 0.25  # of the voltage: where more is left of it under every wiring, a scale is wrong, and no wiring is told
 EXACT = 0.004  # of the voltage: what less is left of it is the noise of an exact relation
 
 
@@ -26,7 +27,7 @@ def motor_known(work: Work) -> bool:
 
 
 class Circuit(NamedTuple):
-    """known: whether u = R i + K l w can be formed. wrong: (channel that is wired wrongly, how), or None."""
+    """known: whether u = R i + K l w holds under some wiring. wrong: (channel that is wired wrongly, how), or None."""
 
     known: bool
     wrong: tuple[str, Answer] | None = None
@@ -57,15 +58,27 @@ def by_circuit(work: Work) -> Circuit:
     total = float((u**2).sum())
     names = ("duty" if work.get("voltage") is None else "voltage", "current", "wheel_speed")
     best: tuple[str, Answer] | None = None
+    holds = False
     for name, changed, rest in zip(names, (u, r, e), ((r, e, 1), (u, e, -1), (u, r, -1)), strict=True):
         fixed = rest[0] + rest[1] if rest[2] > 0 else rest[0] - rest[1]
         m = changed.T @ fixed
         size = float((changed**2).sum() + (fixed**2).sum())
         costs = np.array([size - 2.0 * float((wiring.matrix * m.T).sum()) for wiring in tried])
+        holds |= bool(costs.min() < HOLDS * total)
         answer = choose(tried, costs, total, poor=EXACT)
         if answer is not None and (best is None or answer.left < best[1].left):
             best = (name, answer)
-    return Circuit(True, best)
+    return Circuit(True, best) if holds or best is not None else _by_scaled_speed(tried, u - r, e, total)
+
+
+def _by_scaled_speed(tried: list[Wiring], left: FloatArray, e: FloatArray, total: float) -> Circuit:
+    """The same where no wiring makes the relation hold: speeds in another unit, K l w times any number."""
+    along = np.array([float((wiring.matrix * (e.T @ left).T).sum()) for wiring in tried])
+    costs = float((left**2).sum()) - np.maximum(along, 0.0) ** 2 / max(float((e**2).sum()), 1e-300)
+    if not costs.min() < HOLDS * total:
+        return Circuit(False)
+    answer = choose(tried, costs, total, poor=EXACT)
+    return Circuit(True, None if answer is None else ("wheel_speed", answer))
 
 
 def by_likeness(work: Work, channel: str) -> Answer | None:
