@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import real_logs as logs
-from benchmarks import udea
+from benchmarks import real_loop, udea
 from benchmarks.identify import excitation, noisy
 from benchmarks.table import Table, machine
 from omnidyn.identification.motor_choice import choose_motor
@@ -32,7 +32,7 @@ VISCOUS, COULOMB, LAG = (0.05509, 0.00006), (0.35e-3, 0.24e-3), 5.3e-3  # V/(tur
 
 
 def measure() -> Table:
-    """All of it, half a minute."""
+    """All of it, two minutes."""
     table = Table("real_fit: output error on real logs", ["data", "what", "value", "+-", "unit"])
     table.notes += [machine(), "free runs are never set back; rmse of logs that were not fitted, unless said otherwise"]
     command(table)
@@ -45,6 +45,7 @@ def measure() -> Table:
     chirp_alone(table)
     udea.turning(table)
     udea.drives(table)
+    real_loop.robotino(table)
     return table
 
 

@@ -201,14 +201,9 @@ def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | Tan
 
 def loop_options(given: Options, found: Motion, records: Sequence[Record], robot: Robot) -> Options:
     """By default friction of what moved, and the gains. Raises InsufficientDataError where nothing moved."""
-    if not found.moved.any():
-        raise InsufficientDataError(
-            "the robot never visibly moved: a speed loop shows its friction in motion only", got="rest",
-            expected="motion", remedy="ask for speeds at which it sets off", where=records[0].source,
-        )  # fmt: skip
+    keys = loop_keys(robot, found.moved, records[0].source)
     if given.free is not None:
         return given
-    keys = loop_keys(robot, found.moved)
     more = [key for key in known_priors(robot) if key not in keys] if given.use_priors else []
     return replace(given, free=tuple(key for key in (*keys, *more) if key not in given.fixed), fixed=())
 

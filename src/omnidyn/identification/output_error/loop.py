@@ -70,8 +70,16 @@ def friction_keys(robot: Robot) -> list[str]:
     return keys
 
 
-def loop_keys(robot: Robot, moved: NDArray[np.bool_]) -> list[str]:
-    """What is free by default: friction, of axes that moved only, and the gains."""
+def loop_keys(robot: Robot, moved: NDArray[np.bool_], source: str = "") -> list[str]:
+    """What is free by default: friction, of axes that moved only, and the gains.
+
+    Raises InsufficientDataError where nothing moved.
+    """
+    if not moved.any():
+        raise InsufficientDataError(
+            "the robot never visibly moved: a speed loop shows its friction in motion only", got="rest",
+            expected="motion", remedy="ask for speeds at which it sets off", where=source,
+        )  # fmt: skip
     still = np.flatnonzero(~moved)
     kept = [key for key in friction_keys(robot) if not any(friction_of_axis(key, int(axis)) for axis in still)]
     return [*kept, *gain_keys(robot)]

@@ -96,6 +96,8 @@ class LoopEngine:
             begun, there = times >= t[0] - MEET, times <= grid[-1] + MEET
             outputs[np.ix_(~there, own)] = np.nan
             used = begun & there
+            if not used.any():  # it ends before it is seen
+                continue
             at = np.searchsorted(grid, times[used] - MEET)
             pace = _pace(robot, found, at) if k >= 0 else None
             for c in own:
