@@ -209,6 +209,13 @@ def test_enter_accepts_everything_and_a_default_is_no_measurement(typed, here):
     assert robot.priors["body.mass_kg"] == Prior(std=0.9, source="default of omnidyn init, accepted")
 
 
+def test_places_accepted_beside_a_preset_with_other_wheels_are_not_given(typed, here):
+    assert typed("4\n\n\n\n\n", "init", "asked", "--like", "robotino")[0] == 0
+    robot = load_robot(here / "asked.toml")
+    assert robot.wheels.azimuth_deg == (45.0, 135.0, 225.0, 315.0)
+    assert robot.priors["wheels.azimuth_deg"] == Prior(source="default of omnidyn init, accepted")
+
+
 def test_it_asks_only_for_what_is_missing(typed, here):
     code, _, err = typed("7\n", "init", "asked", *MINI[:-2])
     assert code == 0

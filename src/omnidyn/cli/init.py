@@ -298,7 +298,8 @@ def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, fri
     value = answers.value
     wheels, mass = _wheels(value, preset, mecanum), value.get("mass", preset.body.mass if preset else None)
     Body(mass=mass, inertia=1.0)
-    told = {KEYS[key] for key in value if key in KEYS} | ({KEYS["azimuth"], KEYS["roller"]} if mecanum else set())
+    told = {KEYS[key] for key in value if key in KEYS and key not in answers.accepted}
+    told |= {KEYS["azimuth"], KEYS["roller"]} if mecanum else set()
     try:
         if preset is not None:
             robot = like(preset, name, wheels, mass, value.get("voltage_limit"), told)
@@ -308,7 +309,7 @@ def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, fri
         raise InputError(
             "cannot make such a robot", got=str(error), remedy="check the units: m, kg, V, degree", where=name
         ) from None
-    accepted = {} if preset else {KEYS[key]: value[key] for key in answers.accepted}
+    accepted = {KEYS[key]: value[key] for key in answers.accepted if key in value}
     return robot.replace(priors=robot.priors | {key: default_prior(key, one) for key, one in accepted.items()})
 
 
