@@ -120,7 +120,7 @@ def test_deadzone_of_a_pattern_names_the_axis_that_gives_way(call):
 def test_a_pattern_that_drives_nothing_never_moves(call):
     code, out, _ = call("deadzone", "axebot", "--pattern", "0,0,0")
     assert code == 0
-    assert "never   the pattern (0, 0, 0) drives no axis" in out
+    assert "never   no voltage times (0, 0, 0) moves it" in out
     assert strict(call("deadzone", "axebot", "--pattern", "0,0,0", "--json")[1])["dead_zone"][0]["voltage_V"] is None
 
 

@@ -390,3 +390,12 @@ def test_a_map_that_cannot_be_written_is_refused_first(call, here, monkeypatch, 
     code, out, err = call("deadzone", "axebot", "--map", name)
     assert (code, out) == (3, "")
     assert words in err
+
+
+def test_a_current_limit_that_holds_the_robot_is_not_blamed_on_the_pattern(call, here):
+    axebot = load_robot("axebot")
+    weak = axebot.replace(name="weak", motor=axebot.motor.replace(current_limit=0.05))
+    (here / "weak.toml").write_text(robot_to_toml(weak), encoding="utf-8")
+    code, out, _ = call("deadzone", "weak.toml")
+    assert code == 0
+    assert "never   no voltage times (0, 1, -1) moves it" in out

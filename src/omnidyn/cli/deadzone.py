@@ -81,7 +81,7 @@ def _row(robot: Robot, pattern: list[float]) -> dict[str, Any]:
 def _line(robot: Robot, row: dict[str, Any]) -> str:
     pattern = ", ".join(f"{value:g}" for value in row["pattern"])
     if row["breakaway_scale_V"] is None:
-        return f"  never   the pattern ({pattern}) drives no axis"
+        return f"  never   no voltage times ({pattern}) moves it"
     voltage = ", ".join(f"{value:.3f}" for value in row["voltage_V"])
     line = f"  {row['axis']:6}  {row['breakaway_scale_V']:.3f} V x ({pattern})  =  ({voltage}) V"
     return line + _limit_note(robot, row["voltage_V"])
