@@ -26,8 +26,8 @@ ORDER = {
         command_file words mapping clock guessed guess_time guess counters log read_log segments average plateaus
         findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
-    "logs/check": """robust work time_base reference values limits wirings frame floor motors wiring slip mistakes
-        scale lag energy motion oddities excitation""",
+    "logs/check": """robust work time_base reference spikes values limits wirings frame floor motors wiring slip
+        mistakes scale lag energy motion oddities excitation""",
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
         shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table
         identify joint_problem joint_fit as_fitted validation motor_engine motor_log motor_fit motor_run

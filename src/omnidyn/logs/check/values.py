@@ -11,22 +11,21 @@ from scipy.special import ndtr
 
 from omnidyn.logs.channels import place
 from omnidyn.logs.check.reference import expected_wheel_speed
-from omnidyn.logs.check.robust import MAD, quantum, runs, sample, smooth, spread, white_noise
-from omnidyn.logs.check.work import INPUTS, MIN_ROWS, Work
+from omnidyn.logs.check.robust import MAD, quantum, runs, smooth, white_noise
+from omnidyn.logs.check.spikes import check_spikes, recorded
+from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
-from omnidyn.logs.log import MAX_MISSING, ON_CHANGE
+from omnidyn.logs.log import MAX_MISSING
 from omnidyn.logs.mapping import MOTOR_SIDE
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.units import known_unit
 
 FloatArray = NDArray[np.float64]
 
-MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
 SENSORS = ("current", "wheel_speed", "twist")
 MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # references that say what a wheel did
 FOLLOWS = 0.5  # [s] after which a wheel follows its command
 KICK = 0.3  # of the most a motor gets: a change that its wheel must answer
-SPIKE = 10.0  # a single value so many times the noise away from both its neighbours
 IMPOSSIBLE = 1e-6  # chance, over the whole log, below which repeated values are no chance
 
 
@@ -36,7 +35,7 @@ def check_values(work: Work) -> tuple[list[Finding], Work]:
     if len(work) < MIN_ROWS:
         return found, work
     found += _quantised(work)
-    for family in (_constant, _stuck, _spikes):
+    for family in (_constant, _stuck, check_spikes):
         more, work = family(work)
         found += more
     return found, work
@@ -326,83 +325,8 @@ def _repeats_by_noise() -> tuple[FloatArray, FloatArray]:
     return np.array(after), np.array(middle)
 
 
-def _spikes(work: Work) -> tuple[list[Finding], Work]:
-    """Single values (or two) far away from both neighbours, which agree with each other."""
-    found = []
-    changed = _changed(work)
-    for channel in MEASURED:
-        for component, values in work.columns(channel):
-            k = place(component)[1]  # type: ignore[index]
-            own = _recorded(work, channel, k)
-            bad = np.zeros(len(work), dtype=bool)
-            bad[own] = _isolated(values[own]) & ~_kicked(changed[own])
-            if not bad.any() or bad.mean() > 0.2:
-                continue
-            worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
-            found.append(Finding(
-                "spike", WARN, component,
-                f"{int(bad.sum())} value{'s' * (int(bad.sum()) > 1)} of {component} alone, far from the rows "
-                "before and "
-                f"after, the farthest {values[worst]:.4g} at t = {work.t[worst]:.6g} s",
-                "they are left out where a mean is taken", work.lines(bad), int(bad.sum()),
-                {"farthest": float(values[worst]), "share": float(bad.mean())},
-            ))  # fmt: skip
-            work = work.masked(channel, k, bad)
-    return found, work
-
-
 def _told(work: Work, source: str) -> NDArray[np.int64]:
     """Rows in which what tells the speed of a wheel was recorded."""
     if source not in MEASUREMENTS:
         return np.arange(len(work))
-    return _recorded(work, "current" if source == "voltage and current" else source.removeprefix("the "), 0)
-
-
-def _recorded(work: Work, channel: str, k: int) -> NDArray[np.int64]:
-    """Rows in which a component was recorded; those between are no measurements where it is recorded on change."""
-    logged = work.log.channels.get(channel)
-    if logged is None:
-        return np.arange(len(work))
-    there = np.isfinite(logged.reshape(len(work.log), -1)[work.rows, k])
-    return np.flatnonzero(there) if 1.0 - there.mean() > ON_CHANGE else np.arange(len(work))
-
-
-def _changed(work: Work) -> NDArray[np.int64]:
-    """How often a command has changed up to each row."""
-    changed = np.zeros(len(work), dtype=bool)
-    for channel in INPUTS:
-        values = work.get(channel)
-        if values is not None:
-            changed[1:] |= (np.diff(values, axis=0) != 0.0).any(axis=1)
-    return np.cumsum(changed)
-
-
-def _kicked(changed: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Rows just after a change of a command, where a kick is no error; none where commands change all the time."""
-    near = np.diff(changed, prepend=changed[:1]) > 0
-    if near.mean() > 0.2:
-        return np.zeros(len(near), dtype=bool)
-    for _ in range(3):
-        near[1:] |= near[:-1]
-    near[:-1] |= near[1:]
-    return near
-
-
-def _isolated(values: FloatArray) -> NDArray[np.bool_]:
-    n = len(values)
-    bad = np.zeros(n, dtype=bool)
-    if n < MIN_ROWS:
-        return bad
-    before, after = values[:-2], values[2:]
-    jump = np.abs(values[1:-1] - 0.5 * (before + after))
-    apart = np.abs(after - before)
-    small = sample(jump)
-    small = small[np.isfinite(small)]
-    if not small.size:
-        return bad
-    scale = max(MAD * float(np.median(small)), quantum(values), 1e-3 * spread(values), 1e-12)
-    # Heavy tails are no spikes: what is far must be far beyond the usual largest as well.
-    scale = max(scale, float(np.quantile(small, 0.99)) / 3.0)
-    with np.errstate(invalid="ignore"):
-        bad[1:-1] = (jump > SPIKE * scale) & (apart < 0.25 * jump)
-    return bad
+    return recorded(work, "current" if source == "voltage and current" else source.removeprefix("the "), 0)
