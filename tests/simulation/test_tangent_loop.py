@@ -94,7 +94,7 @@ def check(robot, keys, width=1e-3, tol=1e-10, agrees=AGREES, **commands):
 
 def test_set_speeds_with_stops_reversals_and_saturation(axebot):
     robot = driven(axebot, kp=0.25, ki=0.8)
-    keys = [KP, KI, LIMIT, *BODY, *MOTOR, "friction.axes.viscous[0]", COULOMB, "friction.axes.coulomb[2]"]
+    keys = [KP, KI, LIMIT, *BODY, *MOTOR, COULOMB, "friction.axes.coulomb[2]"]
     found = check(robot, keys, wheel_speed_command=SET)
     assert (np.abs(found.run.voltage) == 6.0).any()
     assert (np.sign(found.run.twist[38]) * np.sign(found.run.twist[78]) < 0.0).any()
@@ -115,7 +115,7 @@ def test_set_twists_of_an_ellipse_robot_whose_ticks_are_not_its_rows(axebot):
 def test_dynamic_electrics(axebot):
     motor = axebot.motor.replace(electrical="dynamic", inductance=0.004)
     robot = driven(axebot, kp=0.3, ki=1.0, motor=motor, name="dynamic")
-    check(robot, [KP, KI, "motor.inductance_H"], width=2e-3, tol=1e-9, twist_command=TWISTS[30:80])
+    check(robot, [KP, KI, "motor.inductance_H"], width=2e-3, twist_command=TWISTS[30:80])
 
 
 def test_what_sticks_has_a_derivative_of_exactly_0_until_the_integral_moves_it(axebot):

@@ -134,11 +134,10 @@ def _fitted(
 ) -> OutputErrorEstimate:  # fmt: skip
     """The fit of records; free: the keys that were asked for by name."""
     motion_of = motion(records, robot)
-    robot, given, still = (
-        (robot, loop_options(given, motion_of, records, robot), [])
-        if looped(records)
-        else without_still_axes(motion_of, records[0].source, robot, given)
-    )
+    if looped(records):
+        given, still = loop_options(given, motion_of, records, robot), []
+    else:
+        robot, given, still = without_still_axes(motion_of, records[0].source, robot, given)
     solver, solution = _solve(records, robot, given, watch)
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
     axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in free and motion_of.moved[axis]]
@@ -201,11 +200,10 @@ def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | Tan
 
 def loop_options(given: Options, found: Motion, records: Sequence[Record], robot: Robot) -> Options:
     """By default friction of what moved, and the gains. Raises InsufficientDataError where nothing moved."""
-    keys = loop_keys(robot, found.moved, records[0].source)
-    if given.free is not None:
-        return given
-    more = [key for key in known_priors(robot) if key not in keys] if given.use_priors else []
-    return replace(given, free=tuple(key for key in (*keys, *more) if key not in given.fixed), fixed=())
+    more = known_priors(robot) if given.use_priors else ()
+    keys = dict.fromkeys((*loop_keys(robot, found.moved, records[0].source), *more))
+    free = tuple(key for key in keys if key not in given.fixed)
+    return given if given.free is not None else replace(given, free=free, fixed=())
 
 
 def fits_exactly(problem: Problem) -> bool:
@@ -240,13 +238,12 @@ def _settled_loop(
     solution: Solution,
 ) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
     """Without the latencies that the logs do not determine, where they are automatic; and what is not used."""
-    words = left_out(records, solver.problem.pieces)
     if given.nuisances is None:
         kept = supported(solver, solution, (LATENCY,))
         given = replace(given, nuisances=kept)
         if len(kept) < len(solver.problem.parameters) - solver.problem.robot_count:
             solver, solution = _solve(records, robot, given, watch)
-    return solver, solution, given, words
+    return solver, solution, given, left_out(records, solver.problem.pieces)
 
 
 def read_records(runs: Sequence[Run], robot: Robot, given: Options) -> list[Record]:
@@ -321,9 +318,8 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     auto = automatic(records) if exact else (LATENCY,)
     more = nuisance_parameters(auto if given.nuisances is None else given.nuisances, records, robot)
     late = any(p.name.startswith(LATENCY) for p in more)
-    parts = (
-        loop_pieces(records, robot, given.start) if looped(records) else pieces(records, robot, given.start, late)
-    )  # fmt: skip
+    start = given.start
+    parts = loop_pieces(records, robot, start) if looped(records) else pieces(records, robot, start, late)
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
     if rows <= len(own) + len(more):
         raise InsufficientDataError(
