@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.exact_engine import Weighting
-from omnidyn.identification.output_error.first_point import first_point
+from omnidyn.identification.output_error.first_point import first_point, moving_start
 from omnidyn.identification.output_error.fit import (
     FINE,
     Options,
@@ -222,7 +222,7 @@ def joint_start(engine: JointEngine, nu: float) -> Point:
         elif looped(member.part.records):
             point = loop_start(problem, nu)
         else:
-            point = problem.start()
+            point = moving_start(problem, nu)
         for k, value in zip(member.at, point.values, strict=True):
             values[k].append(float(value))
         states += point.states

@@ -17,6 +17,7 @@ from omnidyn.identification.output_error.tangent_engine import TangentEngine
 MANY = 100_000  # rows to which a long log is first fitted
 FEW = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
+LESS = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
 NEAR = 0.1  # squared distance to the best point, in standard errors, that is near
 
 
@@ -65,9 +66,22 @@ def _with_latencies(solver: Solver, point: Point) -> Point:
 
 def coarse_point(problem: Problem, nu: float) -> Point:
     """Near the best point, by one step a row; a long log is first fitted in part."""
-    solver, short, own = Solver(problem, TangentEngine(problem), nu, NEAR), problem.shortened(FEW), problem.start()
+    solver, short, own = (
+        Solver(problem, TangentEngine(problem), nu, NEAR),
+        problem.shortened(FEW),
+        moving_start(problem, nu),
+    )
     if short is problem:
         return solver.minimise(own).state.point
     found = Solver(short, TangentEngine(short), nu, NEAR).minimise(own).state.point
     states = [solver.state(point) for point in (own, found)]
     return solver.minimise(min(states, key=lambda state: state.objective).point).state.point
+
+
+def moving_start(problem: Problem, nu: float) -> Point:
+    """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes."""
+    own, short = problem.start(), problem.shortened(FEW)
+    solver = Solver(short, TangentEngine(short), nu)
+    friction = np.array([p.name.startswith("friction.") for p in problem.parameters], bool)
+    points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
+    return min(points, key=lambda point: solver.state(point).objective)

@@ -34,7 +34,7 @@ from omnidyn.identification.output_error.nuisances import (
     nuisance_parameters,
     pieces,
 )
-from omnidyn.identification.output_error.parameters import FRICTION, robot_parameters
+from omnidyn.identification.output_error.parameters import FRICTION, Parameter, robot_parameters
 from omnidyn.identification.output_error.problem import Problem
 from omnidyn.identification.output_error.record import Record, record
 from omnidyn.identification.output_error.resampling import resampled
@@ -43,6 +43,7 @@ from omnidyn.identification.output_error.support import supported, wanted
 from omnidyn.identification.output_error.tangent_engine import TangentEngine
 from omnidyn.identification.output_error.uncertainty import trust
 from omnidyn.logs.steady_table import AXES
+from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -56,6 +57,7 @@ NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count,
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
+BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 BREAKAWAY = "friction.axes.breakaway"
 IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
@@ -314,7 +316,7 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     own = robot_parameters(robot, keys, priors)
     exact = is_exact(robot) and not looped(records)
     if not exact:
-        own = [replace(p, low=LEAST * p.value) if p.low == 0.0 else p for p in own]
+        own = [_within_reach(p, _drive(records, robot)) for p in own]
     auto = automatic(records) if exact else (LATENCY,)
     more = nuisance_parameters(auto if given.nuisances is None else given.nuisances, records, robot)
     late = any(p.name.startswith(LATENCY) for p in more)
@@ -326,6 +328,21 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
             "too few measurements", got=f"{rows}", expected=f"more than {len(own) + len(more)}, one for each number"
         )
     return Problem(robot, (*own, *more), len(own), tuple(parts))
+
+
+def _drive(records: Sequence[Record], robot: Robot) -> float:
+    """The greatest wrench that the voltages of the logs give at rest [N, N, N m]; a loop may give its limit."""
+    limit = robot.motor.voltage_limit or robot.drive.supply or 0.0
+    levels = [r.voltage if r.set_point is None else np.eye(robot.wheels.count) * limit for r in records]
+    return max(float(np.nanmax(np.abs(drive_wrench(robot, np.zeros(3), volts)), initial=0.0)) for volts in levels)
+
+
+def _within_reach(p: Parameter, drive: float) -> Parameter:
+    """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
+    low = LEAST * p.value if p.low == 0.0 else p.low
+    if not p.name.startswith("friction.") or "coulomb" not in p.name or drive == 0.0:
+        return replace(p, low=low)
+    return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
 
 
 def free_by_default(robot: Robot) -> list[str]:

@@ -43,6 +43,9 @@ class Engine(Protocol):
         ...
 
 
+FASTEST = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
+
+
 @dataclass(frozen=True, eq=False)
 class State:
     """A point, its sums, F there and the variance of each column."""
@@ -255,6 +258,7 @@ class Normal:
             if grad.shape[0] > k:
                 damped = _damped(info, damping)
                 new += of_states(damped[k:, k:], grad[k:] - damped[k:, :k] @ step)
+                new[: len(FASTEST)] = np.clip(new[: len(FASTEST)], -FASTEST, FASTEST)
             states.append(new)
         return Point(self.solver.outer(inner), tuple(states))
 
