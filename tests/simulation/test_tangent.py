@@ -96,6 +96,12 @@ STOPS = held((20, [0, 2, -2]), (20, [0, 0, 0]), (10, [3, 3, 3]), (20, [0, 4, -4]
 FOUR = held((15, [1, 5, -3, -4]), (25, [-4, 2, 5, 3]), (20, [0, 0, 0, 0]), (15, [3, 1, 4, -2]))
 
 
+def by_two_stages(robot, force, h=0.01):
+    """Speed along x after one step of SDIRK2 from rest under a constant force: (R(z) - 1)/z h f/M, z = -h b/M."""
+    z, g = -h * robot.friction.axes.viscous[0] / robot.body.mass, 1.0 - 1.0 / np.sqrt(2.0)
+    return ((1.0 + (1.0 - 2.0 * g) * z) / (1.0 - g * z) ** 2 - 1.0) / z * h * force / robot.body.mass
+
+
 def closed_form(p, t):
     """v_x of Table 3's robot from rest under u = (0, 3, -3) V: phi (g - c). `p` may be complex."""
     gain = p["gear"] * p["torque_constant"] / (p["resistance"] * p["radius"])
@@ -139,6 +145,18 @@ def test_ellipse_wheels_and_current_limit(ellipse):
     keys = [*BODY, *MOTOR, "motor.current_limit_A", "friction.direction.coulomb[0]", "friction.direction.coulomb[1]"]
     keys += ["friction.direction.viscous", "friction.direction.yaw_coulomb", "friction.wheels.coulomb[2]"]
     check(lambda r: reference(r, TURNING, 0.01), ellipse, TURNING, keys, 1e-4, channels=("twist", "pose"))
+
+
+def test_at_every_tolerance(ellipse):
+    """Where a step happens to end, near an instant at which a current meets its limit or far from it, is no matter."""
+    keys = ["body.mass_kg", "motor.resistance_ohm", "motor.current_limit_A", "friction.wheels.coulomb[2]"]
+    expected = [differences(lambda r: reference(r, TURNING, 0.01), ellipse, key, 1e-4) for key in keys]
+    for tol in (1e-7, 3e-8, 1e-8, 5e-9):
+        found = derivatives(ellipse, TURNING, 0.01, keys, tol=tol)
+        for j, key in enumerate(keys):
+            errors = worst(found.twist[..., j], expected[j][0]), worst(found.pose[..., j], expected[j][1])
+            print(f"tol {tol:.0e} {key:34} twist {errors[0]:.1e} pose {errors[1]:.1e}")
+            assert max(errors) <= AGREES
 
 
 def test_unequal_motors_with_dynamic_electrics(unequal):
@@ -275,6 +293,18 @@ def test_a_disc_reverses_on_a_straight_line(axebot):
         print(key, error := worst(found.twist[..., j], expected[0]))
         assert error <= AGREES
     assert found.run.twist[59, 0] < 0.0 < found.run.twist[29, 0]
+
+
+@pytest.mark.parametrize("beyond", [1e-7, 1e-9])
+def test_a_current_that_is_only_just_at_its_limit(axebot, beyond):
+    """It does not feel the resistance at all, however near its limit is to what the winding alone would give."""
+    share, each = np.sqrt(3.0) / 2.0, by_two_stages(axebot, 1.0)
+    push, back = 2.0 * share * 19.0 * 0.0059 / 0.035, share * 19.0 * 0.0059 / 0.035
+    now = (3.0 + back * each * 2.2) / (1.69 + back * each * push)  # limit = what the voltage gives at the end
+    robot = axebot.replace(motor=axebot.motor.replace(current_limit=now * (1.0 - beyond)))
+    found = derivatives(robot, [[0, 3, -3]], 0.01, ["motor.resistance_ohm", "motor.current_limit_A"], tol=None)
+    assert (found.twist[..., 0] == 0.0).all()
+    assert found.twist[1, 0, 1] == pytest.approx(by_two_stages(axebot, push), rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["ellipse", "unequal"])

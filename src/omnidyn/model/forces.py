@@ -11,6 +11,7 @@ from omnidyn.compiled import part
 from omnidyn.model.layout import (
     AXES,
     BOUND,
+    BRANCH,
     CURRENT,
     DROP,
     EFFICIENCY,
@@ -28,6 +29,7 @@ from omnidyn.model.layout import (
     LOSS,
     MASS,
     NOW,
+    OPEN,
     PUSH,
     RESISTANCE,
     SIGN,
@@ -41,21 +43,40 @@ from omnidyn.model.layout import (
 )
 from omnidyn.model.scratch import JACOBIAN, RESIDUAL
 
+NONE = 3.0  # the branch on which no current flows against a voltage drop
+
+
+@part
+def winding_branch(speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
+    """The branch of `winding`: 1 and -1 a current flows forward and backward, 2 and -2 it is at its limit, or NONE."""
+    flux = inductance * now + tau * (voltage - emf * speed)
+    lost, below = tau * drop, inductance + tau * resistance
+    if abs(flux) <= lost and lost > 0.0:  # without a drop, no current is a point like any other
+        return NONE
+    side = math.copysign(1.0, flux)
+    return 2.0 * side if abs(flux - side * lost) >= bound * below else side
+
+
+@part
+def winding_answer(branch, speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
+    """`winding` on a branch, beyond its ends too."""
+    if branch == NONE:
+        return 0.0, 0.0
+    if abs(branch) == 2.0:
+        return math.copysign(bound, branch), 0.0
+    flux, below = inductance * now + tau * (voltage - emf * speed), inductance + tau * resistance
+    return (flux - branch * tau * drop) / below, -tau * emf / below
+
 
 @part
 def winding(speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
     """(current [A], its slope [A s/m]) of a motor at the end of a stage: eq (11) with the currents eliminated.
 
     i = clip(soft(L i* + tau (u - E s), tau V_d)/(L + tau R), +-i_max); L = 0 gives the settled current for any tau.
+    The branch is told apart from the current, so that derivatives can be taken of the same lines on one branch.
     """
-    flux = inductance * now + tau * (voltage - emf * speed)
-    lost, below = tau * drop, inductance + tau * resistance
-    if abs(flux) <= lost and lost > 0.0:  # without a drop, no current is a point like any other
-        return 0.0, 0.0
-    i = (flux - math.copysign(lost, flux)) / below
-    if abs(i) > bound:
-        return math.copysign(bound, i), 0.0
-    return i, -tau * emf / below
+    branch = winding_branch(speed, voltage, now, tau, emf, resistance, inductance, drop, bound)
+    return winding_answer(branch, speed, voltage, now, tau, emf, resistance, inductance, drop, bound)
 
 
 @part
@@ -100,7 +121,10 @@ def forces_at_work(body, element):
 
 @part
 def residual(body, element, x, s):
-    """(M/tau)(x - x*) minus all forces but those of stuck elements, its Jacobian, and the currents at x."""
+    """(M/tau)(x - x*) minus all forces but those of stuck elements, its Jacobian, and the currents at x.
+
+    A motor stays on its BRANCH where it has one.
+    """
     stiff = body[MASS] / body[TAU]
     r0 = stiff * (x[0] - body[GOAL]) - body[PUSH]
     r1 = stiff * (x[1] - body[GOAL + 1]) - body[PUSH + 1]
@@ -115,11 +139,18 @@ def residual(body, element, x, s):
         elif sign == -1.0:
             force += element[e, SLIDE + 1]
         if e >= AXES:
-            i, di = winding(
-                speed, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
-                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
+            branch = element[e, BRANCH]
+            if branch == OPEN:
+                branch = winding_branch(
+                    speed, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
+                    element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
+                )  # fmt: skip
+            i, di = winding_answer(
+                branch, speed, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF],
+                element[e, RESISTANCE], element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
             )  # fmt: skip
-            gain = element[e, GAIN] if sign == 2.0 else gear(i, sign, element[e, GAIN], element[e, EFFICIENCY])
+            side = i if element[e, BRANCH] == OPEN else branch
+            gain = element[e, GAIN] if sign == 2.0 else gear(side, sign, element[e, GAIN], element[e, EFFICIENCY])
             element[e, CURRENT] = i
             force, slope = force + gain * i, slope + gain * di
         r0, r1, r2 = r0 - force * g0, r1 - force * g1, r2 - force * g2

@@ -23,4 +23,6 @@ GAIN, EMF, RESISTANCE, INDUCTANCE, DROP, LIMIT, EFFICIENCY = 9, 10, 11, 12, 13, 
 SIGN = 16  # 1 and -1 slide forward and backward, 0 stuck, 2 no dry friction
 VOLTAGE, BOUND, NOW, CURRENT = 17, 18, 19, 20  # applied [V]; current limit in force [A]; i* and i at the solution [A]
 LOSS, FOUND, BEFORE = 21, 23, 24  # gear loss at rest [N], forward and (+1) backward; marks of the solver
-ELEMENT_SIZE = 25
+BRANCH = 25  # of the current, as winding_branch tells it; OPEN: found at the solution
+ELEMENT_SIZE = 26
+OPEN = 0.0

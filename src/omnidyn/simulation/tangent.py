@@ -67,8 +67,8 @@ def derivatives(
     They belong to the sequence of starts, stops and reversals that the run shows. Not differentiable, and not seen:
     whether something breaks away at all, a stop that only just happens, an ellipse crossing rest at an angle, a voltage
     exactly at its limit, a tick at which the integral of a speed loop begins or ceases to stand still. At tol 1e-6 a
-    derivative is within 1e-5 of its largest value in the run, within 2e-4 after a current has met its limit or passed 0
-    against a voltage drop.
+    derivative of the twist or pose is within 1e-5 of its largest value in the run, within 5e-5 after a release inside a
+    row; of a current that has inductance, within 1e-4.
     Raises InputError for what `simulate` refuses, for an unknown key, and for friction or a gear loss that is off;
     UnsupportedError for the rate of a speed loop.
     """
@@ -187,7 +187,7 @@ def ways_of(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Ways:
     return Ways(
         body=body, element=element, arm=arm, voltage=rates, scratch=np.array([scratch(), scratch()]),
         lift=np.zeros((3, 6)), held=np.zeros((2, 3), np.int64), point=np.zeros((5, 3)), aim=work[0], middle=work[1],
-        half=work[2], state=np.zeros((2, len(new_state(numbers)))), gained=np.zeros(3), carry=np.zeros((2, n)),
+        half=work[2], state=np.zeros((2, len(new_state(numbers)))), gained=np.zeros(3), carry=np.zeros((3, n)),
         kept=work[3],
     )  # fmt: skip
 

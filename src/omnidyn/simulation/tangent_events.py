@@ -11,8 +11,10 @@ from omnidyn.model.holding import worst_direction
 from omnidyn.model.layout import (
     AXES,
     BOUND,
+    BRANCH,
     CURRENT,
     DROP,
+    EFFICIENCY,
     ELLIPSE,
     EMF,
     GOAL,
@@ -24,6 +26,7 @@ from omnidyn.model.layout import (
     INDUCTANCE,
     MASS,
     NOW,
+    OPEN,
     PUSH,
     RESISTANCE,
     SIGN,
@@ -33,10 +36,12 @@ from omnidyn.model.layout import (
 from omnidyn.model.rest import SIGNS, put, settle, sticks
 from omnidyn.model.scratch import NEWTON, WORST, copy_row, copy_table
 from omnidyn.simulation.implicit import SHORTEST
+from omnidyn.simulation.implicit_step import step
 from omnidyn.simulation.tangent_step import EPS, stage_tangent, step_tangent
 
 DELAY = 1e-7  # [s] time step of differences in time
-PIECES = 32  # of a half step in which a current meets its limit or 0
+NEAR = 2.0**-16  # of a half step: how near the instant is found at which a current meets its limit or 0
+PIECES = 16  # at most, into which such instants cut a half step
 MARGIN = 1e-3  # relative: how far beyond its hold a release is looked at
 SOON = 1e-6  # of L/R: a time in which a current hardly changes
 
@@ -181,6 +186,7 @@ def _gap(body, element, ways, start, d, eps):
         body[PUSH + a] = ways.point[4, a]
     for w in range(m - AXES):
         element[AXES + w, NOW] += eps * d[3 + w]
+        element[AXES + w, BRANCH] = OPEN
     set_losses(body, element)
     residual(body, element, point, s)
     found = worst_direction(body, element, s, face(body, element, s))
@@ -211,13 +217,38 @@ def _later(body, element, ways, start, acceleration):
 
 @part
 def bends(element, a, b):
-    """Whether a current meets or leaves its limit or 0 between two states: the derivative bends there."""
+    """Whether a current meets or leaves its limit between two states, or 0 against a drop or behind a lossy gear.
+
+    The derivative bends there.
+    """
     first = SIGNS + 1 + len(element)
     for w in range(len(element) - AXES):
-        i, j, bound = a[first + w], b[first + w], element[AXES + w, BOUND]
-        if (np.sign(i) != np.sign(j)) | ((abs(i) >= bound) != (abs(j) >= bound)):
+        i, j, row = a[first + w], b[first + w], element[AXES + w]
+        if (abs(i) >= row[BOUND]) != (abs(j) >= row[BOUND]):
+            return True
+        if (np.sign(i) != np.sign(j)) & ((row[DROP] > 0.0) | (row[EFFICIENCY] != 1.0)):
             return True
     return False
+
+
+@part
+def _reach(body, element, s, first, last, middle, left, near):
+    """Length of the next piece from `first`, of the `left`: up to where a current bends, or else `near`, across that.
+
+    `last` and `middle` are room to work in.
+    """
+    step(body, element, s, first, last, middle, left)
+    if left <= near or not bends(element, first, last):
+        return left
+    low, high = 0.0, left
+    while high - low > near:
+        between = 0.5 * (low + high)
+        step(body, element, s, first, last, middle, between)
+        if bends(element, first, last):
+            high = between
+        else:
+            low = between
+    return low if low > 0.0 else high
 
 
 @part
@@ -271,11 +302,17 @@ def half_tangent(body, element, bare_body, bare_element, s, ways, start, end, mi
             settle(body, element, bare_body, bare_element, s, last, ways.gained)
         _leap(body, element, s, ways, first, last, h, ways.gained, d1)
         return
+    if not bends(element, start, end):
+        step_tangent(body, element, s, ways, start, last, middle, h, d1, d1)
+        return
     copy_row(first, start)
-    pieces = PIECES if bends(element, start, end) else 1
-    for piece in range(pieces):
+    left = h
+    for piece in range(PIECES):
+        length = _reach(body, element, s, first, last, middle, left, NEAR * h) if piece < PIECES - 1 else left
+        left = left - length if length < left else 0.0
         copy_table(ways.kept, d1)
-        step_tangent(body, element, s, ways, first, last, middle, h / pieces, d1, d1)
-        if pieces > 1:
-            _pass_zero(element, ways, start, end, first, last, piece == pieces - 1, d1)
+        step_tangent(body, element, s, ways, first, last, middle, length, d1, d1)
+        _pass_zero(element, ways, start, end, first, last, left == 0.0, d1)
+        if left == 0.0:
+            return
         copy_row(first, last)

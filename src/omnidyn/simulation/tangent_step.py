@@ -6,7 +6,8 @@ right inverse of A and J = dR/dx, a change of a parameter changes the face, and
     dx = -P dA x + B z,   (B' J B) z = -B' (dR - J P dA x - dA' P' R),   dR at fixed x, with x* and i* changed too
 
 No force is written here: dR is a central difference of the residual of two plants, a little up and down the
-parameter. Signs are those of the solution, so what is stuck has a derivative of exactly 0.
+parameter. Signs, and branches of the currents, are those of the solution: what is stuck has a derivative of exactly 0,
+and a current limit or a voltage drop within the reach of the difference is not straddled.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 
 from omnidyn.compiled import part
 from omnidyn.model.face import FLAT, face, newton_direction
-from omnidyn.model.forces import gear, residual, winding
+from omnidyn.model.forces import gear, residual, winding_answer, winding_branch
 from omnidyn.model.layout import (
     AXES,
     BOUND,
+    BRANCH,
     CURRENT,
     DROP,
     EFFICIENCY,
@@ -43,7 +45,7 @@ from omnidyn.model.scratch import JACOBIAN, NEWTON, RESIDUAL
 from omnidyn.simulation.implicit_step import first_stage, last_stage
 
 FloatArray = NDArray[np.float64]
-EPS = 1e-6  # relative change of a parameter: rounding 1e-10, curvature 1e-12; a kink nearer than this is straddled
+EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10; all kinks are on their branch
 
 
 class Ways(NamedTuple):
@@ -62,7 +64,7 @@ class Ways(NamedTuple):
     half: FloatArray  # (K, 3 + n) derivative after the first half step
     state: FloatArray  # (2, size of a state)
     gained: FloatArray  # (3,) acceleration
-    carry: FloatArray  # (2, n) di/di*, and the force per ampere of i*
+    carry: FloatArray  # (3, n) di/di*, the force per ampere of i*, and the branch of the current
     kept: FloatArray  # (K, 3 + n) derivative before a piece of a half step
 
 
@@ -110,7 +112,7 @@ def _holders(body, element, ways):
 
 @part
 def _same_problem(body, element, ways, k, aim):
-    """Give the two plants of parameter k the stage at hand: signs, i*, and x* with its derivative `aim`."""
+    """Give the two plants of parameter k the stage at hand: signs, branches, i*, and x* with its derivative `aim`."""
     for side in range(2):
         b, el, eps = ways.body[2 * k + side], ways.element[2 * k + side], EPS * (1 - 2 * side)
         b[TAU], b[ELLIPSE] = body[TAU], body[ELLIPSE]
@@ -119,23 +121,29 @@ def _same_problem(body, element, ways, k, aim):
         for e in range(len(element)):
             el[e, SIGN] = element[e, SIGN]
             el[e, NOW] = element[e, NOW]
+            if e >= AXES:
+                el[e, BRANCH] = ways.carry[2, e - AXES]
 
 
 @part
 def _carry(body, element, ways, x):
-    """Into ways.carry: di/di* of a stage, and the force that goes with it; by the slope that `winding` gives.
+    """Into ways.carry: di/di* of a stage, the force that goes with it, by the slope of `winding`, and its branch.
 
     Not by differences: i* may be nearer to 0 or to the limit than they reach.
     """
     for e in range(AXES, len(element)):
         row, w = element[e], e - AXES
         speed = row[GX] * x[0] + row[GX + 1] * x[1] + row[GZ] * x[2] if row[SIGN] != 0.0 else 0.0
-        i, slope = winding(
+        branch = winding_branch(
             speed, row[VOLTAGE], row[NOW], body[TAU], row[EMF], row[RESISTANCE], row[INDUCTANCE], row[DROP], row[BOUND]
         )
+        i, slope = winding_answer(
+            branch, speed, row[VOLTAGE], row[NOW], body[TAU], row[EMF], row[RESISTANCE], row[INDUCTANCE], row[DROP],
+            row[BOUND],
+        )  # fmt: skip
         gain = row[GAIN] if row[SIGN] == 2.0 else gear(i, row[SIGN], row[GAIN], row[EFFICIENCY])
         ways.carry[0, w] = -slope * row[INDUCTANCE] / (body[TAU] * row[EMF])
-        ways.carry[1, w] = gain * ways.carry[0, w]
+        ways.carry[1, w], ways.carry[2, w] = gain * ways.carry[0, w], branch
 
 
 @part
