@@ -105,3 +105,26 @@ def test_bootstrap_over_runs(axebot):
     assert (ratio < 2.0).all()
     with pytest.raises(InsufficientDataError, match="too few runs for a bootstrap; got 1; expected 5"):
         fit_output_error(runs[0], axebot, bootstrap=10)
+
+
+def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
+    """25 short runs, Coulomb friction of each 15 % off at random; the truth is their expected value.
+
+    40 draws: errors in standard errors scatter by 1, within three counting errors of 40; by white noise they
+    scatter by nearly 2.
+    """
+    rng, key = np.random.default_rng(5), "friction.axes.coulomb[0]"
+    base = voltages(np.random.default_rng(3))[:100]
+    errors = {"auto": [], "white": []}
+    for _ in range(40):
+        runs = []
+        for level in TRUTH[key] * (1.0 + 0.15 * rng.normal(size=25)):
+            run = simulate(with_parameter(axebot, key, float(level)), base, 0.01)
+            runs.append(Run(t=run.t, voltage=run.voltage, twist=run.twist + rng.normal(size=run.twist.shape) * NOISE))
+        for kind, found in errors.items():
+            fit = fit_output_error(runs, axebot, start="rest", covariance=kind)
+            found.append((fit.value[key] - TRUTH[key]) / fit.std[key])
+        assert fit_output_error(runs, axebot, start="rest").covariance == "sandwich"
+    assert any("from run to run (25 runs)" in words for words in fit_output_error(runs, axebot, start="rest").warnings)
+    assert abs(np.std(errors["auto"]) - 1.0) < 3.0 / np.sqrt(2.0 * 40)
+    assert np.std(errors["white"]) > 1.6

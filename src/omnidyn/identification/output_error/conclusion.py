@@ -192,9 +192,10 @@ def _warnings(
         if known.held[j]:
             words.append(f"{p.name} is at its bound {solution.state.point.values[j]:.4g}: the best fit lies beyond it")
     if known.kind == "sandwich":
+        by = f" by the scatter from run to run ({known.runs} runs)" if known.runs else ""
         words.append(
             f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
-            f"intervals allow for it, up to {max(known.widening, 1.0):.2g} times as wide as for white noise"
+            f"intervals allow for it{by}, up to {max(known.widening, 1.0):.2g} times as wide as for white noise"
         )
     return words
 

@@ -5,7 +5,9 @@
 
 The blocks are longer than the residuals remember, so that the sandwich needs no model of their colour: it is consistent
 under heteroskedasticity and autocorrelation, and its intervals take the quantile of Student's t for the number of
-blocks that carry the information. Which of the two is used is decided by the residuals.
+blocks that carry the information. Which of the two is used is decided by the residuals. Where there are many runs,
+each is one block: a floor or a battery that differs from run to run is then in the intervals too (Liang, Zeger,
+Biometrika 73 (1986); n/(n - 1) for n runs).
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
+MANY_RUNS = 20  # from so many on each run is a block
 COLOURED = 4.0  # standard errors of a correlation of neighbours, and of a variance ratio
 BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below which a direction is not seen
 WEAK = 1e-4  # below it, is hardly seen
@@ -41,7 +44,8 @@ class Trust:
     alone or only together with others. free_step (P,): from a bound to where the fit would go without it. kind: white
     or sandwich. widening: largest ratio of the sandwich's std to the plain one. quantile: standard errors in half a
     95 % interval. degrees: of freedom behind it. neighbours (columns,): correlation of successive residuals.
-    directions: blind or weak ones: (eigenvalue, relative change of each parameter).
+    directions: blind or weak ones: (eigenvalue, relative change of each parameter). runs: that were the blocks, 0 where
+    these were shorter than a run.
     """
 
     covariance: FloatArray
@@ -54,6 +58,7 @@ class Trust:
     degrees: int
     neighbours: FloatArray
     directions: tuple[tuple[float, FloatArray], ...]
+    runs: int = 0
 
     @property
     def std(self) -> FloatArray:
@@ -70,8 +75,12 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     relative = _relative(solver, solution)
     seen, directions = _seen(normal.information, normal.held, relative)
     plain = _inverse(normal.information, seen)
+    runs = _runs(solver, sums)
+    count = len(runs) if len(runs) >= MANY_RUNS else 0
     influence = normal.scores() @ plain  # what each block moves each parameter by
-    coloured, neighbours = _coloured(solver, sums)
+    if count:
+        influence = np.array([influence[own].sum(axis=0) for own in runs]) * np.sqrt(count / (count - 1.0))
+    coloured, neighbours = _coloured(solver, sums, runs if count else None)
     if kind == "auto":  # a loss that is not the likelihood of the noise says nothing by its curvature alone
         kind = SANDWICH if coloured or solver.nu or counted else WHITE  # nor does an encoder at rest, which repeats
     wide = influence.T @ influence + plain @ np.diag(normal.prior_information) @ plain
@@ -83,6 +92,7 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     return Trust(
         covariance, normal.held, ~seen, _free_step(plain, normal), kind, float(np.sqrt(_ratio(wide, plain, seen))),
         float(stdtrit(degrees, TAIL) if degrees > 0 else ndtri(TAIL)), max(int(degrees), 0), neighbours, directions,
+        count if kind == SANDWICH else 0,
     )  # fmt: skip
 
 
@@ -90,8 +100,19 @@ def _rows(solver: Solver, sums: list[PieceSums]) -> int:
     return int(per_column(sums, len(solver.problem.columns), "number").sum())
 
 
-def _coloured(solver: Solver, sums: list[PieceSums]) -> tuple[bool, FloatArray]:
+def _runs(solver: Solver, sums: list[PieceSums]) -> list[NDArray[np.intp]]:
+    """The blocks of each run."""
+    of = [id(piece.record) for piece, own in zip(solver.problem.pieces, sums, strict=True) for _ in own.score]
+    names = np.array(of)
+    return [np.flatnonzero(names == run) for run in dict.fromkeys(of)]
+
+
+def _coloured(
+    solver: Solver, sums: list[PieceSums], runs: list[NDArray[np.intp]] | None = None
+) -> tuple[bool, FloatArray]:
     """Whether the residuals of any column remember: (verdict, correlation of neighbours of each column).
+
+    runs: the blocks of each, where runs are the blocks.
 
     For white noise the correlation of neighbours is 0 +- 1/sqrt(n), and the squared sums over blocks add up to the sum
     of squares, +- sqrt(2/blocks) of it: the first sees fast colours, the second slow ones.
@@ -99,10 +120,14 @@ def _coloured(solver: Solver, sums: list[PieceSums]) -> tuple[bool, FloatArray]:
     columns = len(solver.problem.columns)
     square = np.maximum(per_column(sums, columns, "square"), 1e-300)
     neighbours = per_column(sums, columns, "lag") / square
-    slow, blocks = np.zeros(columns), np.zeros(columns)
+    drift = np.zeros((sum(len(piece.drift) for piece in sums), columns))
+    first = 0
     for piece in sums:
-        slow[piece.columns] += (piece.drift**2).sum(axis=0)
-        blocks[piece.columns] += len(piece.drift)
+        drift[first : first + len(piece.drift), piece.columns] = piece.drift
+        first += len(piece.drift)
+    if runs is not None:
+        drift = np.array([drift[own].sum(axis=0) for own in runs])
+    slow, blocks = (drift**2).sum(axis=0), (drift != 0.0).sum(axis=0)
     fast = np.abs(neighbours) * np.sqrt(np.maximum(per_column(sums, columns, "number"), 1.0)) > COLOURED
     return bool((fast | (slow / square > 1.0 + COLOURED * np.sqrt(2.0 / np.maximum(blocks, 1.0)))).any()), neighbours
 
