@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InsufficientDataError, UnsupportedError
-from omnidyn.identification.output_error.loop_engine import LoopEngine
-from omnidyn.identification.output_error.nuisances import FREE, REST
+from omnidyn.identification.output_error.loop_engine import SLOW_LOOP, LoopEngine
+from omnidyn.identification.output_error.nuisances import EARLIEST, FREE, LATEST, REST
 from omnidyn.identification.output_error.parameters import FRICTION, Parameter
 from omnidyn.identification.output_error.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.record import Record
@@ -31,7 +31,8 @@ FINE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
 SETTING_OFF = 60  # rows of each log on which starts are tried
 STILL = 3  # rows at the beginning in which nothing may move
 CLEAR = 6.0  # standard errors, of the scatter of these rows, that count as motion
-LATENCY = "latency"
+LATENCY, CURRENTS = "latency", "latency.current"
+AROUND = 3  # periods of the loop, each way, in which a latency of the currents is tried
 GAIN_FACTORS, LEVEL_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 1.0, 3.0)
 LATE = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
 BEST = 2  # of the starts from which the fit is carried on
@@ -156,7 +157,9 @@ def solve_loop(
     problem: Problem, nu: float, watch: Callable[[State], None] | None = None
 ) -> tuple[Solver, Solution]:  # fmt: skip
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
-    coarse = Solver(problem, LoopEngine(problem), nu).minimise(loop_start(problem, nu), watch=watch)
+    first = Solver(problem, LoopEngine(problem), nu)
+    coarse = first.minimise(loop_start(problem, nu), FEW, watch)
+    coarse = first.minimise(retimed(problem, coarse.state.point, nu), watch=watch)
     fine = Solver(problem, LoopEngine(problem, FINE), nu)
     return fine, beyond_jumps(fine, fine.minimise(coarse.state.point, watch=watch), watch)
 
@@ -166,6 +169,27 @@ def loop_start(problem: Problem, nu: float) -> Point:
     short = shortened(problem, SETTING_OFF)
     found = best_start(Solver(short, LoopEngine(short), nu))
     return Point(found.values, problem.start().states)
+
+
+def retimed(problem: Problem, point: Point, nu: float) -> Point:
+    """The point with the best latency of the currents, of one in the middle of each period of the loop.
+
+    A current jumps at every tick: no descent gets a latency across one.
+    """
+    period = 1.0 / (problem.robot.drive.rate or np.inf)
+    own = [j for j, p in enumerate(problem.parameters) if p.name == CURRENTS]
+    short = shortened(problem, SETTING_OFF)
+    row = min(float(np.median(np.diff(p.record.t[p.first : p.last + 1]))) for p in short.pieces)
+    if not own or period < SLOW_LOOP * row:
+        return point
+    now = float(point.values[own[0]])
+    middles = (np.floor(now / period) + 0.5 + np.arange(-AROUND, AROUND + 1)) * period
+    solver, states = Solver(short, LoopEngine(short), nu), []
+    for late in (now, *middles[(middles > EARLIEST) & (middles < LATEST)]):
+        values = point.values.copy()
+        values[own] = late
+        states.append(solver.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
+    return min(states, key=lambda state: state.objective).point
 
 
 def shortened(problem: Problem, rows: int) -> Problem:
@@ -202,9 +226,13 @@ def beyond_jumps(solver: Solver, solution: Solution, watch: Callable[[State], No
 
     An integral that stands still at the voltage limit jumps by a whole tick where a number of the robot decides on
     which side of the limit a tick is. So the gains are moved by some standard errors, the others following: where F
-    rises by less than the parabola says, there is another branch to descend into.
+    rises by less than the parabola says, there is another branch to descend into. A run away from the limit has
+    no such branch.
     """
-    if not np.any(solver.problem.robot.drive.ki):
+    engine = solver.engine
+    if not np.any(solver.problem.robot.drive.ki) or (
+        isinstance(engine, LoopEngine) and not engine.meets_limit(solution.state.point)
+    ):
         return solution
     gains = [j for j, p in enumerate(solver.problem.parameters) if p.name.startswith("drive.")]
     for _ in range(ROUNDS):

@@ -17,17 +17,21 @@ from omnidyn.identification.output_error.exact_engine import LATE, Weighting
 from omnidyn.identification.output_error.outputs import refuse_exact_only
 from omnidyn.identification.output_error.problem import Piece, PieceSums, Point, Problem
 from omnidyn.identification.output_error.sums import added
-from omnidyn.model.dynamics import acceleration
+from omnidyn.model.dynamics import acceleration, settled_currents
 from omnidyn.model.layout import AXES
+from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import wheel_speed
+from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.simulation.commands import Commands
-from omnidyn.simulation.tangent import Derivatives, Prepared, differentiate, prepared
+from omnidyn.simulation.tangent import Derivatives, Prepared, difference, differentiate, prepared
+from omnidyn.simulation.tangent_step import EPS
 
 FloatArray = NDArray[np.float64]
 
 MEET = 1e-7  # [s] times that differ by less are one
 SETTLED = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command
+SLOW_LOOP = 0.5  # periods in a row, beyond which a current is seen between its ticks
+NEAR_LIMIT = 0.9  # of the voltage limit
 STEEPEST = 1e8  # a loop that swings has derivatives that grow without bound: they are cut, for they mean nothing
 
 
@@ -77,6 +81,17 @@ class LoopEngine:
             found.append(added(*turned, np.arange(width), weighting, known, width))
         return found
 
+    def meets_limit(self, point: Point) -> bool:
+        """Whether a run comes near the voltage limit, where the integral of the loop stands still, at any row."""
+        ready = self.ready_at(point.values)
+        for piece in self.problem.pieces:
+            t = piece.record.t[piece.first : piece.last + 1]
+            voltage = self._run(ready, piece, t, t).run.voltage
+            assert voltage is not None
+            if (np.abs(voltage) > NEAR_LIMIT * per_wheel(ready.robot.motor.voltage_limit, voltage.shape[1])).any():
+                return True
+        return False
+
     def outputs(
         self, ready: Prepared, piece: Piece, state: FloatArray, values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
@@ -86,7 +101,12 @@ class LoopEngine:
         late = [problem.where(LATE + name) for name, _ in columns]
         seen = {k: t - (values[k] if k >= 0 else 0.0) for k in dict.fromkeys(late)}
         period = 1.0 / (robot.drive.rate or np.inf)
-        after = [seen[k] + period for k, (name, _) in zip(late, columns, strict=True) if k >= 0 and name == "current"]
+        jumps = period < SLOW_LOOP * float(np.median(np.diff(t))) or robot.motor.electrical == DYNAMIC
+        after = [
+            seen[k] + period
+            for k, (name, _) in zip(late, columns, strict=True)
+            if jumps and k >= 0 and name == "current"
+        ]
         grid = _grid(t, [*seen.values(), *after[:1]])
         found = self._run(ready, piece, t, grid)
         outputs = np.zeros((len(t), len(columns)))
@@ -107,7 +127,7 @@ class LoopEngine:
                     outputs[used, c] = np.where(at == len(grid) - 1, np.nan, outputs[used, c])
                 slopes[used, c, : problem.robot_count] = self._chained(by_key)
                 if pace is not None:
-                    slopes[used, c, k] = -_rate(robot, found, pace, name, i, at, grid, period)
+                    slopes[used, c, k] = -_rate(robot, found, pace, name, i, at, grid, period * jumps)
         for c, (name, _) in enumerate(columns):
             if name == "heading":
                 outputs[:, c] += state[AXES + c]
@@ -175,10 +195,14 @@ def _rate(
     robot: Robot, found: Derivatives, pace: FloatArray, name: str, i: int, at: NDArray[np.intp], grid: FloatArray,
     period: float,
 ) -> FloatArray:  # fmt: skip
-    """How fast an output changes. A current jumps at every tick: its change over one period of the loop."""
+    """How fast an output changes. A current jumps at every tick: its change over a period; 0: between ticks."""
     run = found.run
     assert run.twist is not None
     assert run.current is not None
+    if name == "current" and not period:
+        assert run.voltage is not None
+        ends = (settled_currents(robot, run.twist[at] + eps * pace, run.voltage[at])[:, i] for eps in (EPS, -EPS))
+        return difference(np.array([*ends]))[0]
     if name == "current":
         later = np.minimum(np.searchsorted(grid, grid[at] + period - MEET), len(grid) - 1)
         return (run.current[later, i] - run.current[at, i]) / period
