@@ -108,10 +108,23 @@ def test_without_inputs_it_is_steady_state_and_says_why(call):
     assert "omnidyn: steady-state, not output-error: inputless.csv holds no voltage and no duty" in err
 
 
-def test_a_robot_without_an_exact_engine_is_steady_state_too(call):
-    _, _, err = call("smooth0.csv", "--robot", "robotino")
-    assert "steady-state, not output-error: " in err
-    assert "where output-error is asked for by name" in err
+def test_a_new_robot_is_fitted_to_its_logs_by_default(tmp_path, monkeypatch, capsys):
+    """As omnidyn init writes it: friction along the direction of travel, a turning frame. The truth: 1.3 times it."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "newbie", "--azimuth", "60,180,300", "--wheel-radius", "0.05", "--robot-radius", "0.15",
+                 "--mass", "6", "--voltage-limit", "12"]) == 0  # fmt: skip
+    guess = load_robot("newbie.toml")
+    levels = tuple(1.3 * level for level in guess.friction.direction.coulomb)
+    direction = guess.friction.direction.replace(coulomb=levels)
+    true = guess.replace(friction=guess.friction.replace(direction=direction))
+    write_run(noisy(simulate(true, 2.0 * excitation(8.0), 0.01), 1), "log.csv")
+    capsys.readouterr()
+    assert main(["identify", "log.csv", "--robot", "newbie.toml", "--json"]) == 0
+    told = strict(capsys.readouterr().out)
+    assert told["method"].startswith("output error")
+    for axis in range(2):
+        low, high = told["parameters"][f"friction.direction.coulomb[{axis}]"]["ci95"]
+        assert low - 0.1 < levels[axis] < high + 0.1
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ ORDER = {
         mistakes scale lag energy motion oddities excitation""",
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
         shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table
-        identify joint_problem joint_fit as_fitted validation motor_engine motor_log motor_fit motor_run
+        settling identify joint_problem joint_fit as_fitted validation motor_engine motor_log motor_fit motor_run
         motor_choice fit_words best_so_far""",
     "identification/output_error": """parameters primitives counts doubled outputs record problem kernel axis_kernel
         driver exact_engine sums tangent_engine loop_engine solver starts motion nuisances loop uncertainty support

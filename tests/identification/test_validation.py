@@ -109,9 +109,10 @@ def test_what_decides_the_method():
     assert choose_method([run], AXEBOT) == ("output-error", "")
     assert choose_method([run], AXEBOT, ["shape"]) == ("steady-state", "")
     assert choose_method([run], load_robot("robotino"), ["free"]) == ("output-error", "")
-    method, why = choose_method([run], load_robot("robotino"))
-    assert method == "steady-state"
-    assert "friction along the direction of travel" in why
+    assert choose_method([run], load_robot("robotino")) == ("output-error", "")  # by the implicit engine
+    angles = run.replace(twist=None, wheel_angle=run.voltage)
+    assert choose_method([angles], AXEBOT) == ("output-error", "")
+    assert "angles of wheels only" in choose_method([angles], load_robot("robotino"))[1]
     assert "no voltage and no duty" in choose_method([run.replace(voltage=None)], AXEBOT)[1]
     assert "no speed, current or pose" in choose_method([run.replace(twist=None)], AXEBOT)[1]
 

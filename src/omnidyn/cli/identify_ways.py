@@ -122,7 +122,11 @@ def run(asked: Asked) -> None:
 
 def _run_fit(loaded: Loaded, robot: Robot, asked: Asked, record: dict[str, Any], now: Any) -> None:
     from omnidyn.cli.identify_fit import fit_logs
+    from omnidyn.identification.identify import why_not_output_error
 
+    slow = why_not_output_error(loaded.runs, robot)
+    if slow and robot.drive.kind == "speed":
+        say(f"omnidyn: {slow}; --method {STEADY_STATE} (--group instead of --per) answers in seconds")
     if loaded.groups and not asked.per:
         say("omnidyn: all folders are fitted together; --per NAME=GLOB makes groups of them")
         loaded = loaded._replace(groups=None)

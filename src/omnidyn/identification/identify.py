@@ -8,14 +8,13 @@ from typing import Any
 
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.fit import fit_output_error, is_exact
 from omnidyn.identification.output_error.record import LOOP_REMEDY
+from omnidyn.identification.settling import why_no_transient
 from omnidyn.identification.steady_study import identify_steady
 from omnidyn.model.drive import SPEED
-from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.exact import why_not_exact
 
 AUTO, OUTPUT_ERROR, STEADY_STATE = "auto", "output-error", "steady-state"
 METHODS = (OUTPUT_ERROR, STEADY_STATE)
@@ -60,17 +59,9 @@ def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()
 def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
     why = why_no_inputs(runs, robot)
-    if why or (robot.drive.kind == SPEED and any(run.voltage is None and run.duty is None for run in runs)):
+    if why or robot.drive.kind != SPEED or any(run.voltage is not None or run.duty is not None for run in runs):
         return why
-    reasons = why_not_exact(robot)
-    if robot.motor.electrical == DYNAMIC:
-        reasons.append('winding inductance ([motor] electrical = "dynamic")')
-    if reasons:
-        return (
-            f"{robot.name} has {'; '.join(reasons)}; whole logs can be fitted all the same, more slowly, where "
-            f"{OUTPUT_ERROR} is asked for by name"
-        )
-    return ""
+    return why_no_transient(runs, robot)
 
 
 def why_no_inputs(runs: Sequence[Run], robot: Robot) -> str:
@@ -82,8 +73,11 @@ def why_no_inputs(runs: Sequence[Run], robot: Robot) -> str:
                 return f"{run.source or 'a log'} holds set speeds only; to fit it whole, {LOOP_REMEDY}"
         elif none:
             return f"{run.source or 'a log'} holds no voltage and no duty"
-        if all(getattr(run, name) is None for name in OUTPUTS):
+        known = [name for name in OUTPUTS if getattr(run, name) is not None]
+        if not known:
             return f"{run.source or 'a log'} holds no speed, current or pose"
+        if known == ["wheel_angle"] and (none or not is_exact(robot)):
+            return f"{run.source or 'a log'} holds angles of wheels only, which a fit of {robot.name} does not know"
     return ""
 
 
