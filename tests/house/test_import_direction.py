@@ -22,12 +22,12 @@ ORDER = {
     "simulation": """inputs commands exact_step exact_sensitivity travel exact exact_position
         exact_inductance_step exact_inductance_travel exact_inductance implicit_step speed_loop implicit simulate
         tangent_step tangent_events tangent_look tangent_march tangent_loop tangent tangent_sight""",
-    "logs": """channels dialect spaced header rows text_file table parquet_pages parquet tables run_file steady_table
-        command_file words mapping clock guessed guess_time guess counters log read_log segments average plateaus
-        findings check""",
+    "logs": """channels dialect spaced header points rows text_file table parquet_pages parquet tables run_file
+        steady_table command_file words mapping clock guessed guess_time guess counters log read_log segments average
+        plateaus findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
-    "logs/check": """robust work time_base reference spikes values limits wirings frame floor motors wiring slip
-        mistakes scale lag energy motion oddities excitation""",
+    "logs/check": """robust work time_base reference spikes learned stuck values limits wirings frame floor motors
+        wiring slip mistakes scale lag energy motion oddities excitation""",
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
         shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table
         settling identify joint_problem joint_fit as_fitted validation motor_engine motor_log motor_fit motor_run

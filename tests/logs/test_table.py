@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.logs.table import read_table
+from omnidyn.logs.table import iter_text, read_table
 
 
 @pytest.fixture
@@ -66,6 +66,38 @@ def test_a_late_point_among_commas_is_refused(write):
     rows = "".join(f"{k};1,5\n" for k in range(100))
     with pytest.raises(InputError, match=r"decimal commas and decimal points are mixed; got 1,5 and 0\.25"):
         read_table(write("t;u\n" + rows + "100;0.25\n"))
+
+
+def test_a_point_between_thousands_is_refused(write):
+    match = (
+        r"table\.csv:3, column n: a point in a number is ambiguous; got 1\.050 among whole numbers; expected 1050 or "
+    )
+    with pytest.raises(InputError, match=match + r"1\.05; write thousands without a point, or decimal numbers with"):
+        read_table(write("t;n\n0;950\n10;1.050\n20;1.100\n"))
+
+
+@pytest.mark.parametrize("rows", [1, 2, 500])
+def test_a_point_between_thousands_is_found_in_pieces(write, rows):
+    path = write("t;n\n" + "".join(f"{k};{k}\n" for k in range(200)) + "200;-1.000\n")
+    with pytest.raises(
+        InputError, match=r"table\.csv:202, column n: a point in a number is ambiguous; got -1\.000 among"
+    ):
+        list(iter_text(path, rows))
+
+
+def test_three_digits_after_every_point_are_decimal_and_noted(write):
+    table = read_table(write("t;n\n0;1.500\n10;-12.000\n"))
+    assert table.numbers("n").tolist() == [1.5, -12.0]
+    assert "points were read as decimal: 1.500 is 1.5, not 1500" in table.notes
+
+
+@pytest.mark.parametrize("rows", [1, 500])
+def test_one_certain_point_settles_all(write, rows):
+    """0.5 can be nothing else, and no table has two kinds of points."""
+    path = write("t;n\n0;950\n10;1.050\n20;7\n30;0.5\n")
+    tables = list(iter_text(path, rows))
+    assert np.concatenate([each.numbers("n") for each in tables]).tolist() == [950.0, 1.05, 7.0, 0.5]
+    assert tables[-1].notes == ("columns are separated by a semicolon",)
 
 
 def test_a_latin_1_header_is_read(write):  # 8

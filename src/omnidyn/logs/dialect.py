@@ -24,6 +24,8 @@ INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE | re.ASCII)
 MISSING = re.compile(r"(?:[+-]?nan(?:\(\w*\))?)?", re.IGNORECASE | re.ASCII)  # C prints -nan and nan(ind) as well
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 GROUPED_NUMBER = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+", re.ASCII)  # 1,500: fifteen hundred or one and a half?
+GROUPED_POINT = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)  # 1.500: the same question where commas are decimal
+WHOLE = re.compile(r"[+-]?\d{1,3}", re.ASCII)
 
 # A spreadsheet's error values begin like a comment; to skip such a row would lose it in silence.
 _SPREADSHEET_ERROR = re.compile(r"#(?:N/A|REF!|VALUE!|NAME\?|NUM!|NULL!|DIV/0!)", re.IGNORECASE)
@@ -184,6 +186,22 @@ def ambiguous(number: str, where: str) -> InputError:
         remedy="write the table with decimal points",
         where=where,
     )
+
+
+def ambiguous_point(number: str, where: str) -> InputError:
+    """The error of a column of whole numbers in which points could only separate thousands, or be decimal by luck."""
+    return InputError(
+        "a point in a number is ambiguous",
+        got=f"{number} among whole numbers",
+        expected=f"{number.replace('.', '')} or {number.rstrip('0')}{'0' if number.endswith('000') else ''}",
+        remedy="write thousands without a point, or decimal numbers with a point in every cell",
+        where=where,
+    )
+
+
+def is_decimal_point(cell: str) -> bool:
+    """Whether the point in a cell can only be decimal: 0.5, 1.25 or 0.125, but not 1.500, which may be 1500."""
+    return "." in cell and bool(NUMBER.fullmatch(cell)) and not GROUPED_POINT.fullmatch(cell)
 
 
 def is_decimal_comma_plain(rows: Sequence[str], separator: str) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError
 from omnidyn.logs import dialect
 from omnidyn.logs.header import Layout
+from omnidyn.logs.points import Points
 
 FloatArray = NDArray[np.float64]
 Column = FloatArray | tuple[str, ...]
@@ -40,6 +41,7 @@ class RowParser:
         self.layout, self.source, self.skip = layout, source, skip
         self.skipped: dict[str, list[int]] = {}
         self._rows = 0
+        self._points = Points(layout.separator, layout.names, source)
         self._comma = self._point = ""  # the first number of each kind
         self._words: set[str] = set()
         count = len(layout.names)
@@ -52,7 +54,11 @@ class RowParser:
     def notes(self) -> tuple[str, ...]:
         """What was decided so far, in words."""
         comma = [COMMA_NOTE] if self._comma else []
-        return (*comma, *(skip_note(reason, self.skipped[reason]) for reason in REASONS if reason in self.skipped))
+        return (
+            *comma,
+            *self._points.notes,
+            *(skip_note(reason, self.skipped[reason]) for reason in REASONS if reason in self.skipped),
+        )
 
     def parse(
         self, texts: list[str], lines: Lines, later: Callable[[], Iterable[str]] = tuple
@@ -62,9 +68,11 @@ class RowParser:
         texts: without blank lines and comments; `later` gives the texts of all rows that follow, where a decimal comma
         is not certain yet. Raises InputError, at the first bad row of all.
         """
-        columns = self._plain(texts)
+        columns, given = self._plain(texts), lines
         if columns is None:
             columns, lines = self._careful(texts, lines, later)
+        if not self._comma:
+            self._points.look(texts, given, columns, later)
         self._rows += len(texts)
         return columns, lines
 
