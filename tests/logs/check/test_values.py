@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from omnidyn import load_robot, simulate
 from omnidyn.logs.check import check
@@ -126,3 +127,65 @@ def test_kicks_of_a_current_recorded_now_and_then_are_no_spikes():
     current[250, 1] += 40.0 * np.nanstd(current[:, 1])
     (finding,) = check(log, robot).of("spike")
     assert (finding.where, finding.rows) == ("i2", ((252, 252),))
+
+
+def _wheels(rng, seconds):
+    """Times, drives and speeds of three wheels that follow them."""
+    t = np.arange(0.0, seconds, 0.02)
+    drive = np.repeat(rng.uniform(-1.0, 1.0, (len(t) // 40 + 1, 3)), 40, axis=0)[: len(t)]
+    return t, drive, _following(drive)
+
+
+def _following(drive):
+    """Each wheel is driven by all motors, through the floor."""
+    return np.asarray(lfilter([0.15], [1.0, -0.85], 10.0 * drive @ (np.eye(3) - 0.25), axis=0))
+
+
+def _recorded(t, drive, speed):
+    return Log(t, {"voltage": 12.0 * drive, "wheel_speed": speed}, np.arange(len(t)) + 2)
+
+
+def test_a_wheel_that_its_voltage_leaves_is_stuck_and_its_neighbours_are_not():
+    """Steps so coarse that repeats are nothing special: only what drives the wheels can tell."""
+    rng = np.random.default_rng(5)
+    t, drive, speed = _wheels(rng, 30.0)
+    coarse = np.round(speed / 0.8) * 0.8
+    assert not check(_recorded(t, drive, coarse)).of("stuck")
+    moved = [a for a in range(400, 1000) if abs(speed[a + 15, 1] - speed[a, 1]) > 6.0 and coarse[a, 1] != 0.0]
+    for a in moved[::40]:
+        broken = coarse.copy()
+        broken[a : a + 25, 1] = broken[a, 1]  # half a second
+        (finding,) = check(_recorded(t, drive, broken)).of("stuck")
+        assert finding.where == "w2"
+        assert finding.rows[0][0] <= a + 2 + 1 < a + 25 <= finding.rows[-1][1]
+
+
+def test_a_wheel_held_by_the_others_while_its_voltage_changes_is_not_stuck():
+    """Its motor gives more and the others take it away: the voltage changes, the speed keeps its step."""
+    rng = np.random.default_rng(6)
+    t, drive, _ = _wheels(rng, 30.0)
+    for a in range(200, 1400, 300):
+        drive[a : a + 40] = drive[a - 1]
+        drive[a + 15 : a + 40, 1] = drive[a - 1, 1] + 0.6  # 0.75 * 0.6 = 0.25 * (0.9 + 0.9)
+        drive[a + 15 : a + 40, 0] = drive[a - 1, 0] + 0.9
+        drive[a + 15 : a + 40, 2] = drive[a - 1, 2] + 0.9
+    coarse = np.round(_following(drive) / 0.8) * 0.8
+    assert not check(_recorded(t, drive, coarse)).of("stuck")
+
+
+def test_a_channel_that_never_repeats_is_stuck_after_a_few_rows():
+    rng = np.random.default_rng(7)
+    t, drive, speed = _wheels(rng, 30.0)
+    noisy = speed + 0.02 * rng.normal(size=speed.shape)
+    noisy[700:708, 0] = noisy[700, 0]
+    (finding,) = check(_recorded(t, drive, noisy)).of("stuck")
+    assert (finding.where, finding.rows) == ("w1", ((702, 709),))
+
+
+def test_a_simulated_speed_that_settles_is_not_stuck():
+    """Without noise a speed comes to rest at a value, and repeats it to the last digit."""
+    t = np.arange(0.0, 10.0, 0.02)
+    share = np.where(t < 5.0, 1.0 - np.exp(-t / 0.02), -1.0 + 2.0 * np.exp(-(t - 5.0) / 0.02))
+    speed = np.outer(share, [8.0, -5.0, 3.0])
+    drive = np.where(t < 5.0, 0.5, -0.5)[:, None] * [1.0, -0.7, 0.4]
+    assert not check(_recorded(t, drive, speed)).of("stuck")

@@ -14,6 +14,7 @@ from omnidyn.model.motor import back_emf, no_load_speed
 from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed, wheel_speed
 
 FloatArray = NDArray[np.float64]
+MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # sources that say what a wheel did
 POSE_WINDOW = 0.12  # [s] over which a speed is taken from a pose
 POSE_TURN = 0.35  # [rad] that the robot may turn in it: a chord is then 0.5 % shorter than its arc
 

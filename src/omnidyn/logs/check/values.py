@@ -1,19 +1,16 @@
-"""Single channels: missing values, channels that never change, encoders that stick, steps of quantisation, spikes."""
+"""Single channels: missing values, channels that never change, steps of quantisation, spikes."""
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from omnidyn.logs.channels import place
-from omnidyn.logs.check.reference import expected_wheel_speed
-from omnidyn.logs.check.robust import MAD, quantum, runs, smooth, white_noise
+from omnidyn.logs.check.reference import MEASUREMENTS, expected_wheel_speed
+from omnidyn.logs.check.robust import quantum, smooth, white_noise
 from omnidyn.logs.check.spikes import check_spikes, recorded
-from omnidyn.logs.check.work import MIN_ROWS, Work
+from omnidyn.logs.check.stuck import check_stuck
+from omnidyn.logs.check.work import MIN_ROWS, SENSORS, Work
 from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
 from omnidyn.logs.log import MAX_MISSING
 from omnidyn.logs.mapping import MOTOR_SIDE
@@ -22,12 +19,6 @@ from omnidyn.units import known_unit
 
 FloatArray = NDArray[np.float64]
 
-SENSORS = ("current", "wheel_speed", "twist")
-MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # references that say what a wheel did
-FOLLOWS = 0.5  # [s] after which a wheel follows its command
-KICK = 0.3  # of the most a motor gets: a change that its wheel must answer
-IMPOSSIBLE = 1e-6  # chance, over the whole log, below which repeated values are no chance
-
 
 def check_values(work: Work) -> tuple[list[Finding], Work]:
     """All findings on single channels; what sticks or spikes is masked, what is dead taken out."""
@@ -35,7 +26,7 @@ def check_values(work: Work) -> tuple[list[Finding], Work]:
     if len(work) < MIN_ROWS:
         return found, work
     found += _quantised(work)
-    for family in (_constant, _stuck, check_spikes):
+    for family in (_constant, check_stuck, check_spikes):
         more, work = family(work)
         found += more
     return found, work
@@ -206,123 +197,6 @@ def _moves(values: FloatArray) -> bool:
     """Whether a channel does more than its noise and one step of quantisation."""
     noise = max(white_noise(values), quantum(values))
     return spread_of_motion(values) > 5.0 * noise and float(np.nanstd(values)) > 0.0
-
-
-def _stuck(work: Work) -> tuple[list[Finding], Work]:
-    """Stretches in which a sensor repeats one value to the last digit while it should not."""
-    found = []
-    expected = expected_wheel_speed(work, without="wheel_speed")
-    for channel in SENSORS:
-        for component, values in work.columns(channel):
-            k = place(component)[1]  # type: ignore[index]
-            reference, measured = None, False
-            if channel == "wheel_speed" and expected is not None and k < expected[1].shape[1]:
-                reference, measured = expected[1][:, k], expected[0] in MEASUREMENTS
-            slow = max(10, round(FOLLOWS / work.step))
-            bad = _frozen(values, reference, measured, slow, _drive(work, k) if channel == "wheel_speed" else None)
-            if not bad.any():
-                continue
-            stretches = runs(bad)
-            longest = max(work.t[b - 1] - work.t[a] for a, b in stretches)
-            found.append(Finding(
-                "stuck", WARN, component,
-                f"{component} repeats one value to the last digit {len(stretches)} time{'s' * (len(stretches) > 1)}, "
-                f"for up to {longest:.3g} s, while the robot moves",
-                "those rows of it are not used; look at the encoder and its cable", work.lines(bad), int(bad.sum()),
-                {"longest_s": float(longest), "share": float(bad.mean())},
-            ))  # fmt: skip
-            work = work.masked(channel, k, bad)
-    return found, work
-
-
-def _drive(work: Work, k: int) -> FloatArray | None:
-    """What drives a wheel, as a share of the most it gets; None where nothing was recorded."""
-    for channel in ("voltage", "duty"):
-        values = work.get(channel)
-        if values is not None and k < values.shape[1] and np.nanmax(np.abs(values[:, k])) > 0.0:
-            return values[:, k] / np.nanmax(np.abs(values[:, k]))
-    return None
-
-
-def _frozen(
-    values: FloatArray, reference: FloatArray | None, measured: bool, slow: int, drive: FloatArray | None
-) -> NDArray[np.bool_]:
-    """Rows of repeats that are too long for chance, or during which the reference walks away.
-
-    measured: the reference is what the wheel did; a command it follows after `slow` rows, or, at rest, not at all.
-    """
-    n = len(values)
-    bad = np.zeros(n, dtype=bool)
-    stretches = runs(np.diff(values) == 0.0) + np.array([0, 1])
-    lengths = stretches[:, 1] - stretches[:, 0]
-    long = lengths >= 5
-    if not long.any():
-        return bad
-    chance, usual_length = _chance_of_a_repeat(lengths[values[stretches[:, 0]] != 0.0])
-    away = _Away(values, reference) if reference is not None else None
-    for (a, b), length in zip(stretches[long], lengths[long], strict=True):
-        unlikely = values[a] != 0.0 and length > 3 * usual_length and n * chance ** (length - 1) < IMPOSSIBLE
-        asked = length >= (slow // 2 if measured else slow) and (measured or values[a] != 0.0)
-        if drive is not None and values[a] != 0.0 and 2 * length >= slow:
-            # A wheel that turns cannot keep its speed to the digit when its voltage becomes another.
-            low, high = np.nanquantile(drive[a:b], [0.25, 0.75])
-            unlikely |= high - low > KICK
-        if unlikely or (away is not None and asked and away.during(a, b)):
-            bad[a:b] = True
-    return bad
-
-
-class _Away:
-    """Whether a reference walks away from values that repeat, measured by how far it is from them at other times."""
-
-    def __init__(self, values: FloatArray, reference: FloatArray) -> None:
-        self.size, self.reference, self.step = np.abs(values - reference), reference, quantum(values)
-        self.good = np.isfinite(self.size)
-        self.least = max(MAD * float(np.median(self.size[self.good])), self.step) if self.good.any() else np.inf
-
-    def during(self, a: int, b: int) -> bool:
-        """Over rows a to b."""
-        part = self.good[a:b]
-        if part.sum() < 5:
-            return False
-        # A reference that is elsewhere but stays there says slip or a wrong scale, no sensor that sticks. Quantiles:
-        # where a command changes, a late channel makes a reference jump for a row or two.
-        low, high = np.quantile(smooth(self.reference[a:b][part], 3), [0.1, 0.9])
-        if not high - low > 6.0 * self.least:
-            return False
-        # Where the robot speeds up the two differ more, by a lag or by means: the larger of two measures counts.
-        others = np.concatenate([self.size[:a][self.good[:a]], self.size[b:][self.good[b:]]])
-        return bool(others.size) and bool(high - low > 6.0 * float(np.quantile(others, 0.95)) / 1.6)
-
-
-def _chance_of_a_repeat(lengths: NDArray[np.int64]) -> tuple[float, float]:
-    """(chance that a value is repeated once more, length of the fourth longest stretch), the longest left out.
-
-    Repeats after repeats tell how the noise compares with the step of the sensor; the chance is that of a speed in the
-    middle of a step, where it is largest.
-    """
-    rest = np.sort(lengths)[:-3] - 1  # number of repeats in each stretch
-    repeats, again = float(rest.sum()), float((rest - 1).sum())
-    seen = min(1.0, (again + 3.0) / (repeats + 6.0))
-    after, middle = _repeats_by_noise()
-    return float(np.interp(seen, after[::-1], middle[::-1])), float(rest.max(initial=0) + 1)
-
-
-@lru_cache(maxsize=1)
-def _repeats_by_noise() -> tuple[FloatArray, FloatArray]:
-    """(chance of a repeat after a repeat, chance of one in the middle of a step) for noises of 0.05 to 20 steps.
-
-    A speed anywhere in a step, normal noise, rounding: with P_k the chance of level k, E[sum P_k^3]/E[sum P_k^2], and
-    P_0 in the middle. Noise is taken 20 % smaller than it is: changes of the speed look like noise too.
-    """
-    noises, places = np.geomspace(0.05, 20.0, 60), np.linspace(-0.5, 0.5, 21)
-    after, middle = [], []
-    for noise in noises:
-        edges = np.arange(-math.ceil(6 * noise) - 1, math.ceil(6 * noise) + 2) + 0.5
-        chances = np.diff(ndtr((edges[:, None] - places) / noise), axis=0)
-        after.append(float((chances**3).sum() / (chances**2).sum()))
-        middle.append(float(2.0 * ndtr(0.5 / (0.8 * noise)) - 1.0))
-    return np.array(after), np.array(middle)
 
 
 def _told(work: Work, source: str) -> NDArray[np.int64]:

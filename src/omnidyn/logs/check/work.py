@@ -28,6 +28,7 @@ from omnidyn.run import CHANNELS, WHEEL
 FloatArray = NDArray[np.float64]
 
 INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
+SENSORS = ("current", "wheel_speed", "twist")
 MIN_ROWS = 40  # below that nothing is said from statistics
 
 
