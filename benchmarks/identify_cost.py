@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+import omnidyn
 from benchmarks.identify_log import cpu, excitation, fit_output_error, noisy
 from benchmarks.table import Table
 from omnidyn.model.robot import Robot
@@ -99,11 +100,12 @@ def command(table: Table, robot: Robot, clean: Run) -> None:
 def _command(place: Path, cache: str) -> float:
     """Processor time of the command and its start-up [s]."""
     before = sum(os.times()[2:4])
+    source = str(Path(omnidyn.__file__).resolve().parents[1])  # PYTHONPATH may be relative, and the child is elsewhere
     subprocess.run(
         [
             sys.executable, "-m", "omnidyn", "identify", "log.csv", "--robot", "axebot", "-o", "fit.toml",
             "--report", "fit.html", "--force",
         ],
-        cwd=place, env=os.environ | {"NUMBA_CACHE_DIR": str(place / cache)}, capture_output=True, check=True,
+        cwd=place, env=os.environ | {"NUMBA_CACHE_DIR": str(place / cache), "PYTHONPATH": source}, capture_output=True, check=True,
     )  # fmt: skip
     return sum(os.times()[2:4]) - before
