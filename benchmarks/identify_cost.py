@@ -106,6 +106,7 @@ def _command(place: Path, cache: str) -> float:
             sys.executable, "-m", "omnidyn", "identify", "log.csv", "--robot", "axebot", "-o", "fit.toml",
             "--report", "fit.html", "--force",
         ],
-        cwd=place, env=os.environ | {"NUMBA_CACHE_DIR": str(place / cache), "PYTHONPATH": source}, capture_output=True, check=True,
+        cwd=place, env=os.environ | {"NUMBA_CACHE_DIR": str(place / cache), "PYTHONPATH": source},
+        capture_output=True, check=True,
     )  # fmt: skip
     return sum(os.times()[2:4]) - before
