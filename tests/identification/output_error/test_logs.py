@@ -227,6 +227,9 @@ def test_logs_that_cannot_be_used(axebot, four_wheel, clean):
         fit_output_error(Run(t=log.t, twist=log.twist, twist_command=log.twist), axebot)
     with pytest.raises(InputError, match="the log has another number of wheels; got 3; expected 4"):
         fit_output_error(log, four_wheel)
+    fourth = log.replace(voltage=np.column_stack([log.voltage, np.full(len(log), np.nan)]), current=None)
+    with pytest.raises(InputError, match=r"wheels without any input; got none for wheel 4; expected one for each of"):
+        fit_output_error(fourth.replace(wheel_speed=None), four_wheel)
     turning = axebot.replace(body=axebot.body.replace(rotating_frame=True))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got tilt\.x"):
         fit_output_error(log, turning, nuisances=["tilt.x"])

@@ -69,6 +69,7 @@ def record(
         voltage = clipped
     found = outputs_of(run, robot, outputs, tick_rad, set_point is not None)
     inputs = voltage if set_point is None else set_point
+    _refuse_wheels_without_input(run, robot, inputs)
     known = np.asarray(np.isfinite(inputs).all(axis=1), dtype=bool)
     pieces = [piece for s in segments(run.t) for piece in _whole(known, s.start, s.stop)]
     if not pieces:
@@ -82,6 +83,17 @@ def record(
         run.t, np.ascontiguousarray(voltage), found.values, found.columns, found.ticks, tuple(pieces), run.source,
         supplied, (*notes, *found.notes), set_point,
     )  # fmt: skip
+
+
+def _refuse_wheels_without_input(run: Run, robot: Robot, inputs: FloatArray) -> None:
+    """A log of fewer wheels than the robot has leaves the others without a number."""
+    empty = np.flatnonzero(~np.isfinite(inputs).any(axis=0))
+    if 0 < len(empty) < inputs.shape[1]:
+        raise InputError(
+            "wheels without any input", got=", ".join(f"none for wheel {w + 1}" for w in empty), where=run.source,
+            expected=f"one for each of the {robot.wheels.count} wheels of {robot.name}",
+            remedy="take the robot of this log, or map its column to the wheel",
+        )  # fmt: skip
 
 
 def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
