@@ -208,6 +208,55 @@ def test_wheels_may_be_counted_from_zero(tmp_path):
     assert any("numbered from 0" in note for note in columns.notes)
 
 
+def test_names_of_a_run_file_may_be_counted_from_zero_too(tmp_path):
+    names = ["u0_V", "u1_V", "u2_V", "w0_cmd_rad_s", "w1_cmd_rad_s", "w2_cmd_rad_s", "i1_A", "i2_A"]
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), **dict.fromkeys(names, 1)}))
+    assert {key: column.name for key, column in columns.columns.items() if key != "t"} == {
+        "u1": "u0_V", "u2": "u1_V", "u3": "u2_V", "i2": "i1_A", "i3": "i2_A",
+        "w1_cmd": "w0_cmd_rad_s", "w2_cmd": "w1_cmd_rad_s", "w3_cmd": "w2_cmd_rad_s",
+    }  # fmt: skip
+    assert columns.doubts == ()
+
+
+@pytest.mark.parametrize(("speed", "more"), [("w{}_rad_s", ()), ("wheel{}_rpm", ()), ("w{}_rad_s", ("enc0_deg",))])
+def test_what_counts_farther_than_wheels_from_zero_counts_from_one(tmp_path, speed, more):
+    names = ["u0_V", "u1_V", "u2_V", *more, *(speed.format(k) for k in (1, 2, 3))]
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), **dict.fromkeys(names, 1)}))
+    assert [columns.columns[f"u{k}"].name for k in (1, 2, 3)] == ["u0_V", "u1_V", "u2_V"]
+    assert [columns.columns[f"w{k}"].name for k in (1, 2, 3)] == [speed.format(k) for k in (1, 2, 3)]
+    assert "wheels are numbered from 0 in the file: 0 is wheel 1 (w from 1)" in columns.notes
+
+
+def test_a_units_row_that_contradicts_a_name_is_still_refused(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "w1_rad_s": 1}, ["s", "rad"]))
+    assert list(columns.columns) == ["t"]
+    assert columns.doubts == (
+        "w1_rad_s looks like w1, but rad is no unit of a turn rate: not taken; say --assume w=UNIT",
+    )
+
+
+def test_units_in_capitals_are_units(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"T_S": clock(0.01), "W1_RAD_S": 1, "I1_A": 2, "VX_M_S": 1}))
+    assert {key: (column.name, column.unit) for key, column in columns.columns.items() if key != "t"} == {
+        "w1": ("W1_RAD_S", "rad/s"), "i1": ("I1_A", "A"), "vx": ("VX_M_S", "m/s")
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("yaw", "taken"),
+    [(np.arange(ROWS) * 30.0 % 360.0, ""), ((np.arange(ROWS) * 30.0 + 180.0) % 360.0 - 180.0, ""),
+     (np.arange(ROWS) * 0.5 % 6.28, "rad"), (np.arange(ROWS) * 30.0, "rad")],
+)  # fmt: skip
+def test_a_heading_that_jumps_by_360_is_not_taken_as_radians(tmp_path, yaw, taken):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "x_m": 1, "yaw": yaw}))
+    assert (columns.columns["heading"].unit if "heading" in columns.columns else "") == taken
+    if not taken:
+        assert columns.doubts == (
+            "yaw looks like heading, but no unit is given, and it jumps by 360 as degrees do: not taken; say --column "
+            '"heading=yaw:deg"',
+        )
+
+
 def test_a_log_of_one_motor_needs_no_numbers(tmp_path):
     table = table_of(
         tmp_path, {"time": clock(0.01), "voltage": 1, "position": 2, "velocity": 3}, ["s", "V", "turns", "turns/s"]
@@ -326,6 +375,16 @@ def test_cells_with_their_unit_are_doubted_in_words(tmp_path):
     columns = guess_columns(read_table(path))
     assert columns.doubts == ("u1 looks like u1, but cells such as 0.5V are no numbers: not taken",)
     assert columns.unused == ("u1", "mode1")
+
+
+@pytest.mark.parametrize("cell", ['"1,234.5"', "12.5%", "3.5 rad/s"])
+def test_they_are_doubted_too_where_no_other_column_has_a_number(tmp_path, cell):
+    path = tmp_path / "log.csv"
+    path.write_text("t_s,w1_rad_s,w2_rad_s\n" + "".join(f"{0.01 * k:.2f},{cell},{cell}\n" for k in range(ROWS)))
+    words = cell.strip('"')
+    assert guess_columns(read_table(path)).doubts == (
+        f"w1_rad_s, w2_rad_s look like w1, w2, but cells such as {words} are no numbers: not taken",
+    )
 
 
 @pytest.mark.parametrize("cells", ["11/20/2026 10:00:{:02d} AM", "{:02d} sec", '"1,0{:02d}.0"'])

@@ -4,7 +4,7 @@ the words that would settle it. What was guessed is always shown.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from omnidyn.units import TURN_RATE as TURN_RATE_UNIT
 from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
 
 FloatArray = NDArray[np.float64]
+Numbers = Mapping[tuple[str, int], int]  # (letter of a component, number in the file) -> number of the wheel from 1
 
 SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
 SI = {"rad_s": "rad/s", "m_s": "m/s"}
@@ -48,10 +49,10 @@ def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str,
     assumed = {name: parse_unit(text).text for name, text in (assume or {}).items()}
     found = Guess()
     names = [name for name in table.names if is_numeric(table.columns[name])]
-    numbers = _wheel_numbers(names, found)
+    numbers = _wheel_numbers(table, names, found)
     for name in names:
         _take(table, name, numbers, assumed, robot, found)
-    _doubt_words(table, numbers, found)
+    _doubt_words(table, _wheel_numbers(table, table.names, Guess()), found)
     take_time(table, assumed, found)
     if not numbers:
         _take_bench(table, names, assumed, found)
@@ -67,14 +68,26 @@ def _order(component: str) -> tuple[int, str, int]:
     return (0, "", 0) if found is None else (1, found[0], found[1])
 
 
-def _wheel_numbers(names: list[str], found: Guess) -> dict[int, int]:
-    """Number in a name -> number of the wheel from 1; a log that counts from 0 is shifted."""
-    numbers = {read_name(name).number for name in names if _numbered_kind(read_name(name), None) is not None}
-    plain = sorted(number for number in numbers if number is not None)
-    shift = 1 if plain[:1] == [0] else 0
-    if shift:
-        found.notes.append("wheels are numbered from 0 in the file: 0 is wheel 1")
-    return {number: number + shift for number in plain if number + shift <= MAX_WHEELS}
+def _wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> Numbers:
+    """(letter, number in a name) -> number of the wheel from 1; a log that counts from 0 is shifted.
+
+    A letter that does not count from 0 itself is shifted too (the current of wheel 0 may not be logged), unless it
+    counts farther than wheels that are counted from 0 can: u0 u1 u2 beside w1 w2 w3.
+    """
+    seen: dict[str, set[int]] = {}
+    for name in names:
+        parts = read_name(name)
+        letter = _numbered_kind(parts, known_unit(table.units.get(name, "")))
+        if letter is not None and parts.number is not None:
+            seen.setdefault(letter, set()).add(parts.number)
+    count = max((max(mine) + 1 for mine in seen.values() if 0 in mine), default=0)
+    shifted = [letter for letter, mine in seen.items() if 0 in mine or max(mine) < count]
+    if shifted:
+        others = ", ".join(letter for letter in seen if letter not in shifted)
+        but = f" ({others} from 1)" if others else ""
+        found.notes.append(f"wheels are numbered from 0 in the file: 0 is wheel 1{but}")
+    numbers = {(letter, number): number + (letter in shifted) for letter, mine in seen.items() for number in mine}
+    return {key: number for key, number in numbers.items() if 0 < number <= MAX_WHEELS}
 
 
 def _numbered_kind(name: Words, unit: Unit | None) -> str | None:
@@ -90,13 +103,13 @@ def _numbered_kind(name: Words, unit: Unit | None) -> str | None:
 
 
 def _take(
-    table: Table, name: str, numbers: Mapping[int, int], assumed: Mapping[str, str], robot: Robot | None, found: Guess
+    table: Table, name: str, numbers: Numbers, assumed: Mapping[str, str], robot: Robot | None, found: Guess
 ) -> None:
     """One column: which component it is, in which unit; or a doubt."""
     given = table.units.get(name, "")
     unit = known_unit(assumed[name]) if name in assumed else known_unit(given) if given else None
     parts = read_name(name)
-    component = _exact(name) or _component(parts, unit, numbers)
+    component = _component_of(name, unit, numbers)
     if component is None:
         return
     if component in found.columns:
@@ -115,11 +128,11 @@ def _take(
         _enter(name, component, unit, parts, found)
 
 
-def _doubt_words(table: Table, numbers: Mapping[int, int], found: Guess) -> None:
+def _doubt_words(table: Table, numbers: Numbers, found: Guess) -> None:
     """Columns that are called like a component, and whose cells begin like numbers but are none: 5.0V, 1.250.000."""
     for name in table.names:
         cells = table.columns[name]
-        component = None if is_numeric(cells) else _exact(name) or _component(read_name(name), None, numbers)
+        component = None if is_numeric(cells) else _component_of(name, None, numbers)
         if component is not None and (cell := first_word(cells)).lstrip("+-.")[:1].isdigit():
             found.doubts.append(Doubt(name, component, f"but cells such as {cell} are no numbers", ()))
 
@@ -133,16 +146,26 @@ def _exact(name: str) -> str | None:
     return None
 
 
-def _component(name: Words, unit: Unit | None, numbers: Mapping[int, int]) -> str | None:
+def _component_of(name: str, unit: Unit | None, numbers: Numbers) -> str | None:
+    """The component that a column is called, as in a run file or in other words."""
+    exact, parts = _exact(name), read_name(name)
+    number = parts.number
+    if exact is not None and number is not None and numbers.get((exact[0], number), number) != number:
+        exact = None  # a run file counts from 1, this one does not
+    return exact or _component(parts, unit, numbers)
+
+
+def _component(name: Words, unit: Unit | None, numbers: Numbers) -> str | None:
     """The component that the words of a name say, None where they say none or too many."""
     if words.OTHER in name.roles and not (name.number is not None and (unit or name.unit)):
         return None
     command = "_cmd" if words.COMMAND in name.roles else ""
     letter = _numbered_kind(name, unit)
     if name.number is not None:
-        if letter is None or name.number not in numbers or (command and letter in "ia"):
+        wheel = numbers.get((letter or "", name.number))
+        if wheel is None or (command and letter in ("i", "a")):
             return None
-        return f"{letter}{numbers[name.number]}{command if letter == 'w' else ''}"
+        return f"{letter}{wheel}{command if letter == 'w' else ''}"
     if words.SUPPLY in name.roles:
         return None if words.CURRENT in name.roles else "supply"
     return _body_component(name, unit or name.unit, command)
@@ -194,10 +217,19 @@ def _enter(name: str, component: str, unit: Unit, parts: Words, found: Guess) ->
 def _unit_of(table: Table, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:
     """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
     suffix = si_suffix(component)
+    if component == "heading" and _turns_in_degrees(floats(table.columns[name])):
+        found.doubts.append(Doubt(name, component, "no unit is given, and it jumps by 360 as degrees do", ("deg",)))
+        return None
     if suffix in ("V", "duty") and component != "supply":
         return _command_unit(floats(table.columns[name]), name, component, robot, found)
     found.si[name] = SI.get(suffix, suffix)
     return parse_unit(found.si[name])
+
+
+def _turns_in_degrees(values: FloatArray) -> bool:
+    """Whether a heading without a unit stays within a turn of 360 and jumps by about as much."""
+    known = values[np.isfinite(values)]
+    return len(known) > 1 and float(np.ptp(known)) <= 361.0 and float(np.abs(np.diff(known)).max()) > 300.0
 
 
 def _command_unit(values, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:

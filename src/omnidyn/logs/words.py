@@ -83,7 +83,8 @@ def _split_unit(name: str) -> tuple[str, Unit | None]:
     parts = re.split(r"_", name)
     for first in range(1, len(parts)):
         tail = "_".join(parts[first:])
-        for text in (tail, tail.replace("_", "/")):
+        low = tail.lower() if tail.isupper() and len(tail) > 2 else tail  # W1_RAD_S, but mA and MA are two
+        for text in (tail, tail.replace("_", "/"), low, low.replace("_", "/")):
             metre = text == "m" and not any(map(str.isdigit, name))  # x_m, but not 1_m
             unit = known_unit(text) if len(text) > 1 or text in "sVAh%" or metre else None
             if unit is not None:
