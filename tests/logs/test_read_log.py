@@ -110,6 +110,44 @@ def test_a_log_on_change_holds_commands_and_interpolates_measurements(tmp_path):
     assert any("u1 is recorded on change (67% of its cells are blank): held" in words for words in run.warnings)
 
 
+def test_rows_of_one_time_that_fill_each_other_s_blanks_are_one_row(tmp_path):
+    """Every topic writes a row of its own; the battery stands in both, with the same number."""
+    text = "t_s,u1_V,w1_rad_s,supply_V\n" + "".join(f"0.{k},{k},,9\n0.{k},,{10 * k},9\n" for k in range(6))
+    run = read_log(write(tmp_path, text))
+    np.testing.assert_allclose(run.t, 0.1 * np.arange(6))
+    np.testing.assert_array_equal(run.voltage[:, 0], np.arange(6))
+    np.testing.assert_array_equal(run.wheel_speed[:, 0], 10 * np.arange(6))
+    assert any("6 of 12 rows fill the blanks of a row of the same time: joined to it" in w for w in run.warnings)
+
+
+def test_rows_of_one_time_that_contradict_each_other_are_not_joined(tmp_path):
+    text = "t_s,u1_V,w1_rad_s\n0,1,10\n0,2,\n0.1,1,10\n0.1,1,10\n0.2,1,10\n"
+    run = read_log(write(tmp_path, text))
+    np.testing.assert_array_equal(run.voltage[:, 0], [1, 1, 1])
+    assert any("2 of 5 rows repeat the time of the row before" in words for words in run.warnings)
+
+
+@pytest.mark.parametrize(
+    ("names", "size"),
+    [(("header.stamp.sec", "header.stamp.nanosec"), 1e9), (("secs", "nsecs"), 1e9), (("tv_sec", "tv_usec"), 1e6),
+     (("Stamp_Seconds", "Stamp_Nanoseconds"), 1e9)],
+)  # fmt: skip
+def test_seconds_and_the_rest_of_a_second_are_one_time(tmp_path, names, size):
+    times = 1_764_000_000 + np.array([0, 0.25, 0.5, 0.75, 1.0, 1.25])
+    cells = [f"{int(t)},{round((t - int(t)) * size)},{k}" for k, t in enumerate(times)]
+    run = read_log(write(tmp_path, "\n".join([f"{names[0]},{names[1]},w1_rad_s", *cells])))
+    np.testing.assert_array_equal(run.t, times - times[0])
+    assert any(f"t is {names[0]} + {1 / size:g} {names[1]}" in words for words in run.warnings)
+    one = read_log(tmp_path / "log.csv", columns={"t": f"{names[0]}:s"})
+    np.testing.assert_array_equal(one.t, [0.0, 1.0])  # one count a second, where the map says so
+
+
+def test_what_is_no_rest_of_a_second_is_not_added(tmp_path):
+    path = write(tmp_path, "sec,nsec,w1_rad_s\n1,1000000000,1\n2,2000000000,2\n3,3000000000,3\n")
+    with pytest.raises(InputError, match="cannot tell the time of the rows"):
+        read_log(path)
+
+
 def test_a_latency_is_taken_out(tmp_path):
     """A ramp recorded 0.1 s late: at its true time it stands one row earlier."""
     rows = "\n".join(f"{0.1 * k:.1f},{k}" for k in range(6))

@@ -278,6 +278,13 @@ def test_the_encoding_is_told_and_said(write, encoding, note):
     assert table.notes == ((note,) if note else ())
 
 
+@pytest.mark.parametrize("zeros", [1, 4096, 3_000_000])
+def test_zero_bytes_at_the_end_are_left_out_and_said(write, zeros):
+    table = read_table(write(b"t_s,u1_V\n0,1\n0.1,2\n" + bytes(zeros)))
+    np.testing.assert_array_equal(table.columns["u1_V"], [1.0, 2.0])
+    assert "zero bytes at the end, as a recorder leaves that lost its power, were left out" in table.notes
+
+
 def test_broken_utf_16_is_refused(write):
     with pytest.raises(InputError, match=r"not a text file; got no valid UTF-16 .*; save it as UTF-8"):
         read_table(write(b"\xff\xfet\x00,\x00u\x00\n\x00\x00\xd8\n\x00"))
@@ -372,7 +379,9 @@ def test_nothing_left_is_refused(write):
         ),
         (b"PAR1\x00\x01", r"this is not a text file; got a Parquet file"),  # 37
         (b"PK\x03\x04\x00", r"this is not a text file; got a zip archive"),  # 37
-        (b"t,u\n1,\x00\n", r"this is not a text file; got zero bytes in it"),
+        (b"t,u\n1,\x00\n", r"this is not a text file; got zero bytes in it; .*lost its power leaves them: tr -d"),
+        (b"t,u\n1,2\n" + bytes(3_000_000) + b"2,3\n", r"this is not a text file; got zero bytes in it"),
+        (bytes(5000), r"no table in the file"),
         ("a" + ",a" * 2000 + "\n1\n", r"too many columns; got 2001; expected at most 1000"),
     ],
 )

@@ -82,6 +82,28 @@ class Log:
         channels = {name: log.aligned(name, values, warnings) for name, values in log.channels.items()}
         return Run(t=log.t, **channels, source=self.source, warnings=tuple(warnings))
 
+    def joined(self) -> Log:
+        """Rows of one time that fill each other's blanks are one row, as where every topic writes a row of its own."""
+        if not len(self) or not (np.diff(self.t) == 0.0).any():
+            return self
+        new = np.concatenate([[True], np.diff(self.t) != 0.0])
+        first, group = np.flatnonzero(new), np.cumsum(new) - 1
+        table = np.column_stack([values.reshape(len(self), -1) for values in self.channels.values()] or [self.t])
+        low, high = np.fmin.reduceat(table, first), np.fmax.reduceat(table, first)
+        numbers = np.add.reduceat(np.isfinite(table).astype(np.int64), first)
+        size = np.diff(np.append(first, len(self)))[:, None]
+        fits = ~(low < high).any(axis=1) & ((numbers > 0) & (numbers < size)).any(axis=1)
+        if not fits.any():
+            return self
+        joins = new & fits[group]
+        keep = ~fits[group] | joins
+        channels = {}
+        for name, values in self.channels.items():
+            whole = np.fmax.reduceat(values, first)[group]
+            channels[name] = np.where(joins if values.ndim == 1 else joins[:, None], whole, values)[keep]
+        note = f"{int((~keep).sum())} of {len(self)} rows fill the blanks of a row of the same time: joined to it"
+        return replace(self, t=self.t[keep], channels=channels, lines=self.lines[keep], notes=(*self.notes, note))
+
     def aligned(self, channel: str, values: FloatArray, warnings: list[str]) -> FloatArray:
         """A channel on the times of the log, once these can be trusted; what was done goes to `warnings`.
 

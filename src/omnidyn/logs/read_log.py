@@ -16,6 +16,7 @@ from omnidyn.logs.counters import unrolled
 from omnidyn.logs.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.log import Log
 from omnidyn.logs.mapping import MOTOR_SIDE, Column, ColumnMap, component_channel, load_map, parse_column
+from omnidyn.logs.stamps import with_joined_stamp
 from omnidyn.logs.table import ROWS, Table
 from omnidyn.logs.tables import iter_tables, read_any
 from omnidyn.logs.text_file import Progress
@@ -81,7 +82,7 @@ def read_log(
 def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None) -> Log:
     """Read a log as it was recorded: in SI, by channel, time not yet trusted. Raises InputError."""
     options = options or LogOptions()
-    table = read_any(path, header=options.header, skip_bad_rows=options.skip_bad_rows)
+    table = with_joined_stamp(read_any(path, header=options.header, skip_bad_rows=options.skip_bad_rows))
     return log_from_table(table, map_columns(table, robot, options), robot, options)
 
 
@@ -155,7 +156,7 @@ def log_from_table(
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
     t = (clock or Clock()).times(table, columns.columns[TIME], notes)
-    log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes))
+    log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes)).joined()
     return _signed(log, robot) if options.current_unsigned else log
 
 
@@ -217,6 +218,6 @@ def iter_logs(
     """
     options, columns, clock = options or LogOptions(), None, Clock()
     how = {"header": options.header, "skip_bad_rows": options.skip_bad_rows}
-    for table in iter_tables(path, rows, progress=progress, **how):
+    for table in map(with_joined_stamp, iter_tables(path, rows, progress=progress, **how)):
         columns = columns or map_columns(table, robot, options)
         yield log_from_table(table, columns, robot, options, clock)

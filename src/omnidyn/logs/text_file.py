@@ -102,8 +102,11 @@ class TextFile:
             )
 
     def _utf8(self, blocks: Iterator[bytes]) -> Iterator[bytes]:
-        """The same text without a byte order mark, UTF-16 turned into UTF-8. Raises InputError for zero bytes."""
-        decoder = None
+        """The same text without a byte order mark, UTF-16 turned into UTF-8.
+
+        Zero bytes at the end are left out; raises InputError for others.
+        """
+        decoder, zeros = None, False
         for k, block in enumerate(blocks):
             if k == 0:
                 block, encoding = _begin(block)
@@ -112,9 +115,18 @@ class TextFile:
                     decoder = codecs.getincrementaldecoder(encoding)() if encoding.startswith("UTF-16") else None
             if decoder is not None:
                 block = self._from_utf16(decoder, block)
-            if b"\0" in block:
-                raise InputError("this is not a text file", got="zero bytes in it", expected="text", where=self.source)
-            yield block
+            text = block.rstrip(b"\0")
+            if b"\0" in text or (zeros and text):
+                raise InputError(
+                    "this is not a text file", got="zero bytes in it", expected="text",
+                    remedy="a recorder that lost its power leaves them: tr -d '\\000' < LOG > NEW takes them out",
+                    where=self.source,
+                )  # fmt: skip
+            if len(text) < len(block) and not zeros:
+                zeros = True
+                self.notes.append("zero bytes at the end, as a recorder leaves that lost its power, were left out")
+            if text:
+                yield text
         if decoder is not None:
             self._from_utf16(decoder, b"", final=True)
 
