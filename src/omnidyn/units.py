@@ -58,6 +58,7 @@ _SPELLINGS = {
     "msec": "ms", "MS": "ms", "usec": "us", "meter": "m", "meters": "m", "metre": "m", "metres": "m", "Volt": "V",
     "Volts": "V", "v": "V", "Ampere": "A", "Amps": "A", "Amp": "A", "a": "A", "PWM": "pwm", "rad_s": "rad/s",
     "m_s": "m/s", "deg_s": "deg/s", "rot_s": "rot/s", "mm_s": "mm/s", "rev_s": "rev/s",
+    "Grad": "deg", "Grad/s": "deg/s", "millis": "ms", "micros": "us",
 }  # fmt: skip
 
 

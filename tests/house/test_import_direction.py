@@ -23,8 +23,8 @@ ORDER = {
         exact_inductance_step exact_inductance_travel exact_inductance implicit_step speed_loop implicit simulate
         tangent_step tangent_events tangent_look tangent_march tangent_loop tangent tangent_sight""",
     "logs": """channels dialect spaced header points rows text_file table parquet_pages parquet tables run_file
-        steady_table command_file words mapping clock guessed guess_time guess counters log read_log segments average
-        plateaus findings check""",
+        steady_table command_file words mapping clock stamps guessed guess_time guess_unit guess counters log read_log
+        segments average plateaus findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
     "logs/check": """robust work time_base reference spikes learned stuck values limits wirings frame floor motors
         wiring slip mistakes scale lag energy motion oddities excitation""",

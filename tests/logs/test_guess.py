@@ -9,6 +9,7 @@ from omnidyn.logs.guess import guess_columns
 from omnidyn.logs.mapping import Column, ColumnMap, load_map, map_to_toml, parse_column, save_map
 from omnidyn.logs.table import read_table
 from omnidyn.logs.words import read_name
+from omnidyn.units import parse_unit
 
 ROWS = 20
 
@@ -41,6 +42,8 @@ def found(columns):
         ("Motor2Current_mA", "i2"), ("wheelSpeed3_rad_s", "w3"), ("vbx_sp_m_s", "vx_cmd"), ("wb_sp_rad_s", "omega_cmd"),
         ("cmd_vel_x_m_s", "vx_cmd"), ("yaw_rate_deg_s", "omega"), ("gyro_z_deg_s", "omega"),
         ("battery_voltage_V", "supply"),
+        ("rpm1", "w1"), ("RPM_1", "w1"), ("motor2Rpm", "w2"), ("wheelrpm3", "w3"), ("rpm_1_filtered", "w1"),
+        ("current_mA_1", "i1"), ("gyro_dps_z", "omega"), ("V1_V", "u1"), ("field.motor1.voltage_V", "u1"),
         ("phi_deg", "heading"), ("v_n_m_s", "vy"), ("x_mm", "x"), ("pwm1_duty", "d1"),
     ],
 )  # fmt: skip
@@ -143,6 +146,73 @@ def test_the_columns_of_the_robotino(tmp_path):
     doubts = " ".join(columns.doubts)
     assert "m1pos looks like a1, but counts per turn are not known" in doubts
     assert 'the unit pix is unknown: not taken; say --column "x=xpos:UNIT"' in doubts
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("rpm1", "rpm"), ("RPM_1", "rpm"), ("motor2Rpm", "rpm"), ("wheelrpm3", "rpm"), ("w1_rpm_filt", "rpm"),
+        ("current_mA_2", "mA"), ("gyro_dps_z", "dps"), ("speed_rad_s_3", "rad/s"), ("yaw_deg_est", "deg"),
+    ],
+)  # fmt: skip
+def test_a_unit_may_stand_anywhere_in_a_name(tmp_path, name, unit):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 0.5})).columns
+    assert [column.unit for key, column in columns.items() if key != "t"] == [unit]
+
+
+@pytest.mark.parametrize(("name", "step", "unit"), [("millis", 20.0, "ms"), ("micros", 5e3, "us")])
+def test_the_clocks_of_a_microcontroller_say_their_unit(tmp_path, name, step, unit):
+    columns = guess_columns(table_of(tmp_path, {name: 4123 + clock(step), "rpm1": 1.0})).columns
+    assert columns["t"].name == name
+    assert parse_unit(columns["t"].unit).size == parse_unit(unit).size
+
+
+def test_whole_numbers_of_an_encoder_are_counts_and_no_radians(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "enc1": clock(7.0), "enc2": clock(-7.0)}))
+    assert list(columns.columns) == ["t"]
+    assert columns.doubts == (
+        "enc1, enc2 look like a1, a2, but counts per turn are not known: not taken; say --assume "
+        "a=ticks/COUNTS_PER_TURN",
+    )
+    assert "a1" in guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "angle1": clock(0.25)})).columns
+
+
+def test_a_turn_rate_beyond_any_robot_is_not_taken_as_rad_s(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "gyro_z": clock(20.0)}))
+    assert "omega" not in columns.columns
+    assert 'say --column "omega=gyro_z:deg/s"' in columns.doubts[0]
+    assert "omega" in guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "gyro_z": clock(0.2)})).columns
+
+
+def test_an_unknown_unit_in_brackets_is_a_doubt(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "omega [pix/s]": 1.0, "speed1 (pix/s)": 2.0}))
+    assert list(columns.columns) == ["t"]
+    assert all("the unit pix/s is unknown: not taken" in doubt for doubt in columns.doubts)
+    assert len(columns.doubts) == 2
+
+
+def test_german_degrees_are_degrees(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "vx": 1, "omega [Grad/s]": 57.0}))
+    assert parse_unit(columns.columns["omega"].unit).size == parse_unit("deg/s").size
+
+
+def test_v_with_a_number_may_be_volts_or_a_speed(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "V_1": 1, "V_2": 2, "omega_1": 3}))
+    assert columns.doubts == (
+        "V_1, V_2 look like u1, u2, which may be voltages or speeds (say --column u1=V_1:V and so on): not taken",
+    )
+
+
+def test_a_name_that_spells_voltage_is_in_volts(tmp_path):
+    names = {"field.motor1.voltage": 5.0, "Spannung 2": -4.0}
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), **names})).columns
+    assert columns["u1"].unit == columns["u2"].unit == "V"
+
+
+def test_volts_or_percent_is_asked_once_for_all_wheels(tmp_path):
+    doubts = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "pwm1": 45.0, "pwm2": 47.0})).doubts
+    assert len(doubts) == 1
+    assert "pwm1, pwm2 look like d1, d2, but no unit is given, and up to 47 may be volts or percent" in doubts[0]
 
 
 def test_counts_are_an_angle_once_their_counts_per_turn_are_said(tmp_path):

@@ -4,6 +4,7 @@ the words that would settle it. What was guessed is always shown.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -13,7 +14,8 @@ from omnidyn.errors import InputError
 from omnidyn.logs import words
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.guess_time import take_time
-from omnidyn.logs.guessed import Doubt, Guess, first_word, floats, is_numeric, letter_of
+from omnidyn.logs.guess_unit import unit_of
+from omnidyn.logs.guessed import Doubt, Guess, first_word, is_numeric, letter_of
 from omnidyn.logs.mapping import MOTOR_SIDE, SIDED, WHEEL_SIDE, Column, ColumnMap, component_channel, quantity_of
 from omnidyn.logs.table import Table
 from omnidyn.logs.words import Words, read_name
@@ -29,7 +31,7 @@ FloatArray = NDArray[np.float64]
 Numbers = Mapping[tuple[str, int], int]  # (letter of a component, number in the file) -> number of the wheel from 1
 
 SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
-SI = {"rad_s": "rad/s", "m_s": "m/s"}
+_BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
 
 # Kinds of columns that have a number: role -> letter of the component. The first that fits counts.
 _NUMBERED = (
@@ -53,6 +55,7 @@ def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str,
     for name in names:
         _take(table, name, numbers, assumed, robot, found)
     _doubt_words(table, _wheel_numbers(table, table.names, Guess()), found)
+    _doubt_letters(names, found)
     take_time(table, assumed, found)
     if not numbers:
         _take_bench(table, names, assumed, found)
@@ -97,7 +100,8 @@ def _numbered_kind(name: Words, unit: Unit | None) -> str | None:
     unit = unit or name.unit
     if unit is not None and unit.quantity in _BY_UNIT:
         by_word = any(role in name.roles for role, _ in _NUMBERED)
-        if by_word or name.roles & {words.MOTOR, words.WHEEL} or not name.roles - {words.OTHER}:
+        volts = unit.quantity == VOLTAGE_UNIT and name.roles == {words.LINEAR}  # V1 [V]
+        if by_word or volts or name.roles & {words.MOTOR, words.WHEEL} or not name.roles - {words.OTHER}:
             return _BY_UNIT[unit.quantity]
     return next((letter for role, letter in _NUMBERED if role in name.roles), None)
 
@@ -111,6 +115,7 @@ def _take(
     parts = read_name(name)
     component = _component_of(name, unit, numbers)
     if component is None:
+        _doubt_brackets(name, numbers, found)
         return
     if component in found.columns:
         found.doubts.append(Doubt(name, component, f"which is {found.columns[component].name} already", ()))
@@ -123,7 +128,7 @@ def _take(
         found.doubts.append(Doubt(name, component, f"the unit {given} is unknown"))
         return
     if unit is None:
-        unit = _unit_of(table, name, component, robot, found)
+        unit = unit_of(table, name, component, robot, found)
     if unit is not None:
         _enter(name, component, unit, parts, found)
 
@@ -135,6 +140,27 @@ def _doubt_words(table: Table, numbers: Numbers, found: Guess) -> None:
         component = None if is_numeric(cells) else _component_of(name, None, numbers)
         if component is not None and (cell := first_word(cells)).lstrip("+-.")[:1].isdigit():
             found.doubts.append(Doubt(name, component, f"but cells such as {cell} are no numbers", ()))
+
+
+def _doubt_brackets(name: str, numbers: Numbers, found: Guess) -> None:
+    """A column that is called like a component, with an unknown unit in brackets behind: speed1 [pix/s]."""
+    match = _BRACKETS.fullmatch(name)
+    component = _component(read_name(match[1]), None, numbers) if match else None
+    if match and component is not None:
+        found.doubts.append(Doubt(name, component, f"the unit {match[2]} is unknown"))
+
+
+def _doubt_letters(names: list[str], found: Guess) -> None:
+    """V1, V2, ..: volts, or speeds of the rims? Nobody knows."""
+    parts = {name: read_name(name) for name in names}
+    mine = [name for name in names if _is_letter_v(parts[name])]
+    if mine and "u1" not in found.columns:
+        why = f"which may be voltages or speeds (say --column u1={mine[0]}:V and so on)"
+        found.doubts += [Doubt(name, f"u{parts[name].number}", why, ()) for name in mine]
+
+
+def _is_letter_v(name: Words) -> bool:
+    return name.number is not None and name.unit is None and name.roles == {words.LINEAR}
 
 
 def _exact(name: str) -> str | None:
@@ -214,44 +240,6 @@ def _enter(name: str, component: str, unit: Unit, parts: Words, found: Guess) ->
     found.columns[component] = Column(name, unit.text, side)
 
 
-def _unit_of(table: Table, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:
-    """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
-    suffix = si_suffix(component)
-    if component == "heading" and _turns_in_degrees(floats(table.columns[name])):
-        found.doubts.append(Doubt(name, component, "no unit is given, and it jumps by 360 as degrees do", ("deg",)))
-        return None
-    if suffix in ("V", "duty") and component != "supply":
-        return _command_unit(floats(table.columns[name]), name, component, robot, found)
-    found.si[name] = SI.get(suffix, suffix)
-    return parse_unit(found.si[name])
-
-
-def _turns_in_degrees(values: FloatArray) -> bool:
-    """Whether a heading without a unit stays within a turn of 360 and jumps by about as much."""
-    known = values[np.isfinite(values)]
-    return len(known) > 1 and float(np.ptp(known)) <= 361.0 and float(np.abs(np.diff(known)).max()) > 300.0
-
-
-def _command_unit(values, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:
-    """Volts or duty? Volts where the largest lies between 1 and the robot's limit; nothing else is certain."""
-    finite = np.abs(values[np.isfinite(values)])
-    largest = float(finite.max()) if finite.size else 0.0
-    if component.startswith("d") and largest <= 1.0:
-        found.notes.append(f"{name} has no unit: taken as duty, -1..1")
-        return parse_unit("duty")
-    if component.startswith("u") and robot is not None and 1.0 < largest <= 1.05 * _limit(robot):
-        found.notes.append(f"{name} has no unit: taken as V (at most {largest:.3g})")
-        return parse_unit("V")
-    looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else "a PWM value of 0..255"
-    why = f"no unit is given, and up to {largest:.3g} may be volts or {looks}"
-    found.doubts.append(Doubt(name, component, why, ("V", "duty", "%", "duty/255")))
-    return None
-
-
-def _limit(robot: Robot) -> float:
-    return float(np.max(per_wheel(robot.motor.voltage_limit, robot.wheels.count)))
-
-
 def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], found: Guess) -> None:
     """A log of one motor, whose columns need no number: voltage, current, velocity, position.
 
@@ -297,7 +285,7 @@ def _forget(names: list[str], found: Guess) -> None:
 def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, str], found: Guess) -> None:
     parts = read_name(name)
     text = assumed.get(name) or assumed.get(letter_of(component)) or table.units.get(name, "")
-    unit = known_unit(text) or parts.unit or _unit_of(table, name, component, None, found)
+    unit = known_unit(text) or parts.unit or unit_of(table, name, component, None, found)
     if unit is not None:
         _enter(name, component, unit, parts._replace(number=1), found)
 

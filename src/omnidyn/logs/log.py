@@ -86,13 +86,14 @@ class Log:
         """Rows of one time that fill each other's blanks are one row, as where every topic writes a row of its own."""
         if not len(self) or not (np.diff(self.t) == 0.0).any():
             return self
-        new = np.concatenate([[True], np.diff(self.t) != 0.0])
+        new = np.append(True, np.diff(self.t) != 0.0)
         first, group = np.flatnonzero(new), np.cumsum(new) - 1
         table = np.column_stack([values.reshape(len(self), -1) for values in self.channels.values()] or [self.t])
         low, high = np.fmin.reduceat(table, first), np.fmax.reduceat(table, first)
         numbers = np.add.reduceat(np.isfinite(table).astype(np.int64), first)
         size = np.diff(np.append(first, len(self)))[:, None]
-        fits = ~(low < high).any(axis=1) & ((numbers > 0) & (numbers < size)).any(axis=1)
+        one_value, partly = ~np.any(low < high, axis=1), np.any((numbers > 0) & (numbers < size), axis=1)
+        fits = np.asarray(one_value & partly)
         if not fits.any():
             return self
         joins = new & fits[group]

@@ -17,9 +17,9 @@ from omnidyn.units import Unit, known_unit
 )  # fmt: skip
 
 _WORDS = {
-    TIME: "t time stamp timestamp clock zeit uhrzeit",
+    TIME: "t time stamp timestamp clock zeit uhrzeit millis micros",
     SUPPLY: "bat batt battery supply vbat vbatt vcc vin vbus bus akku",
-    VOLTAGE: "u volt volts voltage voltages ua spannung",
+    VOLTAGE: "u volt volts voltage voltages ua va spannung",
     CURRENT: "i cur curr current currents amp amps ia strom",
     DUTY: "duty pwm throttle",
     RATE: "w omega vel velocity velocities speed speeds spd rpm rate dps qd gyro twist drehzahl",
@@ -34,7 +34,7 @@ _WORDS = {
     LINEAR: "v lin linear",
     ANGULAR: "angular",
     # Words that change nothing: joint_states/wheel_1_joint/velocity is the speed of wheel 1.
-    MEASURED: "meas measured act actual fb feedback ist est filt filtered raw joint joints states",
+    MEASURED: "meas measured act actual fb feedback ist est filt filtered raw joint joints states field data msg",
     # Quantities that a log may hold and a Run does not, and differences from row to row.
     OTHER: """ax ay az acc accel acceleration torque tau temp temperature power force f d dx dy dz dang dt delta error
         err state mode id index row mag roll pitch integral index seq frame std var cov step timestep sample""",
@@ -56,12 +56,16 @@ class Words(NamedTuple):
 def read_name(name: str) -> Words:
     """The words of a column's name. A word that is not known counts as "other"."""
     stem, unit = _split_unit(name.strip().replace("v_n", "vn"))
+    stem, unit = (stem, unit) if unit is not None else _unit_inside(stem)
     spread = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower()
     words = re.findall(r"[^\W\d_]+", spread)
+    unit = unit or next((known_unit(part) for word in words for part in _parts(word) if part in _SAYS_ITS_UNIT), None)
     roles = {role for word in words for role in _roles(word)}
     return Words(frozenset(roles), _number(spread), unit)
 
 
+_SAYS_ITS_UNIT = ("rpm", "dps", "millis", "micros")  # a quantity and its unit in one word: rpm1, motor2Rpm, millis
+_NO_UNIT_INSIDE = {"turn", "turns", "rev", "min", "sec"}  # in the middle of a name: a turn rate, a minimum, a section
 _OF_A_WHEEL = {MOTOR, WHEEL, VOLTAGE, CURRENT, DUTY, RATE, ANGLE}
 _OF_NO_WHEEL = {BODY, SUPPLY, TIME}
 
@@ -83,6 +87,8 @@ def _split_unit(name: str) -> tuple[str, Unit | None]:
     parts = re.split(r"_", name)
     for first in range(1, len(parts)):
         tail = "_".join(parts[first:])
+        if re.search(r"(^|\D)\d\d?$", tail):  # the 2 of current_mA_2 is a wheel, no divisor
+            continue
         low = tail.lower() if tail.isupper() and len(tail) > 2 else tail  # W1_RAD_S, but mA and MA are two
         for text in (tail, tail.replace("_", "/"), low, low.replace("_", "/")):
             metre = text == "m" and not any(map(str.isdigit, name))  # x_m, but not 1_m
@@ -92,12 +98,26 @@ def _split_unit(name: str) -> tuple[str, Unit | None]:
     return name, None
 
 
+def _unit_inside(name: str) -> tuple[str, Unit | None]:
+    """A unit between other words, as in current_mA_1 or speed_rad_s_filtered: the longest of two letters or more."""
+    parts = name.split("_")
+    for size in (2, 1):
+        for first in range(1, len(parts) - size):
+            text = "_".join(parts[first : first + size])
+            unit = known_unit(text) if len(text) > 1 and text.lower() not in {*_ROLE, *_NO_UNIT_INSIDE} else None
+            if unit is not None:
+                return "_".join(parts[:first] + parts[first + size :]), unit
+    return name, None
+
+
+def _parts(word: str) -> tuple[str, ...]:
+    """The known words that a word is made of: "xsetspeed" is x, set, speed; () where it is of none."""
+    return (word,) if word in _ROLE else _compound(word)
+
+
 def _roles(word: str) -> list[str]:
-    """Roles of a word, taken apart where it is a compound: "xsetspeed" is x, set, speed."""
-    if word in _ROLE:
-        return [_ROLE[word]]
-    found = _compound(word)
-    return [_ROLE[part] for part in found] if found else [OTHER]
+    """Roles of a word, or of its parts."""
+    return [_ROLE[part] for part in _parts(word)] or [OTHER]
 
 
 @lru_cache(4096)
