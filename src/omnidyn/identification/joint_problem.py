@@ -113,7 +113,11 @@ def _widened(sums: PieceSums, at: IntArray, columns: IntArray, count: int) -> Pi
     info = np.zeros((len(sums.info), total, total))
     grad[:, where], score[:, where] = sums.grad, sums.score
     info[:, where[:, None], where] = sums.info
-    return replace(sums, columns=columns[sums.columns], grad=grad, info=info, score=score)
+    waves = None
+    if sums.waves is not None:
+        waves = np.zeros((*sums.waves.shape[:-1], total))
+        waves[..., where] = sums.waves
+    return replace(sums, columns=columns[sums.columns], grad=grad, info=info, score=score, waves=waves)
 
 
 def read_parts(runs: Sequence[Run], groups: Sequence[str], robot: Robot, given: Options) -> list[Part]:

@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from scipy.special import log_ndtr
+from scipy.stats import truncnorm
 
-from omnidyn.identification.output_error.counts import count_terms, find_tick, information, tail
+from omnidyn.identification.joint_fit import identify_groups
+from omnidyn.identification.output_error.counts import count_terms, find_tick, information, rounding, tail
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -74,6 +76,46 @@ def test_information_of_a_row_against_draws_and_its_limits():
     assert np.mean(terms[:, 0] ** 2) == pytest.approx(angle, rel=0.03)
     assert np.mean((terms[:, 1] - 1.0) ** 2) == pytest.approx(scale, rel=0.06)
     assert abs(np.mean(terms[:, 0])) < 4.0 * np.sqrt(angle / phase.size)
+
+
+def test_the_pull_of_a_row_without_noise_is_the_sum_of_its_harmonics():
+    half, steps = 5.0, 20_000
+    turn = (np.arange(steps) + 0.5) / steps - 0.5
+    low, high = (2.0 * half * turn + side * half for side in (-1.0, 1.0))
+    mean, spread = truncnorm.mean(low, high), truncnorm.var(low, high)
+    series, square, curvature = rounding(half, 40, 4096)
+    for m in (1, 2, 7, 40):
+        assert series[m - 1] == pytest.approx(2.0 * np.mean(mean * np.sin(2.0 * np.pi * m * turn)), abs=1e-4)
+    assert square == pytest.approx(np.mean(mean**2), rel=1e-4)
+    assert curvature == pytest.approx(1.0 - np.mean(spread), rel=1e-4)
+
+
+def test_without_noise_the_spread_of_the_draws_is_what_a_fit_says(axebot, rolled):
+    """Rows at rest repeat one another: a sandwich over blocks shorter than a rest says 1.3 times too little."""
+    run, angle = rolled
+    z = []
+    for seed in range(40):
+        counted = ticks_of(angle, 2.0 * np.pi / 512, np.random.default_rng(seed), 0.0)
+        log = Run(t=run.t, voltage=run.voltage, wheel_angle=counted)
+        fit = fit_output_error(log, axebot, nuisances=(), start="rest")
+        z.append([(v - float(parameter(axebot, key))) / fit.std[key] for key, v in fit.value.items()])
+    sizes = np.sqrt(np.mean(np.square(z), axis=0))  # 1, +- 0.11 by 40 draws
+    assert sizes.max() < 1.33
+    assert sizes.min() > 0.67
+    assert 0.85 < np.sqrt(np.mean(sizes**2)) < 1.15
+
+
+def test_groups_of_counts_without_noise_say_what_each_says_alone(axebot, rolled):
+    run, angle = rolled
+    logs = [
+        Run(t=run.t, voltage=run.voltage, wheel_angle=ticks_of(angle, 2.0 * np.pi / 512, np.random.default_rng(s), 0.0))
+        for s in (1, 2)
+    ]
+    both = identify_groups(logs, axebot, ["a", "b"], nuisances=(), start="rest")
+    for name, log in zip(("a", "b"), logs, strict=True):
+        alone = fit_output_error(log, axebot, nuisances=(), start="rest")
+        for key, std in alone.std.items():
+            assert both.estimates[name].std[key] == pytest.approx(std, rel=0.05)
 
 
 def test_the_tick_of_a_log_is_found():

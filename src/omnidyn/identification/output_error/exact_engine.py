@@ -20,8 +20,8 @@ from omnidyn.identification.output_error.axis_kernel import (
     march_axis,
     spread,
 )
-from omnidyn.identification.output_error.counts import information
-from omnidyn.identification.output_error.kernel import FINAL, KEEP, PATH, Loss, Physics, Slopes, Sums, march
+from omnidyn.identification.output_error.counts import HARMONICS, information
+from omnidyn.identification.output_error.kernel import FINAL, KEEP, PATH, WAVES, Loss, Physics, Slopes, Sums, march
 from omnidyn.identification.output_error.primitives import Mapping, Primitives
 from omnidyn.identification.output_error.problem import Column, Piece, PieceSums, Point, Problem
 from omnidyn.model.dynamics import mass_matrix
@@ -171,7 +171,8 @@ class ExactEngine:
         grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
         info = np.zeros((len(columns), total, total))
         info[:, used[:, None], used] = sums.info[:, : len(used), : len(used)]
-        tight = PieceSums(known, sums.number, sums.square, sums.loss, sums.lag, grad, info, score, sums.drift)
+        waves = _at(used, sums.waves, total) if weighting.mode & WAVES else None
+        tight = PieceSums(known, sums.number, sums.square, sums.loss, sums.lag, grad, info, score, sums.drift, waves)
         return tight, (sums.predicted, _at(used, sums.slopes, total))
 
     def _numbers(
@@ -263,4 +264,5 @@ def _empty(columns: int, padded: int, total: int, rows: int, mode: int, blocks: 
         np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros((columns, padded)),
         np.zeros((columns, padded, padded)), np.zeros((blocks, padded)), np.zeros((blocks, columns)),
         np.full(kept, np.nan), np.full((*kept, total), np.nan),
+        np.zeros((columns, HARMONICS if mode & WAVES else 0, 2, padded)),
     )  # fmt: skip

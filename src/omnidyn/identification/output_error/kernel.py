@@ -8,7 +8,8 @@ Along the way grow, for every column c of the outputs, with r = y - f(p), J = df
 (w r is E x s and w r^2 is E x^2 s^2 for columns that are counts: counts.py)
 
 and, in a final march, for every block of rows: score, the sum of w r J/variance over all columns, and drift, the sum of
-w r of each column. Nothing is kept of the samples, so that memory does not grow with the log. Rows of J are padded to a
+w r of each column. For columns of counts, on request: waves, the sums of cos and sin(2 pi m f/tick) J, m = 1, 2, ...
+Nothing is kept of the samples, so that memory does not grow with the log. Rows of J are padded to a
 multiple of 4 with zeros: the loops become the short vectors of the processor.
 """
 
@@ -33,7 +34,7 @@ BoolArray = NDArray[np.bool_]
 GAIN, DEAD, FADE = 0, 1, 2  # numbers of the driver
 PATH = 5  # integrals of the twist, then x and y of the displacement
 SAME = 1e-7  # times 1/a [s]: steps that differ by less share one exponential, to first order, which leaves 1e-15
-FINAL, KEEP = 1, 2  # what a march is for, beside the sums
+FINAL, KEEP, WAVES = 1, 2, 4  # what a march is for, beside the sums
 
 
 class Physics(NamedTuple):
@@ -99,6 +100,7 @@ class Sums(NamedTuple):
     drift: FloatArray  # (blocks, C)
     predicted: FloatArray
     slopes: FloatArray
+    waves: FloatArray  # (C, M, 2, P), M = 0 but where WAVES asks
 
 
 @part
@@ -180,6 +182,20 @@ def add_information(info, grad, row, pull, curvature):
         if lead != 0.0:
             for j in range(size):
                 info[i, j] += lead * row[j]
+
+
+@part
+def add_waves(waves, row, turns):
+    """waves (M, 2, P) += (cos, sin)(2 pi m turns) row for m = 1 to M."""
+    if waves.shape[0] == 0:
+        return
+    east, north = math.cos(2.0 * math.pi * turns), math.sin(2.0 * math.pi * turns)
+    cosine, sine = east, north
+    for m in range(waves.shape[0]):
+        for i in range(len(row)):
+            waves[m, 0, i] += cosine * row[i]
+            waves[m, 1, i] += sine * row[i]
+        cosine, sine = cosine * east - sine * north, sine * east + cosine * north
 
 
 @part
@@ -327,7 +343,7 @@ def march(
     at_late, at_offset, variance, nu, block = slopes.at_late, slopes.at_offset, loss.variance, loss.nu, loss.block
     d_travel, travel_varies, share = slopes.travel_map, slopes.travel_varies, loss.share
     number, square, total, lag, grad, info = sums.number, sums.square, sums.loss, sums.lag, sums.grad, sums.info
-    score, drift, predicted, kept = sums.score, sums.drift, sums.predicted, sums.slopes
+    score, drift, predicted, kept, waves = sums.score, sums.drift, sums.predicted, sums.slopes, sums.waves
     for k in range(first, last + 1):
         put_volts(volts, u, k, (t[k] - origin) / span, driver)
         put_drive(g, dg, volts, drive, physics.push, d_drive, slopes.push, at_driver, vary)
@@ -371,6 +387,9 @@ def march(
                     lag[c] += pull * before[c]
                     before[c] = pull
                     add_information(info[c], grad[c], row, pull, curvature)
+                    if tick is not None:  # noqa: SIM102 alone, it is decided at compile time
+                        if tick[c] > 0.0:
+                            add_waves(waves[c], row, value / tick[c])
                     if final:
                         drift[(k - first) // block, c] += pull
                         for i in range(size):

@@ -105,6 +105,7 @@ class PieceSums:
     info: FloatArray  # (C, P + 3 + C, P + 3 + C)
     score: FloatArray  # (blocks, P + 3 + C)
     drift: FloatArray  # (blocks, C)
+    waves: FloatArray | None = None  # (C, M, 2, P + 3 + C)
 
 
 def per_column(sums: Sequence[PieceSums], columns: int, name: str) -> FloatArray:

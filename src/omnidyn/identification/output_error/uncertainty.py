@@ -8,6 +8,8 @@ under heteroskedasticity and autocorrelation, and its intervals take the quantil
 blocks that carry the information. Which of the two is used is decided by the residuals. Where there are many runs,
 each is one block: a floor or a battery that differs from run to run is then in the intervals too (Liang, Zeger,
 Biometrika 73 (1986); n/(n - 1) for n runs).
+
+Counts without noise are neither: no variance is less than what rounding.py finds.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from scipy.special import ndtri, stdtrit
 from omnidyn.identification.output_error.exact_engine import Weighting
 from omnidyn.identification.output_error.kernel import FINAL
 from omnidyn.identification.output_error.problem import PieceSums, per_column
+from omnidyn.identification.output_error.rounding import rounding_scatter, silent
 from omnidyn.identification.output_error.solver import Normal, Solution, Solver, State
 
 FloatArray = NDArray[np.float64]
@@ -87,10 +90,12 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     degrees = _degrees(influence, seen) if kind == SANDWICH else _rows(solver, sums) - int(seen.sum())
     if len(influence) <= len(plain):
         kind, degrees = WHITE, _rows(solver, sums) - int(seen.sum())
-    covariance = _at_least(wide, plain) if kind == SANDWICH else plain.copy()
+    least = _least(solver, solution, plain, seen)
+    covariance = _at_least(wide, least) if kind == SANDWICH else least.copy()
+    widening = float(np.sqrt(_ratio(np.maximum(np.diag(wide), np.diag(least)), np.diag(plain), seen)))
     covariance[~seen, ~seen] = np.inf
     return Trust(
-        covariance, normal.held, ~seen, _free_step(plain, normal), kind, float(np.sqrt(_ratio(wide, plain, seen))),
+        covariance, normal.held, ~seen, _free_step(plain, normal), kind, widening,
         float(stdtrit(degrees, TAIL) if degrees > 0 else ndtri(TAIL)), max(int(degrees), 0), neighbours, directions,
         count if kind == SANDWICH else 0,
     )  # fmt: skip
@@ -186,9 +191,19 @@ def _inverse(information: FloatArray, seen: BoolArray) -> FloatArray:
 
 
 def _ratio(wide: FloatArray, plain: FloatArray, seen: BoolArray) -> float:
+    """The largest ratio of two variances among what is seen. Shapes (P,)."""
     if not seen.any():
         return 1.0
-    return float((np.diag(wide)[seen] / np.maximum(np.diag(plain)[seen], 1e-300)).max())
+    return float((wide[seen] / np.maximum(plain[seen], 1e-300)).max())
+
+
+def _least(solver: Solver, solution: Solution, plain: FloatArray, seen: BoolArray) -> FloatArray:
+    """The least covariance: the plain one, or what rounding alone makes of counts that show no noise."""
+    if not silent(solver, solution).any():
+        return plain
+    information, scatter = rounding_scatter(solver, solution)
+    inverse = _inverse(information, seen)
+    return inverse @ scatter @ inverse
 
 
 def _at_least(wide: FloatArray, plain: FloatArray) -> FloatArray:
