@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled import kernel, part
+from omnidyn.errors import InputError
 from omnidyn.model.forces import forces_at_work
 from omnidyn.model.inclusion import CAP
 from omnidyn.model.layout import (
@@ -43,6 +44,7 @@ FORGETS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its MEMORY,
 SHORT = 1.5e-4  # [s] no step is given less than the share of tol of one so long
 ROUNDING = 1e-13  # [m/s] nor less than this
 SHORTEST = 1e-11  # [s]
+MOST = (3e6, 2e7)  # steps solved at tol 1e-6, and so many more per second simulated; then a run is given up
 YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
 CURRENT_SHARE = 1e-2  # and 100 tol in A
 SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 5.0 / 24.0, 8.0 / 24.0, -1.0 / 24.0)
@@ -78,11 +80,21 @@ def run_implicit(
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: one fixed step per row.
 
     voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,).
+    Raises InputError where motion is so fast beside its duration that no patience would do.
     """
     plant, bare, out, spare = plant.copy(), with_given_currents(plant), begun(len(dt), state, pose), room(state)
-    _march(
-        *plant, *bare, scratch(), spare, voltage, bound, dt, *loop, tol, out.pose, out.state, out.iterations, out.steps
-    )
+    most = (MOST[0] + MOST[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
+    row = _march(
+        *plant, *bare, scratch(), spare, voltage, bound, dt, *loop, tol, most, out.pose, out.state, out.iterations,
+        out.steps,
+    )  # fmt: skip
+    if row < len(dt):
+        raise InputError(
+            "this robot moves too fast to be followed", got=f"more than {most:.2g} steps up to row {row}",
+            expected=f"motion that tol = {tol:g} m/s can follow in steps of 20 ns",
+            remedy="check mass, inertia, gear ratio, torque and EMF constant of the robot file; or take one step per "
+            "row (tol=None)",
+        )  # fmt: skip
     return out
 
 
@@ -191,17 +203,22 @@ def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
             astray = max(astray, _unresolved(body, element, state, h))
         if astray > 0.0:
             ratio = max(ratio, 64.0) if astray > tol else 0.5
+        # The error goes with h^3, and so does the ratio where the share of tol is that of SHORT; else it goes with h^2.
+        fitting = 0.9 * (ratio + 1e-12) ** (-1.0 / 3.0 if h < SHORT else -0.5)
         if ratio <= 1.0 or h <= SHORTEST:
-            return h, h * min(4.0, max(1.0, 0.9 / math.sqrt(ratio + 1e-12)))
-        h = max(SHORTEST, h * max(0.125, min(0.5, 0.9 / math.sqrt(ratio))))
+            return h, h * min(4.0, max(1.0, fitting))
+        h = max(SHORTEST, h * (0.125 if astray > tol else max(0.125, fitting)))
 
 
 @part
-def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, h, pose, counts):
-    """Advance over one row of held voltage with adaptive steps. Returns the step length to begin the next row with."""
+def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, most, h, pose, counts):
+    """Advance over one row of held voltage with adaptive steps, `most` of them at the most.
+
+    Returns the step length to begin the next row with.
+    """
     middle, two, inner, m, left = spare[1], spare[2], spare[3], len(element), dt
     counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
-    while left > 0.0:
+    while left > 0.0 and counts[1] <= most:
         taken, h = find_step(body, element, s, spare, state, h, left, dt, tol, counts)
         advance_pose(pose, state, middle, two, body[LENGTH], taken, SIMPSON)
         copy_row(state, two)
@@ -214,9 +231,9 @@ def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, h, po
 @kernel
 def _march(
     body, element, bare_body, bare_element, s, spare, voltage, bound, dt, kp, ki, limit, radius, command, tick, period,
-    total, tol,     poses, states, iterations, steps,
+    total, tol, most, poses, states, iterations, steps,
 ):  # fmt: skip
-    """All rows; see run_implicit."""
+    """All rows; see run_implicit. Returns how many of them were done before `most` steps were."""
     state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(2, np.int64)
     h = dt[0]
     for k in range(len(dt)):
@@ -226,7 +243,10 @@ def _march(
         for w in range(voltage.shape[1]):
             element[AXES + w, VOLTAGE], element[AXES + w, BOUND] = voltage[k, w], bound[k, w]
         if tol > 0.0:
-            h = _row(body, element, bare_body, bare_element, s, spare, state, dt[k], tol, h, pose, counts)
+            h = _row(body, element, bare_body, bare_element, s, spare, state, dt[k], tol, most, h, pose, counts)
+            most -= counts[1]
+            if most < 0.0:
+                return k
         else:
             counts[0], counts[1] = step(body, element, s, state, spare[2], spare[3], dt[k]), 1
             advance_pose(pose, state, spare[3], spare[2], body[LENGTH], dt[k], STAGES)
@@ -234,6 +254,7 @@ def _march(
         iterations[k], steps[k] = counts[0], counts[1]
         copy_row(states[k + 1], state)
         copy_row(poses[k + 1], pose)
+    return len(dt)
 
 
 def capped(outcome: Outcome) -> int:
