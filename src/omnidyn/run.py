@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,8 @@ class Run:
     pose: (x, y, heading) in the world [m, m, rad], heading not wrapped. Shape (samples, 3).
     supply: voltage of the battery [V]. Shape (samples,).
     source: where it comes from. warnings: what a reader should know, in words.
+    interpolated: channel -> which of its values no sensor gave: a reader put them on the line between two measurements.
+    Same shape as the channel. What must count measurements, and no others, takes `as_measured()`.
     Inputs (voltage, duty, commands) of row k hold over [t_k, t_k+1). All arrays are read-only.
     Raises InputError when a channel has another shape or time does not increase.
     """
@@ -57,6 +59,7 @@ class Run:
     supply: FloatArray | None = None
     source: str = ""
     warnings: tuple[str, ...] = ()
+    interpolated: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         time = _read_only("t", self.t, None)
@@ -68,6 +71,10 @@ class Run:
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, _read_only(name, value, kind, len(time)))
+        for name, mask in self.interpolated.items():
+            own = getattr(self, name, None) if name in CHANNELS else None
+            if own is not None and np.shape(mask) != own.shape:
+                raise InputError("wrong shape", got=np.shape(mask), expected=own.shape, where=f"interpolated {name}")
 
     @property
     def channels(self) -> dict[str, FloatArray]:
@@ -79,6 +86,14 @@ class Run:
         """Number of wheels, None where no channel of wheels was measured."""
         counts = {len(value[0]) for name, value in self.channels.items() if CHANNELS[name] == WHEEL}
         return counts.pop() if counts else None
+
+    def as_measured(self) -> Run:
+        """The run with NaN in place of what was interpolated; the run itself where nothing was."""
+        masks = {name: mask for name, mask in self.interpolated.items() if getattr(self, name, None) is not None}
+        if not masks:
+            return self
+        channels = {name: np.where(mask, np.nan, getattr(self, name)) for name, mask in masks.items()}
+        return self.replace(**channels, interpolated={})
 
     def __len__(self) -> int:
         return len(self.t)
@@ -105,6 +120,8 @@ def _values(run: Run) -> Iterator[Any]:
 
 
 def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         return a.shape == b.shape and bool(np.array_equal(a, b, equal_nan=True))
     return bool(a is b or a == b) if not (isinstance(a, np.ndarray) or isinstance(b, np.ndarray)) else False

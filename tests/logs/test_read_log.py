@@ -108,6 +108,11 @@ def test_a_log_on_change_holds_commands_and_interpolates_measurements(tmp_path):
     np.testing.assert_array_equal(run.voltage[:, 0], [1, 1, 1, 2, 2, 2])
     np.testing.assert_allclose(run.wheel_speed[:, 0], [np.nan, 10, 20, 30, 40, np.nan])
     assert any("u1 is recorded on change (67% of its cells are blank): held" in words for words in run.warnings)
+    np.testing.assert_array_equal(run.interpolated["wheel_speed"][:, 0], [1, 0, 1, 1, 0, 1])
+    assert set(run.interpolated) == {"wheel_speed"}
+    np.testing.assert_array_equal(run.as_measured().wheel_speed[:, 0], [np.nan, 10, np.nan, np.nan, 40, np.nan])
+    late = read_log(write(tmp_path, text), latency={"w": 0.1})
+    np.testing.assert_allclose(late.as_measured().wheel_speed[:, 0], [10, np.nan, np.nan, 40, np.nan, np.nan])
 
 
 def test_rows_of_one_time_that_fill_each_other_s_blanks_are_one_row(tmp_path):

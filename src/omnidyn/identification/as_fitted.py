@@ -127,11 +127,23 @@ def _extended(
 
 
 def _shifted(t: FloatArray, values: FloatArray, by: float, parts: list[slice]) -> FloatArray:
-    """values at t + by, between its rows on a line, NaN outside of each piece."""
+    """values at t + by, between its rows on a line; NaN outside of each piece, and a row or more from what is known."""
     if not by:
         return values
     moved = np.full(values.shape, np.nan)
     for rows in parts:
         for k in range(values.shape[1]):
-            moved[rows, k] = np.interp(t[rows] + by, t[rows], values[rows, k], left=np.nan, right=np.nan)
+            known = np.isfinite(values[rows, k])
+            if known.any():
+                moved[rows, k] = _on_lines(t[rows], t[rows][known], values[rows, k][known], by)
     return moved
+
+
+def _on_lines(t: FloatArray, at: FloatArray, values: FloatArray, by: float) -> FloatArray:
+    """What was measured `at` some of the times t, at t + by; NaN inside of lines longer than a row."""
+    after = np.clip(np.searchsorted(at, t + by), 1, max(len(at) - 1, 1))
+    gap = at[np.minimum(after, len(at) - 1)] - at[after - 1]
+    nearest = np.minimum(np.abs(t + by - at[after - 1]), np.abs(t + by - at[np.minimum(after, len(at) - 1)]))
+    row = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    found = np.interp(t + by, at, values, left=np.nan, right=np.nan)
+    return np.where((gap > 1.5 * row) & (nearest > 0.5 * row), np.nan, found)

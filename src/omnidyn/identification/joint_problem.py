@@ -31,7 +31,6 @@ from omnidyn.identification.output_error.problem import PieceSums, Point, Proble
 from omnidyn.identification.output_error.record import Record
 from omnidyn.identification.output_error.solver import Engine, Solver
 from omnidyn.identification.output_error.support import supported
-from omnidyn.logs.steady_table import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -147,7 +146,7 @@ def _still(name: str, records: Sequence[Record], robot: Robot, given: Options) -
     resting = [int(axis) for axis in np.flatnonzero(~moved)]
     still = [key for key in {**dict.fromkeys(usual), **dict.fromkeys(asked)} if _of_any(key, resting)]
     notes = tuple(
-        f"axis {AXES[axis]} never visibly moved in {name}: its friction is not fitted there"
+        f"{found.words(axis, name)} there"
         for axis in resting if any(friction_of_axis(key, axis) for key in still)
     )  # fmt: skip
     if not still:

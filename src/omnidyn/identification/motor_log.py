@@ -39,7 +39,7 @@ def motor_records(runs: Sequence[Run], motor: int, kind: str, between: str, angl
         raise InputError("the logs have no input of this motor", got=", ".join(runs[0].channels),
                          expected=" or ".join(names), where=runs[0].source)  # fmt: skip
     for run in runs:
-        found.append(_record(run, motor, getattr(run, chosen), between, angle))
+        found.append(_record(run.as_measured(), motor, getattr(run, chosen), between, angle))
     return found, INPUTS[chosen]
 
 

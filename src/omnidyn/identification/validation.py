@@ -124,7 +124,7 @@ def validate(
 
 
 def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[[str], object] | None) -> Comparison:
-    return compare(fit.robot, [as_fitted(run, fit) for run in runs], progress=progress)
+    return compare(fit.robot, [as_fitted(run.as_measured(), fit) for run in runs], progress=progress)
 
 
 def _scores(fit: OutputErrorEstimate, found: Comparison) -> dict[str, Score]:

@@ -21,6 +21,7 @@ FloatArray = NDArray[np.float64]
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share is recorded on change
 HELD = ("voltage", "duty", "wheel_speed_command", "twist_command")  # what is commanded holds until the next value
+NEVER_MADE_UP = (*HELD, "supply")  # a battery between two measurements is an input like any other
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,8 @@ class Log:
             )  # fmt: skip
         log = log._without(repeated, "repeat the time of the row before", warnings, bound=1.0)
         channels = {name: log.aligned(name, values, warnings) for name, values in log.channels.items()}
-        return Run(t=log.t, **channels, source=self.source, warnings=tuple(warnings))
+        made_up = {name: mask for name in channels if (mask := log.interpolated(name)).any()}
+        return Run(t=log.t, **channels, source=self.source, warnings=tuple(warnings), interpolated=made_up)
 
     def joined(self) -> Log:
         """Rows of one time that fill each other's blanks are one row, as where every topic writes a row of its own."""
@@ -126,6 +128,18 @@ class Log:
                 changed[:, k] = np.interp(self.t + late, self.t, changed[:, k], right=np.nan)
                 warnings.append(f"{component} was moved back by its latency of {late:g} s")
         return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
+
+    def interpolated(self, channel: str) -> NDArray[np.bool_]:
+        """Which values of `aligned` lie between measurements, where no sensor gave any. Shape as in the channel."""
+        columns = self.channels[channel].reshape(len(self), -1)
+        made_up = np.zeros(columns.shape, dtype=bool)
+        for k, component in enumerate(components(channel, columns.shape[1])):
+            blank = np.isnan(columns[:, k])
+            if channel in NEVER_MADE_UP or not ON_CHANGE < blank.mean() < 1.0:
+                continue
+            late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
+            made_up[:, k] = _far_from(self.t + late, self.t[~blank], self.t) if late else blank
+        return made_up[:, 0] if CHANNELS[channel] == SCALAR else made_up
 
     def empty_rows(self) -> NDArray[np.bool_]:
         """Rows without a time or without any number. Shape (rows,)."""
@@ -183,6 +197,13 @@ def _interpolated(t: FloatArray, values: FloatArray) -> FloatArray:
     """Each blank between two values on the line between them; outside there is none."""
     known = np.isfinite(values)
     return np.interp(t, t[known], values[known], left=np.nan, right=np.nan)
+
+
+def _far_from(at: FloatArray, known: FloatArray, t: FloatArray) -> NDArray[np.bool_]:
+    """Which times `at` have no time of `known` within half a row of `t`. Shape of `at`."""
+    near = 0.5 * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    after = np.clip(np.searchsorted(known, at), 1, max(len(known) - 1, 1))
+    return np.minimum(np.abs(at - known[after - 1]), np.abs(at - known[np.minimum(after, len(known) - 1)])) > near
 
 
 def component(log: Log, name: str) -> FloatArray | None:

@@ -284,14 +284,17 @@ def without_still_axes(
         if not is_exact(robot) and not own & set(asked):
             continue  # friction along the direction of travel: no axis has its own
         held, key = float(found.held[axis]), f"friction.axes.breakaway[{axis}]"
-        what = f"it held {held:.4g} {unit(key)}" if held > NOTHING else "nothing drove it"
-        still.append((key, held, f"axis {AXES[axis]} never visibly moved: its friction is not fitted; {what}"))
+        what = f"; it held {held:.4g} {unit(key)}" if held > NOTHING else "; nothing drove it"
+        still.append((key, held, found.words(int(axis)) + (what if found.seen[axis] else "")))
         if is_exact(robot) and robot.friction.axes.levels[2][axis] < held:
             robot = with_parameter(robot, f"friction.axes.coulomb[{axis}]", held)
     if not found.moved.any():
         raise InsufficientDataError(
             "the robot never visibly moved: its friction is only bounded from below",
-            got="; ".join(f"{AXES[axis]} held {held:.3g}" for axis, held in enumerate(found.held)),
+            got="; ".join(
+                f"{AXES[axis]} held {held:.3g}" if seen else f"{AXES[axis]} was not measured"
+                for axis, (held, seen) in enumerate(zip(found.held, found.seen, strict=True))
+            ),
             expected="motion", remedy="drive it beyond its dead zone", where=source,
         )  # fmt: skip
     if not still:

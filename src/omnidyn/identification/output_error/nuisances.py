@@ -133,7 +133,10 @@ def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: 
     if silent < SILENT or twist is None:
         return False
     rows = twist[first : first + silent]
-    spread = np.nanstd(rows, axis=0) / np.sqrt(silent)
+    rows = rows[:, np.isfinite(rows).any(axis=0)]
+    if not rows.size:
+        return False
+    spread = np.nanstd(rows, axis=0) / np.sqrt(np.isfinite(rows).sum(axis=0))
     return bool((np.abs(np.nanmean(rows, axis=0)) <= CLEAR * spread).all())
 
 

@@ -60,6 +60,8 @@ def record(
     loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad: as in
     outputs.py.
     """
+    made_up = [name.replace("_", " ") for name, mask in run.interpolated.items() if mask.any()]
+    run = run.as_measured()
     set_point = _set_point(run, robot, loop)
     voltage, supplied, notes = _voltage(run, robot) if set_point is None else (np.zeros_like(set_point), False, [])
     clipped = clip_voltage(robot.motor, voltage)
@@ -67,6 +69,8 @@ def record(
     if beyond:
         notes.append(f"{beyond} rows ask for more than the voltage limit: they are clipped to it")
         voltage = clipped
+    if made_up:
+        notes.append(f"{', '.join(made_up)}: only what was measured is fitted, not what was interpolated in between")
     found = outputs_of(run, robot, outputs, tick_rad, set_point is not None)
     inputs = voltage if set_point is None else set_point
     _refuse_wheels_without_input(run, robot, inputs)

@@ -192,7 +192,10 @@ class Normal:
         problem = solver.problem
         self.solver, self.state, count = solver, state, len(problem.parameters)
         self.scale = np.array([p.slope(float(v)) for p, v in zip(problem.parameters, state.point.values, strict=True)])
-        self.pieces = [_weighted(sums, 1.0 / state.variance[sums.columns], self.scale) for sums in state.sums]
+        self.pieces = [
+            _weighted(sums, 1.0 / state.variance[sums.columns], self.scale, states)
+            for sums, states in zip(state.sums, state.point.states, strict=True)
+        ]
         self._count = count
         self.inner = solver.inner(state.point.values)
         self._add_priors()
@@ -274,16 +277,27 @@ def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.pinv(information, hermitian=True) @ right, dtype=float)
 
 
-def _weighted(sums: PieceSums, weight: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gradient and information of a piece over its columns, in inner numbers; states that are not free do not move."""
+def _weighted(
+    sums: PieceSums, weight: FloatArray, scale: FloatArray, states: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gradient and information of a piece over its columns, in inner numbers.
+
+    States that are not free do not move. Nor does a speed that the rows only know to be below the fastest (a robot may
+    forget its start before the first row that is used), or that they would pull beyond it.
+    """
     count = len(scale)
     full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
     grad = (weight @ sums.grad) * full
     info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
     if not np.diag(info)[count:].any():
         return grad[:count], info[:count, :count]
-    still = np.flatnonzero(np.diag(info)[count:] == 0.0) + count
-    info[still, still] = 1.0
+    still = np.diag(info)[count:] == 0.0
+    still[: len(FASTEST)] |= np.diag(info)[count : count + len(FASTEST)] < FASTEST**-2
+    speeds, pull = states[: len(FASTEST)], grad[count : count + len(FASTEST)]
+    still[: len(FASTEST)] |= (np.abs(speeds) >= FASTEST) & (np.sign(speeds) * pull > 0.0)
+    where = np.flatnonzero(still) + count
+    grad[where], info[where, :], info[:, where] = 0.0, 0.0, 0.0
+    info[where, where] = 1.0
     return grad, info
 
 

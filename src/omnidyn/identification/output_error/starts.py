@@ -116,7 +116,7 @@ def _windows(record: Record, twist: FloatArray, drive: FloatArray, axis: int) ->
         if last - first < 2 * rows or np.isfinite(twist[first : last + 1, axis]).sum() < 2 * LEAST_ROWS:
             continue
         noise = difference_noise(twist[first : last + 1, axis])
-        clear = CLEAR * noise / np.sqrt(max(rows // 2, 1))
+        clear = CLEAR * noise / np.sqrt(measured_rows(twist[first : last + 1, axis], max(rows // 2, 1)))
         design, change, own = window_sums(record.t, record.voltage, twist, axis, first, last, drive, rows, clear)
         designs.append(design)
         changes.append(change)
@@ -129,12 +129,17 @@ def window_rows(t: FloatArray) -> int:
     return max(LEAST_ROWS, round(WINDOW / float(np.median(np.diff(t[: SAMPLE + 1])))))
 
 
+def measured_rows(v: FloatArray, rows: int) -> float:
+    """How many of so many rows hold a measurement, on average, and at least one: missing ones do not average noise."""
+    return max(rows * float(np.isfinite(v).mean()), 1.0)
+
+
 def difference_noise(v: FloatArray) -> float:
     """Standard deviation of the noise of a signal that moves slowly, from the differences of its neighbours.
 
     Their median is 0.954 sigma; where most are 0, the signal is quantised, and half of its step is taken.
     """
-    size = np.abs(np.diff(v))
+    size = np.abs(np.diff(v[np.isfinite(v)]))
     size = size[:: max(len(size) // SAMPLE, 1)]
     size = size[np.isfinite(size)]
     middle = float(np.median(size)) / 0.954 if size.size else 0.0
