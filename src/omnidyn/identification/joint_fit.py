@@ -121,7 +121,7 @@ class JointFit:
         found = Solution(state, solution.held[at], solution.iterations, solution.converged)
         own = replace(
             known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
-            free_step=known.free_step[at], neighbours=known.neighbours[columns],
+            unseen=known.unseen[at],             free_step=known.free_step[at], neighbours=known.neighbours[columns],
             directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
         )  # fmt: skip
         names = [self.engine.problem.names[k] for k in at]

@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator, Sequence
 from itertools import starmap
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +117,7 @@ def read_run(path: str | os.PathLike) -> Run:
     known = {channel: columns_of(channel, wheels) for channel in CHANNELS}
     table.check_names(["t_s"], [name for names in known.values() for name in names])
     refuse_other_units(table)
-    channels = {channel: _channel(table, channel, names) for channel, names in known.items()}
+    channels: dict[str, Any] = {channel: _channel(table, channel, names) for channel, names in known.items()}
     time = table.numbers("t_s")
     bad = np.flatnonzero(~(np.diff(time) > 0.0))
     if bad.size:

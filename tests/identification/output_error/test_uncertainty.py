@@ -10,7 +10,7 @@ from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.tangent import with_parameter
+from omnidyn.simulation.tangent import parameter, with_parameter
 from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
@@ -128,3 +128,52 @@ def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
     assert any("from run to run (25 runs)" in words for words in fit_output_error(runs, axebot, start="rest").warnings)
     assert abs(np.std(errors["auto"]) - 1.0) < 3.0 / np.sqrt(2.0 * 40)
     assert np.std(errors["white"]) > 1.6
+
+
+def test_a_number_with_a_small_share_of_a_lost_direction_is_lost_too(axebot, clean):
+    """Twist tells of K/R, and of K^2/R only with viscous friction: 1 % of K and R is worth 5 % of it or more."""
+    start = axebot
+    for key in (KT, "motor.emf_constant_Vs_rad"):
+        start = with_parameter(start, key, 0.95 * 0.0059)
+    resistance = "motor.resistance_ohm"
+    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, resistance], start="rest")
+    lost = {KT, resistance, *FRICTION[:3]}
+    assert set(fit.unidentifiable) == lost
+    assert all(np.isinf(fit.std[key]) for key in lost)
+    (words,) = fit.blind
+    assert all(key in words for key in lost)
+    known = fit_output_error(noisy(clean, 1), axebot, start="rest")
+    for key in FRICTION[3:]:  # as well known as where the other numbers are: no better
+        assert fit.value[key] == pytest.approx(known.value[key], abs=0.2 * known.std[key])
+        assert 0.95 * known.std[key] < fit.std[key] < 2.0 * known.std[key]
+    for key in lost:  # together they are right, so the robot has all of them
+        assert parameter(fit.robot, key) == fit.value[key]
+
+
+def test_what_lies_on_the_other_side_of_a_bound_is_lost_too(axebot, clean):
+    """With the torque constant too large, viscous friction stops at 0; that does not tell the constant."""
+    start = axebot
+    for key in (KT, "motor.emf_constant_Vs_rad"):
+        start = with_parameter(start, key, 1.3 * 0.0059)
+    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, "motor.resistance_ohm"], start="rest")
+    assert {KT, "motor.resistance_ohm"} <= set(fit.unidentifiable)
+
+
+def test_a_model_that_does_not_follow_the_log_is_said(axebot, clean):
+    log = noisy(clean, 1)
+    assert not any("does not follow" in words for words in fit_output_error(log, axebot, start="rest").warnings)
+    wrong = Run(t=log.t, voltage=log.voltage, twist=log.twist * [1.0, -1.0, 1.0])
+    fit = fit_output_error(wrong, axebot, start="rest")
+    assert any("the model does not follow twist[1]" in words for words in fit.warnings)
+    for key in fit.unidentifiable:
+        assert fit.value[key] == TRUTH[key]  # as the robot had it
+    backward = Run(t=log.t, voltage=-log.voltage, twist=log.twist)
+    with pytest.raises(InsufficientDataError, match=r"the robot moved, but with no value .* check signs, units"):
+        fit_output_error(backward, axebot, start="rest")
+
+
+def test_errors_that_remember_ask_for_no_nuisance(axebot, clean):
+    """The scatter of white noise is too small a measure: five of its standard errors are one or two of theirs."""
+    for seed in range(6):
+        fit = whole.fit_output_error(coloured(clean, seed), axebot, start="rest")
+        assert not any("would fit better" in words for words in fit.warnings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +14,19 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.breakaway import Breakaway
-from omnidyn.identification.output_error.nuisances import LATENCY, TILT
+from omnidyn.identification.output_error.nuisances import LATENCY, TILT, TRAVELS
 from omnidyn.identification.output_error.problem import Problem, per_column
 from omnidyn.identification.output_error.record import Record
 from omnidyn.identification.output_error.solver import Solution, Solver
+from omnidyn.identification.output_error.starts import difference_noise
 from omnidyn.identification.output_error.uncertainty import BLIND, SHARE, Trust
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
+LEAST_SHARE = 1e-4  # of a lost direction that a number lost with it must have to be named
+HALF, ROUGH = 0.5, 3.0  # of an output's spread, and times its noise from row to row: errors beyond are no noise
 SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted to Gaussian noise of std 1
 
 
@@ -37,12 +42,12 @@ def conclude(
     """
     problem, values = solver.problem, solution.state.point.values.copy()
     blind = tuple(p.name for p, b in zip(problem.parameters, known.blind, strict=True) if b)
+    unseen = tuple(p.name for p, none in zip(problem.parameters, known.unseen, strict=True) if none)
     own = problem.robot_count
+    missed = unexplained(solver, solution)
     if known.blind[:own].all():
-        raise InsufficientDataError(
-            "the logs say nothing about what is free", got=", ".join(p.name for p in problem.parameters[:own]),
-            expected="motion", remedy="drive the robot faster than its dead zone", where=records[0].source,
-        )  # fmt: skip
+        _refuse_blind([p.name for p in problem.parameters[:own]], missed, records[0].source)
+    values = np.where(known.unseen, [p.value for p in problem.parameters], values)  # they say nothing: as they were
     std, ci95 = intervals(problem, values, known)
     for name, (spread, interval) in (better or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
@@ -50,9 +55,9 @@ def conclude(
     own_levels = _levels(levels, ci95)
     names = [p.name for p in problem.parameters]
     fitted = problem.parameters[:own]
-    warnings = [*_warnings(solver, solution, known, records, blind), *more]
+    warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-        robot=_with_levels(_robot(problem, values, std, blind, data), own_levels),
+        robot=_with_levels(_robot(problem, values, std, unseen, data), own_levels),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
@@ -70,11 +75,59 @@ def conclude(
         },
         noise=noise_of(solver, solution),
         unidentifiable=blind,
-        blind=tuple(_direction(problem, value, way) for value, way in known.directions),
+        blind=tuple(_direction(problem, value, way, known.blind) for value, way in known.directions),
         covariance=known.kind,
         iterations=solution.iterations,
         converged=solution.converged,
     )
+
+
+def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
+    """Output -> share of its spread that the model leaves, where that is most of it and far from the noise of a row.
+
+    An output that hardly moves may be all noise; one that moves, and not as the model does, has a wrong sign or unit.
+    """
+    found = {}
+    noise = noise_of(solver, solution)
+    for c, column in enumerate(solver.problem.columns):
+        pieces = [
+            (piece, piece.record.columns.index(column)) for piece in solver.problem.pieces
+            if column in piece.record.columns
+        ]  # fmt: skip
+        parts = [piece.record.outputs[piece.first : piece.last + 1, k] for piece, k in pieces]
+        parts = [part[np.isfinite(part)] for part in parts]
+        parts = [part - part.mean() if column[0] in TRAVELS else part for part in parts if part.size]
+        left = noise.get(_column(column), 0.0)
+        spread = float(np.std(np.concatenate(parts))) if parts else 0.0
+        rough = max((difference_noise(part) for part in parts), default=0.0)
+        if left > max(HALF * spread, ROUGH * rough) and spread > ROUGH * rough and not solver.tick[c]:
+            found[_column(column)] = left / spread
+    return found
+
+
+def _not_followed(missed: Mapping[str, float]) -> list[str]:
+    if not missed:
+        return []
+    names = ", ".join(f"{name} (errors {100.0 * share:.0f} % of its spread)" for name, share in missed.items())
+    return [
+        f"the model does not follow {names}: a sign, a unit, the order of the wheels or the robot file is wrong; the "
+        "numbers and intervals of this fit mean nothing until it does"
+    ]
+
+
+def _refuse_blind(free: Sequence[str], missed: Mapping[str, float], where: str) -> NoReturn:
+    """Raises InsufficientDataError: either nothing moved, or nothing that the model does is like what did."""
+    if missed:
+        raise InsufficientDataError(
+            "the robot moved, but with no value of what is free does the model move like it",
+            got=f"{', '.join(missed)} that the voltages do not explain",
+            expected="a model that follows the log", where=where,
+            remedy="check signs, units and the order of the wheels, and the voltages (omnidyn check)",
+        )  # fmt: skip
+    raise InsufficientDataError(
+        "the logs say nothing about what is free", got=", ".join(free), expected="motion",
+        remedy="drive the robot faster than its dead zone", where=where,
+    )  # fmt: skip
 
 
 def noise_of(solver: Solver, solution: Solution) -> dict[str, float]:
@@ -117,11 +170,11 @@ def intervals(
     return std, ci95
 
 
-def _robot(problem: Problem, values: FloatArray, std: Mapping[str, float], blind: Sequence[str], data: str) -> Robot:
+def _robot(problem: Problem, values: FloatArray, std: Mapping[str, float], unseen: Sequence[str], data: str) -> Robot:
     """The robot with the fitted numbers, and where they come from."""
     robot, priors = problem.robot, dict(problem.robot.priors)
     for p, value in zip(problem.parameters[: problem.robot_count], values, strict=False):
-        if p.name in blind:
+        if p.name in unseen:
             continue
         robot = p.on(robot, float(value))
         whole = p.name.partition("[")[0]
@@ -200,9 +253,11 @@ def _warnings(
     return words
 
 
-def _direction(problem: Problem, value: float, way: FloatArray) -> str:
+def _direction(problem: Problem, value: float, way: FloatArray, lost: BoolArray) -> str:
     """A direction of the parameters in words: how many percent each moves where one moves by 1 %."""
-    parts = [f"{p.name} {share:+.2g} %" for p, share in zip(problem.parameters, way, strict=True) if abs(share) > SHARE]
+    least = np.where(lost & (value < BLIND), LEAST_SHARE, SHARE)
+    told = np.abs(way) > least
+    parts = [f"{p.name} {share:+.2g} %" for p, share, yes in zip(problem.parameters, way, told, strict=True) if yes]
     change = "leaves the outputs as they are" if value < BLIND else "hardly changes the outputs"
     return f"{' with '.join(parts)} {change}"
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from omnidyn.identification.output_error.nuisances import DEAD, GAIN, LATENCY
 from omnidyn.identification.output_error.problem import Point
-from omnidyn.identification.output_error.solver import Normal, Solution, Solver
+from omnidyn.identification.output_error.solver import Normal, Solution, Solver, State
+from omnidyn.identification.output_error.uncertainty import final_weighting
 
 LATENCY_STD = 0.02  # [s] beyond which a log says nothing of its latency
 DEAD_SHARE = 0.1  # the same for a dead band, of the largest voltage
@@ -35,24 +36,28 @@ def wanted(solver: Solver, solution: Solution, wider: Solver) -> list[str]:
     """What else would fit the logs better, in words, by score tests: `wider` has more nuisances than `solver`.
 
     For a number at its neutral value, with gradient s and variance v once all that was fitted follows it, s v is where
-    it would go, and s sqrt(v) how many standard errors that is.
+    it would go, and s sqrt(v) how many standard errors that is. Errors with a memory wander as such a number would: the
+    variance of s v is then its scatter over blocks of rows, where that is larger.
     """
     values = wider.problem.start().values.copy()
     for j, name in enumerate(wider.problem.names):
         k = solver.problem.where(name)
         if k >= 0:
             values[j] = solution.state.point.values[k]
-    state = wider.state(
-        Point(values, solution.state.point.states), solution.state.variance if wider.scaled.any() else None
-    )
-    normal = Normal(wider, state)
+    point, variance = Point(values, solution.state.point.states), solution.state.variance
+    state = wider.state(point, variance if wider.scaled.any() else None)
+    sums = wider.engine.sums(point, final_weighting(wider, variance))
+    normal = Normal(wider, State(point, sums, state.objective, variance))
+    scores = normal.scores()
     words, count = [], len(solver.problem.parameters)
     if wider.problem.names[:count] != solver.problem.names:
         return words
     for j in range(count, len(wider.problem.parameters)):
         chosen = [*range(count), j]
         covariance = np.linalg.pinv(normal.information[np.ix_(chosen, chosen)], hermitian=True)
-        step, spread = float(covariance[-1] @ normal.gradient[chosen]), float(np.sqrt(max(covariance[-1, -1], 0.0)))
+        step = float(covariance[-1] @ normal.gradient[chosen])
+        by_block = scores[:, chosen] @ covariance[-1]
+        spread = float(np.sqrt(max(covariance[-1, -1], float(by_block @ by_block), 0.0)))
         if spread > 0.0 and abs(step) > CLEAR * spread:
             parameter = wider.problem.parameters[j]
             value = parameter.outer(normal.inner[j] + step)

@@ -44,16 +44,17 @@ class Trust:
     """Covariance of the parameters in the numbers that the solver sees, and what is behind it.
 
     covariance (P, P): infinite variances where the data are blind. held: at a bound. blind: not determined by the data,
-    alone or only together with others. free_step (P,): from a bound to where the fit would go without it. kind: white
-    or sandwich. widening: largest ratio of the sandwich's std to the plain one. quantile: standard errors in half a
-    95 % interval. degrees: of freedom behind it. neighbours (columns,): correlation of successive residuals.
-    directions: blind or weak ones: (eigenvalue, relative change of each parameter). runs: that were the blocks, 0 where
-    these were shorter than a run.
+    alone or only together with others; unseen: not even together. free_step (P,): from a bound to where the fit would
+    go without it. kind: white or sandwich. widening: largest ratio of the sandwich's std to the plain one. quantile:
+    standard errors in half a 95 % interval. degrees: of freedom behind it. neighbours (columns,): correlation of
+    successive residuals. directions: blind or weak ones: (eigenvalue, relative change of each parameter). runs: that
+    were the blocks, 0 where these were shorter than a run.
     """
 
     covariance: FloatArray
     held: BoolArray
     blind: BoolArray
+    unseen: BoolArray
     free_step: FloatArray
     kind: str
     widening: float
@@ -70,14 +71,12 @@ class Trust:
 
 def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     """The covariance at a solution; `kind`: "white", "sandwich" or "auto"."""
-    rows = sum(piece.last - piece.first + 1 for piece in solver.problem.pieces)
     counted = bool(solver.tick.any())
-    weighting = Weighting(solution.state.variance, solver.nu, FINAL, max(LEAST_BLOCK, -(-rows // BLOCKS)), counted)
-    sums = solver.engine.sums(solution.state.point, weighting)
+    sums = solver.engine.sums(solution.state.point, final_weighting(solver, solution.state.variance))
     normal = Normal(solver, State(solution.state.point, sums, solution.state.objective, solution.state.variance))
     relative = _relative(solver, solution)
-    seen, directions = _seen(normal.information, normal.held, relative)
-    plain = _inverse(normal.information, seen)
+    seen, directions, lost = _seen(normal.information, relative)
+    plain = _inverse(normal.information, lost)
     runs = _runs(solver, sums)
     count = len(runs) if len(runs) >= MANY_RUNS else 0
     influence = normal.scores() @ plain  # what each block moves each parameter by
@@ -90,15 +89,22 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     degrees = _degrees(influence, seen) if kind == SANDWICH else _rows(solver, sums) - int(seen.sum())
     if len(influence) <= len(plain):
         kind, degrees = WHITE, _rows(solver, sums) - int(seen.sum())
-    least = _least(solver, solution, plain, seen)
+    least = _least(solver, solution, plain, lost)
     covariance = _at_least(wide, least) if kind == SANDWICH else least.copy()
     widening = float(np.sqrt(_ratio(np.maximum(np.diag(wide), np.diag(least)), np.diag(plain), seen)))
     covariance[~seen, ~seen] = np.inf
     return Trust(
-        covariance, normal.held, ~seen, _free_step(plain, normal), kind, widening,
+        covariance, normal.held, ~seen, np.diag(normal.information) <= 0.0, _free_step(plain, normal), kind, widening,
         float(stdtrit(degrees, TAIL) if degrees > 0 else ndtri(TAIL)), max(int(degrees), 0), neighbours, directions,
         count if kind == SANDWICH else 0,
     )  # fmt: skip
+
+
+def final_weighting(solver: Solver, variance: FloatArray) -> Weighting:
+    """A march that keeps the score of each block of rows. variance (columns,)."""
+    rows = sum(piece.last - piece.first + 1 for piece in solver.problem.pieces)
+    block = max(LEAST_BLOCK, -(-rows // BLOCKS))
+    return Weighting(variance, solver.nu, FINAL, block, bool(solver.tick.any()))
 
 
 def _rows(solver: Solver, sums: list[PieceSums]) -> int:
@@ -156,16 +162,23 @@ def _relative(solver: Solver, solution: Solution) -> FloatArray:
 
 
 def _seen(
-    information: FloatArray, held: BoolArray, relative: FloatArray
-) -> tuple[BoolArray, tuple[tuple[float, FloatArray], ...]]:
-    """Which parameters the data determine, and the directions that they hardly do, in relative changes, largest 1."""
+    information: FloatArray, relative: FloatArray
+) -> tuple[BoolArray, tuple[tuple[float, FloatArray], ...], FloatArray]:
+    """Which parameters the data determine; the directions that they hardly do, in relative changes, largest 1; and
+    those that they do not at all, with the diagonal of the information scaled to 1, shape (P, directions).
+
+    A parameter is lost with a direction that moves it further than all that the data see leaves open. That its share
+    of the direction is small says nothing: of a resistance, a torque constant and friction that only show together,
+    1 % of the first two goes with 30 % of the third.
+    """
     diagonal = np.diag(information)
     seen = diagonal > 0.0
-    chosen = np.flatnonzero(seen & ~held)
-    directions = []
+    chosen = np.flatnonzero(seen)  # those at a bound too: what is lost with them is lost on the other side
+    directions, lost = [], []
     if chosen.size:
         size = np.sqrt(diagonal[chosen])
         values, vectors = np.linalg.eigh(information[np.ix_(chosen, chosen)] / np.outer(size, size))
+        open_ = (vectors[:, values >= BLIND] ** 2 / values[values >= BLIND]).sum(axis=1)
         for value, vector in zip(values, vectors.T, strict=True):
             if value < WEAK:
                 way = np.zeros(len(diagonal))
@@ -173,20 +186,26 @@ def _seen(
                 way /= np.abs(way).max()
                 directions.append((float(value), way))
                 if value < BLIND:
-                    seen[np.abs(way) > SHARE] = False
-    return seen, tuple(directions)
+                    lost.append(np.zeros(len(diagonal)))
+                    lost[-1][chosen] = vector
+                    seen[chosen[vector**2 / BLIND > open_]] = False
+    return seen, tuple(directions), np.array(lost).reshape(-1, len(diagonal)).T
 
 
-def _inverse(information: FloatArray, seen: BoolArray) -> FloatArray:
-    """Inverse over what is seen, 0 elsewhere."""
+def _inverse(information: FloatArray, lost: FloatArray) -> FloatArray:
+    """Inverse without the directions that are lost, (P, directions), the diagonal scaled to 1; 0 where that is 0.
+
+    What a lost direction does not move keeps the variance that it has beside all others, not the one that it would have
+    if these were known.
+    """
     inverse = np.zeros_like(information)
-    if seen.any():
-        chosen = np.ix_(seen, seen)
-        part = information[chosen]
-        size = np.sqrt(np.diag(part))
-        inverse[chosen] = np.linalg.pinv(part / np.outer(size, size), rcond=1e-14, hermitian=True) / np.outer(
-            size, size
-        )
+    there = np.diag(information) > 0.0
+    if there.any():
+        chosen = np.ix_(there, there)
+        size = np.sqrt(np.diag(information)[there])
+        left = np.eye(len(size)) - lost[there] @ lost[there].T
+        part = left @ (information[chosen] / np.outer(size, size)) @ left
+        inverse[chosen] = left @ np.linalg.pinv(part, rcond=1e-14, hermitian=True) @ left / np.outer(size, size)
     return inverse
 
 
@@ -197,12 +216,12 @@ def _ratio(wide: FloatArray, plain: FloatArray, seen: BoolArray) -> float:
     return float((wide[seen] / np.maximum(plain[seen], 1e-300)).max())
 
 
-def _least(solver: Solver, solution: Solution, plain: FloatArray, seen: BoolArray) -> FloatArray:
+def _least(solver: Solver, solution: Solution, plain: FloatArray, lost: FloatArray) -> FloatArray:
     """The least covariance: the plain one, or what rounding alone makes of counts that show no noise."""
     if not silent(solver, solution).any():
         return plain
     information, scatter = rounding_scatter(solver, solution)
-    inverse = _inverse(information, seen)
+    inverse = _inverse(information, lost)
     return inverse @ scatter @ inverse
 
 
