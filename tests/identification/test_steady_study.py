@@ -57,6 +57,16 @@ def test_the_true_shape_is_chosen_and_its_intervals_hold_the_truth(shape):
     assert np.mean(held) >= 0.6
 
 
+def test_wheels_at_rest_do_not_decide_the_shape():
+    """Draws of the benchmark in which squared errors told a level per wheel, and a disc, from one level for all."""
+    rng, chosen = np.random.default_rng(0), []
+    for number in range(173):
+        runs = [spoiled(run, rng) for run in clean("wheel")]
+        if number in (51, 53, 172):
+            chosen.append(identify_steady(runs, AXEBOT).choice.chosen)
+    assert chosen == ["wheel"] * 3
+
+
 def test_a_disc_is_told_from_a_box_in_words():
     study = identify_steady(noisy("disc"), AXEBOT)
     box = next(score for score in study.choice.scores if score.name == "box")

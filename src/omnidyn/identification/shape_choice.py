@@ -5,10 +5,15 @@ squared errors at the same points, so what all shapes share drops out; its stand
 directions err alike. Of the shapes that cannot be told from the best (within two standard errors of the difference, and
 of the best's own error), the one with the fewest levels is taken, much as with the one-standard-error rule of Breiman
 et al., Classification and Regression Trees (1984), section 3.4.3.
+
+What decides is robust where the fits are: beyond two scales of the shape that has the least, an error counts by its
+length (Huber's loss), not by its square. A wheel at rest holds any force up to its level, which no shape foretells: by
+squares, the four directions of 24 in which a wheel of the axebot rests decide alone, and the others hardly count.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -17,7 +22,15 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.operating import ForcePoints
-from omnidyn.identification.shape_fit import ShapeFit, fit_shape, is_turning, mean_error, rms_and_error
+from omnidyn.identification.shape_fit import (
+    HUBER,
+    RAYLEIGH,
+    ShapeFit,
+    fit_shape,
+    is_turning,
+    mean_error,
+    rms_and_error,
+)
 from omnidyn.identification.shapes import SHAPES, VISCOUS
 from omnidyn.model.robot import Robot
 
@@ -34,7 +47,8 @@ class ShapeScore:
 
     levels: how many numbers it has, per group. loo, loo_std: left-out error of the full force vector and its standard
     error. along, along_std: the same along travel. behind, behind_std: how much more than the best shape, and the
-    standard error of that difference. told_apart: whether the data tell it from the best. in_model: whether a robot
+    standard error of that difference. apart: the same in standard errors, by what decides. told_apart: whether the data
+    tell it from the best. in_model: whether a robot
     file can hold it. at_bound: a level came out negative, so it adds nothing real.
     """
 
@@ -47,6 +61,7 @@ class ShapeScore:
     along_std: float
     behind: float
     behind_std: float
+    apart: float
     told_apart: bool
     in_model: bool
     at_bound: bool
@@ -54,7 +69,10 @@ class ShapeScore:
 
 @dataclass(frozen=True, eq=False)
 class ShapeChoice:
-    """The scores, best first; the name of the chosen shape; fits: shape -> group -> fit; missing: shape -> why not."""
+    """The scores, best first by what decides; the name of the chosen shape.
+
+    fits: shape -> group -> fit; missing: shape -> why not.
+    """
 
     scores: tuple[ShapeScore, ...]
     chosen: str
@@ -97,8 +115,9 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
             got=f"{len(points)} points: {missing.get(shape, 'too few')}",
             expected="steady runs in six directions or more", remedy="drive in more directions, each at a held speed",
         )  # fmt: skip
-    scores = _scores(fits)
-    return ShapeChoice(scores, shape if shape != AUTO else _choice(scores, missing), fits, missing)
+    judge = _Judge(fits, robust)
+    scores = _scores(fits, judge)
+    return ShapeChoice(scores, shape if shape != AUTO else _choice(scores, judge), fits, missing)
 
 
 def _refuse_lost_signs(points: ForcePoints) -> None:
@@ -119,31 +138,53 @@ def speeds_differ(points: ForcePoints) -> bool:
     return bool(speed.size > 1 and np.quantile(speed, 0.9) > SPEED_RATIO * np.quantile(speed, 0.1))
 
 
-def _scores(fits: Mapping[str, Mapping[str, ShapeFit]]) -> tuple[ShapeScore, ...]:
-    squares = {name: _joined([(fit.error**2).sum(axis=1) for fit in own.values()]) for name, own in fits.items()}
+class _Judge:
+    """What decides between shapes. squares: shape -> squared left-out errors; fold: of each point."""
+
+    def __init__(self, fits: Mapping[str, Mapping[str, ShapeFit]], robust: bool):
+        self.squares = {
+            name: _joined([(fit.error**2).sum(axis=1) for fit in own.values()]) for name, own in fits.items()
+        }
+        self.fold = _folds(next(iter(fits.values())).values())
+        self._loss = _capped(self.squares) if robust else self.squares
+
+    @property
+    def order(self) -> list[str]:
+        """The shapes, best first."""
+        return sorted(self._loss, key=lambda name: float(np.mean(self._loss[name])))
+
+    def apart(self, name: str, best: str) -> float:
+        """How much worse than the best, in standard errors: of the difference or of the best's own, the smaller."""
+        behind, error = _difference(self._loss[name], self._loss[best], self.fold)
+        error = min(error, rms_and_error(self._loss[best], self.fold)[1])
+        if not behind or math.isnan(error):
+            return 0.0
+        return behind / error if error > 0.0 else math.copysign(math.inf, behind)
+
+
+def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], judge: _Judge) -> tuple[ShapeScore, ...]:
     along = {name: _joined([fit.along_error**2 for fit in own.values()]) for name, own in fits.items()}
-    fold = _folds(next(iter(fits.values())).values())
-    order = sorted(fits, key=lambda name: float(np.mean(squares[name])))
-    best = order[0]
+    squares, fold, order = judge.squares, judge.fold, judge.order
     found = []
     for name in order:
-        loo, loo_std = rms_and_error(squares[name], fold)
-        near, near_std = rms_and_error(along[name], fold)
-        behind, behind_std = _difference(squares[name], squares[best], fold)
+        apart = judge.apart(name, order[0])
         own = list(fits[name].values())
         found.append(
             ShapeScore(
-                name, SHAPES[name].words, len(own[0].keys), loo, loo_std, near, near_std, behind, behind_std,
-                _apart(behind, behind_std, found[0].loo_std if found else 0.0), SHAPES[name].in_model,
-                any((fit.free <= 0.0).any() for fit in own),
+                name, SHAPES[name].words, len(own[0].keys), *rms_and_error(squares[name], fold),
+                *rms_and_error(along[name], fold), *_difference(squares[name], squares[order[0]], fold), apart,
+                apart > APART, SHAPES[name].in_model, any((fit.free <= 0.0).any() for fit in own),
             )
         )  # fmt: skip
     return tuple(found)
 
 
-def _apart(behind: float, behind_std: float, best_std: float) -> bool:
-    """Whether a shape is told from the best: by the difference, or by being beyond the best's own uncertainty."""
-    return bool(behind > APART * min(behind_std, best_std))
+def _capped(squares: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Huber's loss of squared lengths: l^2 up to k, then 2 k l - k^2, k two scales of the shape that has the least."""
+    limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(each) for each in squares.values())))
+    return {
+        name: np.where(each <= limit**2, each, 2.0 * limit * np.sqrt(each) - limit**2) for name, each in squares.items()
+    }
 
 
 def _difference(first: FloatArray, second: FloatArray, fold: NDArray[np.int64]) -> tuple[float, float]:
@@ -167,7 +208,7 @@ def _folds(fits) -> NDArray[np.int64]:
     return np.concatenate(found)
 
 
-def _choice(scores: Sequence[ShapeScore], missing: Mapping[str, str]) -> str:
+def _choice(scores: Sequence[ShapeScore], judge: _Judge) -> str:
     """The simplest shape that a robot file can hold and that the data cannot tell from the best of those."""
     able = [score for score in scores if score.in_model and not score.at_bound]
     if not able:
@@ -176,11 +217,7 @@ def _choice(scores: Sequence[ShapeScore], missing: Mapping[str, str]) -> str:
             got=", ".join(score.name for score in scores), expected="forces that point along the motion",
             remedy="check the sign of the currents, and which wheel is which",
         )  # fmt: skip
-    leader = able[0]
-    equal = [
-        score for score in able
-        if score is leader or not _apart(score.behind - leader.behind, score.behind_std, leader.loo_std)
-    ]  # fmt: skip
+    equal = [score for score in able if judge.apart(score.name, able[0].name) <= APART]
     return min(equal, key=lambda score: (score.levels, score.loo)).name
 
 

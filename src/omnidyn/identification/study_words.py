@@ -166,7 +166,7 @@ def advice(
         found.append("drive at speeds a factor of three apart: that shows, or bounds, viscous friction")
     elif not all(level.seen for levels in viscous.values() for level in levels):
         found.append("drive much faster than now: the viscous part grows with speed, the rest does not")
-    tie = next((s for s in choice.scores[1:] if not s.told_apart and s.behind > 0.0), None)
+    tie = next((s for s in choice.scores[1:] if not s.told_apart and s.apart > 0.0), None)
     if tie is not None:
         found.append(_more_directions(choice.scores[0], tie))
     if force_from == CURRENT:
@@ -175,6 +175,6 @@ def advice(
 
 
 def _more_directions(best: ShapeScore, tie: ShapeScore) -> str:
-    factor = (APART * tie.behind_std / tie.behind) ** 2
+    factor = (APART / tie.apart) ** 2
     amount = f"about {np.ceil(factor):.0f} times as many runs" if factor < 50.0 else "far more runs than is practical"
     return f"to tell {tie.name} from {best.name}: {amount}, in other directions"
