@@ -34,7 +34,7 @@ from omnidyn.identification.output_error.fit import (
     loss_words,
     nuisance_names,
 )
-from omnidyn.identification.output_error.loop import beyond_jumps, looped
+from omnidyn.identification.output_error.loop import beyond_jumps, looped, retimed
 from omnidyn.identification.output_error.nuisances import AUTO
 from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.identification.output_error.resampling import (
@@ -82,7 +82,10 @@ class JointFit:
         members = self.engine.members
         if not all(fits_exactly(member.part.problem) for member in members):  # first a step a row
             coarse = join([m.part for m in members], self.own, tol=None)
-            start = Solver(coarse.problem, coarse, self.solver.nu).minimise(start).state.point
+            first = Solver(coarse.problem, coarse, self.solver.nu)
+            start = first.minimise(start).state.point
+            if looped(members[0].part.records):
+                start = first.minimise(retimed(first, start)).state.point
         found = self.solver.minimise(start, watch=watch)
         return beyond_jumps(self.solver, found, watch) if looped(members[0].part.records) else found
 

@@ -163,6 +163,18 @@ def test_two_floors_share_the_gains(looped):
     assert abs(change.difference - 0.66) < 4.5 * change.std
 
 
+def test_groups_find_the_latency_of_currents_behind_a_slow_loop(looped):
+    """No descent crosses a tick of 20 ms: each group alone tries one after the other, and so must all together."""
+    slow = looped.replace(drive=looped.drive.replace(rate=50.0))
+    runs = [log(slow, seed, late=23) for seed in (1, 2)]
+    for own in ((), ("friction", "latency.current")):
+        found = identify_groups(runs, slow, ["a", "b"], per_free=own, nuisances=("latency",))
+        for estimate in found.estimates.values():
+            late = estimate.nuisances["latency.current"]
+            assert abs(late.value - 0.023) < max(4.5 * late.std, 5e-4)
+            assert late.std < 1e-3
+
+
 def test_a_voltage_beside_the_set_speeds_is_the_input_unless_a_gain_is_asked_for(looped):
     command = twists(9, 300)
     clean = simulate(looped, dt=0.01, twist_command=command[:-1])

@@ -159,7 +159,7 @@ def solve_loop(
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
     first = Solver(problem, LoopEngine(problem), nu)
     coarse = first.minimise(loop_start(problem, nu), FEW, watch)
-    coarse = first.minimise(retimed(problem, coarse.state.point, nu), watch=watch)
+    coarse = first.minimise(retimed(first, coarse.state.point), watch=watch)
     fine = Solver(problem, LoopEngine(problem, FINE), nu)
     return fine, beyond_jumps(fine, fine.minimise(coarse.state.point, watch=watch), watch)
 
@@ -171,25 +171,28 @@ def loop_start(problem: Problem, nu: float) -> Point:
     return Point(found.values, problem.start().states)
 
 
-def retimed(problem: Problem, point: Point, nu: float) -> Point:
+def retimed(solver: Solver, point: Point) -> Point:
     """The point with the best latency of the currents, of one in the middle of each period of the loop.
 
-    A current jumps at every tick: no descent gets a latency across one.
+    A current jumps at every tick: no descent gets a latency across one. Groups may have one each: KEY@GROUP.
     """
+    problem, nu = solver.problem, solver.nu
     period = 1.0 / (problem.robot.drive.rate or np.inf)
-    own = [j for j, p in enumerate(problem.parameters) if p.name == CURRENTS]
+    own = [j for j, p in enumerate(problem.parameters) if p.name.partition("@")[0] == CURRENTS]
     short = shortened(problem, SETTING_OFF)
     row = min(float(np.median(np.diff(p.record.t[p.first : p.last + 1]))) for p in short.pieces)
     if not own or period < SLOW_LOOP * row:
         return point
-    now = float(point.values[own[0]])
-    middles = (np.floor(now / period) + 0.5 + np.arange(-AROUND, AROUND + 1)) * period
-    solver, states = Solver(short, LoopEngine(short), nu), []
-    for late in (now, *middles[(middles > EARLIEST) & (middles < LATEST)]):
-        values = point.values.copy()
-        values[own] = late
-        states.append(solver.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
-    return min(states, key=lambda state: state.objective).point
+    trial = Solver(short, solver.engine.on(short), nu)
+    for j in own:
+        now, states = float(point.values[j]), []
+        middles = (np.floor(now / period) + 0.5 + np.arange(-AROUND, AROUND + 1)) * period
+        for late in (now, *middles[(middles > EARLIEST) & (middles < LATEST)]):
+            values = point.values.copy()
+            values[j] = late
+            states.append(trial.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
+        point = min(states, key=lambda state: state.objective).point
+    return point
 
 
 def shortened(problem: Problem, rows: int) -> Problem:

@@ -78,7 +78,7 @@ class Solver:
         self.tick = problem.tick if counted else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
         # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross.
-        self._jumps = np.array([p.name == "latency.current" for p in problem.parameters], bool)
+        self._jumps = np.array([p.name.partition("@")[0] == "latency.current" for p in problem.parameters], bool)
         self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
         self._high = np.array([p.inner(p.high) for p in problem.parameters])
 
