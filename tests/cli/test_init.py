@@ -181,6 +181,38 @@ def test_a_log_shows_where_the_wheels_stand(call, here, gear):
     )
 
 
+def test_the_columns_of_a_log_can_be_named(call, here):
+    """What check accepts, init does: wheels named by their place, a clock without a unit, speeds in rpm."""
+    rng = np.random.default_rng(4)
+    twist = rng.normal(size=(50, 3)) * 0.2
+    phi = np.radians([60.0, 180.0, 300.0])
+    rim = np.outer(twist[:, 0], -np.sin(phi)) + np.outer(twist[:, 1], np.cos(phi)) + 0.125 * twist[:, 2:]
+    rows = np.column_stack([np.arange(50) * 500.0, twist, rim / 0.04 * 30.0 / np.pi])
+    head = "count,vx,vy,omega,left,back,right"
+    np.savetxt(here / "log.csv", rows, delimiter=",", header=head, comments="")
+    given = ("init", "bot", "--log", "log.csv", "--wheel-radius", "0.04", "--mass", "8")
+    assert call(*given)[0] == 3
+    named = [f"--column=w{k + 1}={name}:rpm" for k, name in enumerate(("left", "back", "right"))]
+    code, out, err = call(*given, *named, "--column=t=count:ms")
+    assert (code, out) == (0, "bot.toml\n")
+    assert "omnidyn:   wheel_speed: w1 <- left [rpm], w2 <- back [rpm], w3 <- right [rpm]" in err
+    np.testing.assert_allclose(load_robot(here / "bot.toml").wheels.azimuth_deg, (60.0, 180.0, 300.0), atol=0.01)
+    code, _, err = call("init", "bot2", *MINI, "--column", "w1=left")
+    assert (code, "are for --log" in err) == (2, True)
+
+
+def test_a_log_that_does_not_tell_of_turning_says_so(call, here):
+    twist = np.random.default_rng(4).normal(size=(50, 3)) * [0.2, 0.2, 3.0]
+    phi = np.radians([60.0, 180.0, 300.0])
+    rim = np.outer(twist[:, 0], -np.sin(phi)) + np.outer(twist[:, 1], np.cos(phi)) + 0.125 * twist[:, 2:]
+    twist[:, 2] = np.nan
+    write_run(Run(t=np.arange(50) * 0.01, twist=twist, wheel_speed=rim / 0.04), here / "log.csv")
+    code, _, err = call("init", "bot", "--log", "log.csv", "--wheel-radius", "0.04", "--mass", "8")
+    assert code == 3
+    assert "a turn rate is not in the logs, or 0" in err
+    assert "--column omega=NAME:UNIT" in err
+
+
 def test_radii_in_millimetres_are_noticed(call):
     _, _, err = call("init", "mini", *MINI[:-6], "--wheel-radius", "4", "--robot-radius", "0.125", "--mass", "8")
     assert "omnidyn: warning: a wheel is larger than the robot; are both radii in metres?" in err

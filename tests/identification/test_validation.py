@@ -48,6 +48,17 @@ def test_a_held_out_log_is_compared_as_it_was_fitted(fit):
     assert "held-out logs are predicted as well as the noise allows" in found.summary()
 
 
+def test_what_lasts_is_not_called_small(fit):
+    """A motor twice as weak as the robot file says: the fit takes its errors for noise, the words do not."""
+    weak = with_parameter(AXEBOT, "motor.resistance_ohm", 2.0 * AXEBOT.motor.resistance)
+    log = noisy(simulate(weak, excitation(20.0), 0.01), 1)
+    wrong = fit_output_error(log, AXEBOT, nuisances=())
+    (words,) = validate(wrong, [log], [log]).statements()
+    assert "no larger than on the fitted ones" in words
+    assert "most of them is no noise" in words
+    assert "small" not in words
+
+
 def test_another_floor_is_seen(fit):
     rough = with_parameter(AXEBOT, "friction.axes.coulomb[0]", 3.0)
     plain = fit_output_error(noisy(simulate(AXEBOT, excitation(20.0), 0.01), 1), AXEBOT, nuisances=())

@@ -14,7 +14,7 @@ def identify(
     ),
     robot: str = typer.Option("", metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
     method: str = typer.Option("", help="output-error (whole logs; the default) or steady-state (the paper's)."),
-    free: list[str] = typer.Option([], metavar="KEY", help="Fit this; friction is all six. Repeatable."),
+    free: list[str] = typer.Option([], metavar="KEY", help="Fit this; friction is all of it. Repeatable."),
     fix: list[str] = typer.Option([], metavar="KEY", help="Leave this as the robot file has it. Repeatable."),
     nuisance: list[str] = typer.Option(
         [],

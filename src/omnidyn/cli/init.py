@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from omnidyn.cli import log_options as logs
 from omnidyn.cli.streams import say, show, show_json
 
 if TYPE_CHECKING:
     from omnidyn.identification.geometry import Geometry
+    from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
     from omnidyn.model.wheels import Wheels
 
@@ -54,6 +56,10 @@ def init(
     ),
     mecanum: bool = typer.Option(False, "--mecanum", help="Four mecanum wheels, in an X seen from above."),
     friction: str = typer.Option("", help="Where the guessed friction acts: direction (default) or axes."),
+    map_file: str = logs.MAP,
+    column: list[str] = logs.COLUMN,
+    assume: list[str] = logs.ASSUME,
+    no_header: bool = logs.NO_HEADER,
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File to write instead; - is stdout."),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="What was written and guessed, for machines."),
@@ -72,7 +78,10 @@ def init(
     path = _checked_path(name, out, force)
     preset = _preset(like)
     told = {key for key, value in given.items() if value is not None}
-    seen = _from_logs(given, log) if log else None
+    if not log and (map_file or column or assume or no_header):
+        raise typer.BadParameter("--map, --column, --assume and --no-header are for --log.")
+    options = logs.log_options(map_file, column, assume, no_header=no_header)
+    seen = _from_logs(given, log, options) if log else None
     from_logs = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
     answers = _complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
     robot = _as_seen(_robot(name, answers, preset, mecanum, friction), seen, from_logs)
@@ -94,13 +103,15 @@ def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str
         raise typer.BadParameter("-o - and --json both want stdout.")
 
 
-def _from_logs(given: dict[str, Any], logs: list[str]) -> Geometry:
+def _from_logs(given: dict[str, Any], log: list[str], options: LogOptions) -> Geometry:
     """Azimuths, and the radius of the robot where it turned, from logs; what is given on the command line stays."""
-    from omnidyn.cli.log_options import log_files
     from omnidyn.identification.geometry import wheel_geometry
-    from omnidyn.logs.read_log import read_log
 
-    seen = wheel_geometry([read_log(path) for path in log_files(logs)])
+    runs, maps = [], logs.Maps()
+    for path, each in logs.load_logs(logs.log_files(log), None, options):
+        maps.show(path, each.columns)
+        runs.append(each.to_run())
+    seen = wheel_geometry(runs)
     azimuth = [round(angle, 2) for angle in seen.azimuth_deg]
     say(f"omnidyn: wheels at {_words(tuple(azimuth))} degrees, from {seen.source} ({seen.residual:.1%} unexplained)")
     if given["azimuth"] is None and given["wheels"] in (None, len(azimuth)):
@@ -108,6 +119,8 @@ def _from_logs(given: dict[str, Any], logs: list[str]) -> Geometry:
     if given["robot_radius"] is None and seen.robot_radius is not None and seen.robot_radius > 0.0:
         given["robot_radius"] = round(seen.robot_radius, 4)
         say(f"omnidyn: centre to wheel {given['robot_radius']:g} m")
+    elif given["robot_radius"] is None:
+        say("omnidyn: the logs do not turn, or hold no turn rate: the distance from centre to wheel is not in them")
     return seen
 
 

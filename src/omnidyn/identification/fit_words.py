@@ -20,8 +20,12 @@ VERDICT_HEAD = ("log", "rows", "length s", "rate Hz", "fatal", "to heed", "what"
 MOTOR_HEAD = ("motor", "dead band fitted", "slope", "+-", "dead band", "95 % interval", "lag ms", "unit", "rmse rad/s",
               "held out rad/s")  # fmt: skip
 WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
+LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
 SHOWN = 6
+# Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
+GOES_WITH_TORQUE = ("motor.emf_constant_Vs_rad", "motor.gear_ratio")
+FREEABLE = ("motor.torque_constant_Nm_A", "motor.resistance_ohm", "body.inertia_kg_m2")
 
 
 def number_rows(fit: OutputErrorEstimate) -> list[tuple[str, ...]]:
@@ -84,10 +88,16 @@ def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]
 
 def verdict_advice(verdicts: Sequence[Verdict]) -> list[str]:
     """What to mend in logs of which `check` says that they give wrong results as they stand."""
+    alike: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for each in verdicts:
+        for finding in each.findings:
+            if finding.level == FATAL:
+                remedy = finding.remedy or "see omnidyn check"
+                alike.setdefault((finding.code, remedy), []).append((each.source, finding.message))
     return [
-        f"{each.source}: {finding.message}: {finding.remedy or 'see omnidyn check'}"
-        for each in verdicts for finding in each.findings if finding.level == FATAL
-    ]  # fmt: skip
+        f"{found[0][0]}{f' and {len(found) - 1} more' if len(found) > 1 else ''}: {found[0][1]}: {remedy}"
+        for (_, remedy), found in alike.items()
+    ]
 
 
 def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
@@ -112,34 +122,44 @@ def _guesses(fit: OutputErrorEstimate, validation: Validation | None) -> Iterato
         key for key, prior in fit.robot.priors.items()
         if prior.source == GUESS and key not in fit.value and key.startswith(("motor.", "body."))
     ]  # fmt: skip
+    if FREEABLE[0] in fit.value:
+        guessed = [key for key in guessed if key not in GOES_WITH_TORQUE]
     missed = validation is not None and bool(coloured(validation.scores.get(HELD_OUT) or validation.scores[FITTED]))
     if guessed and missed:
+        free = " ".join(f"--free {key}" for key in FREEABLE if key in guessed)
+        are = "is a guess" if len(guessed) == 1 else "are guesses"
         yield (
-            f"{', '.join(guessed)} are guesses of the robot file, and the errors are not white: put in what you can "
-            f"measure, or fit one of them too (--free friction --free {guessed[0]})"
+            f"{', '.join(guessed)} {are} of the robot file, and the errors are not white: put in what you can "
+            f"measure{f', or fit what shows in the logs (--free friction {free})' if free else ''}"
         )
 
 
 def _together(fit: OutputErrorEstimate) -> Iterator[str]:
     names, matrix = fit.correlation.names, fit.correlation.matrix
-    for i, first in enumerate(names):
-        for j in range(i + 1, len(names)):
-            if abs(matrix[i, j]) > TOGETHER and not {first, names[j]} & set(fit.unidentifiable):
-                yield (
-                    f"{first} and {names[j]} move together (correlation {matrix[i, j]:+.2f}): measure one of them "
-                    "otherwise, or drive at more different speeds"
-                )
+    pairs = [
+        f"{first} and {names[j]} move together (correlation {matrix[i, j]:+.2f})"
+        for i, first in enumerate(names) for j in range(i + 1, len(names))
+        if abs(matrix[i, j]) > TOGETHER and not {first, names[j]} & set(fit.unidentifiable)
+    ]  # fmt: skip
+    if pairs:
+        one = "one of them" if len(pairs) == 1 else "one of each pair"
+        yield f"{', '.join(pairs)}: measure {one} otherwise, or drive at more different speeds"
 
 
 def _wide(fit: Estimate) -> Iterator[str]:
-    for name, value in fit.value.items():
-        told = value and math.isfinite(fit.std[name]) and name not in fit.at_bound
-        share = fit.std[name] / abs(value) if told else 0.0
-        if share > WIDE:
-            yield (
-                f"{name} is known within {100.0 * share:.0f} % only: a log {(share / GOAL) ** 2:.0f} times as long "
-                f"would bring it to {100.0 * GOAL:.0f} %; more motion where it matters would do so sooner"
-            )
+    shares = {
+        name: fit.std[name] / abs(value) for name, value in fit.value.items()
+        if value and math.isfinite(fit.std[name]) and name not in fit.at_bound
+    }  # fmt: skip
+    wide = {name: share for name, share in shares.items() if share > WIDE}
+    if wide:
+        known = ", ".join(f"{name} is known within {100.0 * share:.0f} % only" for name, share in wide.items())
+        longer = (max(wide.values()) / GOAL) ** 2
+        enough = f"a log {longer:.0f} times as long" if longer <= LONGEST else "no log of a usual length"
+        yield (
+            f"{known}: {enough} would bring {'it' if len(wide) == 1 else 'all of them'} to {100.0 * GOAL:.0f} %; more "
+            "motion where it matters would do so sooner"
+        )
 
 
 def _from_validation(fit: OutputErrorEstimate, validation: Validation | None) -> Iterator[str]:

@@ -58,7 +58,8 @@ def wheel_geometry(runs: Sequence[Run]) -> Geometry:
             return _fit(twist, speed, f"{body} and {wheels}")
     raise InputError(
         "cannot tell where the wheels stand", got=", ".join(runs[0].channels) if runs else "no log",
-        expected="twist_command and wheel_speed_command, or twist and wheel_speed", remedy="give --azimuth",
+        expected="twist_command and wheel_speed_command, or twist and wheel_speed, all components of them",
+        remedy="say which columns they are (--column w1=NAME), or give --azimuth",
     )  # fmt: skip
 
 
@@ -86,7 +87,8 @@ def _fit(twist: FloatArray, speed: FloatArray, source: str) -> Geometry:
         raise InputError(
             "the wheels do not follow the body as omni wheels do",
             got=f"{residual:.0%} of the wheel speeds unexplained", expected=f"at most {MAX_RESIDUAL:.0%}",
-            remedy="check the columns with omnidyn check, or give --azimuth",
+            remedy="check the columns with omnidyn check, or give --azimuth" if turned else "a turn rate is not in the "
+            "logs, or 0: where the robot turned say which column it is (--column omega=NAME:UNIT)",
         )  # fmt: skip
     scale = np.hypot(rows[0], rows[1])
     if (scale == 0.0).any():

@@ -20,6 +20,7 @@ STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
 HEAD = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
 FITTED, HELD_OUT = "fitted", "held out"
 POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
+LASTING = 2.0  # errors over their scatter from row to row, beyond which most of them is no noise
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
 TO_STD = 1.4826  # median size to standard deviation, for Gaussian noise
@@ -80,13 +81,30 @@ class Validation:
             )
             return
         names = coloured(found)
-        if names:
+        shares = {name: self._lasting(name) for name in names}
+        if (worst := max(shares.values(), default=0.0)) > LASTING:
+            lasting = [name for name, share in shares.items() if share > LASTING]
+            yield (
+                f"on held-out logs the errors of {', '.join(lasting)} are no larger than on the fitted ones, but up to "
+                f"{worst:.2g} times what they scatter by from row to row: most of them is no noise, the model misses "
+                "that much"
+            )
+        elif names:
             yield (
                 f"on held-out logs the errors of {', '.join(names)} are no larger than noise, but not white: the "
                 "model misses something small that lasts"
             )
         else:
             yield "held-out logs are predicted as well as the noise allows"
+
+    def _lasting(self, name: str) -> float:
+        """Errors on held-out logs over what white noise, which differs from row to row, makes of them."""
+        found = self.held_out
+        assert found is not None
+        errors = [found.trace(found.robots[0], name, segment).error for segment in found.segments]
+        steps = np.concatenate([np.diff(each) for each in errors])
+        scatter = float(np.sqrt(0.5 * np.nanmean(steps**2))) if np.isfinite(steps).any() else 0.0
+        return self.scores[HELD_OUT][name].rmse / scatter if scatter > 0.0 else 0.0
 
     def summary(self) -> str:
         """A plain table, for reading."""

@@ -16,6 +16,7 @@ LEVELS = (FATAL, WARN, NOTE)
 WORDS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
 MAX_SPANS = 20  # spans of rows that a finding keeps; it counts all
 SHOWN_SPANS = 4
+SECTORS = 12  # of directions of travel
 
 Span = tuple[int, int]
 
@@ -155,9 +156,20 @@ def _lines(finding: Finding) -> str:
 def _excited(excitation: Mapping[str, float], width: int) -> list[str]:
     if not excitation:
         return []
-    shown = {name: value for name, value in excitation.items() if not name.startswith(("forward_", "backward_"))}
-    words = "excites " + ", ".join(f"{name} {value:.3g}" for name, value in shown.items() if math.isfinite(value))
-    return textwrap.wrap(words, max(40, width), initial_indent="  ", subsequent_indent=" " * 9)
+    known = {name: value for name, value in excitation.items() if math.isfinite(value)}
+    parts = []
+    if "moving" in known:
+        parts.append(f"in motion for {100.0 * known['moving']:.0f} % of {known.get('time_s', math.nan):.3g} s")
+    for axis, unit in (("x", "m/s"), ("y", "m/s"), ("yaw", "rad/s")):
+        if axis in known:
+            parts.append(f"{axis} {known[axis]:.3g} {unit} rms, up to {known.get(f'{axis}_max', math.nan):.3g}")
+    if "turning" in known:
+        parts.append(f"turning in {100.0 * known['turning']:.0f} % of the motion")
+    if "directions" in known:
+        parts.append(f"directions {known['directions']:.0f} of {SECTORS}")
+    if "speeds" in known:
+        parts.append(f"speeds a factor of {known['speeds']:.2g} apart")
+    return textwrap.wrap("shows  " + "; ".join(parts), max(40, width), initial_indent="  ", subsequent_indent=" " * 9)
 
 
 def _finite(value: float) -> float | None:

@@ -1,6 +1,7 @@
 """Findings and verdicts as values: JSON, text, spans, merging."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -102,3 +103,9 @@ def test_no_log_makes_it_raise(log, robot):
     json.dumps(verdict.to_dict(), allow_nan=False)
     assert verdict.as_text().isascii()
     check_blocks((log.rows(slice(k, k + 37)) for k in range(0, len(log), 37)), robot)
+
+
+def test_what_a_log_shows_is_said_in_words(log, robot):
+    text = " ".join(check(log, robot).as_text(200).split())
+    assert re.search(r"shows in motion for \d+ % of 20 s; x [\d.]+ m/s rms, up to [\d.]+; y ", text)
+    assert re.search(r"yaw [\d.]+ rad/s rms, up to [\d.]+; turning in \d+ % of the motion; directions \d+ of 12;", text)

@@ -5,6 +5,7 @@ import pytest
 
 from omnidyn.logs.check import check, check_blocks
 from omnidyn.logs.log import Log
+from omnidyn.model.robot import Prior
 
 
 def test_saturation_and_its_share(log, robot, with_channels):
@@ -115,3 +116,14 @@ def test_a_fault_in_one_block_is_found_with_its_lines(log, robot, with_channels)
     (finding,) = check_blocks((broken.rows(slice(k, k + 500)) for k in range(0, len(log), 500)), robot).of("swapped")
     assert finding.where == "w1 w2"
     assert "blocks of the log" in finding.message
+
+
+def test_guesses_of_a_robot_file_are_no_evidence_against_a_log(log, robot):
+    """The back-EMF of a made-up motor is above the voltage: fatal for a data sheet, a hint for a guess."""
+    strong = robot.replace(motor=robot.motor.replace(emf_constant=2.0 * robot.motor.emf_constant))
+    (finding,) = check(log, strong).of("energy")
+    assert finding.level == "fatal"
+    guess = strong.replace(priors={"motor.emf_constant_Vs_rad": Prior(source="guess")})
+    (finding,) = check(log, guess).of("energy")
+    assert finding.level == "warn"
+    assert "motor.emf_constant_Vs_rad of the robot file is only guessed" in finding.remedy

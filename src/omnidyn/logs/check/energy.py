@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from omnidyn.logs.check.reference import ground, volts
 from omnidyn.logs.check.robust import white_noise
 from omnidyn.logs.check.work import MIN_ROWS, Work
-from omnidyn.logs.findings import FATAL, Finding
+from omnidyn.logs.findings import FATAL, WARN, Finding
 from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.motor import back_emf, settled_current, wheel_torque
 from omnidyn.model.robot import Robot
+from omnidyn.model.starter import GUESS
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 
 FloatArray = NDArray[np.float64]
@@ -24,6 +25,7 @@ MARGIN = 0.08  # of the power that turns with the back-EMF: K, R and the gear ar
 WINDOW = 0.4  # [s]
 MOVING = 0.2  # of the back-EMF that 95 % of the rows stay below: a robot at rest says nothing
 LEAST_SHARE = 0.02  # of the rows
+OF_BACK_EMF = ("motor.emf_constant_Vs_rad", "motor.gear_ratio", "wheels.wheel_radius_m")
 
 
 def check_energy(work: Work) -> tuple[list[Finding], Work]:
@@ -37,14 +39,26 @@ def check_energy(work: Work) -> tuple[list[Finding], Work]:
     if not bad.any() or bad.mean() < (0.0 if points else LEAST_SHARE):
         return [], work
     excess = _excess(robot, voltage[bad], speed[bad])
+    guessed = [key for key in OF_BACK_EMF if (prior := robot.priors.get(key)) and prior.source == GUESS]
     return [Finding(
-        "energy", FATAL, "",
+        "energy", WARN if guessed else FATAL, "",
         f"the motors would take up to {worst:.3g} W out of the robot while it does not slow down: the back-EMF is "
         f"{excess:.3g} times the voltage applied",
-        "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of "
-        "voltage "
-        "and speed", work.lines(bad), int(bad.sum()), {"worst_W": worst, "emf_over_voltage": excess},
+        _remedy(guessed), work.lines(bad), int(bad.sum()), {"worst_W": worst, "emf_over_voltage": excess},
     )], work  # fmt: skip
+
+
+def _remedy(guessed: list[str]) -> str:
+    """A robot file that only guesses its motors is no evidence against the log."""
+    if guessed:
+        return (
+            f"{', '.join(guessed)} of the robot file {'is' if len(guessed) == 1 else 'are'} only guessed: put in what "
+            "is known of the motors, or let omnidyn identify --free friction --free motor.torque_constant_Nm_A find it"
+        )
+    return (
+        "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of "
+        "voltage and speed"
+    )
 
 
 def _speed(work: Work) -> FloatArray | None:

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from omnidyn.logs.check.reference import ground, wheels_twist
 from omnidyn.logs.check.robust import smooth
 from omnidyn.logs.check.work import MIN_ROWS, Work
-from omnidyn.logs.findings import NOTE, Finding
+from omnidyn.logs.findings import NOTE, SECTORS, Finding
 from omnidyn.model.wheels import twist_from_wheel_speed
 
 FloatArray = NDArray[np.float64]
 AXES = ("x", "y", "yaw")
-SECTORS = 12
 HARDLY = 0.1  # of the motion along the axis that moves most
 SPEEDS = 2.0  # fastest over slowest motion, below which viscous and dry friction look alike
 
