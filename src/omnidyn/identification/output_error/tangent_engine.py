@@ -51,12 +51,6 @@ class TangentEngine:
         refuse_exact_only(problem.columns, problem.robot.name)
         self._known: dict[tuple[bytes, ...], list[Found]] = {}
 
-    def at_tolerance(self, tol: float | None) -> TangentEngine:
-        """The same engine with another tolerance."""
-        engine = self.on(self.problem)
-        engine.tol = tol
-        return engine
-
     def on(self, problem: Problem) -> TangentEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)

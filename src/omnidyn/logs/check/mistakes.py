@@ -22,8 +22,6 @@ UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file 
 TURN_UNITS = {"rpm read as rad/s": 60.0 / TURN, "deg/s read as rad/s": 1.0 / DEGREE,
               "turns/s read as rad/s": 1.0 / TURN, "rad/s read as rpm": TURN / 60.0,
               "rad/s read as deg/s": DEGREE}  # fmt: skip
-ANGLE_UNITS = {"deg read as rad": 1.0 / DEGREE, "turns read as rad": 1.0 / TURN, "rad read as deg": DEGREE}
-LENGTH_UNITS = {"mm read as m": 1e3, "cm read as m": 1e2, "m read as mm": 1e-3, "m read as cm": 1e-2}
 CURRENT_UNITS = {"mA read as A": 1e3, "A read as mA": 1e-3}
 TIME_UNITS = {"ms read as s": 1e3, "us read as s": 1e6, "ns read as s": 1e9, "s read as ms": 1e-3}
 

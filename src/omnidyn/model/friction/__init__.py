@@ -18,7 +18,7 @@ NONE = (0.0, 0.0, 0.0)
 
 
 class Friction(Value):
-    """All friction of a robot, by where it acts; what is absent is off."""
+    """All friction of a robot, by where it acts; what is absent is off. A field is all that a new law needs here."""
 
     axes: Annotated[AxesFriction, Field(description="on the body axes, eqs (4)-(6)")] = AxesFriction(
         viscous=NONE, coulomb=NONE
@@ -28,10 +28,10 @@ class Friction(Value):
 
     @property
     def laws(self) -> tuple[FrictionLaw, ...]:
-        """The parts, which add up."""
-        return self.axes, self.direction, self.wheels
+        """The parts, which add up: axes first."""
+        return tuple(getattr(self, name) for name in type(self).model_fields)
 
     @property
     def only_axes(self) -> bool:
         """Whether all friction acts on the body axes, as in the paper."""
-        return self.direction == DirectionFriction() and self.wheels == WheelFriction()
+        return all(law == type(law)() for law in self.laws[1:])
