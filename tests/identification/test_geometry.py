@@ -5,7 +5,8 @@ import pytest
 
 from omnidyn import load_robot
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.geometry import wheel_geometry
+from omnidyn.identification.geometry import as_mecanum, wheel_geometry
+from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 
 
@@ -64,3 +65,21 @@ def test_what_is_no_omni_robot_is_refused():
         wheel_geometry([run])
     with pytest.raises(InputError, match="cannot tell where the wheels stand; got wheel_speed"):
         wheel_geometry([Run(t=run.t, wheel_speed=run.wheel_speed)])
+
+
+def test_mecanum_wheels_are_no_omni_wheels():
+    """By hand, rollers in an X, forward: (vx - vy - b om, vx + vy + b om, vx + vy - b om, vx - vy + b om)/r."""
+    twist = np.random.default_rng(3).normal(size=(60, 3))
+    vx, vy, turn = twist[:, 0], twist[:, 1], 0.35 * twist[:, 2]
+    speed = np.column_stack([vx - vy - turn, vx + vy + turn, vx + vy - turn, vx - vy + turn]) / 0.05
+    speed *= [-1.0, 1.0, -1.0, 1.0]  # counter-clockwise about the robot: on the left that is backward
+    run = Run(t=np.arange(60.0), twist=twist, wheel_speed=speed)
+    seen = as_mecanum(wheel_geometry([run]))
+    assert seen.robot_radius == pytest.approx(0.35)
+    assert seen.per_metre == pytest.approx(20.0)
+    preset = load_robot("mecanum").wheels
+    other = wheel_geometry([run.replace(wheel_speed=wheel_speed(preset, twist))])
+    assert as_mecanum(other).robot_radius == pytest.approx(preset.robot_radius)
+    other = run.replace(wheel_speed=speed * [-1.0, 1.0, 1.0, 1.0])
+    with pytest.raises(InputError, match="front left, front right, rear left, rear right"):
+        as_mecanum(wheel_geometry([other]))

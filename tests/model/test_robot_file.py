@@ -231,9 +231,13 @@ def test_a_hexadecimal_schema_of_5000_digits():
 # ---- bad places ------------------------------------------------------------------------------------------
 
 
-def test_places_where_there_is_no_robot(tmp_path):
+def test_places_where_there_is_no_robot(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"no such robot; got axbot; expected .*axebot"):
         load_robot("axbot")
+    (tmp_path / "mini.toml").write_text("", "utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"no such robot; got mini; .* did you mean mini.toml\?"):
+        load_robot("mini")
     with pytest.raises(InputError, match=r"nothing\.toml: no such file"):
         load_robot(tmp_path / "nothing.toml")
     with pytest.raises(InputError, match="got a folder; expected a file"):

@@ -81,7 +81,7 @@ def init(
     if not log and (map_file or column or assume or no_header):
         raise typer.BadParameter("--map, --column, --assume and --no-header are for --log.")
     options = logs.log_options(map_file, column, assume, no_header=no_header)
-    seen = _from_logs(given, log, options) if log else None
+    seen = _from_logs(given, log, options, mecanum) if log else None
     from_logs = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
     answers = _complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
     robot = _as_seen(_robot(name, answers, preset, mecanum, friction), seen, from_logs)
@@ -103,9 +103,9 @@ def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str
         raise typer.BadParameter("-o - and --json both want stdout.")
 
 
-def _from_logs(given: dict[str, Any], log: list[str], options: LogOptions) -> Geometry:
+def _from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool) -> Geometry:
     """Azimuths, and the radius of the robot where it turned, from logs; what is given on the command line stays."""
-    from omnidyn.identification.geometry import wheel_geometry
+    from omnidyn.identification.geometry import as_mecanum, wheel_geometry
 
     runs, maps = [], logs.Maps()
     for path, each in logs.load_logs(logs.log_files(log), None, options):
@@ -113,8 +113,12 @@ def _from_logs(given: dict[str, Any], log: list[str], options: LogOptions) -> Ge
         runs.append(each.to_run())
     seen = wheel_geometry(runs)
     azimuth = [round(angle, 2) for angle in seen.azimuth_deg]
-    say(f"omnidyn: wheels at {_words(tuple(azimuth))} degrees, from {seen.source} ({seen.residual:.1%} unexplained)")
-    if given["azimuth"] is None and given["wheels"] in (None, len(azimuth)):
+    where = "pushing towards" if mecanum else "at"
+    told = f"from {seen.source} ({seen.residual:.1%} unexplained)"
+    say(f"omnidyn: wheels {where} {_words(tuple(azimuth))} degrees, {told}")
+    if mecanum:
+        seen = as_mecanum(seen)
+    elif given["azimuth"] is None and given["wheels"] in (None, len(azimuth)):
         given["azimuth"], given["wheels"] = azimuth, len(azimuth)
     if given["robot_radius"] is None and seen.robot_radius is not None and seen.robot_radius > 0.0:
         given["robot_radius"] = round(seen.robot_radius, 4)

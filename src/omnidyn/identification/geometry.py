@@ -10,7 +10,7 @@ is linear in (-s sin phi_i, s cos phi_i, s b): least squares per wheel gives phi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ FloatArray = NDArray[np.float64]
 
 MAX_CONDITION = 50.0  # of the directions driven: beyond it, one of them is only noise
 MAX_RESIDUAL = 0.2  # share of the wheel speeds that the fit may leave: beyond it these are not omni wheels
+AS_OMNI = (45.0, 315.0, 135.0, 225.0)  # where mecanum wheels FL, FR, RL, RR would stand if they were omni wheels
+MAX_TURNED = 15.0  # [degree] that they may seem to stand elsewhere
 SOURCES = (("twist_command", "wheel_speed_command"), ("twist", "wheel_speed"))
 
 
@@ -61,6 +63,25 @@ def wheel_geometry(runs: Sequence[Run]) -> Geometry:
         expected="twist_command and wheel_speed_command, or twist and wheel_speed, all components of them",
         remedy="say which columns they are (--column w1=NAME), or give --azimuth",
     )  # fmt: skip
+
+
+def as_mecanum(seen: Geometry) -> Geometry:
+    """The same wheels as mecanum wheels with rollers at 45 degrees: front left, front right, rear left, rear right.
+
+    Every wheel counts counter-clockwise about the robot, those on the left backward: w_i = (-+ v_x +- v_y + b omega)/r
+    is an omni wheel's law with sqrt(2)/r for 1/r and b/sqrt(2) for b, b being half track + half wheelbase. Raises
+    InputError where they do not push in these directions.
+    """
+    angle = [round(each, 1) for each in seen.azimuth_deg]
+    off = [(each - there + 180.0) % 360.0 - 180.0 for each, there in zip(angle, AS_OMNI, strict=False)]
+    if len(angle) != len(AS_OMNI) or max(map(abs, off)) > MAX_TURNED:
+        raise InputError(
+            "the wheels do not push as mecanum wheels in an X do", got=f"directions {angle} degree",
+            expected=f"{list(AS_OMNI)}: front left, front right, rear left, rear right, each counter-clockwise positive",
+            remedy="name the columns in this order, left wheels that count forward with a minus: --column w1=-FRONT_LEFT",
+        )  # fmt: skip
+    radius = None if seen.robot_radius is None else float(np.sqrt(2.0)) * seen.robot_radius
+    return replace(seen, azimuth_deg=AS_OMNI, per_metre=seen.per_metre / float(np.sqrt(2.0)), robot_radius=radius)
 
 
 def _rows(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:

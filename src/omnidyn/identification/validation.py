@@ -23,6 +23,7 @@ POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
 LASTING = 2.0  # errors over their scatter from row to row, beyond which most of them is no noise
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
+TINY = 0.001
 TO_STD = 1.4826  # median size to standard deviation, for Gaussian noise
 
 
@@ -62,7 +63,7 @@ class Validation:
         """Cells under HEAD."""
         return [
             (which, name, unit(name), str(s.samples), f"{s.rmse:.4g}", _cell(s.fit_percent, ".1f"),
-             _cell(s.chi2, ".3g"), _cell(s.whiteness, ".3f"), _cell(s.lag, "+.3f"))
+             _cell(s.chi2, ".3g"), _chance(s.whiteness), _cell(s.lag, "+.3f"))
             for which, found in self.scores.items() for name, s in found.items()
         ]  # fmt: skip
 
@@ -170,6 +171,11 @@ def output_name(component: str) -> str:
         return POSE[component]
     found = place(component)
     return f"{found[0]}[{found[1]}]" if found else component
+
+
+def _chance(value: float | None) -> str:
+    """A p-value; none is 0."""
+    return "<0.001" if value is not None and value < TINY else _cell(value, ".3f")
 
 
 def _cell(value: float | None, form: str) -> str:

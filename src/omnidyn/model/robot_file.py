@@ -47,7 +47,11 @@ def load_robot(robot: str | os.PathLike) -> Robot:
         return parse_robot(read_text(PRESETS / f"{name}.toml", MAX_ROBOT_FILE_BYTES), name)
     looks_like_a_name = os.path.basename(name) == name and not name.endswith(".toml")
     if looks_like_a_name and not os.path.exists(name):
-        raise InputError("no such robot", got=name, expected=f"a TOML file or a preset: {', '.join(preset_names())}")
+        beside = f"{name}.toml" if os.path.exists(f"{name}.toml") else ""
+        raise InputError(
+            "no such robot", got=name, expected=f"a TOML file or a preset: {', '.join(preset_names())}",
+            remedy=f"did you mean {beside}?" if beside else "",
+        )  # fmt: skip
     return parse_robot(read_text(name, MAX_ROBOT_FILE_BYTES), name)
 
 
