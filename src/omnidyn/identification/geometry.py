@@ -77,8 +77,8 @@ def as_mecanum(seen: Geometry) -> Geometry:
     if len(angle) != len(AS_OMNI) or max(map(abs, off)) > MAX_TURNED:
         raise InputError(
             "the wheels do not push as mecanum wheels in an X do", got=f"directions {angle} degree",
-            expected=f"{list(AS_OMNI)}: front left, front right, rear left, rear right, each counter-clockwise positive",
-            remedy="name the columns in this order, left wheels that count forward with a minus: --column w1=-FRONT_LEFT",
+            expected=f"{list(AS_OMNI)}: front left, front right, rear left, rear right, counter-clockwise positive",
+            remedy="name the columns in this order, a left wheel that counts forward with a minus: --column w1=-LEFT",
         )  # fmt: skip
     radius = None if seen.robot_radius is None else float(np.sqrt(2.0)) * seen.robot_radius
     return replace(seen, azimuth_deg=AS_OMNI, per_metre=seen.per_metre / float(np.sqrt(2.0)), robot_radius=radius)
