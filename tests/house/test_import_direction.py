@@ -26,7 +26,7 @@ ORDER = {
         steady_table command_file words mapping clock stamps guessed guess_time guess_unit guess counters log read_log
         segments average plateaus findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
-    "logs/check": """robust work time_base reference spikes learned stuck values limits wirings frame floor motors
+    "logs/check": """robust work codes time_base reference spikes learned stuck values limits wirings frame floor motors
         wiring slip mistakes scale lag energy motion oddities excitation""",
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
         shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table

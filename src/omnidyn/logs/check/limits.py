@@ -16,16 +16,50 @@ FloatArray = NDArray[np.float64]
 AT_LIMIT = 0.003  # of the limit
 LEAST_SHARE = 0.005  # of the rows
 SAG = 0.03  # of the highest supply
+BOTH_WAYS = 0.05  # of the rows, each way: more than a wheel goes on against what drives it
 
 
 def check_limits(work: Work) -> tuple[list[Finding], Work]:
-    """Findings on saturation, supply and the sign of currents."""
+    """Findings on saturation, supply and signs; the work without what has lost its sign."""
     if len(work) < MIN_ROWS:
         return [], work
     found: list[Finding] = []
     for channel in ("voltage", "duty", "current"):
         found += _saturated(work, channel)
-    return found + _sag(work) + _no_supply(work) + _unsigned(work), work
+    found += _sag(work) + _no_supply(work)
+    for channel in ("voltage", "duty"):
+        more = _one_way_drive(work, channel)
+        work, found = work.replace(**{channel: None}) if more else work, found + more
+    more = _unsigned(work)
+    return found + more, work.replace(current=None) if any(each.level == FATAL for each in more) else work
+
+
+def _one_way_drive(work: Work, channel: str) -> list[Finding]:
+    """A voltage or duty that is never negative, though one wheel under it turns both ways for long."""
+    driven, speed = work.get(channel), work.get("wheel_speed")
+    if driven is None or speed is None or driven.shape != speed.shape:
+        return []
+    high = float(np.nanmax(driven))
+    with np.errstate(invalid="ignore"):
+        if high <= 0.0 or (driven < -0.01 * high).any():
+            return []
+        width = max(3, round(0.2 / work.step) | 1) if work.step > 0.0 else 3
+        mean, noise = smooth(speed, width), np.array([white_noise(column) for column in speed.T])
+        usual = np.maximum(0.3 * np.nanquantile(np.abs(mean), 0.9), 5.0 * noise / np.sqrt(width))
+        pushed = driven > 0.2 * high
+        back, ahead = ((side * mean > usual) & pushed for side in (-1.0, 1.0))
+        both = np.minimum(back.mean(axis=0), ahead.mean(axis=0))
+    names = [name for name, share in zip(components(channel, driven.shape[1]), both, strict=True) if share > BOTH_WAYS]
+    if not names:
+        return []
+    share = float(back.mean())
+    return [Finding(
+        "unsigned", FATAL, " ".join(names),
+        f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} never negative, though the wheels turn backward "
+        f"under it in {100 * share:.0f} % of the values: a size without its direction, or counted from an offset",
+        f"log the signed {channel}: times the bit of direction, or less the value of standstill", (), 0,
+        {"share": share},
+    )]  # fmt: skip
 
 
 def _limit(work: Work, channel: str) -> tuple[FloatArray | float | None, str]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.logs.channels import components
-from omnidyn.logs.check.reference import emf, volts
+from omnidyn.logs.check.reference import BEYOND, beyond_stall, emf, stall_current, volts
 from omnidyn.logs.check.robust import slope, smooth, windowed
 from omnidyn.logs.check.work import Work
 from omnidyn.logs.findings import FATAL, WARN, Finding
@@ -112,9 +112,9 @@ def current_unit(work: Work) -> tuple[list[Finding], Work]:
     if current is None or robot is None:
         return [], work
     names = " ".join(components("current", work.wheels))
-    stall = float(np.max(robot.motor.voltage_limit)) / float(np.min(robot.motor.resistance))
-    high = float(np.nanquantile(np.abs(current), 0.95))
-    if high > 20.0 * stall:
+    stall = stall_current(robot)
+    high = beyond_stall(robot, current) * stall
+    if high > BEYOND * stall:
         unit = unit_of(high / (0.3 * stall), {"mA read as A": 1e3}) or "mA read as A" if high < 3e3 * stall else ""
         words = f"currents of {high:.4g} A, where a blocked motor draws {stall:.3g} A" + (f": {unit}?" if unit else "")
         return [unit_finding(names, words, high / stall)], work.replace(current=current * (1e-3 if unit else np.nan))

@@ -11,10 +11,12 @@ from omnidyn.logs.check.robust import smooth
 from omnidyn.logs.check.work import Work
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.motor import back_emf, no_load_speed
+from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed, wheel_speed
 
 FloatArray = NDArray[np.float64]
 MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # sources that say what a wheel did
+BEYOND = 20.0
 POSE_WINDOW = 0.12  # [s] over which a speed is taken from a pose
 POSE_TURN = 0.35  # [rad] that the robot may turn in it: a chord is then 0.5 % shorter than its arc
 
@@ -112,10 +114,22 @@ def ohmic(work: Work, current: FloatArray) -> FloatArray | None:
     return lost + drop * np.sign(current) if drop.any() else lost
 
 
+def stall_current(robot: Robot) -> float:
+    """Most that a blocked motor of the robot draws [A]."""
+    return float(np.max(robot.motor.voltage_limit)) / float(np.min(robot.motor.resistance))
+
+
+def beyond_stall(robot: Robot, current: FloatArray) -> float:
+    """How many times the current of a blocked motor is usually reached; above BEYOND it is no current in amperes."""
+    return float(np.nanquantile(np.abs(current), 0.95)) / stall_current(robot)
+
+
 def electric_speed(work: Work) -> FloatArray | None:
     """Wheel speed that voltage and current imply, (u - R i - drop)/(K l) [rad/s]; None where one is missing."""
     voltage, current, robot = volts(work), work.get("current"), work.geometry
     if voltage is None or current is None or robot is None or work.log.current_unsigned:
+        return None
+    if beyond_stall(robot, current) > BEYOND:
         return None
     lost = ohmic(work, current)
     return None if lost is None else no_load_speed(robot.motor, voltage - lost)

@@ -14,7 +14,7 @@ from omnidyn.logs.channels import place
 from omnidyn.logs.check.learned import Learner
 from omnidyn.logs.check.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.logs.check.robust import MAD, quantum, runs, smooth
-from omnidyn.logs.check.work import SENSORS, Work
+from omnidyn.logs.check.work import INPUTS, SENSORS, Work
 from omnidyn.logs.findings import WARN, Finding
 
 FloatArray = NDArray[np.float64]
@@ -25,6 +25,7 @@ IMPOSSIBLE = 1e-6  # chance, over the whole log, below which repeated values are
 SURE = 2.0  # standard errors that a chance may be larger than seen
 PARTS = 4  # of a stretch, whose means are compared
 MARGIN = 1.25  # by which a stretch must differ more than any other of its length
+TOGETHER = 0.8  # of the rows of a stretch: so many repeats of all others say that the robot keeps its speed
 RESOLVES = 0.1  # of the top speed: a reference as exact as this would have seen a change that matters
 
 
@@ -38,6 +39,7 @@ def check_stuck(work: Work) -> tuple[list[Finding], Work]:
         for component, values, stretches in sorted(columns, key=lambda each: -_longest(each[1], each[2])):
             k = place(component)[1]  # type: ignore[index]
             judge = _Judge(work, values, stretches)
+            judge.steady = _Steady(work, channel, k).during
             if channel == "wheel_speed":
                 judge.learn = partial(learner.wheel_speed, k)
             if channel == "wheel_speed" and expected is not None and k < expected[1].shape[1]:
@@ -75,6 +77,7 @@ class _Judge:
 
     learn: Callable[[NDArray[np.bool_]], FloatArray] | None = None  # the channel by all others
     expected: _Away | None = None
+    steady: Callable[[int, int], bool] | None = None  # whether nothing in the log changes, commands least of all
     measured = False  # expected is what the wheel did; a command it follows later, or, at rest, not at all
 
     def __init__(self, work: Work, values: FloatArray, stretches: NDArray[np.int64]) -> None:
@@ -118,7 +121,7 @@ class _Judge:
         beside = np.r_[self.values[max(0, a - 8) : a], self.values[b : b + 8]]
         chance = max(chance, (float((beside == self.values[a]).sum()) + 1.0) / (len(beside) + 2.0))
         unlikely = n * chance ** (length - 1)
-        if length <= 3 * usual or unlikely >= IMPOSSIBLE:
+        if length <= 3 * usual or unlikely >= IMPOSSIBLE or (self.steady is not None and self.steady(a, b)):
             return False
         # Where the others say that the wheel kept its speed, the noise that the rest of the log has counts for less.
         return unlikely < IMPOSSIBLE**2 or self.learned is None or not self.learned.stays(a, b)
@@ -157,6 +160,21 @@ class _Judge:
         if not turning or 2 * length < self.slow or self.learned is None:
             return False
         return self.learned.during(a, b)
+
+
+class _Steady:
+    """Whether commands stand still and all wheels repeat their speed together: a steady run seen in coarse steps."""
+
+    def __init__(self, work: Work, channel: str, k: int) -> None:
+        self.inputs = [np.nan_to_num(values) for name in INPUTS if (values := work.get(name)) is not None]
+        columns = [values for name, values in work.columns(channel) if place(name)[1] != k]  # type: ignore[index]
+        self.others = [np.diff(values) == 0.0 for values in columns]
+
+    def during(self, a: int, b: int) -> bool:
+        """Over rows a to b."""
+        settled = a + (b - a) // 10
+        still = bool(self.inputs) and all(not np.ptp(values[settled:b], axis=0).any() for values in self.inputs)
+        return still and bool(self.others) and all(same[a : b - 1].mean() > TOGETHER for same in self.others)
 
 
 class _Walk:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.logs.channels import place
+from omnidyn.logs.check.codes import check_codes
 from omnidyn.logs.check.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.logs.check.robust import quantum, smooth, white_noise
 from omnidyn.logs.check.spikes import check_spikes, recorded
@@ -25,7 +26,8 @@ def check_values(work: Work) -> tuple[list[Finding], Work]:
     found = _missing(work)
     if len(work) < MIN_ROWS:
         return found, work
-    found += _quantised(work)
+    more, work = check_codes(work)
+    found += more + _quantised(work)
     for family in (_constant, check_stuck, check_spikes):
         more, work = family(work)
         found += more
