@@ -89,3 +89,30 @@ def test_a_long_steady_spin_in_coarse_steps_is_not_stuck(robot, grave, rate):
     broken["wheel_speed"][5 * rate :, 1] = broken["wheel_speed"][rate // 2 + 4, 1]
     again = check(Log(run.t, broken, np.arange(len(run)) + 2), robot)
     assert "w2" in {finding.where for finding in again.findings if finding.level != "note"} or again.of("wheel_scale")
+
+
+@pytest.mark.parametrize("fault", ["rpm", "inverted", "swapped", "gear"])
+def test_a_dead_encoder_hides_no_second_fault(log, robot, with_channels, grave, fault):
+    speed = log.channels["wheel_speed"].copy()
+    if fault == "rpm":
+        speed *= 60.0 / (2.0 * np.pi)
+    elif fault == "inverted":
+        speed[:, 2] *= -1.0
+    elif fault == "swapped":
+        speed[:, [1, 2]] = speed[:, [2, 1]]
+    else:
+        speed *= 1.2
+    speed[:, 0] = 0.0
+    verdict = check(with_channels(wheel_speed=speed), robot)
+    assert [finding.where for finding in verdict.of("dead")] == ["w1"]
+    assert grave(verdict) == {"dead", {"rpm": "unit"}.get(fault, fault)}
+    if fault == "inverted":
+        assert [finding.where for finding in verdict.of("inverted")] == ["w3"]
+
+
+def test_what_was_exchanged_with_the_dead_encoder_starts_no_tale(log, robot, with_channels, grave):
+    """Nothing is said of slip or gears where the speeds of two wheels are not known."""
+    speed = log.channels["wheel_speed"].copy()
+    speed[:, 1] = speed[:, 0]
+    speed[:, 0] = 0.0
+    assert grave(check(with_channels(wheel_speed=speed), robot)) == {"dead"}

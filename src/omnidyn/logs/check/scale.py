@@ -27,6 +27,7 @@ FloatArray = NDArray[np.float64]
 
 LEAST = 0.02  # a scale that is off by less is not worth a word
 NOTHING = 0.003  # of the motion: no unit mistake makes as little of it
+FOLLOWS = 0.95  # likeness of a wheel and what the other channels say of it, lag, slip and scale apart
 ALONE = 0.15  # of the motion: an axis that moves less is no witness
 
 
@@ -54,7 +55,26 @@ def check_scale(work: Work) -> tuple[list[Finding], Work]:
 
 def check_dead_wheels(work: Work) -> tuple[list[Finding], Work]:
     """Findings on wheels whose speed is noise only; a flat line was found before."""
-    return ([], work) if len(work) < MIN_ROWS else _dead_wheels(work)
+    return ([], work) if len(work) < MIN_ROWS else _dead_wheels(_without_stand_in(work))
+
+
+def _without_stand_in(work: Work) -> Work:
+    """The work without the speed that stands in for a dead wheel, where another wheel does not do what it should.
+
+    Its column was exchanged with the dead one, and nothing can be said of a robot of which two wheels are not known.
+    """
+    dead, expected = work.known.get("dead_wheel"), expected_wheel_speed(work, without="wheel_speed")
+    if dead is None or expected is None:
+        return work
+    speed = work.channels["wheel_speed"]
+    width = max(3, round(0.1 / work.step) | 1)
+    own, told = smooth(speed, width), smooth(expected[1], width)
+    good = np.isfinite(own).all(axis=1) & np.isfinite(told).all(axis=1)
+    cross = (own[good] * told[good]).sum(axis=0)
+    alike = cross / np.sqrt((own[good] ** 2).sum(axis=0) * (told[good] ** 2).sum(axis=0))
+    if (np.delete(alike, dead) > FOLLOWS).all():
+        return work
+    return work.masked("wheel_speed", dead, np.ones(len(work), dtype=bool)).knowing(dead_wheel=None)
 
 
 def scales(work: Work) -> Scales | None:
@@ -300,7 +320,7 @@ def _wheel_lines(work: Work) -> tuple[str, list[Slope], list[float]] | None:
 
 def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
     """One wheel that differs from the others: its own radius, gear or counter."""
-    line = _wheel_lines(work)
+    line = _wheel_lines(work) if work.known.get("dead_wheel") is None else None
     if line is None or (work.known.get("floor_ratio") is None and not line[0].startswith("voltage")):
         return [], work
     source, slopes, sizes = line

@@ -31,7 +31,25 @@ def check_values(work: Work) -> tuple[list[Finding], Work]:
     for family in (_constant, check_stuck, check_spikes):
         more, work = family(work)
         found += more
-    return found, work
+    return found, _with_dead_wheel(work, found)
+
+
+def _with_dead_wheel(work: Work, found: list[Finding]) -> Work:
+    """The speed of one dead wheel as the other channels say it, on the scale of the other wheels.
+
+    Else it hides what is wrong with them: neither floor nor circuit can be held against a robot with a wheel missing.
+    """
+    dead = [at[1] for each in found if each.code == "dead" and (at := place(each.where)) and at[0] == "wheel_speed"]
+    expected = expected_wheel_speed(work, without="wheel_speed")
+    if len(dead) != 1 or expected is None or expected[0] not in MEASUREMENTS or expected[1].shape[1] != work.wheels:
+        return work
+    speed = work.channels["wheel_speed"].copy()
+    known = np.isfinite(speed) & np.isfinite(expected[1])
+    size, own = np.abs(expected[1][known]).sum(), np.abs(speed[known]).sum()
+    if not size > 0.0 or not own > 0.0:
+        return work
+    speed[:, dead[0]] = expected[1][:, dead[0]] * (own / size)
+    return work.replace(wheel_speed=speed).knowing(dead_wheel=dead[0])
 
 
 def _missing(work: Work) -> list[Finding]:
