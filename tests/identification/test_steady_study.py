@@ -147,6 +147,20 @@ def test_groups_that_differ_and_groups_that_do_not():
     assert [*study.estimates] == ["slick", "rough", "again"]
 
 
+@pytest.mark.parametrize("turns", ["first", "second"])
+def test_groups_of_which_only_one_turns_are_compared_in_what_both_tell(turns):
+    shape, robot = "disc", robot_with("disc")
+    turning = [turning_run(robot, omega) for omega in (-4, -3, -2, -1.5, 1.5, 2, 3, 4)]
+    runs, groups = clean(shape) + turning + clean(shape), ["first"] * 24 + [turns] * len(turning) + ["second"] * 24
+    study = identify_steady(runs, AXEBOT, groups=groups, shape=shape)
+    assert any("yaw" in key for key in study.estimates[turns].value)
+    straight = study.estimates["second" if turns == "first" else "first"].value
+    assert [each.key for each in study.differences] == list(straight)
+    for each in study.differences:
+        assert each.values == (study.estimates["first"].value[each.key], study.estimates["second"].value[each.key])
+    study_summary(study)
+
+
 def test_internal_forces_of_four_wheels_are_told():
     robot = load_robot("four-wheel")
     runs = clean_runs(robot, DIRECTIONS, (0.3,))

@@ -204,8 +204,11 @@ def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
     for first, second in combinations(fits, 2):
         one, other = fits[first], fits[second]
         for k, key in enumerate(one.keys):
-            values = float(one.free[k]), float(other.free[k])
-            std = float(np.hypot(one.std[k], other.std[k]))
+            if key not in other.keys:  # only one of the groups turns
+                continue
+            j = other.keys.index(key)
+            values = float(one.free[k]), float(other.free[j])
+            std = float(np.hypot(one.std[k], other.std[j]))
             half = quantile(min(one.degrees_of_freedom, other.degrees_of_freedom)) * std
             gap = values[1] - values[0]
             found.append(Difference(key, first, second, values, gap, std, gap - half, gap + half))
