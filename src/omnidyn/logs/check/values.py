@@ -20,6 +20,8 @@ from omnidyn.units import known_unit
 
 FloatArray = NDArray[np.float64]
 
+SAME = 0.03  # a scale so near 1 is 1, within what noise makes of it
+
 
 def check_values(work: Work) -> tuple[list[Finding], Work]:
     """All findings on single channels; what sticks or spikes is masked, what is dead taken out."""
@@ -44,11 +46,14 @@ def _with_dead_wheel(work: Work, found: list[Finding]) -> Work:
     if len(dead) != 1 or expected is None or expected[0] not in MEASUREMENTS or expected[1].shape[1] != work.wheels:
         return work
     speed = work.channels["wheel_speed"].copy()
-    known = np.isfinite(speed) & np.isfinite(expected[1])
-    size, own = np.abs(expected[1][known]).sum(), np.abs(speed[known]).sum()
-    if not size > 0.0 or not own > 0.0:
+    width = max(3, round(0.2 / work.step) | 1)  # noise of what tells the speed would make it look larger
+    own, told = np.delete(smooth(speed, width), dead, axis=1), np.delete(smooth(expected[1], width), dead, axis=1)
+    known = np.isfinite(own) & np.isfinite(told)
+    size, turned = float((told[known] ** 2).sum()), float((own[known] ** 2).sum())
+    if not size > 0.0 or not turned > 0.0:
         return work
-    speed[:, dead[0]] = expected[1][:, dead[0]] * (own / size)
+    ratio = float(np.sqrt(turned / size))
+    speed[:, dead[0]] = expected[1][:, dead[0]] * (ratio if abs(ratio - 1.0) > SAME else 1.0)
     return work.replace(wheel_speed=speed).knowing(dead_wheel=dead[0])
 
 
