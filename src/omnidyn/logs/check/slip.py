@@ -15,6 +15,7 @@ FloatArray = NDArray[np.float64]
 
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
 LEAST, SURE = 0.025, 5.5  # of the ratio; standard errors, over all stretches that are looked at
+STAND_IN = 0.1  # the least where one wheel is dead and another channel stands in for it
 STRETCHES = 3
 FASTER = 12.0  # mean square of the speed in one part of the log over that in the other, at most
 SPINS = 0.25  # of the path: less is no slip but a wheel that spins
@@ -120,7 +121,8 @@ def _contrast(
     rows = (ids >= starts[k]) & (ids < ends[k])
     if inside > outside:  # then the rest is what slips
         inside, outside, rows = outside, inside, ~rows
-    if sure[k] < SURE or not 0.1 < outside < 2.0 or (outside - inside) / outside < LEAST:
+    least = LEAST if work.known.get("dead_wheel") is None else STAND_IN
+    if sure[k] < SURE or not 0.1 < outside < 2.0 or (outside - inside) / outside < least:
         return None
     if inside < SPINS * outside and not 0.5 < (d_in[k] / b_in[k]) / (d_out[k] / b_out[k]) < 2.0:
         return None  # wheels that are said to spin while the robot stands: then as fast as they turn elsewhere
