@@ -256,3 +256,17 @@ def test_motors_by_output_error(call, tmp_path):
     assert motor["without_dead_band"]["held_out_rmse_rad_s"] > motor["held_out_rmse_rad_s"]
     assert motor["dead_band_seen"]
     assert "Motors from whole logs" in (tmp_path / "m.html").read_text("utf-8")
+
+
+def test_an_interrupt_while_free_runs_are_compared_keeps_the_fit(call, tmp_path, monkeypatch):
+    def cut(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("omnidyn.identification.validation.validate", cut)
+    out = tmp_path / "fit.toml"
+    code, text, err = call("smooth0.csv", "--robot", "axebot", "-o", str(out), "--report", str(tmp_path / "r.html"))
+    assert code == 130
+    assert "those of the whole fit, but nothing was compared" in err
+    assert COULOMB in text
+    assert load_robot(out).priors[COULOMB].std
+    assert not (tmp_path / "r.html").exists()

@@ -100,19 +100,29 @@ def fit_logs(loaded: Loaded, robot: Robot, ask: Ask, record: dict[str, Any], out
     verdicts = _verdicts(loaded, robot, now)
     now("fitting")
     fits, differences, cut = _fitted(part, robot, ask, now)
+    why = "the numbers are the best so far, not the best there are" if cut else ""
     validations: dict[str, Validation] = {}
     if not cut:
-        from omnidyn.identification.validation import validate
-
-        for group, fit in fits.items():
-            fitted, held = part.of(group)
-            validations[group] = validate(fit, fitted, held, now)
+        try:
+            validations = _validations(part, fits, now)
+        except KeyboardInterrupt:  # what is fitted stays
+            why = "the numbers are those of the whole fit, but nothing was compared with them"
     now("writing")
     files = _written(fits, validations, verdicts, differences, record, out)
     _tell(fits, validations, verdicts, differences, record, out, files)
-    if cut:
-        say("omnidyn: interrupted: the numbers are the best so far, not the best there are")
+    if why:
+        say(f"omnidyn: interrupted: {why}")
         raise typer.Exit(INTERRUPTED)
+
+
+def _validations(part: _Part, fits: Mapping[str, OutputErrorEstimate], now: Any) -> dict[str, Validation]:
+    from omnidyn.identification.validation import validate
+
+    found = {}
+    for group, fit in fits.items():
+        fitted, held = part.of(group)
+        found[group] = validate(fit, fitted, held, now)
+    return found
 
 
 def _verdicts(loaded: Loaded, robot: Robot, now: Any) -> list[Verdict]:

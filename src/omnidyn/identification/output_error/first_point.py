@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.nuisances import LATENCY
 from omnidyn.identification.output_error.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.record import Record
-from omnidyn.identification.output_error.solver import Solver
+from omnidyn.identification.output_error.solver import Solver, State
 from omnidyn.identification.output_error.starts import friction_values, integral_start
 from omnidyn.identification.output_error.tangent_engine import TangentEngine
 
@@ -64,18 +64,18 @@ def _with_latencies(solver: Solver, point: Point) -> Point:
     return Point(values, point.states)
 
 
-def coarse_point(problem: Problem, nu: float) -> Point:
-    """Near the best point, by one step a row; a long log is first fitted in part."""
+def coarse_point(problem: Problem, nu: float, watch: Callable[[State], None] | None = None) -> Point:
+    """Near the best point, by one step a row; a long log is first fitted in part, which `watch` does not see."""
     solver, short, own = (
         Solver(problem, TangentEngine(problem), nu, NEAR),
         problem.shortened(FEW),
         moving_start(problem, nu),
     )
     if short is problem:
-        return solver.minimise(own).state.point
+        return solver.minimise(own, watch=watch).state.point
     found = Solver(short, TangentEngine(short), nu, NEAR).minimise(own).state.point
     states = [solver.state(point) for point in (own, found)]
-    return solver.minimise(min(states, key=lambda state: state.objective).point).state.point
+    return solver.minimise(min(states, key=lambda state: state.objective).point, watch=watch).state.point
 
 
 def moving_start(problem: Problem, nu: float) -> Point:

@@ -180,7 +180,7 @@ def _solve(
         solver = Solver(problem, ExactEngine(problem), nu)
         return solver, solver.minimise(first_point(solver, records), watch=watch)
     fine = Solver(problem, TangentEngine(problem, FINE), nu, CLOSE)
-    return fine, fine.minimise(coarse_point(problem, nu), watch=watch)
+    return fine, fine.minimise(coarse_point(problem, nu, watch), watch=watch)
 
 
 def degrees(loss: str) -> float:
