@@ -9,8 +9,10 @@ from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.identify import identify
 from omnidyn.identification.joint_fit import identify_groups
 from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem, read_records
-from omnidyn.identification.output_error.loop import friction_keys, gain_keys
+from omnidyn.identification.output_error.loop import friction_keys, gain_keys, retimed
 from omnidyn.identification.output_error.loop_engine import LoopEngine
+from omnidyn.identification.output_error.problem import Point
+from omnidyn.identification.output_error.solver import Solver
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -217,3 +219,16 @@ def test_friction_keys_name_what_is_there(looped, ellipse):
     assert friction_keys(ellipse)[0] == "friction.direction.coulomb[0]"
     none = looped.replace(friction=Friction(axes=AxesFriction(viscous=(0.0,) * 3, coulomb=(0.0,) * 3)))
     assert friction_keys(none) == []
+
+
+def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(looped):
+    """A loop of 500 Hz in rows at 100 Hz: after a few steps with wrong gains a latency may stand anywhere."""
+    fast = looped.replace(drive=looped.drive.replace(rate=500.0))
+    given = Options(nuisances=("latency",), free=(KP,))
+    problem = make_problem(read_records([log(fast, 3, 300)], fast, given), fast, given)
+    point = problem.start()
+    values = point.values.copy()
+    astray = problem.where("latency.current")
+    values[astray] = 0.15
+    found = retimed(Solver(problem, LoopEngine(problem)), Point(values, point.states))
+    assert abs(found.values[astray]) <= 0.01

@@ -174,22 +174,27 @@ def loop_start(problem: Problem, nu: float) -> Point:
 def retimed(solver: Solver, point: Point) -> Point:
     """The point with the best latency of the currents, of one in the middle of each period of the loop.
 
-    A current jumps at every tick: no descent gets a latency across one. Groups may have one each: KEY@GROUP.
+    A current jumps at every tick: no descent gets a latency across one, and one that has gone astray comes back only if
+    it is tried where it began and where the other channels are. Groups may have one each: KEY@GROUP.
     """
     problem, nu = solver.problem, solver.nu
     period = 1.0 / (problem.robot.drive.rate or np.inf)
-    own = [j for j, p in enumerate(problem.parameters) if p.name.partition("@")[0] == CURRENTS]
+    late = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
+    own = [j for j in late if problem.names[j].partition("@")[0] == CURRENTS]
     short = shortened(problem, SETTING_OFF)
     row = min(float(np.median(np.diff(p.record.t[p.first : p.last + 1]))) for p in short.pieces)
-    if not own or period < SLOW_LOOP * row:
+    if not own or not period:
         return point
+    reach = range(-AROUND, AROUND + 1) if period >= SLOW_LOOP * row else (-1, 0)  # a fast loop settles between rows
+    places = (0.0, *(float(point.values[j]) for j in late))
+    near = sorted({int(np.floor(place / period)) + k for place in places for k in reach})
+    middles = (np.array(near) + 0.5) * period
     trial = Solver(short, solver.engine.on(short), nu)
     for j in own:
         now, states = float(point.values[j]), []
-        middles = (np.floor(now / period) + 0.5 + np.arange(-AROUND, AROUND + 1)) * period
-        for late in (now, *middles[(middles > EARLIEST) & (middles < LATEST)]):
+        for each in (now, *middles[(middles > EARLIEST) & (middles < LATEST)]):
             values = point.values.copy()
-            values[j] = late
+            values[j] = each
             states.append(trial.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
         point = min(states, key=lambda state: state.objective).point
     return point
