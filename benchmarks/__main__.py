@@ -36,7 +36,7 @@ def arguments() -> argparse.Namespace:
         "names", nargs="*", metavar="NAME", choices=[*NAMES, "all", []], help=", ".join([*NAMES, "all"])
     )
     parser.add_argument("--json", action="store_true", help="the tables as JSON")
-    parser.add_argument("--publish", action="store_true", help="write the tables into their pages of docs/")
+    parser.add_argument("--publish", action="store_true", help="write tables and pictures into docs/")
     parser.add_argument("--check", action="store_true", help=f"exit code {GOAL_MISSED} when a goal is missed")
     asked = parser.parse_args()
     for name in asked.names if asked.publish else []:

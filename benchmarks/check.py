@@ -1,14 +1,12 @@
 """`omnidyn check` on 12 faults put into 200 clean simulated logs each, and on 1000 clean logs.
 
 python -m benchmarks check              the table
-python -m benchmarks.check --publish    the same, into docs/check.md and docs/images
+python -m benchmarks check --publish    the same, into docs/check.md, and its pictures into docs/images
 """
 
 from __future__ import annotations
 
-import sys
 import time
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +24,6 @@ LOGS, CLEAN = 200, 1000
 RECALL, FALSE = 0.95, 0.02  # the goals
 ROWS, COLUMNS, SECONDS = 500_000, 10, 2.0  # and of the speed, CPU seconds
 BINS = 5
-DOCS = Path(__file__).resolve().parents[1] / "docs"
-BEGIN, END = "<!-- begin: benchmarks.check -->", "<!-- end: benchmarks.check -->"
 
 
 class Outcome(NamedTuple):
@@ -86,8 +82,11 @@ def speed() -> float:
 
 
 def measure(logs: int = LOGS, clean_logs: int = CLEAN) -> Table:
-    """Recall of each fault, false alarms, speed."""
-    return table_of({name: run_fault(name, logs) for name in FAULTS}, run_clean(clean_logs), clean_logs)
+    """Recall of each fault, false alarms, speed; and the pictures of docs/check.md."""
+    outcomes = {name: run_fault(name, logs) for name in FAULTS}
+    table = table_of(outcomes, run_clean(clean_logs), clean_logs)
+    table.pictures |= {"check_recall.png": lambda: draw_recall(outcomes), "check_log.png": draw_example}
+    return table
 
 
 def table_of(outcomes: dict[str, Outcome], false: tuple[int, list[str]], clean_logs: int) -> Table:
@@ -147,22 +146,3 @@ def draw_example() -> bytes:
     log, robot, _, _ = draw("stuck encoder", 3)
     broken = log.rows(np.r_[0:600, 900 : len(log)])
     return draw_raw_log(broken, check(broken, robot)).png
-
-
-def publish(logs: int = LOGS, clean_logs: int = CLEAN) -> Table:
-    """Measure, and write table and picture into the documentation."""
-    outcomes = {name: run_fault(name, logs) for name in FAULTS}
-    table = table_of(outcomes, run_clean(clean_logs), clean_logs)
-    (DOCS / "images" / "check_recall.png").write_bytes(draw_recall(outcomes))
-    (DOCS / "images" / "check_log.png").write_bytes(draw_example())
-    page = DOCS / "check.md"
-    text = page.read_text("utf-8")
-    head, _, rest = text.partition(BEGIN)
-    body = table.as_text().split("\n", 2)[2]
-    page.write_text(f"{head}{BEGIN}\n\n{body}\n{END}{rest.partition(END)[2]}", "utf-8")
-    return table
-
-
-if __name__ == "__main__":
-    chosen = publish if "--publish" in sys.argv[1:] else measure
-    print(chosen().as_text())

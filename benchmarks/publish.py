@@ -1,4 +1,4 @@
-"""Write tables of benchmarks into the pages of docs/: between marks, with the machine and the date."""
+"""Write tables of benchmarks into the pages of docs/, between marks, with the machine and the date; pictures too."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ def page_of(name: str, docs: Path = DOCS) -> Path | None:
 
 
 def publish(name: str, table: Table, docs: Path = DOCS) -> None:
-    """Put the table in its place, or behind all else of the page. Raises LookupError where no page is for it."""
+    """Put the table in its place, or behind all else of the page, and its pictures into docs/images.
+
+    Raises LookupError where no page is for it.
+    """
     page = page_of(name, docs)
     if page is None:
         raise LookupError(f"no page of {docs} has {begin(name)}")
@@ -46,6 +49,9 @@ def publish(name: str, table: Table, docs: Path = DOCS) -> None:
     before, _, rest = text.partition(begin(name))
     after = rest.partition(end(name))[2]
     page.write_text(f"{before}{begin(name)}\n\n{body.rstrip()}\n- {where()}\n\n{end(name)}{after}", "utf-8")
+    for picture, draw in table.pictures.items():
+        (docs / "images").mkdir(exist_ok=True)
+        (docs / "images" / picture).write_bytes(draw())
 
 
 def where() -> str:

@@ -15,12 +15,16 @@ from typing import Any
 
 @dataclass
 class Table:
-    """Rows of numbers; the last two columns are the goal, in words, and whether it is met (None: no goal)."""
+    """Rows of numbers; the last two columns are the goal, in words, and whether it is met (None: no goal).
+
+    pictures: name of a file in docs/images -> what draws it as PNG, called where the table is published.
+    """
 
     title: str
     columns: list[str]
     rows: list[dict[str, Any]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    pictures: dict[str, Callable[[], bytes]] = field(default_factory=dict)
 
     def add(self, goal: str = "", met: bool | None = None, **cells: Any) -> None:
         """One row; `cells` by the names of the columns."""

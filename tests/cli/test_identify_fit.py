@@ -8,6 +8,7 @@ import pytest
 from benchmarks.identify import excitation, noisy
 from omnidyn.cli import main
 from omnidyn.cli.identify_fit import _Watch
+from omnidyn.identification.output_error.solver import Solver
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -170,6 +171,28 @@ def test_an_interrupt_leaves_the_best_so_far(call, tmp_path, monkeypatch):
     assert load_robot(tmp_path / "fit.toml").friction.axes.coulomb[0] == pytest.approx(2.2, abs=0.3)
 
 
+def test_an_interrupt_while_groups_are_fitted_alone_leaves_the_best_so_far(call, tmp_path, monkeypatch):
+    begin, heard = _Watch.__init__, []
+
+    def listening(self, now):
+        def told(words):
+            now(words)
+            heard.extend([words] if words.startswith("fitting rough alone") else [])
+            if len(heard) == 2:
+                raise KeyboardInterrupt
+
+        begin(self, told)
+
+    monkeypatch.setattr(_Watch, "__init__", listening)
+    code, out, err = call(".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--json",
+                          "-o", str(tmp_path / "{group}.toml"))  # fmt: skip
+    assert code == 130
+    assert "interrupted: the numbers are the best so far" in err
+    groups = strict(out)["groups"]
+    assert groups["rough"]["parameters"][COULOMB]["value"] == pytest.approx(ROUGH, abs=0.4)
+    assert "smooth was not fitted yet: its own numbers are where its fit begins" in groups["smooth"]["warnings"]
+
+
 def test_an_interrupt_of_groups_leaves_the_best_so_far_and_the_same_again(call, tmp_path, monkeypatch):
     told = _Watch.__call__
 
@@ -196,6 +219,20 @@ def test_an_interrupt_of_groups_leaves_the_best_so_far_and_the_same_again(call, 
     assert (tmp_path / "a-rough.toml").read_bytes() == (tmp_path / "b-rough.toml").read_bytes()
 
 
+def test_too_few_runs_to_draw_are_told_before_the_fit(call, monkeypatch):
+    def never(self, *_):
+        raise AssertionError("a fit has begun")
+
+    monkeypatch.setattr(Solver, "state", never)
+    code, _, err = call("smooth0.csv", "smooth1.csv", "--robot", "axebot", "--bootstrap", "20")
+    assert code == 4
+    assert "too few runs for a bootstrap; got 2; expected 5 or more" in err
+    groups = ("--per", "smooth=smooth*", "--per", "rough=rough*")
+    code, _, err = call(".", "--robot", "axebot", *groups, "--bootstrap", "20")
+    assert code == 4
+    assert "too few runs for a bootstrap; got 2 in smooth; expected 5 or more" in err
+
+
 def test_groups_have_profiles_and_say_where_there_are_too_few_runs_to_draw(call):
     arguments = (".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--nuisance", "none")
     code, out, _ = call(*arguments, "--profile", COULOMB, "--json")
@@ -205,7 +242,7 @@ def test_groups_have_profiles_and_say_where_there_are_too_few_runs_to_draw(call)
     assert high > ROUGH - 0.05
     code, _, err = call(*arguments, "--bootstrap", "20")
     assert code == 4
-    assert "too few runs for a bootstrap; got 2 in rough; expected 5 or more" in err
+    assert "too few runs for a bootstrap; got 2 in smooth; expected 5 or more" in err
 
 
 def test_a_log_without_motion_is_exit_4(call, tmp_path):

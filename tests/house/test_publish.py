@@ -33,6 +33,13 @@ def test_a_table_replaces_the_last_one(docs):
     assert len(again.splitlines()) == len(once.splitlines())
 
 
+def test_pictures_go_into_the_folder_of_images(docs):
+    table = table_of(1.0)
+    table.pictures["some.png"] = lambda: b"drawn"
+    publish("some", table, docs)
+    assert (docs / "images" / "some.png").read_bytes() == b"drawn"
+
+
 def test_one_of_the_family_makes_its_own_section(docs):
     page = docs / "identify-figures.md"
     before = page.read_text()

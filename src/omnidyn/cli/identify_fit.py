@@ -15,6 +15,7 @@ from omnidyn.cli.streams import say, show, show_json
 if TYPE_CHECKING:
     from omnidyn.identification.motor_fit import MotorFit
     from omnidyn.identification.output_error.answer import OutputErrorEstimate
+    from omnidyn.identification.output_error.problem import Point
     from omnidyn.identification.output_error.solver import State
     from omnidyn.identification.study_parts import Difference
     from omnidyn.identification.validation import Validation
@@ -201,16 +202,27 @@ def _fitted_groups(
     """The same of groups: numbers and differences, or both at the best point so far."""
     from omnidyn.identification.joint_fit import join_groups
 
+    alone: dict[str, Point] = {}
+
+    def seen(group: str, state: State) -> None:
+        alone[group] = state.point
+        watch.now(f"fitting {group} alone, -log likelihood {state.objective:.6g}")
+
     watch.now("fitting each group alone")
-    joint = join_groups(part.runs, robot, part.groups, per_free=per_free, **options)
+    joint = None
     try:
+        draws = more["bootstrap"]
+        joint = join_groups(part.runs, robot, part.groups, per_free=per_free, bootstrap=draws, watch=seen, **options)
         study, cut = joint.answer(joint.solve(watch), **more), False
     except KeyboardInterrupt:
-        if not watch.states:
+        if not watch.states and not alone:
             raise
-        from omnidyn.identification.best_so_far import best_groups_so_far
+        from omnidyn.identification.best_so_far import best_alone_so_far, best_groups_so_far
 
-        study, cut = best_groups_so_far(joint, watch.states), True
+        study, cut = (
+            best_groups_so_far(joint, watch.states) if joint and watch.states
+            else best_alone_so_far(alone, part.runs, robot, part.groups, per_free=per_free, **options)
+        ), True  # fmt: skip
     return dict(study.estimates), study.differences, cut
 
 

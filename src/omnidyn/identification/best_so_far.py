@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from omnidyn.identification.joint_fit import GroupFit, JointFit
+from omnidyn.identification.joint_fit import GroupFit, JointFit, join_groups
+from omnidyn.identification.joint_problem import joint_start
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.fit import (
@@ -21,6 +22,7 @@ from omnidyn.identification.output_error.fit import (
 )
 from omnidyn.identification.output_error.motion import motion
 from omnidyn.identification.output_error.nuisances import AUTO, automatic
+from omnidyn.identification.output_error.problem import Point
 from omnidyn.identification.output_error.record import Record
 from omnidyn.identification.output_error.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.support import supported
@@ -62,6 +64,20 @@ def best_groups_so_far(joint: JointFit, states: Sequence[State]) -> GroupFit:
     """The same for groups: what `joint` says at the last of the states that it told its `watch`."""
     state = states[-1]
     return joint.answer(Solution(state, Normal(joint.solver, state).held, 0, True), words=[WORDS])
+
+
+def best_alone_so_far(
+    alone: Mapping[str, Point], runs: Sequence[Run], robot: Robot, groups: Sequence[str], **options: Any
+) -> GroupFit:
+    """The same where each group was still being fitted alone. alone: the points that `join_groups` told its `watch`.
+
+    options: as they were given to `join_groups`. Automatic nuisances are those before any of them was settled.
+    """
+    joint = join_groups(runs, robot, groups, settle=False, **options)
+    state = joint.solver.minimise(joint_start(joint.engine, joint.solver.nu, alone), limit=0).state
+    late = [name for name in dict.fromkeys(groups) if name not in alone]
+    words = [f"{name} was not fitted yet: its own numbers are where its fit begins" for name in late]
+    return joint.answer(Solution(state, Normal(joint.solver, state).held, 0, True), words=[WORDS, *words])
 
 
 def _solver(records: Sequence[Record], robot: Robot, given: Options) -> Solver:

@@ -6,6 +6,7 @@ result is exact, and differences between groups carry the correlation that the s
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,6 +18,7 @@ from omnidyn.identification.joint_problem import (
     AT,
     JointEngine,
     Member,
+    Watch,
     join,
     joint_start,
     own_names,
@@ -41,6 +43,7 @@ from omnidyn.identification.output_error.resampling import (
     Resampled,
     draw_interval,
     least_runs,
+    refuse_few_runs,
     resampled,
     widening_of_std,
 )
@@ -191,7 +194,7 @@ def identify_groups(
     """
     joint = join_groups(
         runs, robot, groups, per_free=per_free, free=free, fixed=fixed, nuisances=nuisances, start=start,
-        use_priors=use_priors, outputs=outputs, loss=loss, covariance=covariance,
+        use_priors=use_priors, outputs=outputs, loss=loss, covariance=covariance, bootstrap=bootstrap,
     )  # fmt: skip
     return joint.answer(joint.solve(watch), expand_keys(profile, robot), bootstrap)
 
@@ -200,15 +203,19 @@ def join_groups(
     runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, per_free: Sequence[str] = (),
     free: Sequence[str] | None = None, fixed: Sequence[str] = (), nuisances: str | Sequence[str] = AUTO,
     start: str = AUTO, use_priors: bool = False, outputs: Sequence[str] | None = None, loss: str = GAUSS,
-    covariance: str = AUTO,
+    covariance: str = AUTO, bootstrap: int = 0, watch: Watch | None = None, settle: bool = True,
 ) -> JointFit:  # fmt: skip
     """The first part of `identify_groups`: what is shared and what is own, not yet solved. Options and errors as there.
 
-    Automatic nuisances are settled here, by a fit of each group alone.
+    bootstrap: the draws that will be asked for: too few runs are refused here, before any fit.
+    Automatic nuisances are settled here, by a fit of each group alone, of which `watch` sees every better state with
+    the name of the group; without `settle` all of them are kept.
     """
     if len(groups) != len(runs) or len(set(groups)) < 2:
         got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
         raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
+    if bootstrap:
+        refuse_few_runs(Counter(groups))
     why = why_no_inputs(runs, robot)
     if why:
         raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
@@ -216,7 +223,7 @@ def join_groups(
         None if free is None else tuple(expand_keys(free, robot)), tuple(expand_keys(fixed, robot)),
         nuisance_names(nuisances), start, use_priors, None if outputs is None else tuple(outputs), loss, covariance,
     )  # fmt: skip
-    parts = read_parts(runs, groups, robot, given)
+    parts = read_parts(runs, groups, robot, given, watch, settle)
     own = own_names(expand_keys(per_free, robot), parts)
     engine = join(parts, own, FINE)
     return JointFit(Solver(engine.problem, engine, degrees(loss)), engine, tuple(own), loss, covariance)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +30,15 @@ from omnidyn.identification.output_error.nuisances import automatic
 from omnidyn.identification.output_error.parameters import Parameter
 from omnidyn.identification.output_error.problem import PieceSums, Point, Problem
 from omnidyn.identification.output_error.record import Record
-from omnidyn.identification.output_error.solver import Engine, Solver
+from omnidyn.identification.output_error.solver import Engine, Solver, State
 from omnidyn.identification.output_error.support import supported
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+Watch = Callable[[str, State], None]  # the group, and a better state of its fit alone
 
 ANY_FRICTION = "friction."
 AT = "@"  # KEY@GROUP is the number that a group has for itself
@@ -119,8 +122,14 @@ def _widened(sums: PieceSums, at: IntArray, columns: IntArray, count: int) -> Pi
     return replace(sums, columns=columns[sums.columns], grad=grad, info=info, score=score, waves=waves)
 
 
-def read_parts(runs: Sequence[Run], groups: Sequence[str], robot: Robot, given: Options) -> list[Part]:
-    """Each group alone; friction of an axis that never moved in a group stays out of its numbers."""
+def read_parts(
+    runs: Sequence[Run], groups: Sequence[str], robot: Robot, given: Options, watch: Watch | None = None,
+    settle: bool = True,
+) -> list[Part]:  # fmt: skip
+    """Each group alone; friction of an axis that never moved in a group stays out of its numbers.
+
+    watch: sees the better states of the fits that settle automatic nuisances; without `settle` all of these are kept.
+    """
     of = {
         name: read_records([run for run, own in zip(runs, groups, strict=True) if own == name], robot, given)
         for name in dict.fromkeys(groups)
@@ -128,7 +137,8 @@ def read_parts(runs: Sequence[Run], groups: Sequence[str], robot: Robot, given: 
     found = [(name, records, *_still(name, records, robot, given)) for name, records in of.items()]
     kept = given.nuisances
     if kept is None and is_exact(robot) and not any(looped(records) for records in of.values()):
-        kept = _settled(found, robot, automatic([each for records in of.values() for each in records]))
+        kept = automatic([each for records in of.values() for each in records])
+        kept = _settled(found, robot, kept, watch) if settle else kept
     return [
         Part(name, records, make_problem(records, robot, replace(options, nuisances=kept)), notes)
         for name, records, options, notes in found
@@ -163,15 +173,17 @@ def _of_any(key: str, axes: Sequence[int]) -> bool:
 
 
 def _settled(
-    parts: Sequence[tuple[str, list[Record], Options, tuple[str, ...]]], robot: Robot, names: tuple[str, ...]
-) -> tuple[str, ...]:
+    parts: Sequence[tuple[str, list[Record], Options, tuple[str, ...]]], robot: Robot, names: tuple[str, ...],
+    watch: Watch | None,
+) -> tuple[str, ...]:  # fmt: skip
     """The automatic nuisances that every group supports alone."""
     kept: list[str] | None = None
-    for _, records, options, _ in parts:
+    for name, records, options, _ in parts:
         problem = make_problem(records, robot, replace(options, nuisances=names))
         solver = Solver(problem, make_engine(problem), degrees(options.loss))
-        mine = supported(solver, solver.minimise(first_point(solver, records)), names)
-        kept = [name for name in kept if name in mine] if kept is not None else list(mine)
+        seen = partial(watch, name) if watch else None
+        mine = supported(solver, solver.minimise(first_point(solver, records), watch=seen), names)
+        kept = [each for each in kept if each in mine] if kept is not None else list(mine)
     return tuple(kept or ())
 
 
@@ -214,13 +226,15 @@ def join(parts: Sequence[Part], own: Sequence[str], tol: float | None = FINE) ->
     return JointEngine(joint, found)
 
 
-def joint_start(engine: JointEngine, nu: float) -> Point:
-    """Each group begins where it would alone; shared numbers at the median of the groups."""
+def joint_start(engine: JointEngine, nu: float, alone: Mapping[str, Point] | None = None) -> Point:
+    """Each group begins where it would alone, or where `alone` says; shared numbers at the median of the groups."""
     values: list[list[float]] = [[] for _ in engine.problem.parameters]
     states: list[FloatArray] = []
     for member in engine.members:
         problem = member.part.problem
-        if fits_exactly(problem):
+        if alone and member.name in alone:
+            point = alone[member.name]
+        elif fits_exactly(problem):
             point = first_point(Solver(problem, member.engine, nu), member.part.records)
         elif looped(member.part.records):
             point = loop_start(problem, nu)

@@ -37,7 +37,7 @@ from omnidyn.identification.output_error.nuisances import (
 from omnidyn.identification.output_error.parameters import FRICTION, Parameter, robot_parameters
 from omnidyn.identification.output_error.problem import Problem
 from omnidyn.identification.output_error.record import Record, record
-from omnidyn.identification.output_error.resampling import resampled
+from omnidyn.identification.output_error.resampling import refuse_few_runs, resampled
 from omnidyn.identification.output_error.solver import Solution, Solver, State
 from omnidyn.identification.output_error.support import supported, wanted
 from omnidyn.identification.output_error.tangent_engine import TangentEngine
@@ -135,6 +135,8 @@ def _fitted(
     bootstrap: int, watch: Callable[[State], None] | None,
 ) -> OutputErrorEstimate:  # fmt: skip
     """The fit of records; free: the keys that were asked for by name."""
+    if bootstrap:
+        refuse_few_runs({"": len(records)})
     motion_of = motion(records, robot)
     if looped(records):
         given, still = loop_options(given, motion_of, records, robot), []

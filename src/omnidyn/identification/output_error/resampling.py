@@ -142,13 +142,7 @@ def bootstrap(
     """
     pieces, states = solver.problem.pieces, solution.state.point.states
     of_group = runs_by_group(solver, strata)
-    for group, runs in of_group.items():
-        if len(runs) < LEAST_RUNS:
-            raise InsufficientDataError(
-                "too few runs for a bootstrap", got=f"{len(runs)}{f' in {group}' if group else ''}",
-                expected=f"{LEAST_RUNS} or more", remedy="cut a long log into runs, or take the sandwich",
-                where="bootstrap",
-            )  # fmt: skip
+    refuse_few_runs({group: len(runs) for group, runs in of_group.items()})
     rng, found = np.random.default_rng(seed), []
     for _ in range(draws):
         drawn = [runs[k] for runs in of_group.values() for k in rng.integers(len(runs), size=len(runs))]
@@ -158,6 +152,17 @@ def bootstrap(
         point = Point(solution.state.point.values, tuple(states[k] for k in chosen))
         found.append(again.minimise(point).state.point.values)
     return np.array(found)
+
+
+def refuse_few_runs(runs: Mapping[str, int]) -> None:
+    """Raise InsufficientDataError where a group has fewer runs than a bootstrap needs; "" for logs without groups."""
+    for group, count in runs.items():
+        if count < LEAST_RUNS:
+            raise InsufficientDataError(
+                "too few runs for a bootstrap", got=f"{count}{f' in {group}' if group else ''}",
+                expected=f"{LEAST_RUNS} or more", remedy="cut a long log into runs, or take the sandwich",
+                where="bootstrap",
+            )  # fmt: skip
 
 
 def least_runs(solver: Solver, strata: Strata | None = None) -> int:
