@@ -44,9 +44,9 @@ ORDER = {
         raw_log residuals correlation""",
     "export": "",
     "interop": "",
-    "cli": """streams numbers session progress log_options init check plan identify_logs identify_fit identify_steady
-        identify_ways identify simulate friction deadzone compare track tune sweep export robots demo_folder
-        claims_table demo app outcome""",
+    "cli": """streams numbers session progress log_options init_logs init check plan identify_logs identify_fit
+        identify_steady identify_ways identify simulate friction deadzone compare track tune sweep export robots
+        demo_folder claims_table demo app outcome""",
     "studio": "",
 }
 

@@ -5,6 +5,8 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
+from omnidyn.model.starter import even_azimuths, first_guess
+from omnidyn.model.wheels import Wheels
 
 
 def test_patterns_drive_one_axis_each(axebot):
@@ -55,3 +57,15 @@ def test_moves_tells_the_axes(axebot):
 def test_a_pattern_of_the_wrong_length(axebot, pattern):
     with pytest.raises(InputError, match=r"wrong voltage pattern.*one entry per wheel \(3\)"):
         breakaway_voltage(axebot, pattern)
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 7, 8])
+def test_a_push_along_one_axis_moves_no_other(count):
+    """By rounding, the pattern of y pushes along x too, 1e-16 as hard."""
+    wheels = Wheels(azimuth_deg=even_azimuths(count), wheel_radius=0.03, robot_radius=0.1)
+    robot = first_guess("even", wheels, 2.0, None, "direction")
+    for pattern, alone in zip(axis_patterns(robot), np.eye(3, dtype=bool), strict=True):
+        scale = breakaway_voltage(robot, pattern)
+        assert (moves(robot, 2.0 * scale * pattern) == alone).all()
+        assert (moves(robot, (1.0 + 1e-9) * scale * pattern) == alone).all()
+        assert not moves(robot, (1.0 - 1e-9) * scale * pattern).any()

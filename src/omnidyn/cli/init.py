@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli import log_options as logs
+from omnidyn.cli.init_logs import as_seen, from_logs
+from omnidyn.cli.numbers import number_words
 from omnidyn.cli.streams import say, show, show_json
 
 if TYPE_CHECKING:
-    from omnidyn.identification.geometry import Geometry
-    from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
     from omnidyn.model.wheels import Wheels
 
 MAX_NAME = 60
-GEARED = 1.5  # logged speeds so many times those of the wheels are speeds before a gear
+LEAST_WHEELS, MOST_WHEELS = 3, 16
 DEFAULTS = {"wheel_radius": 0.05, "robot_radius": 0.15, "mass": 3.0}  # [m], [m], [kg], shown at a terminal
 KEYS = {
     "azimuth": "wheels.azimuth_deg", "wheel_radius": "wheels.wheel_radius_m", "robot_radius": "wheels.robot_radius_m",
@@ -44,7 +44,9 @@ class Answers:
 
 def init(
     name: str = typer.Argument(metavar="NAME", help="Name of the robot; the file is NAME.toml."),
-    wheels: int | None = typer.Option(None, min=3, max=16, help="How many wheels; 3 or 4 is usual."),
+    wheels: int | None = typer.Option(
+        None, min=LEAST_WHEELS, max=MOST_WHEELS, help="How many wheels; 3 or 4 is usual."
+    ),
     like: str = typer.Option("", metavar="ROBOT", help="Take what is not given from this preset or robot file."),
     azimuth: str = typer.Option("", metavar="DEGREES", help="Where they stand, such as 60,180,300; 0 is forward."),
     wheel_radius: float | None = typer.Option(None, help="Radius of a wheel [m]."),
@@ -74,6 +76,7 @@ def init(
         "mass": mass, "voltage_limit": voltage_limit,
     }  # fmt: skip
     _refuse_words(given, mecanum, friction, like, out, json)
+    _refuse_numbers(given)
     name = name.removesuffix(".toml")
     path = _checked_path(name, out, force)
     preset = _preset(like)
@@ -81,10 +84,10 @@ def init(
     if not log and (map_file or column or assume or no_header):
         raise typer.BadParameter("--map, --column, --assume and --no-header are for --log.")
     options = logs.log_options(map_file, column, assume, no_header=no_header)
-    seen = _from_logs(given, log, options, mecanum) if log else None
-    from_logs = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
+    seen = from_logs(given, log, options, mecanum) if log else None
+    found = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
     answers = _complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
-    robot = _as_seen(_robot(name, answers, preset, mecanum, friction), seen, from_logs)
+    robot = as_seen(_robot(name, answers, preset, mecanum, friction), seen, found)
     _write(robot, path, force, json, like)
 
 
@@ -103,48 +106,21 @@ def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str
         raise typer.BadParameter("-o - and --json both want stdout.")
 
 
-def _from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool) -> Geometry:
-    """Azimuths, and the radius of the robot where it turned, from logs; what is given on the command line stays."""
-    from omnidyn.identification.geometry import as_mecanum, wheel_geometry
+def _refuse_numbers(given: dict[str, Any]) -> None:
+    """Numbers with which no robot can be guessed, by the names that they have here. Raises InputError."""
+    from omnidyn.errors import InputError
 
-    runs, maps = [], logs.Maps()
-    for path, each in logs.load_logs(logs.log_files(log), None, options):
-        maps.show(path, each.columns)
-        runs.append(each.to_run())
-    seen = wheel_geometry(runs)
-    azimuth = [round(angle, 2) for angle in seen.azimuth_deg]
-    where = "pushing towards" if mecanum else "at"
-    told = f"from {seen.source} ({seen.residual:.1%} unexplained)"
-    say(f"omnidyn: wheels {where} {_words(tuple(azimuth))} degrees, {told}")
-    if mecanum:
-        seen = as_mecanum(seen)
-    elif given["azimuth"] is None and given["wheels"] in (None, len(azimuth)):
-        given["azimuth"], given["wheels"] = azimuth, len(azimuth)
-    if given["robot_radius"] is None and seen.robot_radius is not None and seen.robot_radius > 0.0:
-        given["robot_radius"] = round(seen.robot_radius, 4)
-        say(f"omnidyn: centre to wheel {given['robot_radius']:g} m")
-    elif given["robot_radius"] is None:
-        say("omnidyn: the logs do not turn, or hold no turn rate: the distance from centre to wheel is not in them")
-    return seen
-
-
-def _as_seen(robot: Robot, seen: Geometry | None, from_logs: set[str]) -> Robot:
-    """The robot with the gear that the logged speeds show: those of the motor shaft are faster by it.
-
-    from_logs: keys of the robot file whose numbers the logs gave; their source says so.
-    """
-    from omnidyn.model.robot import Prior
-    from omnidyn.model.starter import with_gear
-
-    if seen is None:
-        return robot
-    told = Prior(source=f"logs: {seen.source}")
-    robot = robot.replace(priors=robot.priors | dict.fromkeys(from_logs, told))
-    ratio = seen.per_metre * float(robot.wheels.radii.mean())
-    if ratio < GEARED:
-        return robot
-    say(f"omnidyn: logged speeds are {ratio:.4g} times those of such wheels: taken as those of the motor, gear ratio")
-    return with_gear(robot, round(ratio, 3), "logs: speed of the motor shaft over that of the wheel")
+    azimuth, limit = given["azimuth"], given["voltage_limit"]
+    if azimuth is not None and not LEAST_WHEELS <= len(azimuth) <= MOST_WHEELS:
+        raise InputError(
+            "a robot that can move in every direction has three wheels or more", got=f"{len(azimuth)} angles",
+            expected=f"{LEAST_WHEELS} to {MOST_WHEELS}, one per wheel, such as 60,180,300", where="--azimuth",
+        )  # fmt: skip
+    if limit is not None and not 0.0 < limit < float("inf"):
+        raise InputError(
+            "no motor turns at this voltage", got=f"{limit:g} V", expected="more than 0 V, such as 12",
+            remedy="leave it out for a guess", where="--voltage-limit",
+        )  # fmt: skip
 
 
 def _azimuths(text: str) -> list[float] | None:
@@ -214,7 +190,7 @@ def _ask_for(needed: list[str], answers: Answers, preset: Robot | None) -> None:
             _ask_for_wheels(answers, preset)
             continue
         default = getattr(preset.body if key == "mass" else preset.wheels, key) if preset else DEFAULTS[key]
-        typed = _ask(f"{QUESTIONS[key]} [{_words(default)}]: ", lambda text, key=key: _checked(key, _one(text)))
+        typed = _ask(f"{QUESTIONS[key]} [{number_words(default)}]: ", lambda text, key=key: _checked(key, _one(text)))
         if typed is None:
             answers.accepted.add(key)
             if preset is None:
@@ -234,7 +210,7 @@ def _ask_for_wheels(answers: Answers, preset: Robot | None) -> None:
     taken = preset is not None and preset.wheels.count == count
     default = preset.wheels.azimuth_deg if preset is not None and taken else even_azimuths(count)
     typed = _ask(
-        f"{QUESTIONS['azimuth']} [{_words(default)}]: ", lambda text: _checked("azimuth", _several(text, count))
+        f"{QUESTIONS['azimuth']} [{number_words(default)}]: ", lambda text: _checked("azimuth", _several(text, count))
     )
     if typed is not None or not taken:
         answers.value["azimuth"] = list(default) if typed is None else typed
@@ -283,8 +259,8 @@ def _several(text: str, count: int, expected: str = "") -> list[float]:
 def _count(text: str) -> int:
     from omnidyn.errors import InputError
 
-    if text not in map(str, range(3, 17)):
-        raise InputError("cannot use this answer", got=text, expected="3 to 16 wheels")
+    if text not in map(str, range(LEAST_WHEELS, MOST_WHEELS + 1)):
+        raise InputError("cannot use this answer", got=text, expected=f"{LEAST_WHEELS} to {MOST_WHEELS} wheels")
     return int(text)
 
 
@@ -300,10 +276,6 @@ def _checked(key: str, value: Any) -> Any:
         usual = {"azimuth_deg": even_azimuths(3), "wheel_radius": 0.1, "robot_radius": 0.1}
         Wheels(**{**usual, "azimuth_deg" if key == "azimuth" else key: value})
     return value
-
-
-def _words(value: float | tuple[float, ...]) -> str:
-    return ",".join(f"{one:g}" for one in value) if isinstance(value, tuple) else f"{value:g}"
 
 
 def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, friction: str) -> Robot:

@@ -18,6 +18,11 @@ def number_list(name: str, text: str) -> list[float]:
     return [value for value in values if value is not None]
 
 
+def number_words(value: float | tuple[float, ...]) -> str:
+    """A number, or several, as they are given on the command line."""
+    return ",".join(f"{one:g}" for one in value) if isinstance(value, tuple) else f"{value:g}"
+
+
 def _number(word: str) -> float | None:
     try:
         value = float(word)

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import acceleration, axes_hold_alone, drive_wrench, linear_part
+from omnidyn.model.dynamics import acceleration, axes_hold_alone, drive_wrench, linear_part, mass_matrix
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]
 HIGHEST = 1e6  # [V] beyond which a pattern counts as one that never moves the robot
 BISECTIONS = 60
+ROUNDING = 1e-12  # of what drives the robot: less is none
 
 
 def moves(robot: Robot, voltage: ArrayLike) -> NDArray[np.bool_]:
@@ -23,7 +24,10 @@ def moves(robot: Robot, voltage: ArrayLike) -> NDArray[np.bool_]:
     at_rest = np.zeros((*voltage.shape[:-1], 3))
     if axes_hold_alone(robot):
         return ~robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage))
-    return acceleration(robot, at_rest, voltage) != 0.0
+    length = np.array([1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
+    driven = np.abs(drive_wrench(robot, at_rest, voltage)) / mass_matrix(robot) * length
+    least = ROUNDING * driven.max(axis=-1, keepdims=True)  # a push along y is 1e-16 of itself along x too
+    return np.abs(acceleration(robot, at_rest, voltage)) * length > least
 
 
 def axis_patterns(robot: Robot) -> FloatArray:

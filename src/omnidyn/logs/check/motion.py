@@ -59,7 +59,7 @@ def _still(work: Work) -> NDArray[np.bool_] | None:
     if speed is None:  # a gyro alone does not know
         return None
     width = max(3, round(0.1 / work.step) | 1)
-    still = np.isfinite(speed).any(axis=1)  # what is not known is no rest
+    still = np.asarray(np.isfinite(speed).any(axis=1))  # what is not known is no rest
     for column in speed.T:
         if np.isfinite(column).any():
             with np.errstate(invalid="ignore"):
