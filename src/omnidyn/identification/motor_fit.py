@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.estimate import finite_or_none
 from omnidyn.identification.motor_engine import BAND, INNER, LAG, SLOPE, MotorEngine
 from omnidyn.identification.motor_log import HOLD, MEAN, begin, motor_problem, motor_records, unresolved_rows
 from omnidyn.identification.output_error.answer import Nuisance
@@ -73,7 +74,10 @@ class MotorFit:
 
     def statement(self) -> str:
         """The fit in a sentence."""
-        words = f"motor {self.motor + 1}: slope {self.value[SLOPE]:.5g} +- {self.std[SLOPE]:.2g} {self.unit} s/rad, "
+        spread = f" +- {self.std[SLOPE]:.2g} {self.unit} s/rad" if SLOPE not in self.unidentifiable else (
+            f" {self.unit} s/rad if there is this dead band"
+        )  # fmt: skip
+        words = f"motor {self.motor + 1}: slope {self.value[SLOPE]:.5g}{spread}, "
         words += f"lag {self.value[LAG] * 1e3:.3g} ms"
         if self.left_out:
             words += f" ({self.left_out} rows left out: their input changes too much from row to row)"
@@ -87,14 +91,8 @@ class MotorFit:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        numbers = {
-            name: {"value": self.value[name], "std": self.std[name], "ci95": list(self.ci95[name])}
-            for name in self.value
-        }
-        late = {
-            name: {"value": n.value, "std": n.std, "ci95": list(n.ci95), "unit": n.unit}
-            for name, n in self.nuisances.items()
-        }
+        numbers = {name: {"value": self.value[name], **_known(self.std[name], self.ci95[name])} for name in self.value}
+        late = {name: {"value": n.value, **_known(n.std, n.ci95), "unit": n.unit} for name, n in self.nuisances.items()}
         return {
             "motor": self.motor + 1, "unit": self.unit, "between": self.between, "parameters": numbers,
             "nuisances": late,
@@ -103,6 +101,10 @@ class MotorFit:
             "converged": self.converged, "left_out": self.left_out, "doubts": list(self.doubts),
             "data": self.source,
         }  # fmt: skip
+
+
+def _known(std: float, ci95: tuple[float, float]) -> dict[str, Any]:
+    return {"std": finite_or_none(std), "ci95": [finite_or_none(bound) for bound in ci95]}
 
 
 def fit_motor(
@@ -167,7 +169,7 @@ def _with_rival(fit: MotorFit, rival: MotorFit) -> MotorFit:
 
 def _answer(solver: Solver, solution: Solution, known: Trust, motor: int, unit: str, between: str) -> MotorFit:
     problem, values = solver.problem, solution.state.point.values
-    if known.blind[0]:
+    if known.unseen[0]:
         raise InsufficientDataError(
             "the logs say nothing about this motor", got=f"motor {motor + 1}", expected="motion"
         )
