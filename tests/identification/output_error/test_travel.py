@@ -85,7 +85,7 @@ def test_outputs_and_slopes_are_those_of_whole_runs(seed):
     assert good >= 0.99 * total
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3])
+@pytest.mark.parametrize("seed", range(6))
 def test_each_channel_has_its_latency(seed):
     robot, _, voltage, dt, start = a_case(seed)
     start[2] += 4.0
@@ -106,8 +106,8 @@ def test_each_channel_has_its_latency(seed):
         np.testing.assert_allclose(outputs[np.ix_(rows, at)], expected, atol=1e-10 * np.abs(expected).max())
         sides = [seen(name, late + sign * 1e-6)[2] for sign in (1.0, -1.0)]
         well, many = share_within(slopes[np.ix_(rows, at, [problem.where(name)])][..., 0],
-                                  (sides[0] - sides[1]) / 2e-6, 2e-6)  # fmt: skip
-        assert well >= 0.98 * many, name
+                                  (sides[0] - sides[1]) / 2e-6, 1e-7)  # fmt: skip
+        assert well >= 0.99 * many, name
 
 
 @pytest.mark.parametrize("seed", [1, 2, 4])
