@@ -34,7 +34,7 @@ ORDER = {
         motor_choice fit_words best_so_far""",
     "identification/output_error": """parameters primitives counts doubled outputs record problem kernel axis_kernel
         driver exact_engine sums tangent_engine loop_engine solver starts motion nuisances loop rounding uncertainty
-        support first_point breakaway resampling answer conclusion fit""",
+        support first_point breakaway tied resampling answer conclusion fit""",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch

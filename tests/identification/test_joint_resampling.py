@@ -89,6 +89,9 @@ def test_a_profile_of_a_number_that_is_all_but_linear_is_the_interval_of_the_inf
             )
     ends = [e.ci95[TORQUE] for e in profiled.estimates.values()]
     assert ends[0] == ends[1]
+    for ours, first in zip(profiled.differences, plain.differences, strict=True):
+        assert ((ours.low, ours.high) != (first.low, first.high)) == (ours.key == COULOMB)
+        np.testing.assert_allclose((ours.low, ours.high), (first.low, first.high), atol=0.2 * first.std)
     with pytest.raises(InputError, match=r"profile: not a free number; got body\.mass_kg"):
         identify_groups(runs, AXEBOT, names, profile=[MASS], **QUIET)
 

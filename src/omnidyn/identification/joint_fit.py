@@ -41,6 +41,7 @@ from omnidyn.identification.output_error.nuisances import AUTO
 from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.identification.output_error.resampling import (
     Resampled,
+    difference_interval,
     draw_interval,
     least_runs,
     refuse_few_runs,
@@ -104,7 +105,8 @@ class JointFit:
         again = resampled(self.solver, solution, known.std, self._joint_names(profile), bootstrap, strata)
         estimates = {m.name: self._estimate(m, solution, known, again, words) for m in self.engine.members}
         shared = tuple(name for name in self.engine.problem.names if AT not in name)
-        return GroupFit(estimates, self.own, shared, tuple(self._differences(solution, known, again, strata)))
+        found = self._differences(solution, known, again, strata, profile)
+        return GroupFit(estimates, self.own, shared, tuple(found))
 
     def _joint_names(self, names: Sequence[str]) -> list[str]:
         """Names with those of each group written out: KEY stands for KEY@GROUP of all groups."""
@@ -142,9 +144,9 @@ class JointFit:
         return replace(estimate, method=f"{estimate.method}; fitted together with {others}")
 
     def _differences(
-        self, solution: Solution, known: Trust, again: Resampled, strata: Mapping[int, str]
+        self, solution: Solution, known: Trust, again: Resampled, strata: Mapping[int, str], profile: Sequence[str]
     ) -> list[Difference]:
-        """Second group minus first: from the draws of a bootstrap, else to first order in the joint covariance."""
+        """Second group minus first: by profile, from draws of a bootstrap, else to first order in the covariance."""
         names, values, found = self.engine.problem.names, solution.state.point.values, []
         groups = [member.name for member in self.engine.members]
         for key in self.own:
@@ -162,6 +164,8 @@ class JointFit:
                     else:
                         std = self._std_of_change(a, b, solution, known)
                         low, high = change - known.quantile * std, change + known.quantile * std
+                    if key in profile and std > 0.0:
+                        low, high = difference_interval(self.solver, solution, a, b, std) or (low, high)
                     pair = float(values[a]), float(values[b])
                     found.append(Difference(key, first, second, pair, change, std, low, high))
         return found
@@ -187,8 +191,8 @@ def identify_groups(
     or of the nuisances, each group has for itself; the others are shared. By default all friction that is free. A key
     may stand for several: "friction", "friction.axes.coulomb".
     profile: names whose interval comes from the profile of the likelihood of all logs; one that each group has for
-    itself is profiled in each. bootstrap: draws of whole runs, each group's among themselves, from which std and
-    intervals of all come, those of the differences too; deterministic.
+    itself is profiled in each, and so are its differences. bootstrap: draws of whole runs, each group's among
+    themselves, from which std and intervals of all come, those of the differences too; deterministic.
     Raises InputError for what cannot be used, InsufficientDataError where a group says nothing about its numbers, or
     has too few runs for a bootstrap, UnsupportedError for robots and logs that output error does not take.
     """

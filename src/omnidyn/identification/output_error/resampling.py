@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.special import chdtri, ndtri, stdtrit
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.problem import Point
 from omnidyn.identification.output_error.solver import Solution, Solver
+from omnidyn.identification.output_error.tied import TiedEngine
 
 FloatArray = NDArray[np.float64]
 
@@ -101,22 +102,53 @@ def profile_interval(solver: Solver, solution: Solution, index: int, std: float)
     return own.outer(low), own.outer(high)
 
 
+def difference_interval(
+    solver: Solver, solution: Solution, first: int, second: int, std: float
+) -> tuple[float, float] | None:
+    """95 % interval of parameter `second` minus `first` by the same profile; None where one has a prior.
+
+    std: standard error of the difference.
+    """
+    if any(solver.problem.parameters[j].prior is not None for j in (first, second)):
+        return None
+    values, states = solution.state.point.values, solution.state.point.states
+
+    def rise(change: float, point: Point) -> tuple[float, Point]:
+        engine = TiedEngine(solver.engine, first, second, change)
+        found = Solver(engine.problem, engine, solver.nu).minimise(point)
+        return 2.0 * (found.state.objective - solution.state.objective), found.state.point
+
+    best, point = float(values[second] - values[first]), Point(np.delete(values, second), states)
+    low, high = (_crossing(rise, best, way * std, way * np.inf, point) for way in (-1.0, 1.0))
+    return low, high
+
+
 def _end(solver: Solver, solution: Solution, index: int, best: float, step: float) -> float:
-    own, point = solver.problem.parameters[index], solution.state.point
-    bound = own.inner(own.low) if step < 0.0 else own.inner(own.high)
+    own = solver.problem.parameters[index]
+
+    def rise(inner: float, point: Point) -> tuple[float, Point]:
+        return _rise(solver, solution, index, inner, point)
+
+    return _crossing(rise, best, step, own.inner(own.low if step < 0.0 else own.high), solution.state.point)
+
+
+def _crossing(
+    rise: Callable[[float, Point], tuple[float, Point]], best: float, step: float, bound: float, point: Point
+) -> float:
+    """Where 2 (F - least F) passes 3.84 on the way from `best` by steps of 1.5 `step`, or the bound before it."""
     inside, outside = best, best
     for _ in range(OUTWARD):
         outside = min(outside + 1.5 * step, bound) if step > 0.0 else max(outside + 1.5 * step, bound)
-        rise, point = _rise(solver, solution, index, outside, point)
-        if rise > RISE:
+        up, point = rise(outside, point)
+        if up > RISE:
             break
         inside = outside
         if outside == bound:
             return bound
     for _ in range(HALVINGS):
         middle = 0.5 * (inside + outside)
-        rise, point = _rise(solver, solution, index, middle, point)
-        inside, outside = (middle, outside) if rise <= RISE else (inside, middle)
+        up, point = rise(middle, point)
+        inside, outside = (middle, outside) if up <= RISE else (inside, middle)
     return 0.5 * (inside + outside)
 
 
