@@ -230,7 +230,7 @@ def test_too_few_runs_to_draw_are_told_before_the_fit(call, monkeypatch):
     groups = ("--per", "smooth=smooth*", "--per", "rough=rough*")
     code, _, err = call(".", "--robot", "axebot", *groups, "--bootstrap", "20")
     assert code == 4
-    assert "too few runs for a bootstrap; got 2 in smooth; expected 5 or more" in err
+    assert "too few runs for a bootstrap; got 2 in rough; expected 5 or more" in err
 
 
 def test_groups_have_profiles_and_say_where_there_are_too_few_runs_to_draw(call):
@@ -242,7 +242,7 @@ def test_groups_have_profiles_and_say_where_there_are_too_few_runs_to_draw(call)
     assert high > ROUGH - 0.05
     code, _, err = call(*arguments, "--bootstrap", "20")
     assert code == 4
-    assert "too few runs for a bootstrap; got 2 in smooth; expected 5 or more" in err
+    assert "too few runs for a bootstrap; got 2 in rough; expected 5 or more" in err
 
 
 def test_a_log_without_motion_is_exit_4(call, tmp_path):
