@@ -18,7 +18,7 @@ from benchmarks.identify import excitation, noisy
 from benchmarks.table import Table, machine
 from omnidyn.identification.motor_choice import choose_motor
 from omnidyn.identification.motor_fit import AUTO, MotorFit, fit_motor
-from omnidyn.identification.motor_log import HOLD
+from omnidyn.identification.motor_log import MEAN
 from omnidyn.identification.motor_run import fit_rmse, run_motor
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
@@ -80,14 +80,15 @@ def cut(run: Run, end: float) -> Run:
 def bench(table: Table) -> None:
     """Fitted to step1 and chirp1, run on step2 and chirp2: with and without Coulomb.
 
-    The input as it fits best (between rows the mean of both, as in the README); to compare, held, with a latency.
+    The input as it fits best, with a latency, as the command does by itself; to compare, without one, and the mean of
+    both rows, as in the README.
     """
     runs = bench_runs()
     fitted, held = [each[0] for each in runs.values()], {kind: each[1] for kind, each in runs.items()}
-    for between in (AUTO, HOLD):
+    for between, latency in ((AUTO, True), (AUTO, False), (MEAN, True)):
         for dead_band in (True, False):
-            fit = fit_motor(fitted, dead_band=dead_band, between=between, latency=between == HOLD)
-            how = f"{fit.between}{', latency' if between == HOLD else ''}, {'with' if dead_band else 'without'} Coulomb"
+            fit = fit_motor(fitted, dead_band=dead_band, between=between, latency=latency)
+            how = f"{fit.between}{', latency' if latency else ''}, {'with' if dead_band else 'without'} Coulomb"
             for kind, run in held.items():
                 value = fit_rmse(fit, run) / TURN
                 table.add(

@@ -24,14 +24,14 @@ ORDER = {
         tangent_step tangent_events tangent_look tangent_march tangent_loop tangent tangent_sight""",
     "logs": """channels dialect spaced header points rows text_file table parquet_pages parquet tables run_file
         steady_table command_file words mapping clock stamps guessed guess_time guess_unit guess counters log read_log
-        segments average plateaus findings check""",
+        segments average plateaus resolved findings check""",
     "comparison": "start replay traces aligned lag whiteness metrics difference text result compare threshold",
     "logs/check": """robust work codes time_base reference spikes learned stuck values limits wirings frame floor motors
         wiring slip mistakes scale lag energy motion oddities excitation""",
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
         shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table
-        settling identify joint_problem joint_fit as_fitted validation motor_engine motor_log motor_fit motor_run
-        motor_choice fit_words best_so_far""",
+        settling identify joint_problem joint_fit as_fitted validation motor_engine motor_input motor_log motor_bend
+        motor_fit motor_run motor_choice fit_words best_so_far""",
     "identification/output_error": """parameters primitives counts doubled outputs record problem kernel axis_kernel
         driver exact_engine sums tangent_engine loop_engine solver starts motion nuisances loop rounding uncertainty
         support first_point breakaway tied resampling answer conclusion fit""",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motor_choice import choose_motor
+from omnidyn.identification.motor_choice import WAYS, choose_motor
 from omnidyn.identification.motor_engine import MotorMapping
 from omnidyn.identification.motor_fit import fit_motor
 from omnidyn.identification.motor_run import fit_rmse, run_motor
@@ -107,7 +107,7 @@ def test_the_way_chosen_by_logs_left_out_is_the_true_one(clean, band):
     for runs in (run_of(clean, band, 2), [run_of(clean, band, seed) for seed in range(2)]):
         choice = choose_motor(runs)
         assert choice.way == {"between": "hold", "latency": False, "dead_band": band > 0.0}
-        assert len(choice.errors) == 8
+        assert len(choice.errors) == len(WAYS)
         assert min(error for _, error in choice.errors) == pytest.approx(0.05, rel=0.15)  # the noise
 
 

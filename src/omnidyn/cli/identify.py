@@ -29,7 +29,7 @@ def identify(
     profile: list[str] = typer.Option([], metavar="KEY", help="Interval by profile of the likelihood. Repeatable."),
     bootstrap: int = typer.Option(0, min=0, metavar="N", help="Intervals from N draws of whole runs instead."),
     start: str = typer.Option("", help="How logs begin: rest, free, or auto: at rest where that shows."),
-    between: str = typer.Option("", help="Of the motors: input holds, or mean of two rows; default: auto."),
+    between: str = typer.Option("", help="Of the motors: input holds, mean of two rows, or a curve; default: auto."),
     what: str = typer.Option(FRICTION, help="friction, or motors: the line of each motor, wheels off the ground."),
     shape: str = typer.Option(
         "auto", help="box, disc, ellipse, wheel, wheels, disc+wheel, ...; auto: the best; line: per axis, the paper."

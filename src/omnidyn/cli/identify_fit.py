@@ -315,12 +315,14 @@ def fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out:
     """One output-error fit per motor, with and without a dead band, and free runs on what was held out."""
     import numpy as np
 
+    from omnidyn.identification.motor_choice import is_late
     from omnidyn.identification.motor_fit import fit_motor
     from omnidyn.identification.motor_run import fit_rmse
 
     part = _Part(loaded, ask.hold_out)
     counts = [run.wheels or 1 for run in part.runs]
-    other = [name for name in ask.nuisances if name.partition(".")[0] != "latency"]
+    asked = nuisances(ask.nuisances)
+    other = [name for name in asked if name.partition(".")[0] != "latency"] if asked != "auto" else []
     if other:
         from omnidyn.errors import InputError
 
@@ -330,8 +332,8 @@ def fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out:
     found: list[tuple[MotorFit, MotorFit, float, float]] = []
     for motor in range(min(counts)):
         now(f"fitting motor {motor + 1} of {min(counts)}")
-        how: dict[str, Any] = {"kind": kind, "between": ask.between or "auto", "latency": bool(ask.nuisances),
-                               "loss": ask.loss or "gaussian"}  # fmt: skip
+        how: dict[str, Any] = {"kind": kind, "between": ask.between or "auto", "loss": ask.loss or "gaussian"}
+        how["latency"] = is_late(part.runs, motor, **how) if asked == "auto" else bool(asked)
         band, plain = (fit_motor(part.runs, motor, dead_band=with_band, **how) for with_band in (True, False))
         held = [run for run, _ in part.held]
         errors = [fit_rmse(fit, held) if held else np.nan for fit in (band, plain)]
@@ -353,10 +355,10 @@ def _tell_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], recor
         ]  # fmt: skip
         show_json({"method": "output-error", "motors": motors, "report": out.report or None, "provenance": record})
     else:
-        from omnidyn.identification.fit_words import MOTOR_HEAD, motor_rows
+        from omnidyn.identification.fit_words import MOTOR_HEAD, motor_rows, motor_words
         from omnidyn.identification.study_table import table_text
 
-        words = [each for band, *_ in found for each in (band.statement(), *band.doubts)]
-        show("\n".join([*table_text(MOTOR_HEAD, motor_rows(found)), "", *(f"- {each}" for each in words)]))
+        lines = [f"- {each}" for each in motor_words(found)]
+        show("\n".join([*table_text(MOTOR_HEAD, motor_rows(found)), "", *lines]))
     if out.report:
         say(f"omnidyn: wrote {out.report}")

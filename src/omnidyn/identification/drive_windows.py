@@ -19,6 +19,7 @@ from scipy.interpolate import CubicSpline
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.average import TO_SIGMA, robust_mean, sensor_step
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus, live_angle
+from omnidyn.logs.resolved import unresolved_input
 from omnidyn.logs.segments import segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
@@ -37,8 +38,7 @@ EDGE_SHARE = 0.2  # of a window, around each end: where the speed at the end is 
 SIGN_NOISE = 0.2  # of the usual speed: noise that a sign can bear
 SLOW = 0.02  # of the usual speed: slower is at rest
 REST_SHARE = 0.1  # of the rows of a window at rest from which it says nothing about sliding friction
-CONTEXT_ROWS, SPLINE_ROWS = 24, 6
-JITTER, JITTER_SIZE = 0.15, 0.2  # an input that changes so much from row to row is not resolved by the log
+SPLINE_ROWS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,21 +296,6 @@ def _mean_input(run: Run, motion: _Motion, whole: FloatArray, window: slice) -> 
     if not np.isfinite(whole[near]).all():
         near = window
     return float(CubicSpline(run.t[near], whole[near]).integrate(t[0], t[-1]) / (t[-1] - t[0]))
-
-
-def unresolved_input(whole: FloatArray, window: slice, largest: float, jitter: float = JITTER) -> bool:
-    """Whether the input jumps about so much between rows that what happened there is not in the log.
-
-    whole: the input of one motor, shape (rows,); largest: its largest size in the run. jitter: how much from
-    row to row is too much, as a share of the spread.
-    """
-    more = max(0, CONTEXT_ROWS - (window.stop - window.start)) // 2
-    own = whole[max(0, window.start - more) : window.stop + more]
-    spread = float(np.std(own))
-    jumps = np.abs(np.diff(own))
-    size = float(np.sqrt(np.mean(jumps**2)))
-    many = np.mean(jumps > spread / 10.0) > 2.0 * STEPWISE  # a step alone is no jitter
-    return bool(many) and spread > JITTER_SIZE * largest and size > jitter * spread
 
 
 def _sides(motion: _Motion, window: slice, motor: int, usual: float, error: float, put_in: float) -> FloatArray:

@@ -23,6 +23,7 @@ WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could
 LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
 SHOWN = 6
+PAYS = 0.01  # share by which the error on held-out logs must fall for a number to pay
 # Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
 GOES_WITH_TORQUE = ("motor.emf_constant_Vs_rad", "motor.gear_ratio")
 FREEABLE = ("motor.torque_constant_Nm_A", "motor.resistance_ohm", "body.inertia_kg_m2")
@@ -73,6 +74,19 @@ def motor_rows(found: Sequence[tuple[MotorFit, MotorFit, float, float]]) -> list
                 f"{out:.4g}" if math.isfinite(out) else "-",
             ))  # fmt: skip
     return rows
+
+
+def motor_words(found: Sequence[tuple[MotorFit, MotorFit, float, float]]) -> list[str]:
+    """What each motor's fit says: its statement, its doubts, and whether the dead band is any use on held-out logs."""
+    words = []
+    for band, _, held, held_plain in found:
+        words += [band.statement(), *(f"motor {band.motor + 1}: {each}" for each in band.doubts)]
+        if band.dead_band_seen and held > (1.0 - PAYS) * held_plain:
+            words.append(
+                f"motor {band.motor + 1}: held-out logs are met no better with the dead band (error {held:.4g} rad/s, "
+                f"{held_plain:.4g} without): it may stand for something else"
+            )
+    return words
 
 
 def interval(pair: tuple[float, float]) -> str:

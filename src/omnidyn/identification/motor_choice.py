@@ -11,7 +11,7 @@ import numpy as np
 
 from omnidyn.errors import InsufficientDataError, OmnidynError
 from omnidyn.identification.motor_fit import MotorFit, fit_motor
-from omnidyn.identification.motor_log import HOLD, MEAN
+from omnidyn.identification.motor_log import CURVE, HOLD, MEAN
 from omnidyn.identification.motor_run import fit_rmse
 from omnidyn.run import Run
 
@@ -23,7 +23,7 @@ Score = Callable[[MotorFit, Sequence[Run]], float]
 
 WAYS = tuple(
     {"between": between, "latency": latency, "dead_band": dead_band}
-    for dead_band, latency, between in product((False, True), (False, True), (HOLD, MEAN))
+    for dead_band, latency, between in product((False, True), (False, True), (HOLD, MEAN, CURVE))
 )
 
 
@@ -58,6 +58,16 @@ def choose_motor(
             "no log can be predicted from the others", got=f"{len(every)} logs", expected="more, or longer ones"
         )
     return MotorChoice(best[0], fit_motor(every, motor, **{**shared, **best[0]}), errors)
+
+
+def is_late(runs: Run | Sequence[Run], motor: int = 0, **shared: Any) -> bool:
+    """Whether logs show that speed or angle of a motor were recorded late: an interval of a latency without 0."""
+    try:
+        fit = fit_motor(runs, motor, dead_band=False, latency=True, **shared)
+    except OmnidynError:
+        return False
+    found = (number.ci95 for name, number in fit.nuisances.items() if name not in fit.unidentifiable)
+    return fit.converged and any(low > 0.0 or high < 0.0 for low, high in found)
 
 
 def _left_out(runs: Sequence[Run], motor: int, score: Score, how: Mapping[str, Any]) -> float:

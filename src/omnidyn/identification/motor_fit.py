@@ -19,8 +19,17 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.estimate import finite_or_none
+from omnidyn.identification.motor_bend import Bend, bend
 from omnidyn.identification.motor_engine import BAND, INNER, LAG, SLOPE, MotorEngine
-from omnidyn.identification.motor_log import HOLD, MEAN, begin, motor_problem, motor_records, unresolved_rows
+from omnidyn.identification.motor_log import (
+    CURVE,
+    HOLD,
+    INPUTS,
+    MEAN,
+    begin,
+    motor_problem,
+    motor_records,
+)
 from omnidyn.identification.output_error.answer import Nuisance
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.exact_engine import ExactEngine
@@ -29,13 +38,14 @@ from omnidyn.identification.output_error.nuisances import LATENCY
 from omnidyn.identification.output_error.problem import Point
 from omnidyn.identification.output_error.resampling import RISE
 from omnidyn.identification.output_error.solver import Solution, Solver, State
-from omnidyn.identification.output_error.uncertainty import Trust, trust
+from omnidyn.identification.output_error.uncertainty import SANDWICH, Trust, trust
+from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
 
 AUTO = "auto"
-WORDS = {HOLD: "held from row to row", MEAN: "the mean of two rows"}
+WORDS = {HOLD: "held from row to row", MEAN: "the mean of two rows", CURVE: "a curve through the rows"}
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
 LATENCIES = {"wheel_speed": "wheel_speed", "wheel_angle": "heading"}  # channel -> its name in the engine
 
@@ -79,6 +89,11 @@ class MotorFit:
         )  # fmt: skip
         words = f"motor {self.motor + 1}: slope {self.value[SLOPE]:.5g}{spread}, "
         words += f"lag {self.value[LAG] * 1e3:.3g} ms"
+        if self.nuisances:
+            words += "".join(
+                f", {name.partition('.')[2]} late by {each.value * 1e3:.3g} +- {each.std * 1e3:.2g} ms"
+                for name, each in self.nuisances.items()
+            )
         if self.left_out:
             words += f" ({self.left_out} rows left out: their input changes too much from row to row)"
         if BAND not in self.value:
@@ -116,19 +131,22 @@ def fit_motor(
 
     motor: its number from 0. dead_band: False leaves Coulomb friction out. kind: "voltage" or "duty"; "" takes the
     first that is there. between: "hold": the input of a row holds to the next; "mean": the mean of both rows applies,
-    where inputs are sampled as the speeds are; "auto": whichever fits better. Intervals span both ways unless the
-    other one fits clearly worse. latency: fit how late speed and angle
-    are [s]; a lag and a latency are told apart only by how the speed sets off. angle: the angle is an output too,
-    beside the speed; what the log does not resolve of the input adds up in it, and then looks like friction.
+    where inputs are sampled as the speeds are; "curve": a smooth curve through the rows, a line where the input jumps;
+    "auto": whichever fits best. Intervals span all ways but those that fit clearly worse, and that of the dead band
+    also what is left of it where a smooth bend of the line of speed over input is fitted too, if one is needed.
+    latency: fit how late speed and angle are [s]; a lag and a latency are told apart only by how the speed sets off.
+    angle: the angle is an output too, beside the speed; what the log does not resolve of the input adds up in it, and
+    then looks like friction.
     Raises InputError for a run without the channels, InsufficientDataError where the motor says nothing.
     """
-    if between not in (AUTO, HOLD, MEAN):
-        raise InputError("no such way", got=between, expected=f"{AUTO}, {HOLD} or {MEAN}", where="between")
+    if between not in (AUTO, *WORDS):
+        expected = f"{AUTO}, {', '.join(WORDS)}"
+        raise InputError("no such way", got=between, expected=expected, where="between")
     if loss not in (GAUSS, STUDENT):
         raise InputError("unknown loss", got=loss, expected=f"{GAUSS} or {STUDENT}", where="loss")
     every = [runs] if isinstance(runs, Run) else list(runs)
     found: dict[str, tuple[Solution, Solver, str]] = {}
-    for way in (HOLD, MEAN):
+    for way in WORDS:
         records, unit = motor_records(every, motor, kind, way, angle)
         problem = motor_problem(records, dead_band, latency)
         solver = Solver(problem, MotorEngine(problem), degrees(loss))
@@ -136,21 +154,47 @@ def fit_motor(
         found[way] = min(ends, key=lambda end: end.state.objective), solver, unit
     cost = {way: end.state.objective for way, (end, _, _) in found.items()}
     chosen = between if between != AUTO else min(cost, key=lambda way: cost[way])
-    other = MEAN if chosen == HOLD else HOLD
+    known = {way: trust(solver, end, _colour(covariance, way)) for way, (end, solver, _) in found.items()}
+    answers = {way: _answer(solver, end, known[way], motor, unit, way) for way, (end, solver, unit) in found.items()}
+    inputs = [getattr(run, _kind(found[chosen][2]))[:, motor] for run in every]
+    fit = replace(answers[chosen], left_out=sum(int(unresolved_rows(u).sum()) for u in inputs))
+    rise = RISE * max(known[chosen].widening, 1.0) ** 2  # coloured residuals make every likelihood too steep
+    rivals = [way for way in cost if way != chosen and 2.0 * (cost[way] - cost[chosen]) <= rise]
+    for way in rivals:
+        fit = _with_rival(fit, answers[way])
+    return _with_bend(fit, bend(found[chosen][1], found[chosen][0].state))
 
-    def answer(way: str) -> MotorFit:
-        end, solver, unit = found[way]
-        return _answer(solver, end, trust(solver, end, covariance), motor, unit, way)
 
-    fit = answer(chosen)
-    return fit if 2.0 * (cost[other] - cost[chosen]) > RISE else _with_rival(fit, answer(other))
+def _colour(covariance: str, way: str) -> str:
+    """Rows of a refined log have no measured neighbours, so that auto would not see whether these resemble."""
+    return SANDWICH if (covariance, way) == ("auto", CURVE) else covariance
+
+
+def _kind(unit: str) -> str:
+    return next(name for name, own in INPUTS.items() if own == unit)
+
+
+def _with_bend(fit: MotorFit, bent: Bend | None) -> MotorFit:
+    """The fit with an interval of the dead band that holds the one with a smooth bend of the line fitted too."""
+    if bent is None or not bent.needed or BAND in fit.unidentifiable:
+        return fit
+    low, high = fit.ci95[BAND]
+    std = float(np.hypot(max(fit.std[BAND], bent.std), fit.value[BAND] - bent.value))
+    words = (
+        f"the line of speed over input bends: with a smooth bend fitted too (error {bent.left:.3g} of that without), "
+        f"the dead band is {bent.value:.3g} +- {bent.std:.2g} {fit.unit}: the interval spans both"
+    )
+    return replace(
+        fit, std={**fit.std, BAND: std},
+        ci95={**fit.ci95, BAND: (min(low, bent.ci95[0]), max(high, bent.ci95[1]))}, doubts=(*fit.doubts, words),
+    )  # fmt: skip
 
 
 def _with_rival(fit: MotorFit, rival: MotorFit) -> MotorFit:
     """The fit with intervals that hold those of another way of reading the input, which fits as well or better.
 
-    What the input did between its rows is not in the log: one more number that is fitted or assumed, with two values.
-    Its 95 % region by likelihood holds both ways unless one fits worse by more than RISE, so the intervals do too; the
+    What the input did between its rows is not in the log: one more number that is fitted or assumed, with a few values.
+    Its 95 % region by likelihood holds all ways that fit worse by no more than RISE, so the intervals do too; the
     difference of the values joins the variance.
     """
     shared = [name for name in fit.value if name in rival.value]
@@ -176,11 +220,9 @@ def _answer(solver: Solver, solution: Solution, known: Trust, motor: int, unit: 
     std, ci95 = intervals(problem, values, known)
     blind = {name for name, b in zip(problem.names, known.blind, strict=True) if b}
     for name, value, number in zip(problem.names, values, problem.parameters, strict=False):
-        if name == INNER + BAND and value >= 0.99 * number.high:
+        if name == INNER + BAND and (value >= 0.99 * number.high or std[name] > number.high):
             blind |= {name}
             std[name], ci95[name] = float("nan"), (number.low, number.high)
-    records = {id(piece.record): piece.record for piece in problem.pieces}.values()
-    left_out = sum(int(unresolved_rows(record.voltage[:, 0]).sum()) for record in records)
     own, names = problem.robot_count, tuple(name.removeprefix(INNER) for name in problem.names)
     std = {name.removeprefix(INNER): each for name, each in std.items()}
     ci95 = {name.removeprefix(INNER): each for name, each in ci95.items()}
@@ -202,7 +244,6 @@ def _answer(solver: Solver, solution: Solution, known: Trust, motor: int, unit: 
         names=names, correlation=covariance / np.outer(size, size),
         at_bound=tuple(name for name, held in zip(names, known.held, strict=True) if held),
         unidentifiable=tuple(name for name in names if {name, INNER + name} & blind),
-        left_out=left_out,
         covariance=known.kind, converged=solution.converged,
         source=sources[0] if len(sources) == 1 else f"{sources[0]} and {len(sources) - 1} more logs",
     )  # fmt: skip

@@ -9,21 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.drive_windows import CONTEXT_ROWS, unresolved_input
 from omnidyn.identification.motor_engine import AXIS, BAND, INNER, LAG, SLOPE
+from omnidyn.identification.motor_input import SUB, refined
 from omnidyn.identification.output_error.nuisances import EARLIEST, LATENCY, LATEST
 from omnidyn.identification.output_error.parameters import Parameter
 from omnidyn.identification.output_error.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.record import SHORTEST, Record
+from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.logs.segments import segments
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
 
-HOLD, MEAN = "hold", "mean"  # what the input does from row to row
+HOLD, MEAN, CURVE = "hold", "mean", "curve"  # what the input does from row to row
 INPUTS = {"voltage": "V", "duty": "1"}
-JITTER = 0.6  # of the spread of the input, from row to row: about ten rows a swing; what is faster is not in the log
 
 
 def motor_records(runs: Sequence[Run], motor: int, kind: str, between: str, angle: bool) -> tuple[list[Record], str]:
@@ -55,12 +55,13 @@ def _record(run: Run, motor: int, put_in: FloatArray, between: str, angle: bool)
         raise InputError("the log has no speed and no angle of this motor", got=", ".join(run.channels),
                          expected="wheel_speed or wheel_angle", where=run.source)  # fmt: skip
     u = put_in[:, motor]
-    rough = unresolved_rows(u)
+    rough, t, known = unresolved_rows(u), run.t, np.isfinite(u)
     outputs = {name: np.where(rough, np.nan, column) for name, column in outputs.items()}
     if between == MEAN:
         u = np.append(0.5 * (u[1:] + u[:-1]), u[-1])
+        known = np.isfinite(u)
     pieces = [
-        (s.start + int(a), s.start + int(b) - 1) for s in segments(run.t) for a, b in _stretches(np.isfinite(u[s]))
+        (s.start + int(a), s.start + int(b) - 1) for s in segments(t) for a, b in _stretches(known[s])
         if b - a >= SHORTEST
     ]  # fmt: skip
     if not pieces:
@@ -68,19 +69,14 @@ def _record(run: Run, motor: int, put_in: FloatArray, between: str, angle: bool)
             "no stretch of the log has inputs throughout", got=f"{int(np.isfinite(u).sum())} rows",
             expected=f"{SHORTEST} rows in a row", where=run.source,
         )  # fmt: skip
+    measured = np.stack([*outputs.values()], axis=1)
+    if between == CURVE:
+        t, u, measured = refined(t, u, measured, pieces)
+        pieces = [(SUB * first, SUB * last) for first, last in pieces]
     return Record(
-        run.t, np.ascontiguousarray(np.nan_to_num(u)[:, None]), np.stack([*outputs.values()], axis=1),
+        t, np.ascontiguousarray(np.nan_to_num(u)[:, None]), measured,
         tuple((name, 0) for name in outputs), (0.0,) * len(outputs), tuple(pieces), run.source, False, (),
     )  # fmt: skip
-
-
-def unresolved_rows(u: FloatArray) -> NDArray[np.bool_]:
-    """Rows where the input changes too much from row to row to say what the motor got. u and result: shape (rows,)."""
-    rough, largest = np.zeros(len(u), dtype=bool), float(np.nanmax(np.abs(u), initial=0.0))
-    for first in range(0, len(u) if len(u) > 1 else 0, CONTEXT_ROWS):
-        window = slice(first, min(first + CONTEXT_ROWS, len(u)))
-        rough[window] = unresolved_input(u, window, largest, JITTER)
-    return rough
 
 
 def _stretches(known: NDArray[np.bool_]) -> list[tuple[int, int]]:

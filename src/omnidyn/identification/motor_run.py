@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from omnidyn.identification.motor_engine import BAND, INNER, MotorEngine
 from omnidyn.identification.motor_fit import MotorFit
-from omnidyn.identification.motor_log import INPUTS, motor_problem, motor_records, unresolved_rows
+from omnidyn.identification.motor_input import SUB
+from omnidyn.identification.motor_log import CURVE, INPUTS, motor_problem, motor_records
 from omnidyn.identification.output_error.nuisances import LATENCY
 from omnidyn.identification.output_error.record import SHORTEST
+from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +37,7 @@ def run_motor(fit: MotorFit, runs: Run | Sequence[Run]) -> list[FloatArray]:
     for piece, (predicted, _) in zip(problem.pieces, engine.outputs(point), strict=True):
         k = next(i for i, r in enumerate(records) if r is piece.record)
         found[k][piece.first : piece.last + 1] = predicted[piece.first : piece.last + 1, 0]
-    return found
+    return [speed[::SUB] for speed in found] if fit.between == CURVE else found
 
 
 def _late(fit: MotorFit) -> float:

@@ -13,6 +13,7 @@ from omnidyn.identification.fit_words import (
     advice,
     difference_rows,
     motor_rows,
+    motor_words,
     number_rows,
     verdict_advice,
     verdict_rows,
@@ -69,12 +70,11 @@ def render_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], prov
     )
     doubts = [f"motor {fit.motor + 1}: {name} is at its bound" for fit, *_ in found for name in fit.at_bound]
     doubts += [
-        f"motor {fit.motor + 1}: errors have a memory; the intervals allow for it" for fit, *_ in found
+        f"motor {fit.motor + 1}: the intervals allow for errors that have a memory" for fit, *_ in found
         if fit.covariance == "sandwich"
     ]  # fmt: skip
-    doubts += [f"motor {fit.motor + 1}: {words}" for fit, *_ in found for words in fit.doubts]
     sections = [
-        Section("findings", "What the data say", bullets([fit.statement() for fit, *_ in found])),
+        Section("findings", "What the data say", bullets(motor_words(found))),
         Section("numbers", "Numbers, with and without a dead band", table(MOTOR_HEAD, motor_rows(found))),
         Section("doubts", "Doubts", bullets(doubts) or paragraph("None.")),
     ]

@@ -26,6 +26,7 @@ ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close t
 DAMPING, LEAST_DAMPING = 1e-4, 1e-10
 FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked by a jump
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
+UNSEEN = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
 
 
@@ -289,9 +290,9 @@ def _weighted(
     full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
     grad = (weight @ sums.grad) * full
     info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
-    if not np.diag(info)[count:].any():
+    if not np.diag(info)[count:].max(initial=0.0) > UNSEEN:
         return grad[:count], info[:count, :count]
-    still = np.diag(info)[count:] == 0.0
+    still = np.diag(info)[count:] <= UNSEEN
     still[: len(FASTEST)] |= np.diag(info)[count : count + len(FASTEST)] < FASTEST**-2
     speeds, pull = states[: len(FASTEST)], grad[count : count + len(FASTEST)]
     still[: len(FASTEST)] |= (np.abs(speeds) >= FASTEST) & (np.sign(speeds) * pull > 0.0)

@@ -9,6 +9,7 @@ from omnidyn.logs.channels import components
 from omnidyn.logs.check.robust import quantum, smooth, white_noise
 from omnidyn.logs.check.work import MIN_ROWS, Work
 from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding
+from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.model.wheels import per_wheel
 
 FloatArray = NDArray[np.float64]
@@ -17,6 +18,7 @@ AT_LIMIT = 0.003  # of the limit
 LEAST_SHARE = 0.005  # of the rows
 SAG = 0.03  # of the highest supply
 BOTH_WAYS = 0.05  # of the rows, each way: more than a wheel goes on against what drives it
+TOO_FAST = 0.05  # of the rows
 
 
 def check_limits(work: Work) -> tuple[list[Finding], Work]:
@@ -26,7 +28,7 @@ def check_limits(work: Work) -> tuple[list[Finding], Work]:
     found: list[Finding] = []
     for channel in ("voltage", "duty", "current"):
         found += _saturated(work, channel)
-    found += _sag(work) + _no_supply(work)
+    found += _too_fast(work) + _sag(work) + _no_supply(work)
     for channel in ("voltage", "duty"):
         more = _one_way_drive(work, channel)
         work, found = work.replace(**{channel: None}) if more else work, found + more
@@ -100,6 +102,26 @@ def _saturated(work: Work, channel: str) -> list[Finding]:
         f"{100 * share:.2g} % of the rows",
         "what was asked for beyond it was not applied: fit from what was applied, or drive with less",
         work.lines(bad), int(bad.sum()), {"share": share, "limit": level},
+    )]  # fmt: skip
+
+
+def _too_fast(work: Work) -> list[Finding]:
+    """Inputs that change more from row to row than the rows can tell."""
+    name = next((each for each in ("voltage", "duty") if work.get(each) is not None), "")
+    values = work.get(name) if name else None
+    if values is None:
+        return []
+    fast = np.array([unresolved_rows(column) for column in values.T]).T
+    bad = np.asarray(fast.any(axis=1))
+    if bad.mean() < TOO_FAST:
+        return []
+    names = [each for each, column in zip(components(name, values.shape[1]), fast.T, strict=True) if column.any()]
+    return [Finding(
+        "too_fast", NOTE, " ".join(names),
+        f"{' and '.join(names)} {'changes' if len(names) == 1 else 'change'} so much from row to row in "
+        f"{100 * float(bad.mean()):.2g} % of the rows that what the motors got between them is not in the log",
+        "log faster, or drive more slowly; a fit of the motors leaves these rows out", work.lines(bad),
+        int(bad.sum()), {"share": float(bad.mean())},
     )]  # fmt: skip
 
 

@@ -1,0 +1,49 @@
+"""Whether the rows of a log resolve an input, or it changes so fast that nobody knows what happened between them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.logs.plateaus import STEPWISE
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+CONTEXT_ROWS = 24
+JITTER, JITTER_SIZE = 0.15, 0.2  # an input that changes so much from row to row is not resolved by the log
+JITTER_ROWS = 0.6  # of the spread of the input, from row to row: about ten rows a swing; what is faster is not there
+
+
+def unresolved_input(whole: FloatArray, window: slice, largest: float, jitter: float = JITTER) -> bool:
+    """Whether the input jumps about so much between rows that what happened there is not in the log.
+
+    whole: the input of one motor, shape (rows,); largest: its largest size in the run. jitter: how much from
+    row to row is too much, as a share of the spread.
+    """
+    more = max(0, CONTEXT_ROWS - (window.stop - window.start)) // 2
+    own = whole[max(0, window.start - more) : window.stop + more]
+    spread = float(np.std(own))
+    jumps = np.abs(np.diff(own))
+    size = float(np.sqrt(np.mean(jumps**2)))
+    many = np.mean(jumps > spread / 10.0) > 2.0 * STEPWISE  # a step alone is no jitter
+    return bool(many) and spread > JITTER_SIZE * largest and size > jitter * spread
+
+
+def unresolved_rows(u: FloatArray) -> BoolArray:
+    """Rows where the input changes too much from row to row to say what the motor got. u and result: shape (rows,).
+
+    Rows between two stretches of such rows that are both longer do not count either: a sine whose frequency passes
+    that of the rows looks slow for as long as it is near.
+    """
+    rough, largest = np.zeros(len(u), dtype=bool), float(np.nanmax(np.abs(u), initial=0.0))
+    for first in range(0, len(u) if len(u) > 1 else 0, CONTEXT_ROWS):
+        window = slice(first, min(first + CONTEXT_ROWS, len(u)))
+        rough[window] = unresolved_input(u, window, largest, JITTER_ROWS)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rough, [False]]).astype(np.int8)))
+    begin, end = edges[::2], edges[1::2]
+    length = end - begin
+    for k in range(len(length) - 1):
+        if begin[k + 1] - end[k] < min(length[k], length[k + 1]):
+            rough[end[k] : begin[k + 1]] = True
+    return rough
