@@ -132,8 +132,8 @@ def fit_motor(
     motor: its number from 0. dead_band: False leaves Coulomb friction out. kind: "voltage" or "duty"; "" takes the
     first that is there. between: "hold": the input of a row holds to the next; "mean": the mean of both rows applies,
     where inputs are sampled as the speeds are; "curve": a smooth curve through the rows, a line where the input jumps;
-    "auto": whichever fits best. Intervals span all ways but those that fit clearly worse, and that of the dead band
-    also what is left of it where a smooth bend of the line of speed over input is fitted too, if one is needed.
+    "auto": whichever fits best. Intervals span all ways but those that fit clearly worse, and that of a dead band
+    that is seen also what is left of it where a smooth bend of the line is fitted too, if one is needed.
     latency: fit how late speed and angle are [s]; a lag and a latency are told apart only by how the speed sets off.
     angle: the angle is an output too, beside the speed; what the log does not resolve of the input adds up in it, and
     then looks like friction.
@@ -162,7 +162,7 @@ def fit_motor(
     rivals = [way for way in cost if way != chosen and 2.0 * (cost[way] - cost[chosen]) <= rise]
     for way in rivals:
         fit = _with_rival(fit, answers[way])
-    return _with_bend(fit, bend(found[chosen][1], found[chosen][0].state))
+    return _with_bend(fit, bend(found[chosen][1], found[chosen][0].state)) if fit.dead_band_seen else fit
 
 
 def _colour(covariance: str, way: str) -> str:
@@ -176,7 +176,7 @@ def _kind(unit: str) -> str:
 
 def _with_bend(fit: MotorFit, bent: Bend | None) -> MotorFit:
     """The fit with an interval of the dead band that holds the one with a smooth bend of the line fitted too."""
-    if bent is None or not bent.needed or BAND in fit.unidentifiable:
+    if bent is None or not bent.needed:
         return fit
     low, high = fit.ci95[BAND]
     std = float(np.hypot(max(fit.std[BAND], bent.std), fit.value[BAND] - bent.value))

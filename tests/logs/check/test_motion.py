@@ -127,3 +127,13 @@ def test_guesses_of_a_robot_file_are_no_evidence_against_a_log(log, robot):
     (finding,) = check(log, guess).of("energy")
     assert finding.level == "warn"
     assert "motor.emf_constant_Vs_rad of the robot file is only guessed" in finding.remedy
+
+
+def test_an_input_that_outruns_the_rows(log, with_channels):
+    voltage = log.channels["voltage"].copy()
+    half = len(log) // 2
+    voltage[half:, 0] = 3.0 * (-1.0) ** np.arange(len(log) - half)
+    (finding,) = check(with_channels(voltage=voltage)).of("too_fast")
+    assert finding.where == "u1"
+    assert finding.numbers["share"] == pytest.approx(0.5, abs=0.05)
+    assert not check(log).of("too_fast")

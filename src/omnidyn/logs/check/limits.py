@@ -18,7 +18,7 @@ AT_LIMIT = 0.003  # of the limit
 LEAST_SHARE = 0.005  # of the rows
 SAG = 0.03  # of the highest supply
 BOTH_WAYS = 0.05  # of the rows, each way: more than a wheel goes on against what drives it
-TOO_FAST = 0.05  # of the rows
+TOO_FAST = 0.1  # of the rows
 
 
 def check_limits(work: Work) -> tuple[list[Finding], Work]:
