@@ -235,10 +235,11 @@ def test_no_part_calls_a_maker():
 
 
 def test_nobody_compiles_behind_our_back():
-    """numba is imported in compiled.py alone."""
+    """numba is imported in compiled.py, and in pieces.py, which only that one imports."""
     for file in PACKAGE.rglob("*.py"):
-        if file.name == "compiled.py":
+        if file in (PACKAGE / "compiled.py", PACKAGE / "pieces.py"):
             continue
+        assert "omnidyn.pieces" not in file.read_text(encoding="utf-8"), file
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
@@ -297,3 +298,53 @@ def test_the_hash_covers_names_and_contents(tmp_path, monkeypatch):
 def test_source_hash_is_computed_once_per_process():
     assert compiled.source_hash() is compiled.source_hash()
     assert len(compiled.source_hash()) == 64
+
+
+# ---- pieces of kernels: compiled once, in their kernels ---------------------------------------------------
+
+
+def thrice_at(x, k):
+    return 3.0 * x[k]
+
+
+@pytest.fixture
+def piece():
+    """A part with a kernel that calls it with a constant and with a variable, and two parts between them."""
+    inner = compiled.part(thrice_at)
+    first, second = compiled.part(lambda x: inner(x, 0)), compiled.part(lambda x, k: inner(x, k))
+    outer = compiled.kernel(lambda x: first(x) + second(x, len(x) - 1))
+    return inner, first, second, outer
+
+
+def test_a_piece_has_no_machine_code_of_its_own(piece):
+    """If this fails, numba compiles every formula again for each function above it: time a first run."""
+    inner, first, second, outer = piece
+    assert outer(np.array([1.0, 5.0, 10.0])) == 33.0
+    for part in (inner, first, second):
+        (result,) = part.overloads.values()
+        library, name = result.library, result.fndesc.mangled_name
+        assert not library.codegen._engine.is_symbol_defined(name)
+        assert library.get_llvm_str().count("define ") == 1, "nothing of what it calls, and no wrapper"
+    assert inner.overloads.keys() == second.overloads.keys(), "a constant is an argument like others"
+
+
+def test_a_piece_that_is_called_from_python_is_compiled_for_itself(piece):
+    inner = piece[0]
+    assert inner(np.array([1.0, 5.0]), 1) == inner(np.array([1.0, 5.0]), k=1) == 15.0
+    assert not inner.overloads
+    assert len(inner.whole.overloads) == 1
+
+
+def test_a_numba_without_what_pieces_need_compiles_them_in_its_own_way(monkeypatch):
+    monkeypatch.setattr(compiled, "Piece", None)
+    inner = compiled.part(thrice_at)
+    assert type(inner) is type(numba.njit(thrice_at))
+    assert compiled.kernel(lambda x: inner(x, 1))(np.array([1.0, 5.0])) == 15.0
+
+
+def test_a_piece_under_two_kernels_gives_both_its_code():
+    inner = compiled.part(thrice_at)
+    between = compiled.part(lambda x: inner(x, 1) + inner(x, 0))
+    for factor in (1.0, 2.0):
+        outer = compiled.kernel(lambda x, by=factor: by * between(x) + inner(x, 0))
+        assert outer(np.array([1.0, 5.0])) == factor * 18.0 + 3.0

@@ -17,6 +17,11 @@ from typing import Any
 import numba
 from numba.core.options import DefaultOptions
 
+try:
+    from omnidyn.pieces import Piece
+except ImportError:  # a numba that we do not know: pieces are compiled as it would, a first run takes twice as long
+    Piece = None
+
 PACKAGE = Path(__file__).resolve().parent
 ERROR_MODEL = "numpy"  # a division by zero gives inf or nan, as in NumPy, and needs no branch
 
@@ -43,12 +48,12 @@ def part(function: Callable[..., Any]) -> Callable[..., Any]:
     It works in arrays that its kernel holds, and does not count who holds them: numba lets it neither make nor return
     one.
     """
-    return numba.njit(error_model=ERROR_MODEL, **UNCOUNTED)(function)
+    return _piece(function, UNCOUNTED)
 
 
 def maker(function: Callable[..., Any]) -> Callable[..., Any]:
     """A piece of a kernel that makes arrays, for kernels and other makers: a part would never let go of them."""
-    return numba.njit(error_model=ERROR_MODEL, **COUNTED)(function)
+    return _piece(function, COUNTED)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -62,8 +67,15 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return compiled
 
 
+def _piece(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """A piece of kernels; where numba is switched off, for debuggers, the function itself."""
+    whole = numba.njit(error_model=ERROR_MODEL, **options)(function)
+    return Piece(whole) if Piece is not None and whole is not function else whole
+
+
 def _native(function: Callable[..., Any]) -> Any:
-    return numba.njit(nogil=True, error_model=ERROR_MODEL)(function)
+    options: dict[str, Any] = {"nogil": True, "error_model": ERROR_MODEL, "no_cfunc_wrapper": True}
+    return numba.njit(**options)(function)
 
 
 def _stamp(compiled: Any) -> None:

@@ -19,7 +19,7 @@ def scratch() -> NDArray[np.float64]:
 
 @part
 def copy_row(to, source):
-    """to[:] = source for vectors; numba would make an array on the way."""
+    """to[:] = source for vectors; numba would make an array on the way, and take seconds to compile a message."""
     for j in range(len(to)):
         to[j] = source[j]
 

@@ -170,9 +170,9 @@ def march_loop(
             still = settled > 0.0 and j > keep[row] and _as_before(loop, extra, state, d, settled)
             _tick(element, ways, loop, extra, state, d, row, voltage, loop.tick[j : j + 1])
         if j == keep[row]:
-            found.voltage[row] = voltage[0]
+            copy_row(found.voltage[row], voltage[0])
             for k in range(len(d)):
-                found.by_key[k, row] = extra.voltage[k]
+                copy_row(found.by_key[k, row], extra.voltage[k])
         if not still:
             _apply(element, ways, extra, voltage, bound)
             counts[0] = counts[1] = 0
@@ -194,5 +194,7 @@ def march_loop(
             advance_pose_tangent(ways, pose, dpose, state, state, state, d, d, d, dt[j], SIMPSON)
             advance_pose(pose, state, state, state, body[LENGTH], dt[j], SIMPSON)
         if j + 1 == keep[row + 1]:
-            out.state[row + 1], out.pose[row + 1] = state, pose
-            found.state[row + 1], found.pose[row + 1] = d, dpose
+            copy_row(out.state[row + 1], state)
+            copy_row(out.pose[row + 1], pose)
+            copy_table(found.state[row + 1], d)
+            copy_table(found.pose[row + 1], dpose)

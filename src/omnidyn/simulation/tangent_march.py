@@ -147,6 +147,8 @@ def march_tangent(
             counts[1] = 1
         begin += dt[r]
         iterations[r], steps[r] = counts[0], counts[1]
-        states[r + 1], poses[r + 1] = state, pose
+        copy_row(states[r + 1], state)
+        copy_row(poses[r + 1], pose)
         if kept:
-            ds[r + 1], dposes[r + 1] = d, dpose
+            copy_table(ds[r + 1], d)
+            copy_table(dposes[r + 1], dpose)
