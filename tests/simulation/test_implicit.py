@@ -298,3 +298,22 @@ def test_breakaway_above_coulomb_catches_what_reverses(fixed):
         assert exact.twist[-1, 0] == 0.0
         assert run.twist[-1, 0] == 0.0
         assert np.abs(run.twist - exact.twist).max() <= (3e-3 if fixed else 1e-6)
+
+
+def test_what_is_as_strong_as_its_hold_does_not_take_forever():
+    """The drive comes to the hold of an ellipse that is nearly a line, and stays within rounding of it for a while.
+
+    It gave way and stuck again in every step, the steps as short as they get: half a minute for 50 ms.
+    """
+    robot = load_robot("mecanum")
+    motor = robot.motor.replace(electrical="dynamic", voltage_drop=0.5, current_limit=2.0)
+    robot = robot.replace(motor=motor, friction=Friction(direction=DirectionFriction(coulomb=(9.0, 270e3), **YAW)))
+    voltage = np.array([[5.92564202, -1.19735065, 0.57748773, 0.39531321]])
+    numbers, bound = plant(robot), np.full((1, 4), 2.0)
+    runs = [
+        run_implicit(numbers, voltage, bound, np.array([0.05]), new_state(numbers), np.zeros(3), no_loop(4), tol)
+        for tol in (1e-5, 1e-6)
+    ]
+    assert runs[0].steps[0] < 20_000
+    assert np.abs(runs[0].state[1, :3] - runs[1].state[1, :3]).max() <= 1e-5
+    assert runs[1].state[1, 0] < -2e-3, "it has given way"

@@ -45,6 +45,7 @@ SHORT = 1.5e-4  # [s] no step is given less than the share of tol of one so long
 ROUNDING = 1e-13  # [m/s] nor less than this
 SHORTEST = 1e-11  # [s]
 MOST = (3e6, 2e7)  # steps solved at tol 1e-6, and so many more per second simulated; then a run is given up
+MANY, AGAIN = 1000, 50  # steps tried in a row, an event in each, until the shortest doubles; and until it does again
 YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
 CURRENT_SHARE = 1e-2  # and 100 tol in A
 SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 5.0 / 24.0, 8.0 / 24.0, -1.0 / 24.0)
@@ -187,6 +188,9 @@ def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
     """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
 
     spare[1] and spare[2] receive the states in the middle and at the end. Returns its length and the one to try next.
+    counts: most iterations, steps solved, and steps tried since the last one that was good and without an event. Where
+    what holds and what drives differ by no more than rounding, something gives way and sticks again in every step, for
+    as long as that lasts: after MANY, such steps grow all the same. What moves there is slower than rounding, too.
     """
     one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(element)
     rate = _share(body, element, state, tol)
@@ -201,8 +205,12 @@ def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
         astray = max(_reverses(body, element, state, middle, h), _reverses(body, element, middle, two, h))
         if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
             astray = max(astray, _unresolved(body, element, state, h))
+        counts[2] += 1
         if astray > 0.0:
-            ratio = max(ratio, 64.0) if astray > tol else 0.5
+            lasts = counts[2] > MANY and h <= SHORTEST * 2.0 ** ((counts[2] - MANY) // AGAIN)
+            ratio = 0.5 if astray <= tol else max(ratio, 0.5 if lasts else 64.0)
+        elif ratio <= 1.0:
+            counts[2] = 0
         # The error goes with h^3, and so does the ratio where the share of tol is that of SHORT; else it goes with h^2.
         fitting = 0.9 * (ratio + 1e-12) ** (-1.0 / 3.0 if h < SHORT else -0.5)
         if ratio <= 1.0 or h <= SHORTEST:
@@ -234,7 +242,7 @@ def _march(
     total, tol, most, poses, states, iterations, steps,
 ):  # fmt: skip
     """All rows; see run_implicit. Returns how many of them were done before `most` steps were."""
-    state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(2, np.int64)
+    state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(3, np.int64)
     h = dt[0]
     for k in range(len(dt)):
         counts[0] = counts[1] = 0

@@ -156,7 +156,7 @@ def march_loop(
 ):
     """All rows, cut at the ticks; what is at keep[i] goes to row i. See run_tangent_loop."""
     out = found.outcome
-    state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(2, np.int64)
+    state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
     d, dnext, dpose, h = found.state[0].copy(), found.state[0].copy(), found.pose[0].copy(), dt[0]
     voltage, row, still = np.zeros((1, len(bound))), 0, False
     for j in range(len(dt)):

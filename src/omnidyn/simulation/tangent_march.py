@@ -131,7 +131,7 @@ def march_tangent(
     first, ds, dposes, seen,
 ):  # fmt: skip
     """All rows; see run_tangent. ds and dposes may be empty: the derivatives then are where they were looked at."""
-    state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(2, np.int64)
+    state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(3, np.int64)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
     kept, begin = len(ds) > 0, 0.0
     for r in range(len(dt)):
