@@ -335,11 +335,21 @@ def test_a_piece_that_is_called_from_python_is_compiled_for_itself(piece):
     assert len(inner.whole.overloads) == 1
 
 
-def test_a_numba_without_what_pieces_need_compiles_them_in_its_own_way(monkeypatch):
-    monkeypatch.setattr(compiled, "Piece", None)
-    inner = compiled.part(thrice_at)
-    assert type(inner) is type(numba.njit(thrice_at))
-    assert compiled.kernel(lambda x: inner(x, 1))(np.array([1.0, 5.0])) == 15.0
+def test_an_unknown_numba_compiles_pieces_in_its_own_way(monkeypatch):
+    """With a version that nobody tried, and with one that has not what they need."""
+    for name, value in (("PIECES_TRIED", (0, 1)), ("_piece_class", lambda: None)):
+        compiled._piece_class.cache_clear()
+        with monkeypatch.context() as patch:
+            patch.setattr(compiled, name, value)
+            inner = compiled.part(thrice_at)
+        assert type(inner) is type(numba.njit(thrice_at))
+        assert compiled.kernel(lambda x, inner=inner: inner(x, 1))(np.array([1.0, 5.0])) == 15.0
+    compiled._piece_class.cache_clear()
+
+
+def test_pieces_are_in_use_with_this_numba():
+    """If this fails, a newer numba is locked: try pieces.py with it, time a first run, and raise PIECES_TRIED."""
+    assert compiled._piece_class() is not None
 
 
 def test_a_piece_under_two_kernels_gives_both_its_code():

@@ -17,12 +17,8 @@ from typing import Any
 import numba
 from numba.core.options import DefaultOptions
 
-try:
-    from omnidyn.pieces import Piece
-except ImportError:  # a numba that we do not know: pieces are compiled as it would, a first run takes twice as long
-    Piece = None
-
 PACKAGE = Path(__file__).resolve().parent
+PIECES_TRIED = (0, 68)  # the newest numba whose insides pieces.py is known to fit
 ERROR_MODEL = "numpy"  # a division by zero gives inf or nan, as in NumPy, and needs no branch
 
 
@@ -67,10 +63,23 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return compiled
 
 
+@cache
+def _piece_class() -> Any:
+    """Piece; None with a numba that we do not know: it compiles in its own way, and a first run takes twice as long."""
+    if numba.version_info.short > PIECES_TRIED:
+        return None
+    try:
+        from omnidyn.pieces import Piece
+    except ImportError:
+        return None
+    return Piece
+
+
 def _piece(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """A piece of kernels; where numba is switched off, for debuggers, the function itself."""
     whole = numba.njit(error_model=ERROR_MODEL, **options)(function)
-    return Piece(whole) if Piece is not None and whole is not function else whole
+    piece = _piece_class()
+    return piece(whole) if piece is not None and whole is not function else whole
 
 
 def _native(function: Callable[..., Any]) -> Any:
