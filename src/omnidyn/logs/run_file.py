@@ -5,7 +5,7 @@
 
 A channel that was not measured has no columns. In CSV a missing value is an empty cell, and numbers are written with
 the shortest digits that read back as the same float. In Parquet a missing value is NaN, and each column has its unit.
-Source and warnings of a Run are not in the file.
+Source and warnings of a Run, and which of its values were interpolated, are not in the file.
 """
 
 from __future__ import annotations

@@ -105,15 +105,23 @@ def _patterns(robot: Robot, pattern: ArrayLike) -> FloatArray:
     return pattern
 
 
+def _held(robot: Robot, voltage: FloatArray) -> NDArray[np.bool_]:
+    """Whether nothing at all moves, to the last bit. voltage: (k, n). Shape (k,)."""
+    at_rest = np.zeros((len(voltage), 3))
+    if axes_hold_alone(robot):
+        return np.all(robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage)), axis=-1)
+    return np.all(acceleration(robot, at_rest, voltage) == 0.0, axis=-1)
+
+
 def _bisect(robot: Robot, patterns: FloatArray) -> FloatArray:
-    """The largest scale that holds, by doubling and bisection on the exact test of `moves`. Shape (k,)."""
+    """The largest scale that holds, by doubling and bisection on an exact test. Shape (k,)."""
     low, high = np.zeros(len(patterns)), np.full(len(patterns), 1e-3)
-    still = ~moves(robot, high[:, None] * patterns).any(axis=-1)
+    still = _held(robot, high[:, None] * patterns)
     while still.any() and high.max() < HIGHEST:
         low, high = np.where(still, high, low), np.where(still, 2.0 * high, high)
-        still &= ~moves(robot, high[:, None] * patterns).any(axis=-1)
+        still &= _held(robot, high[:, None] * patterns)
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        holds = ~moves(robot, middle[:, None] * patterns).any(axis=-1)
+        holds = _held(robot, middle[:, None] * patterns)
         low, high = np.where(holds, middle, low), np.where(holds, high, middle)
     return np.where(still, np.inf, low)
