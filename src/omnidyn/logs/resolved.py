@@ -23,11 +23,16 @@ def unresolved_input(whole: FloatArray, window: slice, largest: float, jitter: f
     """
     more = max(0, CONTEXT_ROWS - (window.stop - window.start)) // 2
     own = whole[max(0, window.start - more) : window.stop + more]
-    spread = float(np.std(own))
+    return bool(_jumps(own, largest, jitter))
+
+
+def _jumps(own: FloatArray, largest: float, jitter: float) -> BoolArray:
+    """The test of `unresolved_input` for many windows. own: shape (..., rows), result (...,)."""
+    spread = np.std(own, axis=-1)
     jumps = np.abs(np.diff(own))
-    size = float(np.sqrt(np.mean(jumps**2)))
-    many = np.mean(jumps > spread / 10.0) > 2.0 * STEPWISE  # a step alone is no jitter
-    return bool(many) and spread > JITTER_SIZE * largest and size > jitter * spread
+    size = np.sqrt(np.mean(jumps**2, axis=-1))
+    many = np.mean(jumps > spread[..., None] / 10.0, axis=-1) > 2.0 * STEPWISE  # a step alone is no jitter
+    return np.asarray(many & (spread > JITTER_SIZE * largest) & (size > jitter * spread))
 
 
 def unresolved_rows(u: FloatArray) -> BoolArray:
@@ -37,9 +42,11 @@ def unresolved_rows(u: FloatArray) -> BoolArray:
     that of the rows looks slow for as long as it is near.
     """
     rough, largest = np.zeros(len(u), dtype=bool), float(np.nanmax(np.abs(u), initial=0.0))
-    for first in range(0, len(u) if len(u) > 1 else 0, CONTEXT_ROWS):
-        window = slice(first, min(first + CONTEXT_ROWS, len(u)))
-        rough[window] = unresolved_input(u, window, largest, JITTER_ROWS)
+    whole = len(u) - len(u) % CONTEXT_ROWS
+    windows = u[:whole].reshape(-1, CONTEXT_ROWS)
+    rough[:whole] = np.repeat(_jumps(windows, largest, JITTER_ROWS), CONTEXT_ROWS)
+    if whole < len(u) > 1:
+        rough[whole:] = unresolved_input(u, slice(whole, len(u)), largest, JITTER_ROWS)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rough, [False]]).astype(np.int8)))
     begin, end = edges[::2], edges[1::2]
     length = end - begin
