@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from omnidyn.model.layout import LENGTH
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.plant import plant
-from omnidyn.model.rest import accelerations, start_state
+from omnidyn.model.rest import accelerations, moving_states
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed, wrench_from_traction
 
@@ -74,8 +74,9 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[
     twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
     volts = np.ascontiguousarray(np.broadcast_to(voltage, (*batch, n)).reshape(-1, n))
     numbers = plant(robot.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
-    states = np.array([start_state(numbers, row, np.zeros(n)) for row in twists]).reshape(len(twists), -1)
-    return (accelerations(numbers, states, volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(*batch, 3)
+    return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(
+        *batch, 3
+    )
 
 
 def axes_hold_alone(robot: Robot) -> bool:

@@ -7,8 +7,6 @@ the ellipse, the currents of the motors [A].
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -84,14 +82,22 @@ def sticks(state, m):
 
 def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> FloatArray:
     """The state of a robot that moves with `twist` [m/s, m/s, rad/s] under `current` [A]."""
-    state = new_state(plant)
-    state[:3] = twist * [1.0, 1.0, plant.body[LENGTH]]
+    state = moving_states(plant, twist[None])[0]
     state[len(state) - plant.wheels :] = current
-    local = np.append(plant.element[:, [GX, GY, GZ]] @ state[:3], math.hypot(state[0], state[1]))
-    sign = state[SIGNS : SIGNS + len(local)]
-    moving = (local != 0.0) & (sign != 2.0)
-    sign[moving] = np.sign(local[moving])
     return state
+
+
+def moving_states(plant: Plant, twists: FloatArray) -> FloatArray:
+    """The states of a robot that moves with each of `twists` (k, 3) [m/s, m/s, rad/s], no currents. Shape (k, size)."""
+    states = np.tile(new_state(plant), (len(twists), 1))
+    states[:, :3] = twists * [1.0, 1.0, plant.body[LENGTH]]
+    x, y, z = states[:, :3].T
+    local = [g[GX] * x + g[GY] * y + g[GZ] * z for g in plant.element]
+    for e, speed in enumerate([*local, np.hypot(x, y)]):
+        sign = states[:, SIGNS + e]
+        moving = (speed != 0.0) & (sign != 2.0)
+        sign[moving] = np.sign(speed[moving])
+    return states
 
 
 @part
