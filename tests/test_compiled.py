@@ -18,6 +18,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba.core import event
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
@@ -358,3 +359,29 @@ def test_a_piece_under_two_kernels_gives_both_its_code():
     for factor in (1.0, 2.0):
         outer = compiled.kernel(lambda x, by=factor: by * between(x) + inner(x, 0))
         assert outer(np.array([1.0, 5.0])) == factor * 18.0 + 3.0
+
+
+def test_who_waits_can_see_that_a_kernel_is_being_compiled():
+    seen = []
+
+    class Probe(event.Listener):
+        def on_start(self, event):
+            seen.append(compiled.compiling())
+
+        def on_end(self, event):
+            pass
+
+    @compiled.kernel
+    def twice(x):
+        return 2.0 * x
+
+    @compiled.kernel
+    def wrong(x):
+        return x.no_such_thing
+
+    with event.install_listener("numba:compile", Probe()):
+        assert twice(1.0) == 2.0
+        with pytest.raises(NumbaError):
+            wrong(1.0)
+    assert seen == [True, True]
+    assert not compiled.compiling()

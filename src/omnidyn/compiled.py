@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
 from numba.core.options import DefaultOptions
 
 PACKAGE = Path(__file__).resolve().parent
@@ -36,6 +37,28 @@ def source_hash() -> str:
 KNOWN = hasattr(DefaultOptions, "_nrt")
 COUNTED: dict[str, Any] = {"_nrt": True} if KNOWN else {}
 UNCOUNTED: dict[str, Any] = {"_nrt": False} if KNOWN else {}
+
+
+class _Compiling(event.Listener):
+    """Hears of every function that numba compiles, those inside of others too."""
+
+    def __init__(self):
+        self.under_way = 0
+
+    def on_start(self, event: Any) -> None:
+        self.under_way += 1
+
+    def on_end(self, event: Any) -> None:
+        self.under_way -= 1
+
+
+_compiling = _Compiling()
+event.register("numba:compile", _compiling)
+
+
+def compiling() -> bool:
+    """Whether a kernel is being compiled just now, in any thread: what else is waited for then stands still."""
+    return _compiling.under_way > 0
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:

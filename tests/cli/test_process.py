@@ -193,6 +193,7 @@ def _seconds_of_work(cwd):
 
 def test_work_past_two_seconds_shows_progress(capsys, monkeypatch):
     monkeypatch.setattr("omnidyn.cli.progress.SILENT_S", 0.05)
+    monkeypatch.setattr("omnidyn.cli.progress.NEW_S", 0.05)
     monkeypatch.setattr("omnidyn.cli.progress.BEAT_S", 0.05)
     from omnidyn.cli.progress import progress
 
@@ -204,6 +205,30 @@ def test_work_past_two_seconds_shows_progress(capsys, monkeypatch):
     assert out == ""
     assert "omnidyn: walking ... 0 s" in err
     assert "omnidyn: running ... 0 s" in err
+
+
+def test_a_new_step_is_told_sooner_than_one_that_lasts(capsys, monkeypatch):
+    for name, seconds in (("SILENT_S", 0.02), ("NEW_S", 0.1), ("BEAT_S", 60.0)):
+        monkeypatch.setattr(f"omnidyn.cli.progress.{name}", seconds)
+    from omnidyn.cli.progress import progress
+
+    with progress("walking") as now:
+        time.sleep(0.05)
+        now("running")
+        time.sleep(0.5)
+    err = capsys.readouterr().err
+    assert (err.count("walking"), err.count("running")) == (1, 1)
+
+
+def test_progress_says_where_a_kernel_is_compiled(capsys, monkeypatch):
+    import omnidyn.compiled
+    from omnidyn.cli.progress import progress
+
+    monkeypatch.setattr("omnidyn.cli.progress.SILENT_S", 0.05)
+    monkeypatch.setattr(omnidyn.compiled, "compiling", lambda: True)
+    with progress("walking"):
+        time.sleep(0.2)
+    assert "omnidyn: walking (a kernel is being compiled: once, the first time) ... 0 s" in capsys.readouterr().err
 
 
 def test_quick_work_is_silent(capsys):
