@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.identify import why_no_inputs
@@ -53,6 +54,8 @@ from omnidyn.identification.output_error.uncertainty import SHARE, Trust, trust
 from omnidyn.identification.study_parts import Difference
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
 
 FRICTION_KEYS = "friction"  # stands for all six
 
@@ -102,7 +105,7 @@ class JointFit:
         """
         known = trust(self.solver, solution, self.covariance)
         strata = {id(record): member.name for member in self.engine.members for record in member.part.records}
-        again = resampled(self.solver, solution, known.std, self._joint_names(profile), bootstrap, strata)
+        again = resampled(self.solver, solution, known, self._joint_names(profile), bootstrap, strata)
         estimates = {m.name: self._estimate(m, solution, known, again, words) for m in self.engine.members}
         shared = tuple(name for name in self.engine.problem.names if AT not in name)
         found = self._differences(solution, known, again, strata, profile)
@@ -129,7 +132,8 @@ class JointFit:
         found = Solution(state, solution.held[at], solution.iterations, solution.converged)
         own = replace(
             known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
-            unseen=known.unseen[at],             free_step=known.free_step[at], neighbours=known.neighbours[columns],
+            unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],
+            plain=known.plain[np.ix_(at, at)],
             directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
         )  # fmt: skip
         names = [self.engine.problem.names[k] for k in at]
@@ -149,6 +153,7 @@ class JointFit:
         """Second group minus first: by profile, from draws of a bootstrap, else to first order in the covariance."""
         names, values, found = self.engine.problem.names, solution.state.point.values, []
         groups = [member.name for member in self.engine.members]
+        covariance = np.where(np.isfinite(known.covariance), known.covariance, 0.0)
         for key in self.own:
             there = [group for group in groups if f"{key}{AT}{group}" in names]
             for i, first in enumerate(there):
@@ -156,26 +161,28 @@ class JointFit:
                     a, b = names.index(f"{key}{AT}{first}"), names.index(f"{key}{AT}{second}")
                     if known.blind[a] or known.blind[b]:
                         continue
-                    change = float(values[b] - values[a])
+                    change, way = float(values[b] - values[a]), self._way_of_change(a, b, solution)
                     if again.draws is not None:
                         drawn = again.draws[:, b] - again.draws[:, a]
                         std = widening_of_std(least_runs(self.solver, strata)) * float(drawn.std(ddof=1))
                         low, high = draw_interval(change, drawn, again.widening)
                     else:
-                        std = self._std_of_change(a, b, solution, known)
+                        std = float(np.sqrt(max(way @ covariance @ way, 0.0)))
                         low, high = change - known.quantile * std, change + known.quantile * std
                     if key in profile and std > 0.0:
-                        low, high = difference_interval(self.solver, solution, a, b, std) or (low, high)
+                        low, high = difference_interval(
+                            self.solver, solution, a, b, std, known.rise(way)
+                        ) or (low, high)  # fmt: skip
                     pair = float(values[a]), float(values[b])
                     found.append(Difference(key, first, second, pair, change, std, low, high))
         return found
 
-    def _std_of_change(self, a: int, b: int, solution: Solution, known: Trust) -> float:
+    def _way_of_change(self, a: int, b: int, solution: Solution) -> FloatArray:
+        """What the change from number a to b is of the numbers that the solver sees, to first order. Shape (P,)."""
         parameters, values = self.engine.problem.parameters, solution.state.point.values
         slope = np.zeros(len(parameters))
         slope[a], slope[b] = -parameters[a].slope(float(values[a])), parameters[b].slope(float(values[b]))
-        covariance = np.where(np.isfinite(known.covariance), known.covariance, 0.0)
-        return float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        return slope
 
 
 def identify_groups(

@@ -36,9 +36,8 @@ from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.fit import GAUSS, STUDENT, degrees
 from omnidyn.identification.output_error.nuisances import LATENCY
 from omnidyn.identification.output_error.problem import Point
-from omnidyn.identification.output_error.resampling import RISE
 from omnidyn.identification.output_error.solver import Solution, Solver, State
-from omnidyn.identification.output_error.uncertainty import SANDWICH, Trust, trust
+from omnidyn.identification.output_error.uncertainty import RISE, SANDWICH, Trust, trust
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
 

@@ -4,6 +4,7 @@ An axis at rest holds a drive up to S. Between two neighbouring drives of the lo
 one, a release appears or vanishes, and the likelihood jumps. So S is profiled over these plateaus: the other numbers
 fitted anew at each S, the interval is where 2 (F - least F) stays below 7.35. That is the 95 % quantile for a number at
 which a model jumps (Hansen, Econometrica 68, 575 (2000), on thresholds); the 3.84 of chi^2 holds for smooth ones only.
+Where residuals are not white the likelihood is too steep, and the limit higher, as for coulomb (`Trust.rise`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.problem import Point
 from omnidyn.identification.output_error.solver import Solution, Solver
+from omnidyn.identification.output_error.uncertainty import RISE, SANDWICH, Trust
 
 FloatArray = NDArray[np.float64]
 
@@ -64,21 +66,34 @@ def with_breakaway(solver: Solver, levels: FloatArray) -> Solver:
     return Solver(solver.problem, solver.engine.with_breakaway(levels), solver.nu)
 
 
-def find_breakaway(solver: Solver, solution: Solution, axes: list[int]) -> tuple[Solver, Solution, list[Breakaway]]:
-    """Profile S of the axes, one after the other, twice where there are several: (solver, solution, levels) there."""
+def find_breakaway(
+    solver: Solver, solution: Solution, axes: list[int], known: Trust
+) -> tuple[Solver, Solution, list[Breakaway]]:
+    """Profile S of the axes, one after the other, twice where there are several: (solver, solution, levels) there.
+
+    known: how far the solution can be trusted.
+    """
     assert isinstance(solver.engine, ExactEngine)
     levels, found = solver.engine.mapping.breakaway.copy(), []
     for _ in range(1 if len(axes) == 1 else 2):
         found = []
         for axis in axes:
-            one = _one_axis(solver, solution, levels, axis)
+            one = _one_axis(solver, solution, levels, axis, LIMIT * _steeper(solver, known, axis))
             levels[axis] = np.nan if one.tied and one.value <= one.low else one.value
             solution = with_breakaway(solver, levels).minimise(solution.state.point)
             found.append(one)
     return with_breakaway(solver, levels), solution, found
 
 
-def _one_axis(solver: Solver, solution: Solution, levels: FloatArray, axis: int) -> Breakaway:
+def _steeper(solver: Solver, known: Trust, axis: int) -> float:
+    """What the likelihood is too steep by where residuals are not white, as for coulomb; 1 where they are."""
+    key = f"friction.axes.coulomb[{axis}]"
+    if key in solver.problem.names and not known.blind[j := solver.problem.names.index(key)]:
+        return known.rise(np.eye(len(known.std))[j]) / RISE
+    return known.widening**2 if known.kind == SANDWICH else 1.0
+
+
+def _one_axis(solver: Solver, solution: Solution, levels: FloatArray, axis: int, limit: float) -> Breakaway:
     """The plateau of the least F, and the likely ones around it."""
     point = solution.state.point
     coulomb = _coulomb(solver, point, axis)
@@ -92,9 +107,9 @@ def _one_axis(solver: Solver, solution: Solution, levels: FloatArray, axis: int)
     profile.known.clear()
     best = _descend(profile, middles, best, reach)
     least = min(profile.cost(middles[best]), profile.cost(0.0))
-    low, high = (_walk(profile, middles, best, way, least) for way in (-1, 1))
+    low, high = (_walk(profile, middles, best, way, least + limit) for way in (-1, 1))
     own = _coulomb(solver, profile.at(middles[best]).state.point, axis)
-    tied = profile.cost(0.0) <= least + LIMIT
+    tied = profile.cost(0.0) <= least + limit
     floor = _coulomb(solver, profile.at(0.0).state.point, axis)
     if profile.cost(0.0) <= profile.cost(middles[best]):
         return Breakaway(axis, floor, 0.0, max(float(edges[high + 1]), floor), True)
@@ -138,12 +153,12 @@ def _descend(profile: _Profile, middles: FloatArray, best: int, reach: int) -> i
     return min(near, key=lambda k: profile.cost(float(middles[k])))
 
 
-def _walk(profile: _Profile, middles: FloatArray, best: int, way: int, least: float) -> int:
+def _walk(profile: _Profile, middles: FloatArray, best: int, way: int, limit: float) -> int:
     """Index of the last likely plateau from `best` in one direction."""
     last, k, unlikely = best, best, 0
     while 0 <= k + way < len(middles) and unlikely < FAR:
         k += way
-        if profile.cost(float(middles[k])) <= least + LIMIT:
+        if profile.cost(float(middles[k])) <= limit:
             last, unlikely = k, 0
         else:
             unlikely += 1

@@ -113,7 +113,8 @@ def fit_output_error(
     tick_rad: of the encoders behind wheel angles [rad]; by default found in the log. Their likelihood is that of
     counts; 0 takes them like any other output.
     loss: "gaussian", or "student-t" for logs with outliers. covariance: "white", "sandwich", or "auto".
-    profile: names whose interval comes from the profile of the likelihood instead. bootstrap: draws of whole runs from
+    profile: names whose interval comes from the profile of the likelihood instead, scaled by the sandwich where that is
+    used. bootstrap: draws of whole runs from
     which the std and intervals of all come instead; deterministic.
     watch: is called with every better state on the way.
 
@@ -145,15 +146,17 @@ def _fitted(
     solver, solution = _solve(records, robot, given, watch)
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
     axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in free and motion_of.moved[axis]]
-    solver, solution, levels = _levels_of(solver, solution, axes)
+    solver, solution, levels = _levels_of(solver, solution, axes, given.covariance)
     known = trust(solver, solution, given.covariance)
     more = [*(words for _, _, words in still), *hints]
     bounds = {key: bound for key, bound, _ in still if bound > NOTHING}
-    better = resampled(solver, solution, known.std, profile, bootstrap).intervals
+    better = resampled(solver, solution, known, profile, bootstrap).intervals
     return conclude(solver, solution, known, records, loss_words(given.loss), more, bounds, levels, better)
 
 
-def _levels_of(solver: Solver, solution: Solution, axes: list[int]) -> tuple[Solver, Solution, list[Breakaway]]:
+def _levels_of(
+    solver: Solver, solution: Solution, axes: list[int], covariance: str
+) -> tuple[Solver, Solution, list[Breakaway]]:
     """Breakaway of the axes that were asked for, and the fit with it."""
     if not axes:
         return solver, solution, []
@@ -162,7 +165,7 @@ def _levels_of(solver: Solver, solution: Solution, axes: list[int]) -> tuple[Sol
             "breakaway is profiled with the exact engine only", got=solver.problem.robot.name,
             expected="friction on the body axes", where="free",
         )  # fmt: skip
-    return find_breakaway(solver, solution, axes)
+    return find_breakaway(solver, solution, axes, trust(solver, solution, covariance))
 
 
 def nuisance_names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:

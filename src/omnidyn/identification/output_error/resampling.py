@@ -7,16 +7,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, ndtri, stdtrit
+from scipy.special import ndtri, stdtrit
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.problem import Point
 from omnidyn.identification.output_error.solver import Solution, Solver
 from omnidyn.identification.output_error.tied import TiedEngine
+from omnidyn.identification.output_error.uncertainty import Trust
 
 FloatArray = NDArray[np.float64]
 
-RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
 LEAST_RUNS = 5
 SEED = 20120101
@@ -38,12 +38,12 @@ class Resampled:
 
 
 def resampled(
-    solver: Solver, solution: Solution, std: FloatArray, profile: Sequence[str] = (), draws: int = 0,
+    solver: Solver, solution: Solution, known: Trust, profile: Sequence[str] = (), draws: int = 0,
     strata: Strata | None = None,
 ) -> Resampled:  # fmt: skip
     """Intervals by bootstrap of all numbers, and by profile of those named.
 
-    std (P,): standard errors in the numbers that the solver sees. strata: groups whose runs are drawn apart.
+    A number that the logs do not determine has neither. strata: groups whose runs are drawn apart.
     Raises InputError for a name that is not free, InsufficientDataError for too few runs.
     """
     names, values = solver.problem.names, solution.state.point.values
@@ -56,14 +56,16 @@ def resampled(
         drawn = bootstrap(solver, solution, draws, strata=strata)
         widening = small_sample(least_runs(solver, strata))
         for j, p in enumerate(solver.problem.parameters):
+            if known.blind[j]:
+                continue
             inner = np.array([p.inner(float(v)) for v in drawn[:, j]])
             low, high = draw_interval(p.inner(float(values[j])), inner, widening)
             low = max(low, p.inner(p.low)) if not p.log else low
             spread = widening_of_std(least_runs(solver, strata)) * float(drawn[:, j].std(ddof=1))
             found[p.name] = (spread, (p.outer(low), p.outer(high)))
     for name in profile:
-        j = names.index(name)
-        found[name] = (None, profile_interval(solver, solution, j, float(std[j])))
+        if not known.blind[j := names.index(name)]:
+            found[name] = (None, profile_interval(solver, solution, known, j))
     return Resampled(found, drawn, widening)
 
 
@@ -87,27 +89,28 @@ def small_sample(runs: int) -> float:
     return widening_of_std(runs) * float(stdtrit(runs - 1.0, TAIL) / ndtri(TAIL))
 
 
-def profile_interval(solver: Solver, solution: Solution, index: int, std: float) -> tuple[float, float]:
+def profile_interval(solver: Solver, solution: Solution, known: Trust, index: int) -> tuple[float, float]:
     """95 % interval of one parameter by the profile of the likelihood, all others fitted anew at each value.
 
-    2 (F - least F) = 3.84 at its ends; an end at a bound is that bound. std: standard error on the scale of the solver.
-    For white residuals: colour is not seen.
+    2 (F - least F) is 3.84 at its ends, and more where residuals are not white (`Trust.rise`); an end at a bound is
+    that bound.
     """
+    std, limit = float(known.std[index]), known.rise(np.eye(len(known.std))[index])
     own = solver.problem.parameters[index]
     best = own.inner(float(solution.state.point.values[index]))
     low, high = (
-        _end(solver, solution, index, best, way * (std if np.isfinite(std) and std > 0.0 else abs(best) or 1.0))
+        _end(solver, solution, index, best, way * (std if std > 0.0 else abs(best) or 1.0), limit)
         for way in (-1.0, 1.0)
     )
     return own.outer(low), own.outer(high)
 
 
 def difference_interval(
-    solver: Solver, solution: Solution, first: int, second: int, std: float
+    solver: Solver, solution: Solution, first: int, second: int, std: float, limit: float
 ) -> tuple[float, float] | None:
     """95 % interval of parameter `second` minus `first` by the same profile; None where one has a prior.
 
-    std: standard error of the difference.
+    std: standard error of the difference. limit: 2 (F - least F) at its ends.
     """
     if any(solver.problem.parameters[j].prior is not None for j in (first, second)):
         return None
@@ -119,28 +122,29 @@ def difference_interval(
         return 2.0 * (found.state.objective - solution.state.objective), found.state.point
 
     best, point = float(values[second] - values[first]), Point(np.delete(values, second), states)
-    low, high = (_crossing(rise, best, way * std, way * np.inf, point) for way in (-1.0, 1.0))
+    low, high = (_crossing(rise, best, way * std, way * np.inf, point, limit) for way in (-1.0, 1.0))
     return low, high
 
 
-def _end(solver: Solver, solution: Solution, index: int, best: float, step: float) -> float:
+def _end(solver: Solver, solution: Solution, index: int, best: float, step: float, limit: float) -> float:
     own = solver.problem.parameters[index]
 
     def rise(inner: float, point: Point) -> tuple[float, Point]:
         return _rise(solver, solution, index, inner, point)
 
-    return _crossing(rise, best, step, own.inner(own.low if step < 0.0 else own.high), solution.state.point)
+    return _crossing(rise, best, step, own.inner(own.low if step < 0.0 else own.high), solution.state.point, limit)
 
 
 def _crossing(
-    rise: Callable[[float, Point], tuple[float, Point]], best: float, step: float, bound: float, point: Point
-) -> float:
-    """Where 2 (F - least F) passes 3.84 on the way from `best` by steps of 1.5 `step`, or the bound before it."""
+    rise: Callable[[float, Point], tuple[float, Point]], best: float, step: float, bound: float, point: Point,
+    limit: float,
+) -> float:  # fmt: skip
+    """Where 2 (F - least F) passes `limit` on the way from `best` by steps of 1.5 `step`, or the bound before it."""
     inside, outside = best, best
     for _ in range(OUTWARD):
         outside = min(outside + 1.5 * step, bound) if step > 0.0 else max(outside + 1.5 * step, bound)
         up, point = rise(outside, point)
-        if up > RISE:
+        if up > limit:
             break
         inside = outside
         if outside == bound:
@@ -148,7 +152,7 @@ def _crossing(
     for _ in range(HALVINGS):
         middle = 0.5 * (inside + outside)
         up, point = rise(middle, point)
-        inside, outside = (middle, outside) if up <= RISE else (inside, middle)
+        inside, outside = (middle, outside) if up <= limit else (inside, middle)
     return 0.5 * (inside + outside)
 
 

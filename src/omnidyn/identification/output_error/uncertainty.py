@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtrit
+from scipy.special import chdtri, ndtri, stdtrit
 
 from omnidyn.identification.output_error.exact_engine import Weighting
 from omnidyn.identification.output_error.kernel import FINAL
@@ -37,6 +37,7 @@ WEAK = 1e-4  # below it, is hardly seen
 SHARE = 0.05  # of a blind direction that a parameter must have to be named
 WHITE, SANDWICH = "white", "sandwich"
 TAIL = 0.975
+RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,8 @@ class Trust:
     go without it. kind: white or sandwich. widening: largest ratio of the sandwich's std to the plain one. quantile:
     standard errors in half a 95 % interval. degrees: of freedom behind it. neighbours (columns,): correlation of
     successive residuals. directions: blind or weak ones: (eigenvalue, relative change of each parameter). runs: that
-    were the blocks, 0 where these were shorter than a run.
+    were the blocks, 0 where these were shorter than a run. plain (P, P): inverse of the information, which is what the
+    likelihood itself curves by; the covariance where the noise is white.
     """
 
     covariance: FloatArray
@@ -62,11 +64,24 @@ class Trust:
     degrees: int
     neighbours: FloatArray
     directions: tuple[tuple[float, FloatArray], ...]
-    runs: int = 0
+    runs: int
+    plain: FloatArray
 
     @property
     def std(self) -> FloatArray:
         return np.sqrt(np.diag(self.covariance))
+
+    def rise(self, way: FloatArray) -> float:
+        """2 (F - least F) at the ends of a 95 % interval of the sum of way (P,) times the parameters.
+
+        3.84 where noise is white. Elsewhere the likelihood is too steep, and as much more of it as the variance is
+        larger than its curvature tells: Kent, Biometrika 69 (1982); Royall, Tsou, J. R. Stat. Soc. B 65 (2003).
+        """
+        steep = float(way @ self.plain @ way)
+        if self.kind == WHITE or steep <= 0.0:
+            return RISE
+        known = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
+        return self.quantile**2 * float(way @ known @ way) / steep
 
 
 def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
@@ -96,7 +111,7 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     return Trust(
         covariance, normal.held, ~seen, np.diag(normal.information) <= 0.0, _free_step(plain, normal), kind, widening,
         float(stdtrit(degrees, TAIL) if degrees > 0 else ndtri(TAIL)), max(int(degrees), 0), neighbours, directions,
-        count if kind == SANDWICH else 0,
+        count if kind == SANDWICH else 0, plain,
     )  # fmt: skip
 
 
