@@ -33,8 +33,8 @@ ORDER = {
         settling identify joint_problem joint_fit as_fitted validation motor_engine motor_input motor_log motor_bend
         motor_fit motor_run motor_choice fit_words best_so_far""",
     "identification/output_error": """parameters primitives counts doubled outputs record problem kernel axis_kernel
-        driver exact_engine sums tangent_engine loop_engine solver starts motion nuisances loop rounding uncertainty
-        support first_point breakaway tied resampling answer conclusion fit""",
+        driver exact_engine sums tangent_engine loop_engine solver onlooker starts motion nuisances loop rounding
+        uncertainty support first_point breakaway tied resampling answer conclusion fit""",
     "control": "",
     "campaigns": "",
     "paper": """tables claim steady experiments geometry motion motors friction speeds validation reconcile mismatch

@@ -15,6 +15,7 @@ from omnidyn.cli.streams import say, show, show_json
 if TYPE_CHECKING:
     from omnidyn.identification.motor_fit import MotorFit
     from omnidyn.identification.output_error.answer import OutputErrorEstimate
+    from omnidyn.identification.output_error.onlooker import Onlooker
     from omnidyn.identification.output_error.problem import Point
     from omnidyn.identification.output_error.solver import State
     from omnidyn.identification.study_parts import Difference
@@ -99,7 +100,7 @@ def fit_logs(loaded: Loaded, robot: Robot, ask: Ask, record: dict[str, Any], out
     """Fit, validate, write, tell. An interrupt during the fit leaves the best so far, and ends with exit code 130."""
     part = _Part(loaded, ask.hold_out)
     verdicts = _verdicts(loaded, robot, now)
-    now("fitting")
+    now("fitting: loading")
     fits, differences, cut = _fitted(part, robot, ask, now)
     why = "the numbers are the best so far, not the best there are" if cut else ""
     validations: dict[str, Validation] = {}
@@ -165,6 +166,19 @@ class _Watch:
         self.states.append(state)
         self.now(f"fitting, step {len(self.states)}, -log likelihood {state.objective:.6g}")
 
+    def looking(self) -> Onlooker:
+        """The same as a fit wants it: what is done in words, too."""
+        from omnidyn.identification.output_error.onlooker import Onlooker
+
+        return Onlooker(self, lambda words: self.now(f"fitting: {words}"))
+
+    def kept(self) -> bool:
+        """Whether an interrupt leaves something; says so at once, for it takes its time."""
+        if self.states:
+            self.now("finishing with the best so far")
+            say("omnidyn: interrupted: finishing with the best so far (again: give up)")
+        return bool(self.states)
+
 
 def _fitted(
     part: _Part, robot: Robot, ask: Ask, now: Any
@@ -186,9 +200,9 @@ def _fitted(
 
     group = part.groups[0]
     try:
-        return {group: fit_output_error(part.runs, robot, watch=watch, **options, **more)}, (), False
+        return {group: fit_output_error(part.runs, robot, watch=watch.looking(), **options, **more)}, (), False
     except KeyboardInterrupt:
-        if not watch.states:
+        if not watch.kept():
             raise
         from omnidyn.identification.best_so_far import best_so_far
 
@@ -213,9 +227,9 @@ def _fitted_groups(
     try:
         draws = more["bootstrap"]
         joint = join_groups(part.runs, robot, part.groups, per_free=per_free, bootstrap=draws, watch=seen, **options)
-        study, cut = joint.answer(joint.solve(watch), **more), False
+        study, cut = joint.answer(joint.solve(watch.looking()), **more), False
     except KeyboardInterrupt:
-        if not watch.states and not alone:
+        if not watch.kept() and not alone:
             raise
         from omnidyn.identification.best_so_far import best_alone_so_far, best_groups_so_far
 

@@ -11,15 +11,18 @@ from omnidyn.identification.joint_problem import joint_start
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.fit import (
+    FINE,
     Options,
     degrees,
     loss_words,
     make_engine,
     make_problem,
     nuisance_names,
+    of_what_moved,
     read_records,
-    without_still_axes,
 )
+from omnidyn.identification.output_error.loop import FINE as LOOP_FINE
+from omnidyn.identification.output_error.loop import looped
 from omnidyn.identification.output_error.motion import motion
 from omnidyn.identification.output_error.nuisances import AUTO, automatic
 from omnidyn.identification.output_error.problem import Point
@@ -47,13 +50,14 @@ def best_so_far(
         use_priors=options.get("use_priors", False),
     )  # fmt: skip
     records = read_records(list(runs), robot, given)
-    robot, given, still = without_still_axes(motion(records, robot), records[0].source, robot, given)
+    robot, given, still = of_what_moved(motion(records, robot), records, robot, given)
     solver = _solver(records, robot, given)
     state = states[-1]
     if len(state.point.values) != len(solver.problem.parameters):  # automatic nuisances had been settled
         first = next(s for s in reversed(states) if len(s.point.values) == len(solver.problem.parameters))
         kept = supported(solver, Solution(first, Normal(solver, first).held, 0, True), automatic(records))
         solver = _solver(records, robot, replace(given, nuisances=kept))
+    state = solver.minimise(state.point, limit=0).state  # it may be from a part of the logs, or with longer steps
     solution = Solution(state, Normal(solver, state).held, 0, True)
     bounds = {key: bound for key, bound, _ in still}
     words = [WORDS, *(each for _, _, each in still)]
@@ -82,4 +86,4 @@ def best_alone_so_far(
 
 def _solver(records: Sequence[Record], robot: Robot, given: Options) -> Solver:
     problem = make_problem(records, robot, given)
-    return Solver(problem, make_engine(problem), degrees(given.loss))
+    return Solver(problem, make_engine(problem, LOOP_FINE if looped(records) else FINE), degrees(given.loss))

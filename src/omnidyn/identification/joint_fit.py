@@ -39,6 +39,7 @@ from omnidyn.identification.output_error.fit import (
 )
 from omnidyn.identification.output_error.loop import beyond_jumps, looped, retimed
 from omnidyn.identification.output_error.nuisances import AUTO
+from omnidyn.identification.output_error.onlooker import onlooker
 from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.identification.output_error.resampling import (
     Resampled,
@@ -85,16 +86,18 @@ class JointFit:
 
     def solve(self, watch: Callable[[State], None] | None = None) -> Solution:
         """The best point; `watch` sees every better state on the way."""
-        start = joint_start(self.engine, self.solver.nu)
+        seen = onlooker(watch)
+        start = joint_start(self.engine, self.solver.nu, watch=seen)
         members = self.engine.members
         if not all(fits_exactly(member.part.problem) for member in members):  # first a step a row
             coarse = join([m.part for m in members], self.own, tol=None)
             first = Solver(coarse.problem, coarse, self.solver.nu)
-            start = first.minimise(start).state.point
+            aside = seen.aside("all groups, first a step a row")
+            start = first.minimise(start, watch=aside).state.point
             if looped(members[0].part.records):
-                start = first.minimise(retimed(first, start)).state.point
-        found = self.solver.minimise(start, watch=watch)
-        return beyond_jumps(self.solver, found, watch) if looped(members[0].part.records) else found
+                start = first.minimise(retimed(first, start, seen), watch=aside).state.point
+        found = self.solver.minimise(start, watch=seen)
+        return beyond_jumps(self.solver, found, seen) if looped(members[0].part.records) else found
 
     def answer(
         self, solution: Solution, profile: Sequence[str] = (), bootstrap: int = 0, words: Sequence[str] = ()

@@ -27,6 +27,7 @@ from omnidyn.identification.output_error.fit import (
 from omnidyn.identification.output_error.loop import friction_of_axis, loop_start, looped
 from omnidyn.identification.output_error.motion import motion
 from omnidyn.identification.output_error.nuisances import automatic
+from omnidyn.identification.output_error.onlooker import NOBODY, Onlooker
 from omnidyn.identification.output_error.parameters import Parameter
 from omnidyn.identification.output_error.problem import PieceSums, Point, Problem
 from omnidyn.identification.output_error.record import Record
@@ -226,18 +227,24 @@ def join(parts: Sequence[Part], own: Sequence[str], tol: float | None = FINE) ->
     return JointEngine(joint, found)
 
 
-def joint_start(engine: JointEngine, nu: float, alone: Mapping[str, Point] | None = None) -> Point:
-    """Each group begins where it would alone, or where `alone` says; shared numbers at the median of the groups."""
+def joint_start(
+    engine: JointEngine, nu: float, alone: Mapping[str, Point] | None = None, watch: Onlooker = NOBODY
+) -> Point:
+    """Each group begins where it would alone, or where `alone` says; shared numbers at the median of the groups.
+
+    watch: hears what is done; the states of one group alone are not for it.
+    """
     values: list[list[float]] = [[] for _ in engine.problem.parameters]
     states: list[FloatArray] = []
     for member in engine.members:
         problem = member.part.problem
+        watch.doing(f"looking for a start of {member.name}")
         if alone and member.name in alone:
             point = alone[member.name]
         elif fits_exactly(problem):
             point = first_point(Solver(problem, member.engine, nu), member.part.records)
         elif looped(member.part.records):
-            point = loop_start(problem, nu)
+            point = loop_start(problem, nu, watch.aside(f"looking for a start of {member.name}"))
         else:
             point = moving_start(problem, nu)
         for k, value in zip(member.at, point.values, strict=True):

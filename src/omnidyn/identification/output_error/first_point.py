@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.nuisances import LATENCY
+from omnidyn.identification.output_error.onlooker import Onlooker
 from omnidyn.identification.output_error.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.record import Record
-from omnidyn.identification.output_error.solver import Solver, State
+from omnidyn.identification.output_error.solver import Solver
 from omnidyn.identification.output_error.starts import friction_values, integral_start
 from omnidyn.identification.output_error.tangent_engine import TangentEngine
 
@@ -64,8 +65,9 @@ def _with_latencies(solver: Solver, point: Point) -> Point:
     return Point(values, point.states)
 
 
-def coarse_point(problem: Problem, nu: float, watch: Callable[[State], None] | None = None) -> Point:
-    """Near the best point, by one step a row; a long log is first fitted in part, which `watch` does not see."""
+def coarse_point(problem: Problem, nu: float, watch: Onlooker) -> Point:
+    """Near the best point, by one step a row; a long log is first fitted in part, of which `watch` hears only."""
+    watch.doing("looking for a start")
     solver, short, own = (
         Solver(problem, TangentEngine(problem), nu, NEAR),
         problem.shortened(FEW),
@@ -73,7 +75,11 @@ def coarse_point(problem: Problem, nu: float, watch: Callable[[State], None] | N
     )
     if short is problem:
         return solver.minimise(own, watch=watch).state.point
-    found = Solver(short, TangentEngine(short), nu, NEAR).minimise(own).state.point
+    found = (
+        Solver(short, TangentEngine(short), nu, NEAR)
+        .minimise(own, watch=watch.aside("a part of the log first"))
+        .state.point
+    )
     states = [solver.state(point) for point in (own, found)]
     return solver.minimise(min(states, key=lambda state: state.objective).point, watch=watch).state.point
 

@@ -34,6 +34,7 @@ from omnidyn.identification.output_error.nuisances import (
     nuisance_parameters,
     pieces,
 )
+from omnidyn.identification.output_error.onlooker import Onlooker, onlooker
 from omnidyn.identification.output_error.parameters import FRICTION, Parameter, robot_parameters
 from omnidyn.identification.output_error.problem import Problem
 from omnidyn.identification.output_error.record import Record, record
@@ -116,7 +117,7 @@ def fit_output_error(
     profile: names whose interval comes from the profile of the likelihood instead, scaled by the sandwich where that is
     used. bootstrap: draws of whole runs from
     which the std and intervals of all come instead; deterministic.
-    watch: is called with every better state on the way.
+    watch: is called with every better state on the way; an Onlooker is told in words what is done, too.
 
     Returns an Estimate with nuisances, noise and what is not identifiable. Raises InputError for options and logs that
     cannot be used, InsufficientDataError where nothing can be learnt, UnsupportedError for what an engine does not
@@ -128,29 +129,28 @@ def fit_output_error(
         None if outputs is None else tuple(outputs), loss, covariance, tick_rad,
     )  # fmt: skip
     records = read_records([runs] if isinstance(runs, Run) else list(runs), robot, given)
-    return _fitted(records, robot, given, tuple(free or ()), profile, bootstrap, watch)
+    return _fitted(records, robot, given, tuple(free or ()), profile, bootstrap, onlooker(watch))
 
 
 def _fitted(
     records: Sequence[Record], robot: Robot, given: Options, free: tuple[str, ...], profile: Sequence[str],
-    bootstrap: int, watch: Callable[[State], None] | None,
+    bootstrap: int, watch: Onlooker,
 ) -> OutputErrorEstimate:  # fmt: skip
     """The fit of records; free: the keys that were asked for by name."""
     if bootstrap:
         refuse_few_runs({"": len(records)})
+    watch.doing("looking for what moved")
     motion_of = motion(records, robot)
-    if looped(records):
-        given, still = loop_options(given, motion_of, records, robot), []
-    else:
-        robot, given, still = without_still_axes(motion_of, records[0].source, robot, given)
+    robot, given, still = of_what_moved(motion_of, records, robot, given)
     solver, solution = _solve(records, robot, given, watch)
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
     axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in free and motion_of.moved[axis]]
     solver, solution, levels = _levels_of(solver, solution, axes, given.covariance)
+    watch.doing("finding how sure the numbers are")
     known = trust(solver, solution, given.covariance)
     more = [*(words for _, _, words in still), *hints]
     bounds = {key: bound for key, bound, _ in still if bound > NOTHING}
-    better = resampled(solver, solution, known, profile, bootstrap).intervals
+    better = resampled(solver, solution, known, profile, bootstrap, watch=watch).intervals
     return conclude(solver, solution, known, records, loss_words(given.loss), more, bounds, levels, better)
 
 
@@ -175,13 +175,23 @@ def nuisance_names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:
     return (nuisances,) if isinstance(nuisances, str) else tuple(nuisances)
 
 
+def of_what_moved(
+    found: Motion, records: Sequence[Record], robot: Robot, given: Options
+) -> tuple[Robot, Options, list[tuple[str, float, str]]]:
+    """The robot and the options that a fit of these records has; see `without_still_axes`."""
+    if looped(records):
+        return robot, loop_options(given, found, records, robot), []
+    return without_still_axes(found, records[0].source, robot, given)
+
+
 def _solve(
-    records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None
-) -> tuple[Solver, Solution]:
+    records: Sequence[Record], robot: Robot, given: Options, watch: Onlooker
+) -> tuple[Solver, Solution]:  # fmt: skip
     problem, nu = make_problem(records, robot, given), degrees(given.loss)
     if looped(records):
         return solve_loop(problem, nu, watch)
     if is_exact(robot):
+        watch.doing("looking for a start")
         solver = Solver(problem, ExactEngine(problem), nu)
         return solver, solver.minimise(first_point(solver, records), watch=watch)
     fine = Solver(problem, TangentEngine(problem, FINE), nu, CLOSE)
@@ -224,14 +234,14 @@ def is_exact(robot: Robot) -> bool:
 
 
 def _settled(
-    records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None, solver: Solver,
-    solution: Solution,
+    records: Sequence[Record], robot: Robot, given: Options, watch: Onlooker, solver: Solver, solution: Solution,
 ) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
     """Where the nuisances are automatic: without those that the logs do not support; and what they ask for beside."""
     if looped(records):
         return _settled_loop(records, robot, given, watch, solver, solution)
     if given.nuisances is not None or not isinstance(solver.engine, ExactEngine):
         return solver, solution, given, []
+    watch.doing("which nuisances the logs support")
     kept = supported(solver, solution, automatic(records))
     given = replace(given, nuisances=kept)
     if set(kept) != set(automatic(records)):
@@ -241,15 +251,15 @@ def _settled(
 
 
 def _settled_loop(
-    records: Sequence[Record], robot: Robot, given: Options, watch: Callable[[State], None] | None, solver: Solver,
-    solution: Solution,
+    records: Sequence[Record], robot: Robot, given: Options, watch: Onlooker, solver: Solver, solution: Solution,
 ) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
     """Without the latencies that the logs do not determine, where they are automatic; and what is not used."""
     if given.nuisances is None:
         kept = supported(solver, solution, (LATENCY,))
         given = replace(given, nuisances=kept)
-        if len(kept) < len(solver.problem.parameters) - solver.problem.robot_count:
-            solver, solution = _solve(records, robot, given, watch)
+        lost = [name for name in solver.problem.names[solver.problem.robot_count :] if name not in kept]
+        if lost:  # from its start on: until it is done, the fit with all of them is the best so far
+            solver, solution = _solve(records, robot, given, watch.aside(f"once more without {', '.join(lost)}"))
     return solver, solution, given, left_out(records, solver.problem.pieces)
 
 

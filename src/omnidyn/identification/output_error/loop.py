@@ -7,7 +7,7 @@ piece must begin at rest: the integral of the loop is 0 there, anywhere else it 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.loop_engine import SLOW_LOOP, LoopEngine
 from omnidyn.identification.output_error.nuisances import EARLIEST, FREE, LATEST, REST
+from omnidyn.identification.output_error.onlooker import NOBODY, Onlooker
 from omnidyn.identification.output_error.parameters import FRICTION, Parameter
 from omnidyn.identification.output_error.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.record import Record
@@ -153,25 +154,24 @@ def _piece(record: Record, first: int, last: int) -> Piece:
     )  # fmt: skip
 
 
-def solve_loop(
-    problem: Problem, nu: float, watch: Callable[[State], None] | None = None
-) -> tuple[Solver, Solution]:  # fmt: skip
+def solve_loop(problem: Problem, nu: float, watch: Onlooker = NOBODY) -> tuple[Solver, Solution]:
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
     first = Solver(problem, LoopEngine(problem), nu)
-    coarse = first.minimise(loop_start(problem, nu), FEW, watch)
-    coarse = first.minimise(retimed(first, coarse.state.point), watch=watch)
+    coarse = first.minimise(loop_start(problem, nu, watch), FEW, watch)
+    coarse = first.minimise(retimed(first, coarse.state.point, watch), watch=watch)
+    watch.doing("the same as exactly as it must be")
     fine = Solver(problem, LoopEngine(problem, FINE), nu)
     return fine, beyond_jumps(fine, fine.minimise(coarse.state.point, watch=watch), watch)
 
 
-def loop_start(problem: Problem, nu: float) -> Point:
+def loop_start(problem: Problem, nu: float, watch: Onlooker = NOBODY) -> Point:
     """Where a fit begins: the best of several starts, tried on what sets off."""
     short = shortened(problem, SETTING_OFF)
-    found = best_start(Solver(short, LoopEngine(short), nu))
+    found = best_start(Solver(short, LoopEngine(short), nu), watch)
     return Point(found.values, problem.start().states)
 
 
-def retimed(solver: Solver, point: Point) -> Point:
+def retimed(solver: Solver, point: Point, watch: Onlooker = NOBODY) -> Point:
     """The point with the best latency of the currents, of one in the middle of each period of the loop.
 
     A current jumps at every tick: no descent gets a latency across one, and one that has gone astray comes back only if
@@ -192,7 +192,9 @@ def retimed(solver: Solver, point: Point) -> Point:
     trial = Solver(short, solver.engine.on(short), nu)
     for j in own:
         now, states = float(point.values[j]), []
-        for each in (now, *middles[(middles > EARLIEST) & (middles < LATEST)]):
+        trials = (now, *middles[(middles > EARLIEST) & (middles < LATEST)])
+        for k, each in enumerate(trials):
+            watch.doing(f"trying {problem.names[j]}, {k + 1} of {len(trials)}")
             values = point.values.copy()
             values[j] = each
             states.append(trial.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
@@ -205,15 +207,29 @@ def shortened(problem: Problem, rows: int) -> Problem:
     return replace(problem, pieces=tuple(replace(p, last=min(p.last, p.first + rows)) for p in problem.pieces))
 
 
-def best_start(solver: Solver, watch: Callable[[State], None] | None = None) -> Point:
+def best_start(solver: Solver, watch: Onlooker = NOBODY) -> Point:
     """The best of several starts: all gains, all friction and all latencies by factors, then a few steps of each."""
-    problem = solver.problem
-    late = min(_if_any(problem, LATENCY, LATE, 0.0), key=lambda late: _moved(solver, late, 1.0, 1.0).objective)
+    problem, seen = solver.problem, watch.below()
+    delays = _if_any(problem, LATENCY, LATE, 0.0)
+    by_delay = _tried(solver, [(late, 1.0, 1.0) for late in delays], "latencies", seen)
+    late = delays[int(np.argmin([state.objective for state in by_delay]))]
     levels, gains = _if_any(problem, "friction.", LEVEL_FACTORS), _if_any(problem, "drive.", GAIN_FACTORS)
-    states = [_moved(solver, late, level, gain) for level, gain in itertools.product(levels, gains)]
-    states.sort(key=lambda state: state.objective)
-    tried = [solver.minimise(state.point, FEW, watch) for state in states[:BEST]]
+    factors = [(late, *pair) for pair in itertools.product(levels, gains)]
+    states = sorted(_tried(solver, factors, "friction and gains", seen), key=lambda state: state.objective)
+    tried = [solver.minimise(state.point, FEW, seen) for state in states[:BEST]]
     return min(tried, key=lambda solution: solution.state.objective).state.point
+
+
+def _tried(
+    solver: Solver, which: Sequence[tuple[float, float, float]], what: str, watch: Onlooker
+) -> list[State]:  # fmt: skip
+    """The states at each (latency [s], factor of friction, factor of gains)."""
+    found = []
+    for k, each in enumerate(which):
+        watch.doing(f"looking for a start, {what} {k + 1} of {len(which)}")
+        found.append(_moved(solver, *each))
+        watch(found[-1])
+    return found
 
 
 def _moved(solver: Solver, late: float, level: float, gain: float) -> State:
@@ -229,7 +245,7 @@ def _moved(solver: Solver, late: float, level: float, gain: float) -> State:
     return solver.state(Point(values, own.states), np.ones(len(problem.columns)) if solver.nu else None)
 
 
-def beyond_jumps(solver: Solver, solution: Solution, watch: Callable[[State], None] | None = None) -> Solution:
+def beyond_jumps(solver: Solver, solution: Solution, watch: Onlooker = NOBODY) -> Solution:
     """The solution, or a better one behind a jump of the likelihood, which no descent crosses.
 
     An integral that stands still at the voltage limit jumps by a whole tick where a number of the robot decides on
@@ -237,7 +253,8 @@ def beyond_jumps(solver: Solver, solution: Solution, watch: Callable[[State], No
     rises by less than the parabola says, there is another branch to descend into. A run away from the limit has
     no such branch.
     """
-    engine = solver.engine
+    engine, seen = solver.engine, watch.below(solution.state.objective)
+    watch.doing("looking for a better branch, beyond jumps of the likelihood")
     if not np.any(solver.problem.robot.drive.ki) or (
         isinstance(engine, LoopEngine) and not engine.meets_limit(solution.state.point)
     ):
@@ -245,11 +262,11 @@ def beyond_jumps(solver: Solver, solution: Solution, watch: Callable[[State], No
     gains = [j for j, p in enumerate(solver.problem.parameters) if p.name.startswith("drive.")]
     for _ in range(ROUNDS):
         better = next(_branches(solver, solution, gains), None)
-        found = None if better is None else solver.minimise(better.point, FEW, watch)
+        found = None if better is None else solver.minimise(better.point, FEW, seen)
         if found is None or found.state.objective >= solution.state.objective - LESS:
             break
         solution = found
-    return solver.minimise(solution.state.point, watch=watch)
+    return solver.minimise(solution.state.point, watch=seen)
 
 
 def _branches(solver: Solver, solution: Solution, gains: Sequence[int]) -> Iterator[State]:

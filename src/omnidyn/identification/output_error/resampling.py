@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.output_error.onlooker import NOBODY, Onlooker
 from omnidyn.identification.output_error.problem import Point
 from omnidyn.identification.output_error.solver import Solution, Solver
 from omnidyn.identification.output_error.tied import TiedEngine
@@ -39,7 +40,7 @@ class Resampled:
 
 def resampled(
     solver: Solver, solution: Solution, known: Trust, profile: Sequence[str] = (), draws: int = 0,
-    strata: Strata | None = None,
+    strata: Strata | None = None, watch: Onlooker = NOBODY,
 ) -> Resampled:  # fmt: skip
     """Intervals by bootstrap of all numbers, and by profile of those named.
 
@@ -53,7 +54,7 @@ def resampled(
     found: dict[str, tuple[float | None, tuple[float, float]]] = {}
     drawn, widening = None, 1.0
     if draws:
-        drawn = bootstrap(solver, solution, draws, strata=strata)
+        drawn = bootstrap(solver, solution, draws, strata=strata, watch=watch)
         widening = small_sample(least_runs(solver, strata))
         for j, p in enumerate(solver.problem.parameters):
             if known.blind[j]:
@@ -65,6 +66,7 @@ def resampled(
             found[p.name] = (spread, (p.outer(low), p.outer(high)))
     for name in profile:
         if not known.blind[j := names.index(name)]:
+            watch.doing(f"the profile of {name}")
             found[name] = (None, profile_interval(solver, solution, known, j))
     return Resampled(found, drawn, widening)
 
@@ -169,8 +171,9 @@ def _rise(solver: Solver, solution: Solution, index: int, inner: float, point: P
 
 
 def bootstrap(
-    solver: Solver, solution: Solution, draws: int, seed: int = SEED, strata: Strata | None = None
-) -> FloatArray:
+    solver: Solver, solution: Solution, draws: int, seed: int = SEED, strata: Strata | None = None,
+    watch: Onlooker = NOBODY,
+) -> FloatArray:  # fmt: skip
     """Fits to runs drawn with replacement, those of each group among themselves. Shape (draws, P).
 
     Runs are the blocks: whatever their residuals remember, from one run to the next they do not.
@@ -180,7 +183,8 @@ def bootstrap(
     of_group = runs_by_group(solver, strata)
     refuse_few_runs({group: len(runs) for group, runs in of_group.items()})
     rng, found = np.random.default_rng(seed), []
-    for _ in range(draws):
+    for draw in range(draws):
+        watch.doing(f"drawing the runs anew, {draw + 1} of {draws}")
         drawn = [runs[k] for runs in of_group.values() for k in rng.integers(len(runs), size=len(runs))]
         chosen = [k for run in drawn for k, piece in enumerate(pieces) if id(piece.record) == run]
         problem = replace(solver.problem, pieces=tuple(pieces[k] for k in chosen))
