@@ -30,8 +30,8 @@ ORDER = {
         wiring slip mistakes scale lag energy motion oddities excitation""",
     "identification": """estimate geometry line points doubts steady_state band output_error operating shapes shape_fit
         shape_choice study_parts study_words steady_study steady_lines drive_windows drive_line study_table
-        settling identify joint_problem joint_fit as_fitted validation motor_engine motor_input motor_log motor_bend
-        motor_fit motor_run motor_choice fit_words best_so_far""",
+        settling identify joint_problem joint_fit as_fitted validation between_axes motor_engine motor_input motor_log
+        motor_bend motor_fit motor_run motor_choice fit_words best_so_far""",
     "identification/output_error": """parameters primitives counts doubled outputs record problem kernel axis_kernel
         driver exact_engine sums tangent_engine loop_engine solver onlooker starts motion nuisances loop rounding
         uncertainty support first_point breakaway tied resampling answer conclusion fit""",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from omnidyn.identification.between_axes import between_axes
 from omnidyn.identification.estimate import Estimate, unit
 from omnidyn.identification.motor_fit import MotorFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
@@ -189,5 +190,18 @@ def _from_validation(fit: OutputErrorEstimate, validation: Validation | None) ->
             "errors are not white, so the model misses something: try --nuisance latency, gain or dead_band, or free "
             "motor.torque_constant_Nm_A"
         )
+    yield from _shape(fit, validation)
     if validation.held_out is None:
         yield "record one more log, of other drives, and hold it out (--hold-out): only that shows what it is worth"
+
+
+def _shape(fit: OutputErrorEstimate, validation: Validation) -> Iterator[str]:
+    """Friction of another shape than that of the robot file, where errors that last depend on the direction."""
+    found = between_axes(validation.fitted, fit.robot) if coloured(validation.scores[FITTED]) else None
+    if found is not None and found.clear:
+        way = "faster" if found.change > 0.0 else "slower"
+        yield (
+            f"between its axes the robot is {abs(found.change):.2g} +- {found.std:.1g} m/s {way} against the model "
+            "than along them, as with friction of another shape than that of the robot file: --method steady-state "
+            "says which shape the logs have"
+        )
