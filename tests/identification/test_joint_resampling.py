@@ -64,7 +64,7 @@ def test_values_stay_and_intervals_hold_them(drawn):
 
 def test_the_same_draws_again(drawn):
     _, _, (runs, names, how) = drawn
-    first, second = (identify_groups(runs, AXEBOT, names, bootstrap=5, **how) for _ in range(2))
+    first, second = (identify_groups(runs, AXEBOT, names, bootstrap=20, **how) for _ in range(2))
     assert first.differences == second.differences
     for group in first.estimates:
         assert first.estimates[group].ci95 == second.estimates[group].ci95

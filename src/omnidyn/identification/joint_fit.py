@@ -26,6 +26,7 @@ from omnidyn.identification.joint_problem import (
     read_parts,
 )
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.output_error.breakaway import KEY, asked_axes
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.fit import (
     FINE,
@@ -40,13 +41,13 @@ from omnidyn.identification.output_error.fit import (
 from omnidyn.identification.output_error.loop import beyond_jumps, looped, retimed
 from omnidyn.identification.output_error.nuisances import AUTO
 from omnidyn.identification.output_error.onlooker import onlooker
-from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.identification.output_error.parameters import FRICTION, names_of, refuse_unknown
 from omnidyn.identification.output_error.resampling import (
     Resampled,
     difference_interval,
     draw_interval,
     least_runs,
-    refuse_few_runs,
+    refuse_bootstrap,
     resampled,
     widening_of_std,
 )
@@ -229,13 +230,19 @@ def join_groups(
         got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
         raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
     if bootstrap:
-        refuse_few_runs(Counter(groups))
+        refuse_bootstrap(bootstrap, Counter(groups))
+    if asked_axes(names_of(free or ())):
+        raise UnsupportedError(
+            "breakaway is not profiled in groups", got=KEY, expected="other keys", remedy="fit each group alone",
+            where="free",
+        )  # fmt: skip
+    refuse_unknown(expand_keys(fixed, robot), robot)
     why = why_no_inputs(runs, robot)
     if why:
         raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
     given = Options(
         None if free is None else tuple(expand_keys(free, robot)), tuple(expand_keys(fixed, robot)),
-        nuisance_names(nuisances), start, use_priors, None if outputs is None else tuple(outputs), loss, covariance,
+        nuisance_names(nuisances), start, use_priors, None if outputs is None else names_of(outputs), loss, covariance,
     )  # fmt: skip
     parts = read_parts(runs, groups, robot, given, watch, settle)
     own = own_names(expand_keys(per_free, robot), parts)
@@ -250,7 +257,7 @@ def expand_keys(keys: Sequence[str], robot: Robot | None = None) -> list[str]:
     """
     known = list(FRICTION) if robot is None else free_by_default(robot)
     found: list[str] = []
-    for key in keys:
+    for key in names_of(keys):
         many = [each for each in (*known, *FRICTION) if each.startswith(f"{key}[")]
         found += known if key == FRICTION_KEYS else many or [key]
     return list(dict.fromkeys(found))

@@ -9,11 +9,13 @@ Where residuals are not white the likelihood is too steep, and the limit higher,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.errors import InputError
 from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.problem import Point
 from omnidyn.identification.output_error.solver import Solution, Solver
@@ -21,6 +23,7 @@ from omnidyn.identification.output_error.uncertainty import RISE, SANDWICH, Trus
 
 FloatArray = NDArray[np.float64]
 
+KEY = "friction.axes.breakaway"
 LIMIT = 7.35 / 2.0
 COARSE, NARROWER = 24, 0.2  # levels tried in a round, and the share of the range that the next one looks at
 HIGHEST = 3.0  # S/C is 1.1 to 1.6 in the literature
@@ -37,6 +40,19 @@ class Breakaway:
     low: float
     high: float
     tied: bool
+
+
+def asked_axes(free: Sequence[str], fixed: Sequence[str] = ()) -> list[int]:
+    """The axes whose breakaway is among the free keys; without an index it stands for all three.
+
+    Raises InputError for a key of no axis.
+    """
+    known = {f"{KEY}[{axis}]": axis for axis in range(3)}
+    asked = [key for key in free if key.startswith(KEY)]
+    for key in asked:
+        if key != KEY and key not in known:
+            raise InputError("not an axis", got=key, expected=", ".join(known), where="free")
+    return [axis for key, axis in known.items() if {key, KEY} & set(asked) and not {key, KEY} & set(fixed)]
 
 
 class _Profile:

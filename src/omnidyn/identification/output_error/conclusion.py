@@ -46,7 +46,7 @@ def conclude(
     own = problem.robot_count
     missed = unexplained(solver, solution)
     if known.blind[:own].all():
-        _refuse_blind([p.name for p in problem.parameters[:own]], missed, records[0].source)
+        _refuse_blind([p.name for p in problem.parameters[:own]], missed, records[0].source, known.unseen[:own])
     values = np.where(known.unseen, [p.value for p in problem.parameters], values)  # they say nothing: as they were
     std, ci95 = intervals(problem, values, known)
     for name, (spread, interval) in (better or {}).items():
@@ -115,14 +115,22 @@ def _not_followed(missed: Mapping[str, float]) -> list[str]:
     ]
 
 
-def _refuse_blind(free: Sequence[str], missed: Mapping[str, float], where: str) -> NoReturn:
-    """Raises InsufficientDataError: either nothing moved, or nothing that the model does is like what did."""
+def _refuse_blind(free: Sequence[str], missed: Mapping[str, float], where: str, unseen: BoolArray) -> NoReturn:
+    """Raises InsufficientDataError: nothing moved, or all that is free can be traded, or the model does other things.
+
+    unseen: for each of `free`, whether the outputs do not change with it at all.
+    """
     if missed:
         raise InsufficientDataError(
             "the robot moved, but with no value of what is free does the model move like it",
             got=f"{', '.join(missed)} that the voltages do not explain",
             expected="a model that follows the log", where=where,
             remedy="check signs, units and the order of the wheels, and the voltages (omnidyn check)",
+        )  # fmt: skip
+    if not unseen.all():
+        raise InsufficientDataError(
+            "of what is free each number can be made up for by others, so that none can be told", got=", ".join(free),
+            expected="fewer numbers", remedy="leave out one that is known, such as body.mass_kg", where=where,
         )  # fmt: skip
     raise InsufficientDataError(
         "the logs say nothing about what is free", got=", ".join(free), expected="motion",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import unit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.breakaway import Breakaway, find_breakaway
+from omnidyn.identification.output_error.breakaway import KEY, Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.exact_engine import ExactEngine
 from omnidyn.identification.output_error.first_point import coarse_point, first_point
@@ -35,10 +35,16 @@ from omnidyn.identification.output_error.nuisances import (
     pieces,
 )
 from omnidyn.identification.output_error.onlooker import Onlooker, onlooker
-from omnidyn.identification.output_error.parameters import FRICTION, Parameter, robot_parameters
+from omnidyn.identification.output_error.parameters import (
+    FRICTION,
+    Parameter,
+    names_of,
+    refuse_unknown,
+    robot_parameters,
+)
 from omnidyn.identification.output_error.problem import Problem
 from omnidyn.identification.output_error.record import Record, record
-from omnidyn.identification.output_error.resampling import refuse_few_runs, resampled
+from omnidyn.identification.output_error.resampling import refuse_bootstrap, resampled
 from omnidyn.identification.output_error.solver import Solution, Solver, State
 from omnidyn.identification.output_error.support import supported, wanted
 from omnidyn.identification.output_error.tangent_engine import TangentEngine
@@ -60,7 +66,6 @@ CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
-BREAKAWAY = "friction.axes.breakaway"
 IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
 
 
@@ -101,7 +106,7 @@ def fit_output_error(
     runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
     free: keys of the robot file, such as "body.mass_kg"; by default the friction that the robot has. fixed: taken out.
     The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, or stays as
-    the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval.
+    the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval, without "[0]" for all.
     nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade", "tilt"
     (or "tilt.x", "tilt.y", "tilt.yaw"). By default latency and dead band, and the gain where the supply is only
     nominal, as far as the logs determine them; a warning says what else would fit the logs better. () for none.
@@ -125,26 +130,27 @@ def fit_output_error(
     no position and no wheel angle as outputs.
     """
     given = Options(
-        None if free is None else tuple(free), tuple(fixed), nuisance_names(nuisances), start, use_priors,
-        None if outputs is None else tuple(outputs), loss, covariance, tick_rad,
+        None if free is None else names_of(free), names_of(fixed), nuisance_names(nuisances), start, use_priors,
+        None if outputs is None else names_of(outputs), loss, covariance, tick_rad,
     )  # fmt: skip
     records = read_records([runs] if isinstance(runs, Run) else list(runs), robot, given)
-    return _fitted(records, robot, given, tuple(free or ()), profile, bootstrap, onlooker(watch))
+    return _fitted(records, robot, given, names_of(profile), bootstrap, onlooker(watch))
 
 
 def _fitted(
-    records: Sequence[Record], robot: Robot, given: Options, free: tuple[str, ...], profile: Sequence[str],
-    bootstrap: int, watch: Onlooker,
+    records: Sequence[Record], robot: Robot, given: Options, profile: Sequence[str], bootstrap: int, watch: Onlooker
 ) -> OutputErrorEstimate:  # fmt: skip
-    """The fit of records; free: the keys that were asked for by name."""
+    """The fit of records."""
     if bootstrap:
-        refuse_few_runs({"": len(records)})
+        refuse_bootstrap(bootstrap, {"": len(records)})
+    refuse_unknown(given.fixed, robot)
+    asked = asked_axes(given.free or (), given.fixed)
     watch.doing("looking for what moved")
     motion_of = motion(records, robot)
     robot, given, still = of_what_moved(motion_of, records, robot, given)
     solver, solution = _solve(records, robot, given, watch)
     solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
-    axes = [axis for axis in range(3) if f"{BREAKAWAY}[{axis}]" in free and motion_of.moved[axis]]
+    axes = [axis for axis in asked if motion_of.moved[axis]]
     solver, solution, levels = _levels_of(solver, solution, axes, given.covariance)
     watch.doing("finding how sure the numbers are")
     known = trust(solver, solution, given.covariance)
@@ -325,12 +331,13 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     priors = known_priors(robot) if given.use_priors else {}
     usual = free_by_default(robot)
     keys = list(given.free) if given.free is not None else [*usual, *(key for key in priors if key not in usual)]
-    unknown = [key for key in given.fixed if key not in keys]
+    unknown = [key for key in given.fixed if key not in keys and (KEY not in keys or not key.startswith(KEY))]
     if unknown and given.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
-    keys = [key for key in keys if key not in given.fixed and not key.startswith(BREAKAWAY)]
+    keys = [key for key in keys if key not in given.fixed and not key.startswith(KEY)]
     if not keys:
-        raise InputError("nothing is free", got="no key", expected="at least one", where="free")
+        got = ", ".join(given.free or ()) or "no key"
+        raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
     own = robot_parameters(robot, keys, priors)
     exact = is_exact(robot) and not looped(records)
     if not exact:

@@ -75,6 +75,21 @@ def robot_parameter(robot: Robot, key: str, tied: bool, prior: tuple[float, floa
     return Parameter(key, value, value / SPAN, value * SPAN, True, prior, also)
 
 
+def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
+    """Names as a tuple; a string is one name."""
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def refuse_unknown(keys: Sequence[str], robot: Robot) -> None:
+    """Raises InputError for a key that the robot does not have: left alone it would hold nothing.
+
+    Breakaway may be fixed where the robot has none: it follows coulomb then.
+    """
+    for key in keys:
+        if not key.startswith("friction.axes.breakaway"):
+            parameter(robot, key)
+
+
 def robot_parameters(robot: Robot, keys: Sequence[str], priors: dict[str, tuple[float, float]]) -> list[Parameter]:
     """Free parameters by key; the EMF constant is tied to the torque constant unless it is asked for itself."""
     twice = sorted({key for key in keys if list(keys).count(key) > 1})

@@ -19,7 +19,7 @@ from omnidyn.identification.output_error.uncertainty import Trust
 FloatArray = NDArray[np.float64]
 
 OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
-LEAST_RUNS = 5
+LEAST_RUNS, LEAST_DRAWS = 5, 20
 SEED = 20120101
 TAIL = 0.975
 
@@ -203,6 +203,16 @@ def refuse_few_runs(runs: Mapping[str, int]) -> None:
                 expected=f"{LEAST_RUNS} or more", remedy="cut a long log into runs, or take the sandwich",
                 where="bootstrap",
             )  # fmt: skip
+
+
+def refuse_bootstrap(draws: object, runs: Mapping[str, int]) -> None:
+    """Raise as `refuse_few_runs` does, and InputError for draws that make no interval: one in twenty lies outside."""
+    refuse_few_runs(runs)
+    if not isinstance(draws, (int, np.integer)) or draws < LEAST_DRAWS:
+        raise InputError(
+            "too few draws for a 95 % interval", got=f"{draws}", expected=f"{LEAST_DRAWS} or more; better 200",
+            where="bootstrap",
+        )  # fmt: skip
 
 
 def least_runs(solver: Solver, strata: Strata | None = None) -> int:
