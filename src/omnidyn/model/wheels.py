@@ -90,7 +90,7 @@ def _wrench_matrix(wheels: Wheels) -> NDArray[np.float64]:
 
 def per_wheel(value: PerWheel, count: int) -> NDArray[np.float64]:
     """`value` as an array with one entry per wheel. Shape (count,)."""
-    return np.broadcast_to(np.asarray(value, dtype=float), (count,)).copy()
+    return np.full(count, value, dtype=float)
 
 
 def check_count(name: str, value: PerWheel | None, count: int) -> None:
