@@ -66,6 +66,7 @@ def drives(loaded: Loaded, robot: Robot | None, kind: str, how: How) -> DriveStu
 
 
 def tell_study(study: SteadyStudy, record: dict[str, Any], to: Out) -> None:
+    """Write and show friction and its shape: robot files, report, JSON or the summary."""
     from omnidyn.cli.identify_logs import outputs
     from omnidyn.files import check_output, write_atomic
     from omnidyn.identification.study_table import study_summary, study_to_dict
@@ -90,6 +91,7 @@ def tell_study(study: SteadyStudy, record: dict[str, Any], to: Out) -> None:
 
 
 def tell_lines(lines: dict[str, Estimate], record: dict[str, Any], to: Out) -> None:
+    """Write and show the lines of the axes of each group: robot files, JSON or the summaries."""
     from omnidyn.cli.identify_logs import outputs
     from omnidyn.files import check_output
     from omnidyn.model.robot_file import save_robot
@@ -110,6 +112,7 @@ def tell_lines(lines: dict[str, Estimate], record: dict[str, Any], to: Out) -> N
 
 
 def tell_drives(drives: DriveStudy, record: dict[str, Any], to: Out) -> None:
+    """Write and show the lines of the motors: report, JSON or the summary."""
     from omnidyn.files import write_atomic
     from omnidyn.identification.study_table import drive_summary, drive_to_dict
 
