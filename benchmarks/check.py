@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.check_faults import FAULTS, draw
 from benchmarks.check_logs import clean
 from benchmarks.table import Table, machine, one_core
-from omnidyn.logs.check import check
-from omnidyn.logs.findings import NOTE
+from omnidyn.findings.check import check
+from omnidyn.findings.finding import NOTE
 from omnidyn.logs.log import Log
 from omnidyn.report.figures.raw_log import draw_raw_log
 from omnidyn.report.style import BLUE, GREY, VERMILLION, WIDTH, look, new_figure, picture

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.check_logs import FloatArray, Rng, Scene, plain, play, program, random_scene, record
-from omnidyn.logs.findings import Verdict
+from omnidyn.findings.finding import Verdict
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 

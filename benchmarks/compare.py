@@ -13,7 +13,7 @@ from omnidyn.comparison.result import Comparison
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.inputs import prbs
+from omnidyn.simulation.programs import prbs
 from omnidyn.simulation.simulate import simulate
 
 LOGS, ROWS, DT = 400, 400, 0.01

@@ -30,9 +30,9 @@ from benchmarks.table import Table, machine
 from omnidyn.errors import OmnidynError
 from omnidyn.logs.command_file import read_commands
 from omnidyn.logs.read_log import read_log
+from omnidyn.logs.readers.any_table import iter_tables, read_any
 from omnidyn.logs.run_file import read_run, run_to_csv, run_to_parquet
 from omnidyn.logs.steady_table import read_steady_table
-from omnidyn.logs.tables import iter_tables, read_any
 from omnidyn.run import CHANNELS, Run
 
 SECONDS = float(os.environ.get("OMNIDYN_FUZZ_SECONDS", "60"))

@@ -8,12 +8,12 @@ import numpy as np
 
 from benchmarks.identify import NOISE, excitation, noisy
 from benchmarks.table import Table, machine
-from omnidyn.identification.joint_fit import GroupFit, identify_groups
+from omnidyn.identification.output_error.group_fit import GroupFit, identify_groups
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.tangent import with_parameter
 
 PAIRS, SECONDS = 200, 20.0
 MEMORY = 0.9  # correlation of neighbours of coloured noise

@@ -20,7 +20,7 @@ from benchmarks.identify_log import (
     with_friction,
 )
 from benchmarks.table import Table
-from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

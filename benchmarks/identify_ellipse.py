@@ -16,18 +16,18 @@ import numpy as np
 from benchmarks.identify_log import COUNTING, NOISE, RATE, SHARE, Draws, excitation, noisy
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.exact_engine import Weighting
+from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.implicit import TangentEngine
 from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem
-from omnidyn.identification.output_error.problem import Point
-from omnidyn.identification.output_error.record import record
-from omnidyn.identification.output_error.solver import Solver
-from omnidyn.identification.output_error.tangent_engine import TangentEngine
+from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.identification.output_error.problem.record import record
+from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.tangent import parameter, with_parameter
 
 LOGS = max(int(300 * SHARE), 10)
 LATE, FINE_ROWS = 0.013, 10  # [s]; rows of the truth in a row of the log

@@ -15,10 +15,10 @@ import numpy as np
 
 from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.tangent import parameter, with_parameter
+from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a row asks for
 

@@ -15,13 +15,13 @@ import numpy as np
 from benchmarks.identify_log import COUNTING, NOISE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.loop import friction_keys, gain_keys
+from omnidyn.identification.output_error.solve.loop import friction_keys, gain_keys
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.tangent import parameter, with_parameter
 
 SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
 LOGS = max(int(100 * SHARE), 5)

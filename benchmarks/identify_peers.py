@@ -34,7 +34,7 @@ from benchmarks.identify_log import (
 )
 from benchmarks.table import Table
 from benchmarks.tanh import run_tanh
-from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space

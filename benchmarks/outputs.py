@@ -12,10 +12,10 @@ import numpy as np
 
 from benchmarks.identify_log import NOISE, SHARE, Draws, excitation, truth
 from benchmarks.table import Table, machine
-from omnidyn.identification.output_error.counts import information
-from omnidyn.identification.output_error.exact_engine import ExactEngine
+from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem, read_records
-from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.identification.output_error.kernel.counts import information
+from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.statespace import state_space

@@ -17,11 +17,11 @@ from scipy.integrate import solve_ivp
 from benchmarks.table import Table, Times, machine, one_core
 from benchmarks.tanh import run_tanh
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
-from omnidyn.model.plant import plant
-from omnidyn.model.rest import new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
-from omnidyn.simulation.implicit import run_implicit
+from omnidyn.model.stick_slip.plant import plant
+from omnidyn.model.stick_slip.release import new_state
+from omnidyn.simulation.implicit.march import run_implicit
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.speed_loop import no_loop
 from tests.reference.make import FILE

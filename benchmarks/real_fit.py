@@ -16,10 +16,10 @@ from benchmarks import real_logs as logs
 from benchmarks import real_loop, udea
 from benchmarks.identify import excitation, noisy
 from benchmarks.table import Table, machine
-from omnidyn.identification.motor_choice import choose_motor
-from omnidyn.identification.motor_fit import AUTO, MotorFit, fit_motor
-from omnidyn.identification.motor_log import MEAN
-from omnidyn.identification.motor_run import fit_rmse, run_motor
+from omnidyn.identification.motors.choice import choose_motor
+from omnidyn.identification.motors.fit import AUTO, MotorFit, fit_motor
+from omnidyn.identification.motors.log import MEAN
+from omnidyn.identification.motors.run import fit_rmse, run_motor
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run

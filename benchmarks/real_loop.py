@@ -8,14 +8,14 @@ import numpy as np
 
 from benchmarks import real_logs as logs
 from benchmarks.table import Table
-from omnidyn.identification.joint_fit import identify_groups
 from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.steady_study import identify_steady
+from omnidyn.identification.output_error.group_fit import identify_groups
+from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.tangent import with_parameter
 
 SETS_OFF = 0.5  # [s] of each run that the fit does not see: the robot sets off within it, between two rows
 SECONDS = 6.0  # [s] of each run that are used: the shortest have as many, and nothing changes after the start

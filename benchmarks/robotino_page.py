@@ -10,7 +10,7 @@ from pathlib import Path
 
 from benchmarks import real_logs as logs
 from omnidyn.cli import main as omnidyn
-from omnidyn.identification.steady_study import identify_steady
+from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.shapes import draw_polar
 

@@ -11,10 +11,10 @@ from scipy.stats import trim_mean
 
 from benchmarks import real_logs as logs
 from benchmarks.table import Table
-from omnidyn.identification.motor_choice import choose_motor
-from omnidyn.identification.motor_fit import MotorFit, fit_motor
-from omnidyn.identification.motor_log import HOLD, MEAN
-from omnidyn.identification.motor_run import run_motor
+from omnidyn.identification.motors.choice import choose_motor
+from omnidyn.identification.motors.fit import MotorFit, fit_motor
+from omnidyn.identification.motors.log import HOLD, MEAN
+from omnidyn.identification.motors.run import run_motor
 from omnidyn.logs.read_log import read_log
 from omnidyn.run import Run
 

@@ -34,8 +34,8 @@ import json, sys
 import numpy as np
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.statespace import discretise, state_space
-from omnidyn.simulation import exact
-from omnidyn.simulation.exact_step import exact_step, pieces, turned_within
+from omnidyn.simulation.exact import march as exact
+from omnidyn.simulation.exact.step import exact_step, pieces, turned_within
 from omnidyn.simulation.simulate import simulate
 robot, dt = load_robot("axebot"), 0.05
 voltage = np.array([[3.0, -1.0, 2.5]] * 4 + [[-2.0, 4.0, 1.0]] * 4)
@@ -164,7 +164,7 @@ def decorated(decorator):
 
 def test_every_kernel_is_stamped_and_nothing_else_is_cached():
     kernels = decorated("kernel")
-    assert {"omnidyn.simulation.exact._twists", "omnidyn.simulation.exact._poses"} <= kernels
+    assert {"omnidyn.simulation.exact.march._twists", "omnidyn.simulation.exact.march._poses"} <= kernels
     everything = dispatchers()
     assert kernels <= set(everything)
     for name, function in everything.items():

@@ -24,15 +24,15 @@ _HOME = {
     "acceleration": "omnidyn.model.dynamics",
     "axis_patterns": "omnidyn.model.deadzone",
     "breakaway_voltage": "omnidyn.model.deadzone",
-    "check": "omnidyn.logs.check",
+    "check": "omnidyn.findings.check",
     "compare": "omnidyn.comparison.compare",
     "dead_zone_map": "omnidyn.model.deadzone",
-    "fit_drive_lines": "omnidyn.identification.drive_line",
+    "fit_drive_lines": "omnidyn.identification.motors.drive_line",
     "fit_output_error": "omnidyn.identification.output_error.fit",
-    "fit_steady_state": "omnidyn.identification.steady_state",
+    "fit_steady_state": "omnidyn.identification.steady.steady_state",
     "identify": "omnidyn.identification.identify",
-    "identify_groups": "omnidyn.identification.joint_fit",
-    "identify_steady": "omnidyn.identification.steady_study",
+    "identify_groups": "omnidyn.identification.output_error.group_fit",
+    "identify_steady": "omnidyn.identification.steady.study",
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
@@ -54,15 +54,15 @@ if TYPE_CHECKING:
     from omnidyn.comparison.compare import compare
     from omnidyn.comparison.result import Comparison
     from omnidyn.errors import OmnidynError
-    from omnidyn.identification.drive_line import fit_drive_lines
+    from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identify import identify
-    from omnidyn.identification.joint_fit import identify_groups
+    from omnidyn.identification.motors.drive_line import fit_drive_lines
     from omnidyn.identification.output_error.fit import fit_output_error
-    from omnidyn.identification.steady_state import fit_steady_state
-    from omnidyn.identification.steady_study import identify_steady
+    from omnidyn.identification.output_error.group_fit import identify_groups
+    from omnidyn.identification.steady.steady_state import fit_steady_state
+    from omnidyn.identification.steady.study import identify_steady
     from omnidyn.identification.validation import validate
-    from omnidyn.logs.check import check
     from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run

@@ -8,12 +8,12 @@ import pytest
 from benchmarks.identify import excitation, noisy
 from omnidyn.cli import main
 from omnidyn.cli.identify_fit import _Watch
-from omnidyn.identification.output_error.solver import Solver
+from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.tangent import with_parameter
 
 ROUGH = 2.6  # N along x; the preset has 2.2
 COULOMB = "friction.axes.coulomb[0]"

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from omnidyn import Run, write_run
 from omnidyn.cli import main
+from omnidyn.model.first_guess import first_guess
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
-from omnidyn.model.starter import first_guess
 
 MINI = ["--azimuth", "60,180,300", "--wheel-radius", "0.04", "--robot-radius", "0.125", "--mass", "8"]
 

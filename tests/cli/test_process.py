@@ -192,10 +192,10 @@ def _seconds_of_work(cwd):
 
 
 def test_work_past_two_seconds_shows_progress(capsys, monkeypatch):
-    monkeypatch.setattr("omnidyn.cli.progress.SILENT_S", 0.05)
-    monkeypatch.setattr("omnidyn.cli.progress.NEW_S", 0.05)
-    monkeypatch.setattr("omnidyn.cli.progress.BEAT_S", 0.05)
-    from omnidyn.cli.progress import progress
+    monkeypatch.setattr("omnidyn.cli.terminal.progress.SILENT_S", 0.05)
+    monkeypatch.setattr("omnidyn.cli.terminal.progress.NEW_S", 0.05)
+    monkeypatch.setattr("omnidyn.cli.terminal.progress.BEAT_S", 0.05)
+    from omnidyn.cli.terminal.progress import progress
 
     with progress("walking") as now:
         time.sleep(0.2)
@@ -209,8 +209,8 @@ def test_work_past_two_seconds_shows_progress(capsys, monkeypatch):
 
 def test_a_new_step_is_told_sooner_than_one_that_lasts(capsys, monkeypatch):
     for name, seconds in (("SILENT_S", 0.02), ("NEW_S", 0.1), ("BEAT_S", 60.0)):
-        monkeypatch.setattr(f"omnidyn.cli.progress.{name}", seconds)
-    from omnidyn.cli.progress import progress
+        monkeypatch.setattr(f"omnidyn.cli.terminal.progress.{name}", seconds)
+    from omnidyn.cli.terminal.progress import progress
 
     with progress("walking") as now:
         time.sleep(0.05)
@@ -222,9 +222,9 @@ def test_a_new_step_is_told_sooner_than_one_that_lasts(capsys, monkeypatch):
 
 def test_progress_says_where_a_kernel_is_compiled(capsys, monkeypatch):
     import omnidyn.compiled
-    from omnidyn.cli.progress import progress
+    from omnidyn.cli.terminal.progress import progress
 
-    monkeypatch.setattr("omnidyn.cli.progress.SILENT_S", 0.05)
+    monkeypatch.setattr("omnidyn.cli.terminal.progress.SILENT_S", 0.05)
     monkeypatch.setattr(omnidyn.compiled, "compiling", lambda: True)
     with progress("walking"):
         time.sleep(0.2)
@@ -232,7 +232,7 @@ def test_progress_says_where_a_kernel_is_compiled(capsys, monkeypatch):
 
 
 def test_quick_work_is_silent(capsys):
-    from omnidyn.cli.progress import progress
+    from omnidyn.cli.terminal.progress import progress
 
     with progress("walking"):
         pass

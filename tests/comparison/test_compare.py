@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binom
 
 import omnidyn
-from omnidyn.cli.streams import to_json
+from omnidyn.cli.terminal.streams import to_json
 from omnidyn.comparison.compare import what_is_compared
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.robot_file import load_robot

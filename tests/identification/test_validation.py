@@ -14,8 +14,8 @@ from omnidyn.identification.output_error.fit import NU, fit_output_error
 from omnidyn.identification.validation import Score, coloured, validate
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.tangent import with_parameter
 
 AXEBOT = load_robot("axebot")
 LATE, GAIN, DEAD = 0.013, 0.95, 0.2

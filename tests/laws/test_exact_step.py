@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from omnidyn.simulation.exact_step import exact_step, pieces, speed_within, turned_within
+from omnidyn.simulation.exact.step import exact_step, pieces, speed_within, turned_within
 
 POSITIVE = st.floats(1e-3, 30.0)
 

@@ -12,7 +12,7 @@ from omnidyn.model.robot import Body, Robot
 from omnidyn.model.wheels import Wheels
 from omnidyn.simulation.simulate import simulate
 from tests.reference.random_robots import random_robot, random_voltages
-from tests.simulation.test_implicit import AXEBOT, SHAPES, implicit, shaped
+from tests.simulation.implicit.test_march import AXEBOT, SHAPES, implicit, shaped
 
 TOL = 1e-7
 NEAR = {"rtol": 0.0, "atol": 10 * TOL}

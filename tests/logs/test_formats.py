@@ -21,9 +21,9 @@ from omnidyn.errors import InputError
 from omnidyn.files import read_text
 from omnidyn.logs.command_file import read_commands
 from omnidyn.logs.read_log import read_log
+from omnidyn.logs.readers.any_table import iter_tables, read_any
 from omnidyn.logs.run_file import read_run
 from omnidyn.logs.steady_table import read_steady_table
-from omnidyn.logs.tables import iter_tables, read_any
 
 TABLE = {"t": np.arange(3.0), "u": [1, 2, 3]}
 

@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 
 from omnidyn import load_robot
 from omnidyn.errors import OmnidynError
-from omnidyn.logs.guess import guess_columns
-from omnidyn.logs.mapping import load_map, map_to_toml, parse_column
+from omnidyn.logs.columns.guess import guess_columns
+from omnidyn.logs.columns.mapping import load_map, map_to_toml, parse_column
 from omnidyn.logs.read_log import LogOptions, log_from_table, map_columns
-from omnidyn.logs.table import Table
+from omnidyn.logs.table.table import Table
 
 ROBOT = load_robot("axebot")
 PARTS = [

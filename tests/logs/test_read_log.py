@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn import load_robot
 from omnidyn.errors import InputError
-from omnidyn.logs.check import check_blocks
+from omnidyn.findings.check import check_blocks
 from omnidyn.logs.log import component
 from omnidyn.logs.read_log import LogOptions, iter_logs, load_log, read_log
 from omnidyn.logs.run_file import write_run

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
-from omnidyn.model.starter import even_azimuths, first_guess
+from omnidyn.model.first_guess import even_azimuths, first_guess
 from omnidyn.model.wheels import Wheels
 
 

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from omnidyn.logs.check import check
+from omnidyn.findings.check import check
 from omnidyn.logs.read_log import LogOptions, load_log
 from omnidyn.model.robot_file import load_robot, robot_from_dict
 

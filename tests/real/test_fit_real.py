@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks import real_fit, udea
 from benchmarks import real_logs as logs
-from omnidyn.identification.motor_choice import choose_motor
-from omnidyn.identification.motor_fit import fit_motor
-from omnidyn.identification.motor_run import fit_rmse
+from omnidyn.identification.motors.choice import choose_motor
+from omnidyn.identification.motors.fit import fit_motor
+from omnidyn.identification.motors.run import fit_rmse
 
 TURN = 2.0 * np.pi
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from benchmarks import real_logs as logs
-from omnidyn.identification.drive_line import fit_drive_lines
-from omnidyn.identification.line import fit_line
-from omnidyn.identification.operating import force_points
-from omnidyn.identification.shape_fit import fit_shape, rms_and_error
-from omnidyn.identification.shapes import SHAPES
-from omnidyn.identification.steady_study import identify_steady
+from omnidyn.identification.motors.drive_line import fit_drive_lines
+from omnidyn.identification.steady.line import fit_line
+from omnidyn.identification.steady.operating_points import force_points
+from omnidyn.identification.steady.shape_fit import fit_shape, rms_and_error
+from omnidyn.identification.steady.shapes import SHAPES
+from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
 
 ROBOTINO = load_robot("robotino")

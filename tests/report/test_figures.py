@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from omnidyn.identification.band import confidence_band
-from omnidyn.identification.steady_state import fit_steady_state
+from omnidyn.identification.steady.band import confidence_band
+from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.model.robot_file import load_robot, preset_names
 from omnidyn.paper.friction import table_1_points
 from omnidyn.report.figures import paper_pictures

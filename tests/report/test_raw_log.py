@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omnidyn.logs.check import check
+from omnidyn.findings.check import check
 from omnidyn.logs.log import Log
 from omnidyn.report.figures.raw_log import draw_raw_log
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.steady_logs import clean_runs, robot_with, spoiled
-from omnidyn.identification.drive_line import fit_drive_lines
-from omnidyn.identification.steady_study import identify_steady
+from omnidyn.identification.motors.drive_line import fit_drive_lines
+from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.drive_lines import draw_drive_lines
 from omnidyn.report.figures.shapes import shape_pictures

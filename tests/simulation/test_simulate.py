@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.model.robot_file import PRESETS, parse_robot
-from omnidyn.simulation.exact import why_not_exact
+from omnidyn.simulation.exact.march import why_not_exact
 from omnidyn.simulation.simulate import simulate
 from tests.reference.robots import table_3_voltages
 

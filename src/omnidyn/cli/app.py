@@ -6,7 +6,7 @@ import typer
 
 import omnidyn
 from omnidyn.cli import check, compare, deadzone, demo, identify, init, robots, simulate
-from omnidyn.cli.streams import show
+from omnidyn.cli.terminal.streams import show
 
 app = typer.Typer(
     name="omnidyn", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli import log_options
-from omnidyn.cli.progress import progress
-from omnidyn.cli.streams import coloured, say, show, show_json, width
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import coloured, say, show, show_json, width
 
 if TYPE_CHECKING:
     from omnidyn.errors import OmnidynError
-    from omnidyn.logs.findings import Finding, Verdict
+    from omnidyn.findings.finding import Finding, Verdict
     from omnidyn.logs.log import Log
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
@@ -101,8 +101,8 @@ def _checked(
 ) -> Checked:  # fmt: skip
     """One log, block by block; an error in reading it does not stop the others."""
     from omnidyn.errors import OmnidynError
-    from omnidyn.logs.check import check as check_log
-    from omnidyn.logs.check import check_blocks
+    from omnidyn.findings.check import check as check_log
+    from omnidyn.findings.check import check_blocks
     from omnidyn.logs.read_log import iter_logs
 
     done, digest, kept = Checked(path), _Digest(), _Kept()
@@ -167,7 +167,7 @@ def _compare_data(done: list[Checked]) -> None:
     """Logs that hold the same numbers under two names: evidence that counts once."""
     from dataclasses import replace
 
-    from omnidyn.logs.findings import WARN, Finding, in_order
+    from omnidyn.findings.finding import WARN, Finding, in_order
 
     first: dict[str, Checked] = {}
     for each in done:
@@ -209,7 +209,7 @@ def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
 
 
 def _document(done: list[Checked], robot: str) -> dict[str, Any]:
-    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.cli.terminal.session import provenance, robot_input
 
     logs = [
         each.verdict.to_dict() | {"source": each.path, "notes": list(each.notes)}

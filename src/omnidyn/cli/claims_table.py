@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-from omnidyn.cli.streams import coloured, width
+from omnidyn.cli.terminal.streams import coloured, width
 from omnidyn.paper.claim import Claim, Verdict
 
 SHORT = {Verdict.REPRODUCED: "yes", Verdict.CORRECTED: "mended", Verdict.NOT_REPRODUCED: "no"}

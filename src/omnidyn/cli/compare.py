@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli import log_options
-from omnidyn.cli.progress import progress
-from omnidyn.cli.streams import say, show, show_json
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
     from omnidyn.comparison.result import Comparison
@@ -139,7 +139,7 @@ def _tell(
     if not json:
         show(found.summary(segments).rstrip("\n"))
         return
-    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.cli.terminal.session import provenance, robot_input
 
     for warning in found.warnings:
         say(f"omnidyn: warning: {warning}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli.streams import say, show, show_json
+from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -23,8 +23,8 @@ def deadzone(
 ) -> None:
     """Show at which voltage it starts to move."""
     _refuse_picture(picture, force)
-    from omnidyn.cli.numbers import number_list
-    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.cli.terminal.numbers import number_list
+    from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.model.deadzone import axis_patterns
     from omnidyn.model.robot_file import load_robot
 
@@ -53,7 +53,7 @@ def _refuse_picture(path: str, force: bool) -> None:
 
 
 def _draw(robot: Robot, path: str, force: bool) -> None:
-    from omnidyn.cli.progress import progress
+    from omnidyn.cli.terminal.progress import progress
     from omnidyn.files import write_atomic
     from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli.progress import progress
-from omnidyn.cli.streams import say, show, show_json, to_json
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import say, show, show_json, to_json
 
 if TYPE_CHECKING:
     from omnidyn.paper.claim import Claim
@@ -50,7 +50,7 @@ def demo(
 
 def _made(now: Any) -> tuple[tuple[Claim, ...], list[Picture], dict[str, Any]]:
     """Claims, pictures and the record of what they were made from."""
-    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.model.robot_file import load_robot
     from omnidyn.paper.claims import PRESET, all_claims
     from omnidyn.report.figures import paper_pictures

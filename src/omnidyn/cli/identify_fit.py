@@ -10,17 +10,17 @@ import typer
 
 from omnidyn.cli.identify_logs import Loaded, outputs
 from omnidyn.cli.log_options import matches
-from omnidyn.cli.streams import say, show, show_json
+from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
-    from omnidyn.identification.motor_fit import MotorFit
+    from omnidyn.findings.finding import Verdict
+    from omnidyn.identification.motors.fit import MotorFit
     from omnidyn.identification.output_error.answer import OutputErrorEstimate
-    from omnidyn.identification.output_error.onlooker import Onlooker
-    from omnidyn.identification.output_error.problem import Point
-    from omnidyn.identification.output_error.solver import State
-    from omnidyn.identification.study_parts import Difference
+    from omnidyn.identification.output_error.problem.problem import Point
+    from omnidyn.identification.output_error.solve.progress import Onlooker
+    from omnidyn.identification.output_error.solve.solver import State
+    from omnidyn.identification.steady.study_parts import Difference
     from omnidyn.identification.validation import Validation
-    from omnidyn.logs.findings import Verdict
     from omnidyn.model.robot import Robot
     from omnidyn.run import Run
 
@@ -129,7 +129,7 @@ def _validations(part: _Part, fits: Mapping[str, OutputErrorEstimate], now: Any)
 
 def _verdicts(loaded: Loaded, robot: Robot, now: Any) -> list[Verdict]:
     """What check says of the logs, where they are not too long; fatal findings are said at once."""
-    from omnidyn.logs.check import check
+    from omnidyn.findings.check import check
 
     if sum(len(log) for log in loaded.logs) > CHECKED:
         say("omnidyn: the logs are long: not checked on the way (omnidyn check does)")
@@ -168,7 +168,7 @@ class _Watch:
 
     def looking(self) -> Onlooker:
         """The same as a fit wants it: what is done in words, too."""
-        from omnidyn.identification.output_error.onlooker import Onlooker
+        from omnidyn.identification.output_error.solve.progress import Onlooker
 
         return Onlooker(self, lambda words: self.now(f"fitting: {words}"))
 
@@ -184,7 +184,7 @@ def _fitted(
     part: _Part, robot: Robot, ask: Ask, now: Any
 ) -> tuple[dict[str, OutputErrorEstimate], Sequence[Difference], bool]:
     """(fits by group, differences, whether it was interrupted)."""
-    from omnidyn.identification.joint_fit import expand_keys
+    from omnidyn.identification.output_error.group_fit import expand_keys
 
     options: dict[str, Any] = {
         "free": expand_keys(ask.free, robot) if ask.free else None, "fixed": expand_keys(ask.fix, robot),
@@ -204,7 +204,7 @@ def _fitted(
     except KeyboardInterrupt:
         if not watch.kept():
             raise
-        from omnidyn.identification.best_so_far import best_so_far
+        from omnidyn.identification.output_error.best_so_far import best_so_far
 
         return {group: best_so_far(watch.states, part.runs, robot, options)}, (), True
 
@@ -214,7 +214,7 @@ def _fitted_groups(
     more: Mapping[str, Any],
 ) -> tuple[dict[str, OutputErrorEstimate], Sequence[Difference], bool]:  # fmt: skip
     """The same of groups: numbers and differences, or both at the best point so far."""
-    from omnidyn.identification.joint_fit import join_groups
+    from omnidyn.identification.output_error.group_fit import join_groups
 
     alone: dict[str, Point] = {}
 
@@ -231,7 +231,7 @@ def _fitted_groups(
     except KeyboardInterrupt:
         if not watch.kept() and not alone:
             raise
-        from omnidyn.identification.best_so_far import best_alone_so_far, best_groups_so_far
+        from omnidyn.identification.output_error.best_so_far import best_alone_so_far, best_groups_so_far
 
         study, cut = (
             best_groups_so_far(joint, watch.states) if joint and watch.states
@@ -275,7 +275,7 @@ def _tell(
     fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], verdicts: Sequence[Verdict],
     differences: Sequence[Difference], record: dict[str, Any], out: Out, files: Mapping[str, str],
 ) -> None:  # fmt: skip
-    from omnidyn.identification.fit_words import advice, verdict_advice
+    from omnidyn.identification.advice import advice, verdict_advice
 
     report = out.report if out.report and validations else ""
     next_ = verdict_advice(verdicts)
@@ -308,8 +308,8 @@ def _text(
 ) -> str:  # fmt: skip
     import textwrap
 
-    from omnidyn.identification.fit_words import DIFFERENCE_HEAD, difference_rows
-    from omnidyn.identification.study_table import table_text
+    from omnidyn.identification.advice import DIFFERENCE_HEAD, difference_rows
+    from omnidyn.identification.steady.study_table import table_text
 
     lines = []
     for group, fit in fits.items():
@@ -329,9 +329,9 @@ def fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out:
     """One output-error fit per motor, with and without a dead band, and free runs on what was held out."""
     import numpy as np
 
-    from omnidyn.identification.motor_choice import is_late
-    from omnidyn.identification.motor_fit import fit_motor
-    from omnidyn.identification.motor_run import fit_rmse
+    from omnidyn.identification.motors.choice import is_late
+    from omnidyn.identification.motors.fit import fit_motor
+    from omnidyn.identification.motors.run import fit_rmse
 
     part = _Part(loaded, ask.hold_out)
     counts = [run.wheels or 1 for run in part.runs]
@@ -369,8 +369,8 @@ def _tell_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], recor
         ]  # fmt: skip
         show_json({"method": "output-error", "motors": motors, "report": out.report or None, "provenance": record})
     else:
-        from omnidyn.identification.fit_words import MOTOR_HEAD, motor_rows, motor_words
-        from omnidyn.identification.study_table import table_text
+        from omnidyn.identification.advice import MOTOR_HEAD, motor_rows, motor_words
+        from omnidyn.identification.steady.study_table import table_text
 
         lines = [f"- {each}" for each in motor_words(found)]
         show("\n".join([*table_text(MOTOR_HEAD, motor_rows(found)), "", *lines]))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from omnidyn.cli.log_options import Maps, load_logs, log_files, matches
-from omnidyn.cli.streams import say
+from omnidyn.cli.terminal.streams import say
 
 if TYPE_CHECKING:
     from omnidyn.logs.log import Log

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli.progress import progress
-from omnidyn.cli.streams import say, show, show_json
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
     from omnidyn.cli.identify_fit import Out
     from omnidyn.cli.identify_logs import Loaded
-    from omnidyn.identification.drive_line import DriveStudy
     from omnidyn.identification.estimate import Estimate
-    from omnidyn.identification.steady_study import SteadyStudy
+    from omnidyn.identification.motors.drive_line import DriveStudy
+    from omnidyn.identification.steady.study import SteadyStudy
     from omnidyn.model.robot import Robot
 
 LINE = "line"
@@ -31,7 +31,7 @@ class How:
 
     def shares(self) -> tuple[float, float] | None:
         """The two shares of --window. Raises InputError where they are none."""
-        from omnidyn.cli.numbers import number_list
+        from omnidyn.cli.terminal.numbers import number_list
         from omnidyn.errors import InputError
 
         if not self.window:
@@ -43,7 +43,7 @@ class How:
 
 
 def study(loaded: Loaded, robot: Robot, shape: str, how: How) -> SteadyStudy:
-    from omnidyn.identification.steady_study import identify_steady
+    from omnidyn.identification.steady.study import identify_steady
 
     return identify_steady(
         loaded.runs, robot, groups=loaded.groups, shape=shape, speed=how.speed, force_from=how.force_from,
@@ -52,7 +52,7 @@ def study(loaded: Loaded, robot: Robot, shape: str, how: How) -> SteadyStudy:
 
 
 def lines(loaded: Loaded, robot: Robot, how: How) -> dict[str, Estimate]:
-    from omnidyn.identification.steady_lines import identify_lines
+    from omnidyn.identification.steady.axis_lines import identify_lines
 
     return identify_lines(
         loaded.runs, robot, groups=loaded.groups, speed=how.speed, force_from=how.force_from, window=how.shares()
@@ -60,7 +60,7 @@ def lines(loaded: Loaded, robot: Robot, how: How) -> dict[str, Estimate]:
 
 
 def drives(loaded: Loaded, robot: Robot | None, kind: str, how: How) -> DriveStudy:
-    from omnidyn.identification.drive_line import fit_drive_lines
+    from omnidyn.identification.motors.drive_line import fit_drive_lines
 
     return fit_drive_lines(loaded.runs, kind=kind, speed=how.speed, robot=robot, share=how.shares())
 
@@ -69,7 +69,7 @@ def tell_study(study: SteadyStudy, record: dict[str, Any], to: Out) -> None:
     """Write and show friction and its shape: robot files, report, JSON or the summary."""
     from omnidyn.cli.identify_logs import outputs
     from omnidyn.files import check_output, write_atomic
-    from omnidyn.identification.study_table import study_summary, study_to_dict
+    from omnidyn.identification.steady.study_table import study_summary, study_to_dict
     from omnidyn.model.robot_file import save_robot
 
     files = outputs(to.out, list(study.estimates))
@@ -114,7 +114,7 @@ def tell_lines(lines: dict[str, Estimate], record: dict[str, Any], to: Out) -> N
 def tell_drives(drives: DriveStudy, record: dict[str, Any], to: Out) -> None:
     """Write and show the lines of the motors: report, JSON or the summary."""
     from omnidyn.files import write_atomic
-    from omnidyn.identification.study_table import drive_summary, drive_to_dict
+    from omnidyn.identification.motors.drive_table import drive_summary, drive_to_dict
 
     if to.out:
         say("omnidyn: the lines of the motors do not go into a robot file; -o is not used")
@@ -160,8 +160,8 @@ def _estimated(table: str, robot: str, rest: str) -> tuple[Estimate, dict[str, A
     """The estimate and the record of what it was made from; what the reader had to decide joins the warnings."""
     from dataclasses import replace
 
-    from omnidyn.cli.session import provenance, robot_input
-    from omnidyn.identification.steady_state import fit_steady_state
+    from omnidyn.cli.terminal.session import provenance, robot_input
+    from omnidyn.identification.steady.steady_state import fit_steady_state
     from omnidyn.logs.steady_table import read_steady_table
     from omnidyn.model.robot_file import load_robot
 

@@ -9,8 +9,8 @@ import typer
 
 from omnidyn.cli import identify_steady as steady
 from omnidyn.cli import log_options as options
-from omnidyn.cli.progress import progress
-from omnidyn.cli.streams import say
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import say
 
 if TYPE_CHECKING:
     from omnidyn.cli.identify_fit import Ask, Out
@@ -221,6 +221,6 @@ def _robot(robot: str) -> Robot | None:
 
 
 def _record(robot: str, loaded: Loaded) -> dict[str, Any]:
-    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.cli.terminal.session import provenance, robot_input
 
     return provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])

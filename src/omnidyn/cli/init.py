@@ -12,8 +12,8 @@ import typer
 
 from omnidyn.cli import log_options as logs
 from omnidyn.cli.init_logs import as_seen, from_logs
-from omnidyn.cli.numbers import number_words
-from omnidyn.cli.streams import say, show, show_json
+from omnidyn.cli.terminal.numbers import number_words
+from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -124,7 +124,7 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
 
 
 def _azimuths(text: str) -> list[float] | None:
-    from omnidyn.cli.numbers import number_list
+    from omnidyn.cli.terminal.numbers import number_list
 
     return number_list("--azimuth", text) if text else None
 
@@ -200,7 +200,7 @@ def _ask_for(needed: list[str], answers: Answers, preset: Robot | None) -> None:
 
 
 def _ask_for_wheels(answers: Answers, preset: Robot | None) -> None:
-    from omnidyn.model.starter import even_azimuths
+    from omnidyn.model.first_guess import even_azimuths
 
     count = answers.value.get("wheels")
     if count is None:
@@ -242,7 +242,7 @@ def _one(text: str) -> float:
 
 
 def _several(text: str, count: int, expected: str = "") -> list[float]:
-    from omnidyn.cli.numbers import number_list
+    from omnidyn.cli.terminal.numbers import number_list
     from omnidyn.errors import InputError
 
     try:
@@ -266,8 +266,8 @@ def _count(text: str) -> int:
 
 def _checked(key: str, value: Any) -> Any:
     """The value, if a robot may have it. Raises InputError."""
+    from omnidyn.model.first_guess import even_azimuths
     from omnidyn.model.robot import Body
-    from omnidyn.model.starter import even_azimuths
     from omnidyn.model.wheels import Wheels
 
     if key == "mass":
@@ -281,8 +281,8 @@ def _checked(key: str, value: Any) -> Any:
 def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, friction: str) -> Robot:
     """The robot of these answers. Raises InputError, also where no guess makes sense."""
     from omnidyn.errors import InputError
+    from omnidyn.model.first_guess import DIRECTION, default_prior, first_guess, like
     from omnidyn.model.robot import Body
-    from omnidyn.model.starter import DIRECTION, default_prior, first_guess, like
 
     value = answers.value
     wheels, mass = _wheels(value, preset, mecanum), value.get("mass", preset.body.mass if preset else None)
@@ -303,7 +303,7 @@ def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, fri
 
 
 def _wheels(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Wheels:
-    from omnidyn.model.starter import mecanum_wheels
+    from omnidyn.model.first_guess import mecanum_wheels
     from omnidyn.model.wheels import Wheels
 
     known = {key: value[key] for key in ("wheel_radius", "robot_radius") if key in value}
@@ -316,10 +316,10 @@ def _wheels(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Wheel
 
 
 def _write(robot: Robot, path: str, force: bool, json: bool, like: str) -> None:
-    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.files import write_atomic
+    from omnidyn.model.first_guess import guessed
     from omnidyn.model.robot_file import robot_to_toml
-    from omnidyn.model.starter import guessed
 
     text = _head(robot) + robot_to_toml(robot)
     if path == "-":
@@ -347,7 +347,7 @@ def _smallest(robot: Robot) -> float:
 
 def _head(robot: Robot) -> str:
     """Comments for whoever opens the file."""
-    from omnidyn.model.starter import reasons
+    from omnidyn.model.first_guess import reasons
 
     lines = [
         "Written by omnidyn init. SI units; azimuths count counter-clockwise from forward (x forward, y left).",

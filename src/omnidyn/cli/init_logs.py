@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.cli import log_options as logs
-from omnidyn.cli.numbers import number_words
-from omnidyn.cli.streams import say
+from omnidyn.cli.terminal.numbers import number_words
+from omnidyn.cli.terminal.streams import say
 
 if TYPE_CHECKING:
     from omnidyn.identification.geometry import Geometry
@@ -46,8 +46,8 @@ def as_seen(robot: Robot, seen: Geometry | None, from_logs: set[str]) -> Robot:
 
     from_logs: keys of the robot file whose numbers the logs gave; their source says so.
     """
+    from omnidyn.model.first_guess import with_gear
     from omnidyn.model.robot import Prior
-    from omnidyn.model.starter import with_gear
 
     if seen is None:
         return robot

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli.streams import say
+from omnidyn.cli.terminal.streams import say
 
 if TYPE_CHECKING:
+    from omnidyn.logs.columns.mapping import ColumnMap
     from omnidyn.logs.log import Log
-    from omnidyn.logs.mapping import ColumnMap
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
 
@@ -47,7 +47,7 @@ def log_options(
     current_unsigned: bool = False,
 ) -> LogOptions:
     """The options as the readers take them. Raises InputError for what cannot be read."""
-    from omnidyn.logs.mapping import load_map
+    from omnidyn.logs.columns.mapping import load_map
     from omnidyn.logs.read_log import LogOptions
 
     return LogOptions(
@@ -151,7 +151,7 @@ class Maps:
 
     def show(self, path: str, columns: ColumnMap) -> None:
         """Say a map on stderr, unless it was said before; write the first where --save-map asks."""
-        from omnidyn.logs.mapping import save_map
+        from omnidyn.logs.columns.mapping import save_map
 
         lines = (*columns.lines(), *(f"doubt: {words}" for words in columns.doubts))
         if lines in self.said:

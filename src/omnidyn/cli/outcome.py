@@ -12,8 +12,8 @@ from types import FrameType
 
 import typer
 
-from omnidyn.cli import session
-from omnidyn.cli.streams import prepare, say
+from omnidyn.cli.terminal import session
+from omnidyn.cli.terminal.streams import prepare, say
 from omnidyn.errors import OmnidynError
 
 BUG, USAGE, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143

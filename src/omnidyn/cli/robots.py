@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import typer
 
-from omnidyn.cli.streams import show, show_json
+from omnidyn.cli.terminal.streams import show, show_json
 
 
 def robots(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
     """List the robots that come along."""
-    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.model.robot_file import load_robot, preset_names
 
     known = {name: load_robot(name) for name in preset_names()}

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli.progress import progress
-from omnidyn.cli.streams import say, show, show_json
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
     from omnidyn.run import Run
@@ -35,7 +35,7 @@ def simulate(
     The dead zone included. The run is written as CSV.
     Without -o nothing is written: only the summary is shown.
     """
-    from omnidyn.cli.numbers import three
+    from omnidyn.cli.terminal.numbers import three
 
     start_twist, start_pose = three("--twist", twist), three("--pose", pose)
     # -o - and --json both want stdout
@@ -75,7 +75,7 @@ def _simulated(
     tol: float,
 ) -> tuple[Run, dict[str, Any]]:
     """The run and the record of what it was made from."""
-    from omnidyn.cli.session import provenance, robot_input
+    from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.logs.command_file import read_commands
     from omnidyn.model.robot_file import load_robot
     from omnidyn.simulation.simulate import simulate as simulate_robot

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.nuisances import DEAD, FADE, GAIN, LATENCY, TILT
-from omnidyn.identification.output_error.primitives import primitives
-from omnidyn.identification.output_error.record import record
+from omnidyn.identification.output_error.problem.nuisances import DEAD, FADE, GAIN, LATENCY, TILT
+from omnidyn.identification.output_error.problem.primitives import primitives
+from omnidyn.identification.output_error.problem.record import record
 from omnidyn.logs.segments import segments
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.tangent import GAINS
+from omnidyn.simulation.sensitivity.directions import GAINS
 
 FloatArray = NDArray[np.float64]
 

@@ -8,17 +8,16 @@ from typing import Any
 
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.output_error.fit import fit_output_error, is_exact
-from omnidyn.identification.output_error.record import LOOP_REMEDY
-from omnidyn.identification.settling import why_no_transient
-from omnidyn.identification.steady_study import identify_steady
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.inputs import why_no_inputs
+from omnidyn.identification.steady.settling import why_no_transient
+from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
 AUTO, OUTPUT_ERROR, STEADY_STATE = "auto", "output-error", "steady-state"
 METHODS = (OUTPUT_ERROR, STEADY_STATE)
-OUTPUTS = ("twist", "wheel_speed", "wheel_angle", "current", "pose")
 _FUNCTIONS: dict[str, Callable[..., Any]] = {OUTPUT_ERROR: fit_output_error, STEADY_STATE: identify_steady}
 
 
@@ -62,23 +61,6 @@ def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     if why or robot.drive.kind != SPEED or any(run.voltage is not None or run.duty is not None for run in runs):
         return why
     return why_no_transient(runs, robot)
-
-
-def why_no_inputs(runs: Sequence[Run], robot: Robot) -> str:
-    """Which log has no input that the robot follows, or no output, in words; "" where all have both."""
-    for run in runs:
-        none = run.voltage is None and run.duty is None
-        if none and (run.wheel_speed_command is not None or run.twist_command is not None):
-            if robot.drive.kind != SPEED:
-                return f"{run.source or 'a log'} holds set speeds only; to fit it whole, {LOOP_REMEDY}"
-        elif none:
-            return f"{run.source or 'a log'} holds no voltage and no duty"
-        known = [name for name in OUTPUTS if getattr(run, name) is not None]
-        if not known:
-            return f"{run.source or 'a log'} holds no speed, current or pose"
-        if known == ["wheel_angle"] and (none or not is_exact(robot)):
-            return f"{run.source or 'a log'} holds angles of wheels only, which a fit of {robot.name} does not know"
-    return ""
 
 
 def options_of(method: str) -> tuple[str, ...]:

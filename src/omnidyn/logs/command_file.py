@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
+from omnidyn.logs.readers.any_table import read_any
 from omnidyn.logs.run_file import columns_of, refuse_other_units
-from omnidyn.logs.table import Table
-from omnidyn.logs.tables import read_any
+from omnidyn.logs.table.table import Table
 
 FloatArray = NDArray[np.float64]
 MAX_STEPS = 10_000_000

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import components, place
-from omnidyn.logs.mapping import ColumnMap
+from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 
 FloatArray = NDArray[np.float64]

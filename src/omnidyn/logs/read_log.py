@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
-from omnidyn.logs.clock import Clock
-from omnidyn.logs.counters import unrolled
-from omnidyn.logs.guess import guess_columns, refuse_doubtful
+from omnidyn.logs.clock.clock import Clock
+from omnidyn.logs.clock.counters import unrolled
+from omnidyn.logs.clock.stamps import with_joined_stamp
+from omnidyn.logs.column import MOTOR_SIDE, Column
+from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
+from omnidyn.logs.columns.mapping import ColumnMap, component_channel, load_map, parse_column
 from omnidyn.logs.log import Log
-from omnidyn.logs.mapping import MOTOR_SIDE, Column, ColumnMap, component_channel, load_map, parse_column
-from omnidyn.logs.stamps import with_joined_stamp
-from omnidyn.logs.table import ROWS, Table
-from omnidyn.logs.tables import iter_tables, read_any
-from omnidyn.logs.text_file import Progress
+from omnidyn.logs.readers.any_table import iter_tables, read_any
+from omnidyn.logs.table.table import ROWS, Table
+from omnidyn.logs.table.text import Progress
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
 from omnidyn.logs.channels import components, si_suffix
-from omnidyn.logs.parquet import SUFFIXES, import_pyarrow, parquet_bytes
-from omnidyn.logs.table import Table
-from omnidyn.logs.tables import read_any
+from omnidyn.logs.readers.any_table import read_any
+from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
+from omnidyn.logs.table.table import Table
 from omnidyn.run import CHANNELS, SCALAR, Run
 from omnidyn.units import DUTY, known_unit, parse_unit
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.logs.table import Table, read_table
+from omnidyn.logs.table.table import Table, read_table
 
 FloatArray = NDArray[np.float64]
 

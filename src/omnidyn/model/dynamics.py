@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.model.layout import LENGTH
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
-from omnidyn.model.plant import plant
-from omnidyn.model.rest import accelerations, moving_states
 from omnidyn.model.robot import Robot
+from omnidyn.model.stick_slip.plant import plant
+from omnidyn.model.stick_slip.release import accelerations, moving_states
 from omnidyn.model.wheels import wheel_speed, wrench_from_traction
 
 
@@ -63,7 +63,7 @@ def frame_wrench(robot: Robot, twist: ArrayLike) -> NDArray[np.float64]:
 def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[np.float64]:
     """Acceleration of the twist [m/s^2, m/s^2, rad/s^2], eqs (4)-(6), currents settled.
 
-    Friction at rest balances what drives it; where several parts hold at once, the inclusion of inclusion.py decides.
+    Friction at rest balances what drives it; where several parts hold at once, stick_slip/inclusion.py decides.
     `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
     """
     twist, voltage = np.asarray(twist, dtype=float), np.asarray(voltage, dtype=float)

@@ -12,7 +12,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.paper.steady import measured_speed, pattern_of, settled_speed
 from omnidyn.paper.tables import AXES, DEAD_ZONE_TEXT, TABLE_1, TABLE_4, Three
 from omnidyn.run import Run
-from omnidyn.simulation.inputs import ramp, steps
+from omnidyn.simulation.programs import ramp, steps
 from omnidyn.simulation.simulate import simulate
 
 FloatArray = NDArray[np.float64]

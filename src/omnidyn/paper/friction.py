@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.steady_state import fit_steady_state
+from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.robot import Robot

@@ -1,0 +1,1 @@
+"""Pages that stand alone: html and page, figures/, one file per page; style is shared."""

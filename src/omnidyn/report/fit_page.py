@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from omnidyn.identification.fit_words import (
+from omnidyn.findings.finding import Verdict
+from omnidyn.identification.advice import (
     DIFFERENCE_HEAD,
     MOTOR_HEAD,
     NUMBER_HEAD,
@@ -18,11 +19,10 @@ from omnidyn.identification.fit_words import (
     verdict_advice,
     verdict_rows,
 )
-from omnidyn.identification.motor_fit import MotorFit
+from omnidyn.identification.motors.fit import MotorFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.study_parts import Difference
+from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import HEAD, Validation, output_name
-from omnidyn.logs.findings import Verdict
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.residuals import draw_residuals

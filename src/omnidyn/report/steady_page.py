@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from omnidyn.identification.drive_line import DriveStudy
-from omnidyn.identification.operating import SPEEDS
-from omnidyn.identification.steady_study import SteadyStudy
-from omnidyn.identification.study_table import (
-    DRIVE_HEAD,
+from omnidyn.identification.motors.drive_line import DriveStudy
+from omnidyn.identification.motors.drive_table import DRIVE_HEAD, drive_rows
+from omnidyn.identification.steady.operating_points import SPEEDS
+from omnidyn.identification.steady.study import SteadyStudy
+from omnidyn.identification.steady.study_table import (
     LEVEL_HEAD,
     SHAPE_HEAD,
     TRAVEL_HEAD,
-    drive_rows,
     level_rows,
     shape_rows,
     travel_rows,
 )
-from omnidyn.identification.study_words import FORCES
+from omnidyn.identification.steady.study_words import FORCES
 from omnidyn.report.figures.drive_lines import draw_drive_lines
 from omnidyn.report.figures.shapes import shape_pictures
 from omnidyn.report.html import Section, bullets, figure, page, paragraph, table

@@ -9,15 +9,15 @@ from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.layout import AXES, LENGTH
 from omnidyn.model.motor import DYNAMIC
-from omnidyn.model.plant import plant
-from omnidyn.model.rest import SIGNS, start_state
 from omnidyn.model.robot import Robot
+from omnidyn.model.stick_slip.plant import plant
+from omnidyn.model.stick_slip.release import SIGNS, start_state
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, as_floats, commands, on_ticks
-from omnidyn.simulation.exact import simulate_exact, why_not_exact
-from omnidyn.simulation.exact_inductance import simulate_exact_inductance
-from omnidyn.simulation.implicit import Outcome, capped, run_implicit
+from omnidyn.simulation.exact.inductance import simulate_exact_inductance
+from omnidyn.simulation.exact.march import simulate_exact, why_not_exact
+from omnidyn.simulation.implicit.march import Outcome, capped, run_implicit
 from omnidyn.simulation.speed_loop import loop_of, no_loop
 
 FloatArray = NDArray[np.float64]

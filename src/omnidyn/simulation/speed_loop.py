@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from omnidyn.compiled import part
 from omnidyn.model.layout import AXES, GX, GY, GZ
-from omnidyn.model.rest import SIGNS
 from omnidyn.model.robot import Robot
+from omnidyn.model.stick_slip.release import SIGNS
 from omnidyn.simulation.commands import loop_gains
 
 FloatArray = NDArray[np.float64]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.output_error import fit as whole
-from omnidyn.identification.output_error.parameters import FRICTION
+from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
-from omnidyn.simulation.tangent import with_parameter
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 

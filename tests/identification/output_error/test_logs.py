@@ -7,8 +7,8 @@ import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error import fit as whole
-from omnidyn.identification.output_error.parameters import FRICTION
-from omnidyn.identification.output_error.solver import of_states
+from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.identification.output_error.solve.solver import of_states
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

@@ -13,13 +13,13 @@ from scipy.special import ndtri
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
-from omnidyn.identification.output_error.breakaway import Breakaway
-from omnidyn.identification.output_error.nuisances import LATENCY, TILT, TRAVELS
-from omnidyn.identification.output_error.problem import Problem, per_column
-from omnidyn.identification.output_error.record import Record
-from omnidyn.identification.output_error.solver import Solution, Solver
-from omnidyn.identification.output_error.starts import difference_noise
-from omnidyn.identification.output_error.uncertainty import BLIND, SHARE, Trust
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS
+from omnidyn.identification.output_error.problem.problem import Problem, per_column
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.output_error.problem.starts import difference_noise
+from omnidyn.identification.output_error.solve.solver import Solution, Solver
+from omnidyn.identification.output_error.trust.breakaway import Breakaway
+from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]

@@ -11,11 +11,30 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import unit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.breakaway import KEY, Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.conclusion import conclude
-from omnidyn.identification.output_error.exact_engine import ExactEngine
-from omnidyn.identification.output_error.first_point import coarse_point, first_point
-from omnidyn.identification.output_error.loop import (
+from omnidyn.identification.output_error.engines.exact import ExactEngine
+from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
+from omnidyn.identification.output_error.problem.motion import Motion, motion
+from omnidyn.identification.output_error.problem.nuisances import (
+    AUTO,
+    LATENCY,
+    NUISANCES,
+    automatic,
+    nuisance_parameters,
+    pieces,
+)
+from omnidyn.identification.output_error.problem.parameters import (
+    FRICTION,
+    Parameter,
+    names_of,
+    refuse_unknown,
+    robot_parameters,
+)
+from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.output_error.problem.record import Record, record
+from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
+from omnidyn.identification.output_error.solve.loop import (
     friction_keys,
     friction_of_axis,
     left_out,
@@ -24,38 +43,19 @@ from omnidyn.identification.output_error.loop import (
     looped,
     solve_loop,
 )
-from omnidyn.identification.output_error.loop_engine import LoopEngine
-from omnidyn.identification.output_error.motion import Motion, motion
-from omnidyn.identification.output_error.nuisances import (
-    AUTO,
-    LATENCY,
-    NUISANCES,
-    automatic,
-    nuisance_parameters,
-    pieces,
-)
-from omnidyn.identification.output_error.onlooker import Onlooker, onlooker
-from omnidyn.identification.output_error.parameters import (
-    FRICTION,
-    Parameter,
-    names_of,
-    refuse_unknown,
-    robot_parameters,
-)
-from omnidyn.identification.output_error.problem import Problem
-from omnidyn.identification.output_error.record import Record, record
-from omnidyn.identification.output_error.resampling import refuse_bootstrap, resampled
-from omnidyn.identification.output_error.solver import Solution, Solver, State
-from omnidyn.identification.output_error.support import supported, wanted
-from omnidyn.identification.output_error.tangent_engine import TangentEngine
-from omnidyn.identification.output_error.uncertainty import trust
+from omnidyn.identification.output_error.solve.progress import Onlooker, onlooker
+from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
+from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
+from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
+from omnidyn.identification.output_error.trust.support import supported, wanted
+from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.exact import why_not_exact
-from omnidyn.simulation.tangent import GAINS, parameter, with_parameter
+from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.sensitivity.directions import GAINS, parameter, with_parameter
 
 FloatArray = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ A law acts between body and floor. It must:
    paper, would let a robot creep inside its dead zone;
 3. hold at least as much as it slides with: breakaway >= coulomb >= 0, element by element;
 4. never smooth sgn: no tanh, no small speed below which it changes;
-5. derive from a convex potential of the velocity (maximum dissipation), so that the inclusion of inclusion.py has one
-   solution and says by itself what sticks;
+5. derive from a convex potential of the velocity (maximum dissipation), so that the inclusion of
+   stick_slip/inclusion.py has one solution and says by itself what sticks;
 6. say so in two tables: `add_to` adds its levels to those of the elements on which it acts. That is all the solvers,
    the dead zone and the derivatives need.
 """

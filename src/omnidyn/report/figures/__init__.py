@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from omnidyn.identification.steady_state import fit_steady_state
+from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.model.robot import Robot
 from omnidyn.paper.experiments import dead_zone_ramps, step_responses, table1_runs
 from omnidyn.paper.friction import table_1_points

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from omnidyn.identification.drive_line import DriveLine, DriveStudy
+from omnidyn.identification.motors.drive_line import DriveLine, DriveStudy
 from omnidyn.report.style import BLUE, GREY, INK, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
 
 PER_ROW = 3

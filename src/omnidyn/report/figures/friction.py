@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from omnidyn.identification.band import confidence_band
 from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.steady.band import confidence_band
 from omnidyn.paper.tables import AXES, FORCE_UNIT, SPEED_UNIT, TABLE_1, TABLE_2_COULOMB, TABLE_2_VISCOUS
 from omnidyn.report.style import (
     BLUE,

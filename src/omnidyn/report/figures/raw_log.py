@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, Verdict
 from omnidyn.logs.channels import components
-from omnidyn.logs.findings import FATAL, NOTE, WARN, Finding, Verdict
 from omnidyn.logs.log import Log
 from omnidyn.logs.segments import segments
 from omnidyn.report.style import (

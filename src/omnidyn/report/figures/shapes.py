@@ -11,9 +11,9 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from omnidyn.identification.operating import SPEEDS, ForcePoints
-from omnidyn.identification.shapes import SHAPES
-from omnidyn.identification.steady_study import SteadyStudy
+from omnidyn.identification.steady.operating_points import SPEEDS, ForcePoints
+from omnidyn.identification.steady.shapes import SHAPES
+from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.report.style import (
     BLUE,
     GREEN,

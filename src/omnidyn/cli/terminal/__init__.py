@@ -1,0 +1,1 @@
+"""What every command shares: streams (out and err), numbers, session (provenance), progress."""

@@ -1,0 +1,5 @@
+"""Is a log fit for use? check runs one family of faults after the other, finding is what they say.
+
+signal/ is what all families stand on (log_under_check is their contract). Families: time_base, values/, limits,
+wiring/, slip, scale/, energy, motion, oddities, excitation.
+"""

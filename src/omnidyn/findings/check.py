@@ -1,0 +1,112 @@
+"""check: is this log fit for use? Never raises for what a log holds; says which rows, why, and what to do.
+
+One file per family of checks; the contract of a family stands in signal/log_under_check.py. They run in an order in
+which each finds the log without the faults that were found before it.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from omnidyn.findings.energy import check_energy
+from omnidyn.findings.excitation import check_excitation, joined, judge
+from omnidyn.findings.finding import FATAL, NOTE, Finding, Verdict, in_order, merged
+from omnidyn.findings.limits import check_limits
+from omnidyn.findings.motion import check_motion
+from omnidyn.findings.oddities import check_oddities
+from omnidyn.findings.scale.lag import check_lag
+from omnidyn.findings.scale.scale import check_dead_wheels, check_scale
+from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.slip import check_slip
+from omnidyn.findings.time_base import begin, between
+from omnidyn.findings.values.values import check_values
+from omnidyn.findings.wiring.wheels import check_wiring
+from omnidyn.logs.log import Log
+from omnidyn.model.robot import Robot
+
+__all__ = ["check", "check_blocks"]
+
+Family = Callable[[Work], tuple[list[Finding], Work]]
+FAMILIES: tuple[Family, ...] = (
+    check_values, check_limits, check_wiring, check_dead_wheels, check_slip, check_scale, check_lag, check_energy,
+    check_motion, check_oddities, check_excitation,
+)  # fmt: skip
+
+# What only a whole log can show: dropped unless every block shows it.
+WHOLE = ("never_moved", "few_rows")
+OF_EXCITATION = ("not_excited", "one_way", "one_speed")
+
+
+def check(log: Log, robot: Robot | None = None) -> Verdict:
+    """Everything that `log` shows about itself, and, with a robot, about how the two fit together.
+
+    Never raises for what the log holds. The verdict is fatal where the log gives wrong results as it stands.
+    """
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing: NaN is the answer wanted
+        found, work = begin(log, robot)
+        found += _no_channel(log) + _other_count(log, robot)
+        for family in FAMILIES:
+            more, work = family(work)
+            found += more
+    length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
+    return Verdict(
+        in_order(found), work.known.get("excitation", {}), len(log), length,
+        1.0 / work.step if work.step > 0.0 else 0.0, tuple(name for name in log.channels if work_has(log, name)),
+        log.source,
+    )  # fmt: skip
+
+
+def work_has(log: Log, channel: str) -> bool:
+    """Whether a channel of the log holds any number."""
+    return bool(np.isfinite(log.channels[channel]).any())
+
+
+def _no_channel(log: Log) -> list[Finding]:
+    if any(work_has(log, name) for name in log.channels) or not len(log):
+        return []
+    unused = log.columns.unused
+    names = f" of {', '.join(unused[:6])}{', ...' * (len(unused) > 6)}" if unused else ""
+    return [Finding(
+        "no_channel", FATAL, "", f"no column but the time is known: nothing was checked{names}",
+        "say which column is what: --column w1=NAME:rad/s, or --map FILE", (), 0, {},
+    )]  # fmt: skip
+
+
+def _other_count(log: Log, robot: Robot | None) -> list[Finding]:
+    if robot is None or log.wheels is None or log.wheels == robot.wheels.count:
+        return []
+    return [Finding(
+        "wheel_count", NOTE, "", f"the log has {log.wheels} wheel{'s' * (log.wheels > 1)} or motors, the robot "
+        f"{robot.wheels.count}: what needs the robot was not checked", "give the robot that the log is of", (), 0, {},
+    )]  # fmt: skip
+
+
+def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
+    """The verdict on a log that comes block by block, in order, so that memory is bounded by one block.
+
+    Findings of one kind and place are joined; what only a whole log can show has to hold in every block.
+    """
+    found: dict[tuple[str, str], list[Finding]] = {}
+    parts, rows, duration, rates, channels, source = [], 0, 0.0, [], (), ""
+    last: tuple[float, int] | None = None
+    count = 0
+    for block in blocks:
+        count += 1
+        verdict = check(block, robot)
+        more, last = between(last, block, verdict.rate)
+        for finding in (*more, *verdict.findings):
+            if finding.code not in OF_EXCITATION:
+                found.setdefault((finding.code, finding.where), []).append(finding)
+        parts.append(verdict.excitation)
+        rows, duration = rows + verdict.rows, duration + verdict.duration
+        rates.append(verdict.rate)
+        channels, source = tuple(dict.fromkeys((*channels, *verdict.channels))), verdict.source
+    together = [merged(group, count) for (code, _), group in found.items() if code not in WHOLE or len(group) == count]
+    known = joined(parts)
+    length = float(np.mean(robot.wheels.robot_radius)) if robot is not None else 0.15
+    rate = float(np.median(rates)) if rates else 0.0
+    return Verdict(in_order([*together, *judge(known, length)]), known, rows, duration, rate, channels, source)

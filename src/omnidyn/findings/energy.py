@@ -1,0 +1,133 @@
+"""Energy: motors that would have to be driven by the robot they drive.
+
+On a level floor what the motors give goes into kinetic energy and friction, and friction takes:
+integral of T w dt >= change of M v^2/2. Where that fails, voltage, speed and robot file are not of one robot.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import FATAL, WARN, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.reference import ground, volts
+from omnidyn.findings.signal.robust import white_noise
+from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.first_guess import GUESS
+from omnidyn.model.motor import back_emf, settled_current, wheel_torque
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
+
+FloatArray = NDArray[np.float64]
+
+MARGIN = 0.08  # of the power that turns with the back-EMF: K, R and the gear are not known better
+WINDOW = 0.4  # [s]
+MOVING = 0.2  # of the back-EMF that 95 % of the rows stay below: a robot at rest says nothing
+LEAST_SHARE = 0.02  # of the rows
+OF_BACK_EMF = ("motor.emf_constant_Vs_rad", "motor.gear_ratio", "wheels.wheel_radius_m")
+
+
+def check_energy(work: Work) -> tuple[list[Finding], Work]:
+    """The finding on rows whose energy is impossible."""
+    voltage, robot = volts(work), work.geometry
+    speed = _speed(work)
+    if voltage is None or robot is None or speed is None or voltage.shape != speed.shape or len(work) < 2:
+        return [], work
+    points = len(work) < MIN_ROWS and work.step >= 0.1
+    bad, worst = _points(robot, voltage, speed) if points else _windows(work, robot, voltage, speed)
+    if not bad.any() or bad.mean() < (0.0 if points else LEAST_SHARE):
+        return [], work
+    excess = _excess(robot, voltage[bad], speed[bad])
+    guessed = [key for key in OF_BACK_EMF if (prior := robot.priors.get(key)) and prior.source == GUESS]
+    return [Finding(
+        "energy", WARN if guessed else FATAL, "",
+        f"the motors would take up to {worst:.3g} W out of the robot while it does not slow down: the back-EMF is "
+        f"{excess:.3g} times the voltage applied",
+        _remedy(guessed), work.lines(bad), int(bad.sum()), {"worst_W": worst, "emf_over_voltage": excess},
+    )], work  # fmt: skip
+
+
+def _remedy(guessed: list[str]) -> str:
+    """A robot file that only guesses its motors is no evidence against the log."""
+    if guessed:
+        return (
+            f"{', '.join(guessed)} of the robot file {'is' if len(guessed) == 1 else 'are'} only guessed: put in what "
+            "is known of the motors, or let omnidyn identify --free friction --free motor.torque_constant_Nm_A find it"
+        )
+    return (
+        "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of "
+        "voltage and speed"
+    )
+
+
+def _speed(work: Work) -> FloatArray | None:
+    speed, robot = work.full("wheel_speed"), work.geometry
+    if speed is not None or robot is None:
+        return speed
+    seen = ground(work)
+    return wheel_speed(robot.wheels, seen.twist) if seen is not None and len(seen.axes) == 3 else None
+
+
+def _power(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(mechanical power of the motors [W], power that turns with the back-EMF [W], the scale of it). Shape (rows,)."""
+    torque = wheel_torque(robot.motor, settled_current(robot.motor, voltage, speed))
+    own = wheel_torque(robot.motor, settled_current(robot.motor, back_emf(robot.motor, speed), 0.0 * speed))
+    return (torque * speed).sum(axis=1), np.abs(own * speed).sum(axis=1)
+
+
+def _excess(robot: Robot, voltage: FloatArray, speed: FloatArray) -> float:
+    counter = back_emf(robot.motor, speed)
+    return float(np.nansum(np.abs(counter)) / max(np.nansum(np.abs(voltage)), 1e-12))
+
+
+def _points(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[NDArray[np.bool_], float]:
+    """Each row a steady state of its own."""
+    power, scale = _power(robot, voltage, speed)
+    counter = np.sqrt((back_emf(robot.motor, speed) ** 2).sum(axis=1))
+    with np.errstate(invalid="ignore"):
+        bad = (power < -MARGIN * scale) & (counter > MOVING * np.nanquantile(counter, 0.95))
+    return bad, float(-power[bad].min()) if bad.any() else 0.0
+
+
+def _windows(work: Work, robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[NDArray[np.bool_], float]:
+    """Balance over windows: work of the motors, change of kinetic energy."""
+    none = np.zeros(len(work), dtype=bool), 0.0
+    width = max(4, round(WINDOW / work.step))
+    edges = [(a, min(a + width, piece.stop - 1)) for piece in work.pieces for a in range(piece.start, piece.stop, width)
+             if min(a + width, piece.stop - 1) - a >= width // 2]  # fmt: skip
+    if not edges:
+        return none
+    low, high = np.array(edges).T
+    length = np.diff(work.t)
+    mean = 0.5 * (speed[1:] + speed[:-1])
+    power, scale = _power(robot, voltage[:-1], mean)
+    good = np.isfinite(power)
+    done, size, whole = (np.concatenate([[0.0], np.cumsum(np.nan_to_num(each))]) for each in
+                         (power * length, scale * length, np.where(good, 0.0, 1.0)))  # fmt: skip
+    twist = twist_from_wheel_speed(robot.wheels, speed)
+    kinetic = 0.5 * (twist**2 * mass_matrix(robot)).sum(axis=1)
+    noise = np.array([white_noise(column) for column in twist.T])
+    change = kinetic[high] - kinetic[low]
+    unsure = 4.0 * np.sqrt((twist[low] ** 2 * (mass_matrix(robot) * noise) ** 2).sum(axis=1)
+                           + (twist[high] ** 2 * (mass_matrix(robot) * noise) ** 2).sum(axis=1)) + (
+        mass_matrix(robot) * noise**2).sum() * 6.0  # fmt: skip
+    spent = done[high] - done[low]
+    wrong = (spent - change < -MARGIN * (size[high] - size[low]) - unsure - MARGIN * np.abs(change)) & (
+        whole[high] - whole[low] == 0.0)  # fmt: skip
+    # Only where the back-EMF is the larger of the two, and the robot moves.
+    counter = np.sqrt((back_emf(robot.motor, mean) ** 2).sum(axis=1))
+    applied = np.sqrt((voltage[:-1] ** 2).sum(axis=1))
+    bar = MOVING * float(np.nanquantile(counter, 0.95))
+    e, u = (np.concatenate([[0.0], np.cumsum(np.nan_to_num(each))]) for each in (counter, applied))
+    wrong &= (e[high] - e[low] > 1.02 * (u[high] - u[low])) & (e[high] - e[low] > bar * (high - low))
+    # Noise of the speed makes E[w^2] too large, which looks like back-EMF.
+    lift, _ = _power(robot, np.zeros((1, speed.shape[1])), np.array([[white_noise(column) for column in speed.T]]))
+    span = work.t[high] - work.t[low]
+    wrong &= spent - change < -MARGIN * (size[high] - size[low]) - unsure + 2.0 * float(lift[0]) * span
+    bad = np.zeros(len(work), dtype=bool)
+    for a, b in zip(low[wrong], high[wrong], strict=True):
+        bad[a:b] = True
+    if not wrong.any():
+        return none
+    return bad, float((-(spent - change) / span)[wrong].max())

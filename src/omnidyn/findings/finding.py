@@ -1,0 +1,177 @@
+"""What `check` says about a log: findings, each with its rows and a remedy, and the verdict they add up to."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FATAL, WARN, NOTE = "fatal", "warn", "note"
+LEVELS = (FATAL, WARN, NOTE)
+WORDS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
+MAX_SPANS = 20  # spans of rows that a finding keeps; it counts all
+SHOWN_SPANS = 4
+SECTORS = 12  # of directions of travel
+
+Span = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a log shows.
+
+    code: what kind, such as "gap" or "swapped". level: "fatal" (the log cannot be used as it stands), "warn" (it can,
+    with care) or "note". where: the components concerned, such as "w1 w2", or "". message: what is the case, in words.
+    remedy: what to do. rows: (first line, last line) in the file, the first MAX_SPANS of them. count: of all rows
+    concerned, 0 where the finding is about the log as a whole. numbers: what it was measured from.
+    """
+
+    code: str
+    level: str
+    where: str
+    message: str
+    remedy: str = ""
+    rows: tuple[Span, ...] = ()
+    count: int = 0
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON; a number that is not finite is None."""
+        return {
+            "code": self.code, "level": self.level, "where": self.where, "message": self.message,
+            "remedy": self.remedy, "rows": [list(span) for span in self.rows], "count": self.count,
+            "numbers": {name: _finite(value) for name, value in self.numbers.items()},
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """All findings of one log, gravest first, and what the log excites.
+
+    excitation: name of a measure -> value (see excitation.py). rows: of the log. duration [s]. rate [Hz].
+    channels: that were recorded. source: the path.
+    """
+
+    findings: tuple[Finding, ...]
+    excitation: Mapping[str, float] = field(default_factory=dict)
+    rows: int = 0
+    duration: float = 0.0
+    rate: float = 0.0
+    channels: tuple[str, ...] = ()
+    source: str = ""
+
+    @property
+    def fatal(self) -> bool:
+        """Whether any finding is fatal."""
+        return any(finding.level == FATAL for finding in self.findings)
+
+    def of(self, code: str) -> tuple[Finding, ...]:
+        """The findings of one kind."""
+        return tuple(finding for finding in self.findings if finding.code == code)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Level -> number of findings."""
+        return {level: sum(finding.level == level for finding in self.findings) for level in LEVELS}
+
+    def headline(self) -> str:
+        """One line: what the log is, and how many findings of each level it has."""
+        counts = self.counts
+        parts = [f"{counts[FATAL]} fatal", f"{counts[WARN]} to heed", f"{counts[NOTE]} to know"]
+        size = f"{self.rows} rows, {self.duration:.4g} s"
+        rate = f" at {self.rate:.4g} Hz" if self.rate > 0.0 else ""
+        return f"{self.source or 'log'}: {size}{rate}: {', '.join(parts)}"
+
+    def as_text(self, width: int = 110) -> str:
+        """The verdict for people: headline, then a paragraph per finding. ASCII only."""
+        lines = [self.headline()]
+        for finding in self.findings:
+            lines += _paragraph(finding, width)
+        lines += _excited(self.excitation, width)
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, without NaN."""
+        return {
+            "source": self.source, "rows": self.rows, "duration_s": _finite(self.duration),
+            "rate_Hz": _finite(self.rate), "channels": list(self.channels), "fatal": self.fatal,
+            "counts": self.counts, "findings": [finding.to_dict() for finding in self.findings],
+            "excitation": {name: _finite(value) for name, value in self.excitation.items()},
+        }  # fmt: skip
+
+
+def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Gravest first; otherwise as they were found."""
+    return tuple(sorted(findings, key=lambda finding: LEVELS.index(finding.level)))
+
+
+def spans_of(bad: NDArray[np.bool_], lines: NDArray[np.int64]) -> tuple[Span, ...]:
+    """The first stretches of rows where `bad` holds, as (first line, last line). Shapes (rows,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
+    starts, ends = edges[::2][:MAX_SPANS], edges[1::2][:MAX_SPANS]
+    return tuple((int(lines[a]), int(lines[b - 1])) for a, b in zip(starts, ends, strict=True))
+
+
+def merged(findings: Sequence[Finding], blocks: int) -> Finding:
+    """Findings of one kind and place from several blocks of a log as one: rows joined, counts added.
+
+    The words and numbers are those of the block where it weighs most: the gravest, then the one with most rows.
+    """
+    if len(findings) == 1:
+        return findings[0]
+    heaviest = max(findings, key=lambda finding: (-LEVELS.index(finding.level), finding.count))
+    rows: list[Span] = []
+    for span in sorted(span for finding in findings for span in finding.rows):
+        if rows and span[0] <= rows[-1][1] + 1:
+            rows[-1] = (rows[-1][0], max(rows[-1][1], span[1]))
+        else:
+            rows.append(span)
+    words = f"{heaviest.message} (so in {len(findings)} of {blocks} blocks of the log)"
+    total = sum(finding.count for finding in findings)
+    return replace(heaviest, message=words, rows=tuple(rows[:MAX_SPANS]), count=total)
+
+
+def _paragraph(finding: Finding, width: int) -> list[str]:
+    head = f"  {WORDS[finding.level]:5s}  {finding.code}{' ' + finding.where if finding.where else ''}: "
+    body = finding.message + (f" [{_lines(finding)}]" if finding.rows else "")
+    wrapped = textwrap.wrap(head + body, max(40, width), subsequent_indent=" " * 9) or [head]
+    if finding.remedy:
+        wrapped += textwrap.wrap("-> " + finding.remedy, max(40, width), initial_indent=" " * 9,
+                                 subsequent_indent=" " * 12)  # fmt: skip
+    return wrapped
+
+
+def _lines(finding: Finding) -> str:
+    shown = [f"{a}-{b}" if b > a else f"{a}" for a, b in finding.rows[:SHOWN_SPANS]]
+    more = ", ..." if len(finding.rows) > SHOWN_SPANS else ""
+    count = f"; {finding.count} rows" if finding.count else ""
+    return f"line {', '.join(shown)}{more}{count}"
+
+
+def _excited(excitation: Mapping[str, float], width: int) -> list[str]:
+    if not excitation:
+        return []
+    known = {name: value for name, value in excitation.items() if math.isfinite(value)}
+    parts = []
+    if "moving" in known:
+        parts.append(f"in motion for {100.0 * known['moving']:.0f} % of {known.get('time_s', math.nan):.3g} s")
+    for axis, unit in (("x", "m/s"), ("y", "m/s"), ("yaw", "rad/s")):
+        if axis in known:
+            parts.append(f"{axis} {known[axis]:.3g} {unit} rms, up to {known.get(f'{axis}_max', math.nan):.3g}")
+    if "turning" in known:
+        parts.append(f"turning in {100.0 * known['turning']:.0f} % of the motion")
+    if "directions" in known:
+        parts.append(f"directions {known['directions']:.0f} of {SECTORS}")
+    if "speeds" in known:
+        parts.append(f"speeds a factor of {known['speeds']:.2g} apart")
+    return textwrap.wrap("shows  " + "; ".join(parts), max(40, width), initial_indent="  ", subsequent_indent=" " * 9)
+
+
+def _finite(value: float) -> float | None:
+    value = float(value)
+    return value if math.isfinite(value) else None

@@ -1,0 +1,192 @@
+"""Limits of driver and battery: saturation, sag, a duty whose supply nobody knows, currents without a sign."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.robust import quantum, smooth, white_noise
+from omnidyn.logs.channels import components
+from omnidyn.logs.resolved import unresolved_rows
+from omnidyn.model.wheels import per_wheel
+
+FloatArray = NDArray[np.float64]
+
+AT_LIMIT = 0.003  # of the limit
+LEAST_SHARE = 0.005  # of the rows
+SAG = 0.03  # of the highest supply
+BOTH_WAYS = 0.05  # of the rows, each way: more than a wheel goes on against what drives it
+TOO_FAST = 0.1  # of the rows
+
+
+def check_limits(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on saturation, supply and signs; the work without what has lost its sign."""
+    if len(work) < MIN_ROWS:
+        return [], work
+    found: list[Finding] = []
+    for channel in ("voltage", "duty", "current"):
+        found += _saturated(work, channel)
+    found += _too_fast(work) + _sag(work) + _no_supply(work)
+    for channel in ("voltage", "duty"):
+        more = _one_way_drive(work, channel)
+        work, found = work.replace(**{channel: None}) if more else work, found + more
+    more = _unsigned(work)
+    return found + more, work.replace(current=None) if any(each.level == FATAL for each in more) else work
+
+
+def _one_way_drive(work: Work, channel: str) -> list[Finding]:
+    """A voltage or duty that is never negative, though one wheel under it turns both ways for long."""
+    driven, speed = work.get(channel), work.get("wheel_speed")
+    if driven is None or speed is None or driven.shape != speed.shape:
+        return []
+    high = float(np.nanmax(driven))
+    with np.errstate(invalid="ignore"):
+        if high <= 0.0 or (driven < -0.01 * high).any():
+            return []
+        width = max(3, round(0.2 / work.step) | 1) if work.step > 0.0 else 3
+        mean, noise = smooth(speed, width), np.array([white_noise(column) for column in speed.T])
+        usual = np.maximum(0.3 * np.nanquantile(np.abs(mean), 0.9), 5.0 * noise / np.sqrt(width))
+        pushed = driven > 0.2 * high
+        back, ahead = ((side * mean > usual) & pushed for side in (-1.0, 1.0))
+        both = np.minimum(back.mean(axis=0), ahead.mean(axis=0))
+    names = [name for name, share in zip(components(channel, driven.shape[1]), both, strict=True) if share > BOTH_WAYS]
+    if not names:
+        return []
+    share = float(back.mean())
+    return [Finding(
+        "unsigned", FATAL, " ".join(names),
+        f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} never negative, though the wheels turn backward "
+        f"under it in {100 * share:.0f} % of the values: a size without its direction, or counted from an offset",
+        f"log the signed {channel}: times the bit of direction, or less the value of standstill", (), 0,
+        {"share": share},
+    )]  # fmt: skip
+
+
+def _limit(work: Work, channel: str) -> tuple[FloatArray | float | None, str]:
+    """What a channel cannot exceed, and whose limit that is."""
+    robot, supply = work.geometry, work.get("supply")
+    if channel == "duty":
+        return 1.0, "full duty"
+    if robot is None:
+        if channel == "voltage" and supply is not None:
+            return 0.985 * smooth(supply, 9)[:, None], "the supply"
+        return None, ""
+    if channel == "current":
+        limit = robot.motor.current_limit
+        return (None, "") if limit is None else (per_wheel(limit, work.wheels), "current_limit_A of the robot file")
+    return per_wheel(robot.motor.voltage_limit, work.wheels), "voltage_limit_V of the robot file"
+
+
+def _saturated(work: Work, channel: str) -> list[Finding]:
+    values = work.get(channel)
+    limit, whose = _limit(work, channel)
+    if values is None or limit is None:
+        return []
+    tolerance = np.array([max(AT_LIMIT * float(np.max(limit)), 0.5 * quantum(column), 2.5 * white_noise(column))
+                          for column in values.T])  # fmt: skip
+    tolerance = np.minimum(tolerance, 0.03 * np.max(limit))
+    with np.errstate(invalid="ignore"):
+        at = np.abs(values) >= limit - tolerance
+    bad = np.asarray(at.any(axis=1))
+    share = float(bad.mean())
+    if share < LEAST_SHARE:
+        return []
+    names = [name for name, column in zip(components(channel, values.shape[1]), at.T, strict=True)
+             if column.mean() > 0.2 * LEAST_SHARE]  # fmt: skip
+    level = float(np.mean(limit))
+    return [Finding(
+        "saturation", WARN, " ".join(names),
+        f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} at the limit ({level:.4g}, {whose}) in "
+        f"{100 * share:.2g} % of the rows",
+        "what was asked for beyond it was not applied: fit from what was applied, or drive with less",
+        work.lines(bad), int(bad.sum()), {"share": share, "limit": level},
+    )]  # fmt: skip
+
+
+def _too_fast(work: Work) -> list[Finding]:
+    """Inputs that change more from row to row than the rows can tell."""
+    name = next((each for each in ("voltage", "duty") if work.get(each) is not None), "")
+    values = work.get(name) if name else None
+    if values is None:
+        return []
+    fast = np.array([unresolved_rows(column) for column in values.T]).T
+    bad = np.asarray(fast.any(axis=1))
+    if bad.mean() < TOO_FAST:
+        return []
+    names = [each for each, column in zip(components(name, values.shape[1]), fast.T, strict=True) if column.any()]
+    return [Finding(
+        "too_fast", NOTE, " ".join(names),
+        f"{' and '.join(names)} {'changes' if len(names) == 1 else 'change'} so much from row to row in "
+        f"{100 * float(bad.mean()):.2g} % of the rows that what the motors got between them is not in the log",
+        "log faster, or drive more slowly; a fit of the motors leaves these rows out", work.lines(bad),
+        int(bad.sum()), {"share": float(bad.mean())},
+    )]  # fmt: skip
+
+
+def _sag(work: Work) -> list[Finding]:
+    supply = work.get("supply")
+    if supply is None or not np.isfinite(supply).any():
+        return []
+    width = max(3, round(0.1 / work.step) | 1) if work.step > 0.0 else 3
+    level = smooth(supply, width)
+    high = float(np.nanquantile(level, 0.98))
+    noise = white_noise(supply) / np.sqrt(width)
+    if high <= 0.0:
+        return []
+    low = float(np.nanmin(level)) + 3.0 * noise
+    drop = (high - low) / high
+    if drop < SAG or high - low < 4.0 * noise:
+        return []
+    bad = level < high - 0.5 * (high - low)
+    used = "voltage = duty x supply" if work.get("duty") is not None else "the voltage applied"
+    return [Finding(
+        "sag", WARN, "supply",
+        f"the supply drops by {100 * drop:.3g} %, from {high:.4g} to {low:.4g} V, at its lowest at "
+        f"t = {work.t[int(np.nanargmin(level))]:.5g} s",
+        f"use the supply row by row ({used}), never one number for it", work.lines(bad), int(bad.sum()),
+        {"drop": drop, "high_V": high, "low_V": low},
+    )]  # fmt: skip
+
+
+def _no_supply(work: Work) -> list[Finding]:
+    if work.get("duty") is None or work.get("supply") is not None or work.get("voltage") is not None:
+        return []
+    nominal = work.geometry.drive.supply if work.geometry is not None else None
+    rest = f"the {nominal:g} V of the robot file are taken" if nominal else "no voltage can be made of it"
+    return [Finding(
+        "no_supply", NOTE, "supply", f"duty was logged, the supply was not: {rest}, and a sag cannot be seen",
+        "log the battery voltage; give its nominal value as [drive] supply_V", (), 0, {},
+    )]  # fmt: skip
+
+
+def _unsigned(work: Work) -> list[Finding]:
+    """Currents that are never negative though the motors turn both ways."""
+    current = work.get("current")
+    if current is None:
+        return []
+    names = " ".join(components("current", current.shape[1]))
+    if work.log.current_unsigned:
+        return [Finding(
+            "unsigned", NOTE, names,
+            "the sensor gives the size of the current only; its sign was taken from the commanded speed",
+            "a mean of it has a floor where the current changes sign within its ripple", (), 0, {},
+        )]  # fmt: skip
+    turning = next((values for name in ("wheel_speed", "wheel_speed_command", "voltage", "duty")
+                    if (values := work.get(name)) is not None and values.shape == current.shape), None)  # fmt: skip
+    noise = np.array([max(white_noise(column), quantum(column)) for column in current.T])
+    with np.errstate(invalid="ignore"):
+        if turning is None or (current < -2.0 * noise).mean() > 1e-3:
+            return []
+        usual = np.nanquantile(np.abs(turning), 0.9)
+        backward = (turning < -0.3 * usual) & (current > 3.0 * noise)
+    share = float(backward.mean())
+    if usual <= 0.0 or share < 0.05:
+        return []
+    return [Finding(
+        "unsigned", FATAL, names,
+        f"the currents are never negative, though the motors are driven backward in {100 * share:.0f} % of the values: "
+        "the sensor gives their size only",
+        "say so: --current-unsigned takes the sign from the commanded speed", (), 0, {"share": share},
+    )]  # fmt: skip

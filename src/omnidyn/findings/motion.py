@@ -1,0 +1,165 @@
+"""What the robot did with its commands: never moved, was blocked, did not reach the commanded speed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.reference import ground, volts
+from omnidyn.findings.signal.robust import quantum, runs, slope, smooth, white_noise
+from omnidyn.logs.channels import components
+from omnidyn.model.dynamics import acceleration
+from omnidyn.model.wheels import wheel_speed
+
+FloatArray = NDArray[np.float64]
+
+SETTLE, HELD = 0.4, 0.3  # [s]
+DROOP = 0.05
+MOMENT = 0.15  # [s]
+SAFETY = 1.6  # a robot that stands although its voltages are so many times those that move it was held
+
+
+def check_motion(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on motion."""
+    if len(work) < MIN_ROWS or work.step <= 0.0:
+        return [], work
+    still = _still(work)
+    if still is None:
+        return [], work
+    if still.all():
+        return [_never_moved(work)], work
+    return _start_up(work, still) + _blocked(work, still) + _droop(work), work
+
+
+def _start_up(work: Work, still: NDArray[np.bool_]) -> list[Finding]:
+    """A log that begins with its command already set: the first rows are the start, not the motion asked for."""
+    rows = int(np.argmin(still))
+    if rows < 2:
+        return []
+    for channel in ("wheel_speed_command", "twist_command"):
+        command = work.get(channel)
+        if command is not None and np.nanmax(np.abs(command[0])) > 0.0 and not np.diff(command[:rows], axis=0).any():
+            first = np.arange(len(work)) < rows
+            return [Finding(
+                "start_up", NOTE, channel, f"the command is set from the first row, the wheels rest for {rows} rows "
+                f"({work.t[rows] - work.t[0]:.2g} s) and then speed up",
+                "leave the first half second out of steady values", work.lines(first), rows,
+                {"seconds": float(work.t[rows] - work.t[0])},
+            )]  # fmt: skip
+    return []
+
+
+def _still(work: Work) -> NDArray[np.bool_] | None:
+    """Rows in which nothing moves beyond noise; None where no motion was recorded."""
+    speed, seen = work.get("wheel_speed"), ground(work)
+    if speed is None and seen is not None and len(seen.axes) == 3:
+        speed = seen.twist
+    if speed is None:  # a gyro alone does not know
+        return None
+    width = max(3, round(0.1 / work.step) | 1)
+    still = np.asarray(np.isfinite(speed).any(axis=1))  # what is not known is no rest
+    for column in speed.T:
+        if np.isfinite(column).any():
+            with np.errstate(invalid="ignore"):
+                still &= ~(np.abs(smooth(column, width)) > _rest_level(column, width))
+    return still
+
+
+def _rest_level(column: FloatArray, width: int) -> float:
+    """What a mean over `width` rows has to exceed to be motion."""
+    return max(4.0 * white_noise(column) / np.sqrt(width), 1.01 * quantum(column), 1e-9)
+
+
+def _level(work: Work) -> float:
+    """The same as a speed of wheels [rad/s]."""
+    speed, robot = work.get("wheel_speed"), work.geometry
+    seen = ground(work)
+    if speed is None and seen is not None and robot is not None:
+        speed = wheel_speed(robot.wheels, seen.twist)
+    width = max(3, round(0.1 / work.step) | 1)
+    return np.inf if speed is None else max(_rest_level(column, width) for column in speed.T)
+
+
+def _never_moved(work: Work) -> Finding:
+    driven = any(work.get(name) is not None and np.nanmax(np.abs(work.channels[name])) > 0.0
+                 for name in ("voltage", "duty", "wheel_speed_command", "twist_command"))  # fmt: skip
+    why = "it was driven, but never beyond its dead zone, or it was blocked" if driven else "and nothing drove it"
+    return Finding(
+        "never_moved", FATAL, "", f"the robot never moves beyond the noise of its sensors: {why}",
+        "drive with more; such a log bounds friction from below and says nothing else",
+        work.lines(np.ones(len(work), dtype=bool)), len(work), {},
+    )  # fmt: skip
+
+
+def _blocked(work: Work, still: NDArray[np.bool_]) -> list[Finding]:
+    """At rest although the motors are driven as they are elsewhere where the robot moves."""
+    voltage, robot = volts(work), work.geometry
+    current = work.get("current")
+    if voltage is not None and robot is not None and voltage.shape[1] == work.wheels:
+        bad = np.zeros(len(work), dtype=bool)
+        rest = np.flatnonzero(still & np.isfinite(voltage).all(axis=1))
+        if rest.size:
+            levels, back = np.unique(np.round(voltage[rest], 3), axis=0, return_inverse=True)
+            if len(levels) <= 2000:
+                # It would have to be seen: a speed after a moment that is well above what counts as rest.
+                start = acceleration(robot, np.zeros((len(levels), 3)), levels / SAFETY)
+                soon = np.abs(wheel_speed(robot.wheels, MOMENT * start)).max(axis=1)
+                bad[rest] = (soon > 3.0 * _level(work))[back.ravel()]
+    elif current is not None:
+        load = np.nansum(np.abs(smooth(current, 9)), axis=1)
+        moving = load[~still]
+        bad = still & (load > 2.0 * np.quantile(moving, 0.99)) if moving.size > MIN_ROWS else np.zeros(len(work), bool)
+    else:
+        return []
+    bad = _long(bad, round(SETTLE / work.step))
+    if not bad.any():
+        return []
+    return [Finding(
+        "blocked", WARN, "",
+        f"for {bad.sum() * work.step:.3g} s the robot stands although it is driven hard enough to move: it was held, "
+        "stood against something, or its friction is far above that of the robot file",
+        "leave those rows out", work.lines(bad), int(bad.sum()), {"seconds": float(bad.sum() * work.step)},
+    )]  # fmt: skip
+
+
+def _long(bad: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+    """Only the stretches of at least so many rows, without their first half second of starting."""
+    out = np.zeros_like(bad)
+    for a, b in runs(bad):
+        if b - a >= max(least, 5):
+            out[a:b] = True
+    return out
+
+
+def held(work: Work, command: FloatArray, seconds: float = HELD) -> NDArray[np.bool_]:
+    """Rows whose command has been the same for so long. Shape (rows,)."""
+    change = np.concatenate([[True], (np.diff(command, axis=0) != 0.0).any(axis=1)])
+    last = np.maximum.accumulate(np.where(change, np.arange(len(change)), 0))
+    return work.t - work.t[last] >= seconds
+
+
+def _droop(work: Work) -> list[Finding]:
+    """Commanded against measured wheel speed, where the command has been held."""
+    speed, command = work.get("wheel_speed"), work.get("wheel_speed_command")
+    name = "wheel_speed_command"
+    if command is None and work.geometry is not None and work.full("twist_command") is not None:
+        command, name = wheel_speed(work.geometry.wheels, work.channels["twist_command"]), "twist_command"
+    if speed is None or command is None or speed.shape != command.shape:
+        return []
+    settled = held(work, command, SETTLE)
+    if settled.sum() < MIN_ROWS:
+        return []
+    ids, count = work.windows()
+    w = np.where(settled[:, None], speed, np.nan)
+    line = slope(w, command, ids, count)
+    if not line.differs(1.0, DROOP, 5.0) or line.windows < 4 or line.value <= 0.0:
+        return []
+    words = "is not reached" if line.value < 1.0 else "is exceeded"
+    return [Finding(
+        "droop", WARN, " ".join(components("wheel_speed", speed.shape[1])),
+        f"the commanded speed ({name}) {words}: settled wheels turn {line.value:.3g} (+-{line.error:.2g}) of it",
+        "fit friction against measured speed, not against the commanded one", work.lines(settled), int(settled.sum()),
+        {"ratio": line.value, "error": line.error},
+    )]  # fmt: skip

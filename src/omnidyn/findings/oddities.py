@@ -1,0 +1,55 @@
+"""Small things that a reader of the log should know: bursts of a tracker, a last row that is not like the others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omnidyn.findings.finding import NOTE, Finding
+from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, Work
+from omnidyn.findings.signal.robust import runs
+
+BURST, SHORT = 10.0, 0.25  # times what 90 % of the rows stay below; [s]
+
+
+def check_oddities(work: Work) -> tuple[list[Finding], Work]:
+    """Notes; nothing is masked."""
+    if len(work) < MIN_ROWS:
+        return [], work
+    return _bursts(work) + _last_row(work), work
+
+
+def _bursts(work: Work) -> list[Finding]:
+    """Speeds over the floor that shoot up for a moment, in a log without wheel speeds to hold them against."""
+    if work.get("wheel_speed") is not None:
+        return []
+    found = []
+    for component, values in work.columns("twist"):
+        size = np.abs(values)
+        usual = float(np.nanquantile(size, 0.9))
+        bad = np.zeros(len(work), dtype=bool)
+        for a, b in runs(size > BURST * usual):
+            bad[a:b] = work.t[min(b, len(work) - 1)] - work.t[a] < SHORT
+        if usual <= 0.0 or not bad.any():
+            continue
+        top = int(np.flatnonzero(bad)[np.argmax(size[bad])])
+        found.append(Finding(
+            "burst", NOTE, component,
+            f"{component} shoots up to {values[top]:.3g} at t = {work.t[top]:.5g} s for less than {SHORT:g} s, "
+            f"{size[top] / usual:.0f} times what it stays below in 90 % of the rows",
+            "a tracker that slips does so; leave those rows out if the robot cannot turn or drive like that",
+            work.lines(bad), int(bad.sum()), {"farthest": float(values[top]), "usual": usual},
+        ))  # fmt: skip
+    return found
+
+
+def _last_row(work: Work) -> list[Finding]:
+    """Commands that are 0 in the last row only: the recorder stopped the robot, the row is no part of the run."""
+    for channel in INPUTS:
+        values = work.get(channel)
+        if values is not None and not values[-1].any() and values[-2].any() and np.isfinite(values[-2:]).all():
+            bad = np.arange(len(work)) == len(work) - 1
+            return [Finding(
+                "last_row", NOTE, channel, f"{channel} is 0 in the last row, and not before: the end of the recording",
+                "leave the last row out", work.lines(bad), 1, {},
+            )]  # fmt: skip
+    return []

@@ -1,0 +1,1 @@
+"""What is proportional and should be equal: scale, mistakes (of units), lag."""

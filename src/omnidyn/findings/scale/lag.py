@@ -1,0 +1,152 @@
+"""Channels that are late: y(t) = a x(t - lag), found from channels that measure one thing twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import NOTE, WARN, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.reference import electric_speed, emf, ground, ohmic, volts, wheels_twist
+from omnidyn.findings.signal.robust import Slope, clusters, ratio, smooth, windowed
+
+FloatArray = NDArray[np.float64]
+
+FARTHEST = 8  # rows that are searched to either side
+WARN_FROM, NOTE_FROM = 0.75, 0.35  # rows
+ENOUGH = 60_000  # rows that tell a lag
+SURE, VAGUE = 5.0, 0.4  # standard errors; rows of error beyond which nothing is said
+
+
+class Pair(NamedTuple):
+    """Two channels that should be the same. y, x: shape (rows, k). width: rows over which both are means already."""
+
+    late: str
+    against: str
+    y: FloatArray
+    x: FloatArray
+    where: str
+
+
+def check_lag(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on lag between channels that are redundant; what follows a command is dynamics and no lag."""
+    found: list[Finding] = []
+    if len(work) < 3 * MIN_ROWS or work.step <= 0.0:
+        return found, work
+    for pair in _pairs(work):
+        line = lag(work, pair.y, pair.x)
+        if line is None or not line.error < VAGUE:
+            continue
+        rows = line.value
+        if abs(rows) < NOTE_FROM or abs(rows) < SURE * line.error:
+            continue
+        found.append(_finding(work, pair, line))
+    return found, work
+
+
+def _finding(work: Work, pair: Pair, line: Slope) -> Finding:
+    late, early = (pair.late, pair.against) if line.value > 0.0 else (pair.against, pair.late)
+    rows, ms = abs(line.value), abs(line.value) * work.step * 1e3
+    half = rows < WARN_FROM
+    why = ": half a row is what a speed from differences of counts is late by" if half else ""
+    return Finding(
+        "lag", NOTE if half else WARN, pair.where,
+        f"{late} is {ms:.3g} ms ({rows:.2f} rows, +-{line.error:.2f}) later than {early}{why}",
+        f"move its times back by {ms:.3g} ms: latency in the mapping", (), 0,
+        {"rows": line.value, "error": line.error, "seconds": line.value * work.step},
+    )  # fmt: skip
+
+
+def _pairs(work: Work) -> Iterator[Pair]:
+    """What can be compared; `late` is the channel whose lag is positive."""
+    speed = work.full("wheel_speed")
+    seen = ground(work)
+    if speed is not None and seen is not None and work.geometry is not None:
+        own = wheels_twist(work, speed, seen.width)
+        assert own is not None
+        length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
+        axes = seen.axes
+        yield Pair("wheel_speed", seen.name, own[:, axes] * length[axes], seen.twist[:, axes] * length[axes],
+                   f"wheel_speed {seen.name}")  # fmt: skip
+    if speed is not None:
+        yield from _of_motors(work, speed)
+    pose, twist = work.get("pose"), work.get("twist")
+    if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
+        heading = pose[:, 2].copy()
+        good = np.isfinite(heading)
+        heading[good] = np.unwrap(heading[good])
+        rate = np.full(len(heading), np.nan)
+        rate[1:-1] = (heading[2:] - heading[:-2]) / (work.t[2:] - work.t[:-2])
+        yield Pair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
+
+
+def _of_motors(work: Work, speed: FloatArray) -> Iterator[Pair]:
+    """u = R i + K l w: late voltage, current or speed, each against the two others."""
+    voltage, current = volts(work), work.full("current")
+    if voltage is None or current is None or electric_speed(work) is None:
+        return
+    counter, lost = emf(work, speed), ohmic(work, current)
+    if counter is None or lost is None or voltage.shape != lost.shape:
+        return
+    names = "voltage" if work.get("voltage") is not None else "duty"
+    yield Pair("current", f"{names} and wheel_speed", lost, voltage - counter, "current")
+
+
+def lag(work: Work, y: FloatArray, x: FloatArray) -> Slope | None:
+    """Rows by which y is later than x, with its error; None where the two do not share motion enough to tell.
+
+    A whole number of rows first, by the least residual; then the rest from the residual's part along the slope of x,
+    with the slope of y beside it as instrument, so that noise of neither pulls it.
+    """
+    y, x = _filled(y)[:ENOUGH], _filled(x)[:ENOUGH]
+    width = 3
+    y, x = smooth(y, width), smooth(x, width)
+    n = len(y)
+    inside = slice(FARTHEST + 4, n - FARTHEST - 4)
+    good = np.asarray(np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1))
+    for piece in work.pieces[1:]:
+        if piece.start > n:
+            break
+        good[max(0, piece.start - FARTHEST - 4) : piece.start + FARTHEST + 4] = False
+    keep = good[inside]
+    if keep.sum() < MIN_ROWS:
+        return None
+    target = np.where(keep[:, None], y[inside], 0.0)
+
+    def moved(values: FloatArray, by: int) -> FloatArray:
+        part = values[inside.start - by : inside.stop - by]
+        return np.where(keep[:, None] & np.isfinite(part), part, 0.0)
+
+    best, least, at = 0, np.inf, {}
+    for by in range(-FARTHEST, FARTHEST + 1):
+        shifted = moved(x, by)
+        size, along = float((shifted**2).sum()), float((target * shifted).sum())
+        left = float((target**2).sum()) - along * (along / size) if size > 0.0 and along > 0.0 else np.inf
+        at[by] = left
+        if left < least:
+            best, least = by, left
+    total = float((target**2).sum())
+    if not np.isfinite(least) or least > 0.5 * total or abs(best) == FARTHEST:
+        return None
+    shifted = moved(x, best)
+    a = float((target * shifted).sum() / (shifted**2).sum())
+    # Slopes over +-k rows; the instrument stays clear of the rows that the residual's noise comes from.
+    k = 3
+    climb = (moved(x, best - 1) - moved(x, best + 1)) / 2.0
+    instrument = moved(y, -k) - moved(y, k)
+    residual = target - a * shifted
+    ids, count = clusters(n, work.step)
+    ids = ids[inside]
+    top = windowed(ids, count, -(residual * instrument).sum(axis=1))
+    below = windowed(ids, count, a * (climb * instrument).sum(axis=1))
+    rest = ratio(top, below)
+    if not np.isfinite(rest.error):
+        return None
+    return Slope(best + rest.value, rest.error, rest.windows)
+
+
+def _filled(values: FloatArray) -> FloatArray:
+    return values if values.ndim == 2 else values[:, None]

@@ -1,0 +1,354 @@
+"""Scales: what is proportional to something else, but not equal to it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.scale.mistakes import (
+    TURN_UNITS,
+    current_unit,
+    duty_as_voltage,
+    emf_alone,
+    own_derivatives,
+    unit_finding,
+    unit_of,
+)
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.reference import Ground, electric_speed, expected_wheel_speed, ground, wheels_twist
+from omnidyn.findings.signal.robust import Slope, quantum, slope, smooth
+from omnidyn.logs.channels import components
+from omnidyn.units import TURN
+
+FloatArray = NDArray[np.float64]
+
+LEAST = 0.02  # a scale that is off by less is not worth a word
+NOTHING = 0.003  # of the motion: no unit mistake makes as little of it
+FOLLOWS = 0.95  # likeness of a wheel and what the other channels say of it, lag, slip and scale apart
+ALONE = 0.15  # of the motion: an axis that moves less is no witness
+
+
+class Scales(NamedTuple):
+    """How the channels of speed compare. Each slope is (other channel)/(wheel speed), 1 where they agree.
+
+    linear, yaw: over the floor. electric: by voltage and current. wheels: by each wheel, against the best of them.
+    """
+
+    linear: Slope | None
+    yaw: Slope | None
+    electric: Slope | None
+
+
+def check_scale(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on units and scales; the work with the wheel speeds put right."""
+    if len(work) < MIN_ROWS:
+        return [], work
+    found = own_derivatives(work)
+    for part in (current_unit, duty_as_voltage, _speeds, _single_wheels):
+        more, work = part(work)
+        found += more
+    return found, work
+
+
+def check_dead_wheels(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on wheels whose speed is noise only; a flat line was found before."""
+    return ([], work) if len(work) < MIN_ROWS else _dead_wheels(_without_stand_in(work))
+
+
+def _without_stand_in(work: Work) -> Work:
+    """The work without the speed that stands in for a dead wheel, where another wheel does not do what it should.
+
+    Its column was exchanged with the dead one, and nothing can be said of a robot of which two wheels are not known.
+    """
+    dead, expected = work.known.get("dead_wheel"), expected_wheel_speed(work, without="wheel_speed")
+    if dead is None or expected is None:
+        return work
+    speed = work.channels["wheel_speed"]
+    width = max(3, round(0.1 / work.step) | 1)
+    own, told = smooth(speed, width), smooth(expected[1], width)
+    good = np.isfinite(own).all(axis=1) & np.isfinite(told).all(axis=1)
+    cross = (own[good] * told[good]).sum(axis=0)
+    alike = cross / np.sqrt((own[good] ** 2).sum(axis=0) * (told[good] ** 2).sum(axis=0))
+    if (np.delete(alike, dead) > FOLLOWS).all():
+        return work
+    return work.masked("wheel_speed", dead, np.ones(len(work), dtype=bool)).knowing(dead_wheel=None)
+
+
+def scales(work: Work) -> Scales | None:
+    """The slopes of what is known of the speeds; None without wheel speeds or a robot."""
+    speed = work.full("wheel_speed")
+    if speed is None or work.geometry is None:
+        return None
+    seen = ground(work)
+    ids, count = work.windows()
+    linear = yaw = electric = None
+    if seen is not None:
+        linear, yaw = _against_floor(work, seen, speed, ids, count)
+    implied = electric_speed(work)
+    if implied is not None:
+        # The noise of the speed is small beside that of the currents: it is the better regressor.
+        electric = slope(implied, speed, ids, count)
+    return Scales(linear, yaw, electric)
+
+
+def _against_floor(work: Work, seen: Ground, speed: FloatArray, ids, count: int) -> tuple[Slope | None, Slope | None]:
+    own = wheels_twist(work, speed, seen.width)
+    if own is None:
+        return None, None
+    robot = work.geometry
+    length = float(np.mean(robot.wheels.robot_radius)) if robot else 0.1
+    size = np.nanmean(own[:, :2] ** 2) + np.nanmean((own[:, 2] * length) ** 2)
+    axes = [k for k in seen.axes if k < 2]
+    linear = yaw = None
+    if axes and np.nanmean(own[:, axes] ** 2) > ALONE**2 * size:
+        linear = slope(seen.twist[:, axes], own[:, axes], ids, count)
+    if 2 in seen.axes and np.nanmean((own[:, 2] * length) ** 2) > ALONE**2 * size:
+        yaw = slope(seen.twist[:, 2], own[:, 2], ids, count)
+    return linear, yaw
+
+
+def _speeds(work: Work) -> tuple[list[Finding], Work]:
+    """The one scale of all wheel speeds, judged by floor and motors together."""
+    these = scales(work)
+    if these is None:
+        return [], work
+    floor = _joined([line for line in (these.linear, these.yaw) if line is not None])
+    electric = these.electric if these.electric is not None and these.electric.windows >= 4 else None
+    robot = work.geometry
+    assert robot is not None
+    factor = floor if floor is not None else electric
+    if factor is None:
+        return emf_alone(work)
+    if floor is not None and not floor.value > max(4.0 * floor.error, NOTHING):
+        return _against(work, floor), work
+    work = work.knowing(floor_ratio=floor, electric_ratio=electric)
+    gear = float(np.mean(robot.motor.gear_ratio))
+    units = {**TURN_UNITS, "the motor's speed read as the wheel's": gear,
+             "the motor's rpm read as the wheel's rad/s": gear * 60.0 / TURN}  # fmt: skip
+    if not factor.value > 0.0:
+        return [], work  # a current that says the motors run backward: its wiring or sign was named before
+    unit = unit_of(1.0 / factor.value, units) if abs(np.log(factor.value)) > 0.5 else ""
+    names = " ".join(components("wheel_speed", work.wheels))
+    if unit and (electric is None or floor is None or abs(np.log(max(electric.value, 1e-9) / factor.value)) < 0.5):
+        speed = work.channels["wheel_speed"]
+        source = "the motion over the floor" if floor is not None else "voltage and current"
+        found = [unit_finding(names, f"the wheel speeds are {1 / factor.value:.4g} times what {source} says: {unit}?",
+                               1.0 / factor.value)]  # fmt: skip
+        return found, work.replace(wheel_speed=speed * factor.value)
+    return _ratio_findings(work, these, floor, electric, names)
+
+
+def _against(work: Work, floor: Slope) -> list[Finding]:
+    """A motion over the floor that goes the other way, or not at all."""
+    seen = ground(work)
+    if seen is None:
+        return []
+    names = {"twist": ("vx", "vy", "omega"), "pose": ("x", "y", "heading")}[seen.name]
+    where = " ".join(names[k] for k in seen.axes)
+    if floor.value > -4.0 * floor.error:
+        if abs(floor.value) > 0.1 or floor.error > 0.03:
+            return []
+        return [Finding(
+            "dead", WARN, where,
+            f"{where} stays as it is while the wheels say that the robot moves: it was not recorded, "
+            "or the wheels ran in the air", "leave it out of the mapping", (), 0,
+            {"ratio": floor.value, "error": floor.error},
+        )]  # fmt: skip
+    return [Finding(
+        "inverted", FATAL, where,
+        f"{where} goes the other way than the wheels say ({floor.value:.3g} +-{floor.error:.2g} of "
+        "it): it has the opposite sign, or all wheels have",
+        "set `invert` for that column in the mapping, or turn the wheels' signs", (), 0,
+        {"ratio": floor.value, "error": floor.error},
+    )]  # fmt: skip
+
+
+def _joined(lines: list[Slope]) -> Slope | None:
+    """The weighted mean of slopes, by their errors."""
+    lines = [line for line in lines if np.isfinite(line.error) and line.error > 0.0 and line.windows >= 4]
+    if not lines:
+        return None
+    weight = np.array([1.0 / (max(line.error, 1e-4) * max(line.error, 1e-4)) for line in lines])
+    value = float(np.dot(weight, [line.value for line in lines]) / weight.sum())
+    return Slope(value, float(weight.sum() ** -0.5), min(line.windows for line in lines))
+
+
+def _ratio_findings(
+    work: Work, these: Scales, floor: Slope | None, electric: Slope | None, names: str
+) -> tuple[list[Finding], Work]:
+    off_floor = floor is not None and floor.differs(1.0, LEAST)
+    off_motor = electric is not None and electric.differs(1.0, LEAST)
+    numbers = {}
+    for name, line in (("floor_ratio", floor), ("electric_ratio", electric)):
+        if line is not None:
+            numbers |= {name: line.value, name + "_error": line.error}
+    speed = work.channels["wheel_speed"]
+    if these.linear is not None and these.yaw is not None:
+        apart = _apart(these.linear, these.yaw)
+        if apart is not None and not these.linear.differs(1.0, LEAST):
+            return [_yaw_only(these.yaw)], work
+    if off_floor and floor is not None and off_motor and electric is not None and _same(floor, electric):
+        both = _joined([floor, electric]) or floor
+        return [Finding(
+            "gear", WARN, names,
+            f"floor and motors agree that the wheels turn {both.value:.4g} times (+-{both.error:.2g}) what "
+            "wheel_speed says: "
+            "a wrong gear ratio or a wrong number of counts per turn in the log",
+            "divide by the right gear ratio, or give the right counts per turn", (), 0,
+            {**numbers, "ratio": both.value},
+        )], work.replace(wheel_speed=speed * both.value).knowing(floor_ratio=None)  # fmt: skip
+    found = []
+    if off_floor and floor is not None:
+        found.append(_path_ratio(floor, electric, off_motor, names, numbers))
+    if off_motor and electric is not None:
+        found.append(_motor_constants(electric, floor, off_floor, names, numbers))
+    return found, work
+
+
+def _same(a: Slope, b: Slope) -> bool:
+    nearest = min(abs(a.value - 1.0), abs(b.value - 1.0))
+    return abs(a.value - b.value) < max(0.4 * nearest, 3.0 * np.hypot(a.error, b.error))
+
+
+def _apart(a: Slope, b: Slope) -> float | None:
+    away = b.value - a.value
+    return away if abs(away) > LEAST and abs(away) > 4.0 * np.hypot(a.error, b.error) else None
+
+
+def _yaw_only(yaw: Slope) -> Finding:
+    return Finding(
+        "robot_radius", WARN, "omega",
+        f"the robot turns {yaw.value:.4g} times (+-{yaw.error:.2g}) as fast as its wheels say, while it drives "
+        "as far as "
+        "they say: the robot radius of the file is not that of the robot, or the gyro has a wrong scale",
+        f"try a robot radius {1.0 / max(yaw.value, 1e-9):.4g} times as large", (), 0,
+        {"ratio": yaw.value, "error": yaw.error},
+    )  # fmt: skip
+
+
+def _path_ratio(
+    floor: Slope, electric: Slope | None, off_motor: bool, names: str, numbers: dict[str, float]
+) -> Finding:
+    """Floor and wheels disagree everywhere alike."""
+    words = f"the robot covers {floor.value:.4g} (+-{floor.error:.2g}) of the path that its wheels roll"
+    if electric is not None and not off_motor and floor.value < 1.0:
+        return Finding(
+            "slip", WARN, names, words + ", the whole log through, while voltage and current agree with the wheels: it "
+            "slips, or the wheel radius of the file is too large",
+            "take the motion over the floor for friction; measure the wheel radius by rolling slowly", (), 0, numbers,
+        )  # fmt: skip
+    if electric is not None and not off_motor:
+        return Finding(
+            "wheel_radius", WARN, names,
+            words + ", while voltage and current agree with the wheels: the wheel radius of "
+            "the file is too small, or the ground speed has a wrong scale",
+            f"try a wheel radius {floor.value:.4g} times as large", (), 0, numbers,
+        )  # fmt: skip
+    slips = " it slips, or" if floor.value < 1.0 else ""
+    return Finding(
+        "path_ratio", WARN, names,
+        words + f", the whole log through:{slips} the gear ratio (counts per turn) of the log "
+        "or the wheel radius of the file is wrong",
+        "roll the robot over a measured distance by hand: that tells slip from a wrong radius or gear", (), 0, numbers,
+    )  # fmt: skip
+
+
+def _motor_constants(
+    electric: Slope, floor: Slope | None, off_floor: bool, names: str, numbers: dict[str, float]
+) -> Finding:
+    size = f"{electric.value:.4g} times (+-{electric.error:.2g})"
+    words = f"by voltage and current the wheels turn {size} what wheel_speed says"
+    if floor is not None and not off_floor:
+        return Finding(
+            "motor_constants", NOTE, names,
+            words + ", while the floor agrees with the wheels: K, R or the gear ratio of "
+            "the robot file, or the scale of voltage or current, is off",
+            "identify the motor from this log", (), 0, numbers,
+        )  # fmt: skip
+    return Finding(
+        "gear", WARN, names, words + ": the gear ratio, the counts per turn, or K and R of the robot file are off",
+        "check the gear ratio; roll the robot over a measured distance by hand", (), 0, numbers,
+    )  # fmt: skip
+
+
+def _dead_wheels(work: Work) -> tuple[list[Finding], Work]:
+    """A wheel whose speed is noise only, while floor or motor says that it turns."""
+    found: list[Finding] = []
+    line = _wheel_lines(work)
+    if line is None:
+        return found, work
+    source, slopes, sizes = line
+    for k, (a, size) in enumerate(zip(slopes, sizes, strict=True)):
+        name = components("wheel_speed", work.wheels)[k]
+        coarse = 4.0 * quantum(work.channels["wheel_speed"][:, k])
+        sure = np.isfinite(a.error) and a.windows >= 4 and abs(a.value) < 0.1 and a.error < 0.05
+        if sure and size > max(0.2 * max(sizes), coarse) and not _told_to_rest(work, k):
+            found.append(Finding(
+                "dead", FATAL, name, f"{name} is noise about 0, while {source} says that the wheel turns",
+                "look at its encoder, its cable and its column; leave it out otherwise",
+                work.lines(np.ones(len(work), dtype=bool)), len(work), {"slope": a.value, "error": a.error},
+            ))  # fmt: skip
+            work = work.masked("wheel_speed", k, np.ones(len(work), dtype=bool))
+    return found, work
+
+
+def _told_to_rest(work: Work, k: int) -> bool:
+    """Whether a wheel is commanded to stand while others turn."""
+    command = work.get("wheel_speed_command")
+    if command is None:
+        return False
+    sizes = np.sqrt(np.nanmean(command**2, axis=0))
+    return bool(sizes[k] < 0.25 * sizes.max())
+
+
+def _wheel_lines(work: Work) -> tuple[str, list[Slope], list[float]] | None:
+    """(source, slope of each wheel's speed on what it should be, how much that moves)."""
+    speed, expected = work.get("wheel_speed"), expected_wheel_speed(work)
+    if speed is None or expected is None or expected[1].shape != speed.shape or work.geometry is None:
+        return None
+    seen = ground(work)
+    width = seen.width if seen is not None and expected[0].endswith(seen.name) else 1
+    w = smooth(speed, width)
+    ids, count = work.windows()
+    slopes = [slope(w[:, k], expected[1][:, k], ids, count) for k in range(speed.shape[1])]
+    sizes = [float(np.sqrt(np.nanmean(column**2))) if np.isfinite(column).any() else 0.0 for column in expected[1].T]
+    return expected[0], slopes, sizes
+
+
+def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
+    """One wheel that differs from the others: its own radius, gear or counter."""
+    line = _wheel_lines(work) if work.known.get("dead_wheel") is None else None
+    if line is None or (work.known.get("floor_ratio") is None and not line[0].startswith("voltage")):
+        return [], work
+    source, slopes, sizes = line
+    ratio = work.known.get("floor_ratio")
+    if ratio is not None and abs(ratio.value - 1.0) > 0.1:
+        return [], work  # a robot that slips does so more in one direction than in another
+    coarse = [10.0 * quantum(column) for column in work.channels["wheel_speed"].T]
+    good = [k for k, a in enumerate(slopes)
+            if np.isfinite(a.error) and a.windows >= 4 and sizes[k] > max(0.2 * max(sizes), coarse[k])]  # fmt: skip
+    if len(good) < 3:
+        return [], work
+    found = []
+    for k in good:
+        others = [slopes[j].value for j in good if j != k]
+        if np.ptp(others) > 0.02 or not slopes[k].differs(float(np.mean(others)), 0.03, 5.0):
+            continue
+        off = slopes[k].value / float(np.mean(others))
+        name = components("wheel_speed", work.wheels)[k]
+        if off < 0.0:
+            found.append(Finding(
+                "inverted", FATAL, name, f"{name} has the opposite sign of what {source} says, while the other wheels "
+                "agree with it", "put the column right in the mapping (--column)", (), 0,
+                {"ratio": off, "error": slopes[k].error},
+            ))  # fmt: skip
+            continue
+        found.append(Finding(
+            "wheel_scale", WARN, name, f"{name} reads {off:.4g} times what {source} says, measured by the other wheels",
+            "that wheel has another radius, gear or counter; give it its own in the mapping or the robot file", (), 0,
+            {"ratio": off, "error": slopes[k].error},
+        ))  # fmt: skip
+    return (found, work) if len(found) == 1 else ([], work)

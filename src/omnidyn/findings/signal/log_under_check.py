@@ -1,0 +1,118 @@
+"""Work: a log being checked. Each family of checks gets it, says what it found, and hands on what is left to trust.
+
+The contract of a family, a function `family(work) -> tuple[list[Finding], Work]`:
+
+1. It says only what the log itself shows; thresholds come from the noise found in the log.
+2. It never raises for what a log may hold: no channel, no row, NaN anywhere.
+3. It returns the work with the fault mended (columns put right, a scale taken out) or masked (NaN), so that a later
+   family does not report the consequences of a fault as faults of their own.
+4. It does not change arrays in place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import Span, spans_of
+from omnidyn.findings.signal.robust import clusters, quantum, white_noise
+from omnidyn.logs.channels import components
+from omnidyn.logs.log import Log
+from omnidyn.model.robot import Robot
+from omnidyn.run import CHANNELS, WHEEL
+
+FloatArray = NDArray[np.float64]
+
+INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
+SENSORS = ("current", "wheel_speed", "twist")
+MIN_ROWS = 40  # below that nothing is said from statistics
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """A log in order of time.
+
+    log: as recorded. robot: or None. rows: index into the log of each row kept, increasing in time. t [s], step: the
+    usual one [s]. pieces: between the gaps. channels: as in Log, what is not to be trusted is NaN.
+    known: facts that families pass on, such as "ground_ratio".
+    """
+
+    log: Log
+    robot: Robot | None
+    rows: NDArray[np.int64]
+    t: FloatArray
+    step: float
+    pieces: tuple[slice, ...]
+    channels: Mapping[str, FloatArray]
+    known: Mapping[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def wheels(self) -> int:
+        """Number of wheels in the log, else of the robot, else 0."""
+        counts = [values.shape[1] for name, values in self.channels.items() if CHANNELS[name] == WHEEL]
+        return counts[0] if counts else (self.robot.wheels.count if self.robot else 0)
+
+    @property
+    def geometry(self) -> Robot | None:
+        """The robot, where it has as many wheels as the log."""
+        return self.robot if self.robot is not None and self.robot.wheels.count == self.wheels else None
+
+    def get(self, channel: str) -> FloatArray | None:
+        """A channel with any number in it, else None."""
+        values = self.channels.get(channel)
+        return values if values is not None and np.isfinite(values).any() else None
+
+    def full(self, channel: str) -> FloatArray | None:
+        """A channel of which every component was recorded, else None."""
+        values = self.channels.get(channel)
+        if values is None or not np.isfinite(values).any(axis=0).all():
+            return None
+        return values
+
+    def columns(self, channel: str) -> list[tuple[str, FloatArray]]:
+        """(component, values) of a channel's components that hold any number."""
+        values = self.get(channel)
+        if values is None:
+            return []
+        names = components(channel, values.shape[1] if values.ndim == 2 else 0)
+        table = values.reshape(len(values), -1)
+        return [(name, table[:, k]) for k, name in enumerate(names) if np.isfinite(table[:, k]).any()]
+
+    def lines(self, bad: NDArray[np.bool_]) -> tuple[Span, ...]:
+        """Lines of the file where `bad`, shape (rows kept,), holds."""
+        return spans_of(bad, self.log.lines[self.rows])
+
+    def windows(self, seconds: float = 0.2) -> tuple[NDArray[np.int64], int]:
+        """(window of each row, number of windows)."""
+        return clusters(len(self), self.step, seconds)
+
+    def noise(self, component: str, values: FloatArray) -> float:
+        """Noise of one component: what its neighbours scatter by, at least what its quantisation makes."""
+        cache: dict[str, float] = self.known.get("noise", {})
+        if component not in cache:
+            cache[component] = max(white_noise(values), quantum(values) / np.sqrt(12.0))
+        return cache[component]
+
+    def replace(self, **channels: FloatArray | None) -> Work:
+        """The work with some channels changed, or taken out where None."""
+        changed = {**self.channels, **channels}
+        return replace(self, channels={name: values for name, values in changed.items() if values is not None})
+
+    def knowing(self, **facts: Any) -> Work:
+        """The work with more facts known."""
+        return replace(self, known={**self.known, **facts})
+
+    def masked(self, channel: str, column: int, bad: NDArray[np.bool_]) -> Work:
+        """The work without the values of one component where `bad` holds."""
+        if not bad.any():
+            return self
+        values = self.channels[channel].copy()
+        (values if values.ndim == 1 else values[:, column])[bad] = np.nan
+        return self.replace(**{channel: values})

@@ -1,0 +1,163 @@
+"""What one channel should be, told by others: the redundancy that every check of wiring, scale and lag lives on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.robust import smooth
+from omnidyn.model.frames import world_to_body
+from omnidyn.model.motor import back_emf, no_load_speed
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed, wheel_speed
+
+FloatArray = NDArray[np.float64]
+MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # sources that say what a wheel did
+BEYOND = 20.0
+POSE_WINDOW = 0.12  # [s] over which a speed is taken from a pose
+POSE_TURN = 0.35  # [rad] that the robot may turn in it: a chord is then 0.5 % shorter than its arc
+
+
+class Ground(NamedTuple):
+    """How the robot moved over the floor. name: of the channel. twist: shape (rows, 3), NaN for an axis not measured.
+
+    width: rows over which it is a mean; whatever is compared with it must be smoothed alike.
+    """
+
+    name: str
+    twist: FloatArray
+    width: int
+
+    @property
+    def axes(self) -> list[int]:
+        """Axes that were measured."""
+        return [k for k in range(3) if np.isfinite(self.twist[:, k]).any()]
+
+
+def ground(work: Work) -> Ground | None:
+    """The twist as measured, else from the pose, axis by axis; None where neither was recorded."""
+    twist, pose = work.get("twist"), work.get("pose")
+    if twist is not None:
+        return Ground("twist", twist, 1)
+    if pose is None or work.step <= 0.0 or len(work) < 20:
+        return None
+    return Ground("pose", *pose_twist(work, pose))
+
+
+def pose_twist(work: Work, pose: FloatArray) -> tuple[FloatArray, int]:
+    """(twist of the body from differences of the pose, shape (rows, 3); rows over which each is a mean)."""
+    heading = _unwrapped(pose[:, 2])
+    rate = _difference(heading, work.t, max(1, round(0.5 * POSE_WINDOW / work.step)))
+    turning = np.nanquantile(np.abs(rate), 0.95) if np.isfinite(rate).any() else 0.0
+    seconds = min(POSE_WINDOW, POSE_TURN / turning) if turning > 0.0 else POSE_WINDOW
+    half = max(1, round(0.5 * seconds / work.step))
+    twist = np.full((len(pose), 3), np.nan)
+    twist[:, 2] = _difference(heading, work.t, half)
+    if np.isfinite(heading).any() and np.isfinite(pose[:, :2]).any():
+        speed = np.column_stack([_difference(pose[:, k], work.t, half) for k in range(2)])
+        turn = world_to_body(smooth(heading, 2 * half + 1))
+        twist[:, :2] = np.einsum("kij,kj->ki", turn[:, :2, :2], speed)
+    for piece in work.pieces[1:]:
+        twist[max(0, piece.start - half) : piece.start + half] = np.nan
+    return twist, 2 * half + 1
+
+
+def _unwrapped(heading: FloatArray) -> FloatArray:
+    """Heading without its jumps by a turn; NaN stays."""
+    good = np.isfinite(heading)
+    out = heading.copy()
+    out[good] = np.unwrap(heading[good])
+    return out
+
+
+def _difference(values: FloatArray, t: FloatArray, half: int) -> FloatArray:
+    out = np.full(len(values), np.nan)
+    if len(values) > 2 * half:
+        out[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
+    return out
+
+
+def wheels_twist(work: Work, speed: FloatArray, width: int = 1) -> FloatArray | None:
+    """Twist of the robot from its wheels, smoothed over `width` rows. Shape (rows, 3); None without a robot."""
+    robot = work.geometry
+    if robot is None or speed.shape[1] != robot.wheels.count:
+        return None
+    return twist_from_wheel_speed(robot.wheels, smooth(speed, width))
+
+
+def volts(work: Work) -> FloatArray | None:
+    """Voltage of the motors: as logged, else duty times the supply (logged, or of the robot file)."""
+    voltage, duty = work.get("voltage"), work.get("duty")
+    if voltage is not None:
+        return voltage
+    if duty is None:
+        return None
+    supply = work.get("supply")
+    if supply is not None:
+        return duty * supply[:, None]
+    if work.geometry is not None and work.geometry.drive.supply is not None:
+        return duty * work.geometry.drive.supply
+    return None
+
+
+def ohmic(work: Work, current: FloatArray) -> FloatArray | None:
+    """Voltage lost in the windings, R i and the drop of brushes and driver [V]; None without a robot."""
+    robot = work.geometry
+    if robot is None:
+        return None
+    motor, n = robot.motor, robot.wheels.count
+    lost = per_wheel(motor.resistance, n) * current
+    drop = per_wheel(motor.voltage_drop, n)
+    return lost + drop * np.sign(current) if drop.any() else lost
+
+
+def stall_current(robot: Robot) -> float:
+    """Most that a blocked motor of the robot draws [A]."""
+    return float(np.max(robot.motor.voltage_limit)) / float(np.min(robot.motor.resistance))
+
+
+def beyond_stall(robot: Robot, current: FloatArray) -> float:
+    """How many times the current of a blocked motor is usually reached; above BEYOND it is no current in amperes."""
+    return float(np.nanquantile(np.abs(current), 0.95)) / stall_current(robot)
+
+
+def electric_speed(work: Work) -> FloatArray | None:
+    """Wheel speed that voltage and current imply, (u - R i - drop)/(K l) [rad/s]; None where one is missing."""
+    voltage, current, robot = volts(work), work.get("current"), work.geometry
+    if voltage is None or current is None or robot is None or work.log.current_unsigned:
+        return None
+    if beyond_stall(robot, current) > BEYOND:
+        return None
+    lost = ohmic(work, current)
+    return None if lost is None else no_load_speed(robot.motor, voltage - lost)
+
+
+def emf(work: Work, speed: FloatArray) -> FloatArray | None:
+    """Back-EMF at a wheel speed [V]; None without a robot."""
+    return None if work.geometry is None else back_emf(work.geometry.motor, speed)
+
+
+def expected_wheel_speed(work: Work, without: str = "") -> tuple[str, FloatArray] | None:
+    """(what says so, wheel speed by it, shape (rows, wheels)), from the most exact source there is."""
+    robot, seen = work.geometry, ground(work)
+    if robot is not None and seen is not None and len(seen.axes) == 3:
+        return f"the {seen.name}", wheel_speed(robot.wheels, seen.twist)
+    electric = electric_speed(work)
+    if electric is not None:
+        return "voltage and current", electric
+    command = work.get("wheel_speed_command")
+    if command is not None:
+        return "the commanded speed", command
+    orders = work.full("twist_command")
+    if robot is not None and orders is not None:
+        return "the commanded twist", wheel_speed(robot.wheels, orders)
+    driven, speed = work.get("voltage"), work.get("wheel_speed")
+    if driven is None:
+        driven = work.get("duty")
+    if driven is None or speed is None or without != "wheel_speed" or driven.shape != speed.shape:
+        return None
+    top, below = np.nansum(np.abs(speed)), np.nansum(np.abs(driven))
+    return ("its voltage", driven * (top / below)) if below > 0.0 else None

@@ -1,0 +1,150 @@
+"""Slip in some stretch: where the robot covers less of the path that its wheels roll than it does elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.reference import ground, wheels_twist
+from omnidyn.findings.signal.robust import MAD, products, slope, smooth
+from omnidyn.logs.channels import components
+
+FloatArray = NDArray[np.float64]
+
+WINDOW, SHORTEST = 0.15, 0.4  # [s]
+LEAST, SURE = 0.025, 5.5  # of the ratio; standard errors, over all stretches that are looked at
+STAND_IN = 0.1  # the least where one wheel is dead and another channel stands in for it
+STRETCHES = 3
+FASTER = 12.0  # mean square of the speed in one part of the log over that in the other, at most
+SPINS = 0.25  # of the path: less is no slip but a wheel that spins
+LAG = 1.5  # rows by which the channels may lag each other
+MAX_WINDOWS = 400
+
+
+def check_slip(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on stretches that slip; the motion over the floor is masked there."""
+    found: list[Finding] = []
+    for _ in range(STRETCHES):
+        stretch = _worst(work)
+        if stretch is None:
+            break
+        bad, inside, outside, error = stretch
+        seen = ground(work)
+        assert seen is not None
+        names = " ".join(components("wheel_speed", work.wheels))
+        rows = np.flatnonzero(bad)
+        found.append(Finding(
+            "slip", WARN, names,
+            f"from t = {work.t[rows[0]]:.5g} to {work.t[rows[-1]]:.5g} s the robot covers {inside / outside:.3g} "
+            f"(+-{error:.2g}) of the path its wheels roll, measured by the rest of the log ({inside:.3g} there, "
+            f"{outside:.3g} elsewhere): it slips, or was pushed",
+            "leave those rows out of fits of wheel speed against ground speed", work.lines(bad), int(bad.sum()),
+            {"ratio": inside / outside, "error": error, "from_s": float(work.t[rows[0]]),
+             "to_s": float(work.t[rows[-1]])},
+        ))  # fmt: skip
+        values = work.channels[seen.name].copy()
+        values[bad] = np.nan
+        work = work.replace(**{seen.name: values})
+    return found, work
+
+
+def _worst(work: Work) -> tuple[NDArray[np.bool_], float, float, float] | None:
+    """(rows, ratio inside, ratio outside, error of their quotient) of the stretch that differs most, if it is sure."""
+    speed, seen = work.full("wheel_speed"), ground(work)
+    if speed is None or seen is None or work.geometry is None or len(work) < 3 * MIN_ROWS:
+        return None
+    own = wheels_twist(work, speed, seen.width)
+    assert own is not None
+    length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
+    if not _witness(own * length, seen.axes):
+        return None
+    for weights in (length, _levelled(work, seen.twist, own, length)):
+        # An axis with a scale of its own is no slip: the contrast has to be there without it as well.
+        stretch = _contrast(work, seen.twist * weights, own * length, seen.axes)
+        if stretch is None:
+            return None
+    return stretch
+
+
+def _witness(own: FloatArray, axes: list[int]) -> bool:
+    """Whether the axes that were measured hold a fair part of the motion."""
+    size = np.sqrt(np.nanmean(own**2, axis=0))
+    return bool(np.sqrt((size[axes] ** 2).sum()) > 0.3 * np.sqrt((size**2).sum()))
+
+
+def _levelled(work: Work, floor: FloatArray, own: FloatArray, length: FloatArray) -> FloatArray:
+    """Weights that give floor and wheels the same slope about yaw as along x and y."""
+    ids, count = work.windows()
+    linear, yaw = slope(floor[:, :2], own[:, :2], ids, count), slope(floor[:, 2], own[:, 2], ids, count)
+    apart = abs(linear.value - yaw.value)
+    if not (apart > 0.03 and apart > 5.0 * np.hypot(linear.error, yaw.error)) or min(linear.value, yaw.value) <= 0.1:
+        return length
+    return length * np.array([1.0, 1.0, linear.value / yaw.value])
+
+
+def _contrast(
+    work: Work, floor: FloatArray, own: FloatArray, axes: list[int]
+) -> tuple[NDArray[np.bool_], float, float, float] | None:
+    ids, count = work.windows(WINDOW)
+    top, below = products(floor[:, axes], own[:, axes], ids, count)
+    if count > MAX_WINDOWS or below.sum() <= 0.0:
+        return None
+    overall = top.sum() / below.sum()
+    moving = below > 1e-2 * below.mean()
+    if moving.sum() < 12:
+        return None
+    noise = min(_noise(top, below, overall, moving, size) for size in (1, 4))
+    numbers = np.concatenate([[0.0], np.cumsum(top)]), np.concatenate([[0.0], np.cumsum(np.maximum(below, 0.0))])
+    shortest = max(2, round(SHORTEST / (work.step * max(1, (ids == 0).sum()))))
+    starts, ends = np.triu_indices(count + 1, shortest)
+    n_in, d_in = numbers[0][ends] - numbers[0][starts], numbers[1][ends] - numbers[1][starts]
+    n_out, d_out = numbers[0][-1] - n_in, numbers[1][-1] - d_in
+    # Both parts have to move, and about as fast as each other: what is left of noise is no motion.
+    busy = np.concatenate([[0.0], np.cumsum(moving)])
+    b_in = np.maximum(busy[ends] - busy[starts], 1.0)
+    b_out = np.maximum(busy[-1] - b_in, 1.0)
+    alike = np.abs(np.log(np.maximum(d_in / b_in, 1e-300) / np.maximum(d_out / b_out, 1e-300))) < np.log(FASTER)
+    good = (d_in > 0.02 * numbers[1][-1]) & (d_out > 0.02 * numbers[1][-1]) & alike
+    if not good.any():
+        return None
+    # A lag of so many rows adds lag/2 times the change of x^2 over the stretch.
+    square = _at_edges(np.nansum(own[:, axes] ** 2, axis=1), ids, count)
+    lagged = 0.5 * LAG * np.abs(square[ends] - square[starts])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = n_in / d_in - n_out / d_out
+        error = noise * np.sqrt(1.0 / d_in + 1.0 / d_out)
+        sure = np.where(good, (np.abs(away) - lagged * (1.0 / d_in + 1.0 / d_out)) / error, 0.0)
+    k = int(np.argmax(sure))
+    inside, outside = n_in[k] / d_in[k], n_out[k] / d_out[k]
+    rows = (ids >= starts[k]) & (ids < ends[k])
+    if inside > outside:  # then the rest is what slips
+        inside, outside, rows = outside, inside, ~rows
+    least = LEAST if work.known.get("dead_wheel") is None else STAND_IN
+    if sure[k] < SURE or not 0.1 < outside < 2.0 or (outside - inside) / outside < least:
+        return None
+    if inside < SPINS * outside and not 0.5 < (d_in[k] / b_in[k]) / (d_out[k] / b_out[k]) < 2.0:
+        return None  # wheels that are said to spin while the robot stands: then as fast as they turn elsewhere
+    return rows, float(inside), float(outside), float(error[k] / outside)
+
+
+def _noise(top: FloatArray, below: FloatArray, overall: float, moving: NDArray[np.bool_], size: int) -> float:
+    """Noise of the ratio for one unit of `below`, from groups of `size` windows.
+
+    From one group to the next slip does not change, noise does; where the robot speeds up there is more of it. Errors
+    of a pose cancel over longer groups.
+    """
+    t, b = top[moving], below[moving]
+    groups = len(b) // size
+    if groups < 12:
+        return np.inf if size > 1 else 1.0
+    t, b = (each[: groups * size].reshape(groups, size).sum(axis=1) for each in (t, b))
+    changes = np.abs(np.diff((t - overall * b) / np.sqrt(b))) / np.sqrt(2.0)
+    return max(MAD * float(np.median(changes)), float(np.quantile(changes, 0.9)) / 2.0)
+
+
+def _at_edges(values: FloatArray, ids: NDArray[np.int64], count: int) -> FloatArray:
+    """Values where the windows begin, and at the end. Shape (count + 1,)."""
+    first = np.searchsorted(ids, np.arange(count))
+    return smooth(values[:, None], 3)[np.append(first, len(values) - 1), 0]

@@ -1,0 +1,207 @@
+"""Time: order, repeated stamps, gaps, jitter, padding, and whether it is in seconds at all."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.robust import MAD
+from omnidyn.logs.log import MAX_MISSING, Log
+from omnidyn.logs.segments import GAP, segments
+from omnidyn.model.robot import Robot
+
+JITTER_WARN, JITTER_NOTE = 0.5, 0.1  # spread of the steps, of the usual step
+LONGEST_STEP, SHORTEST_STEP = 2.0, 2e-5  # [s] outside of which no robot is logged
+
+
+def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], Work]:
+    """The findings on time, and the work on the rows that have one: sorted, each time once."""
+    found: list[Finding] = []
+    rows = np.arange(len(log))
+    empty = log.empty_rows() if len(log) else np.zeros(0, dtype=bool)
+    found += _empty_rows(log, empty)
+    rows = rows[~empty]
+    padding = log.rows(rows).padding_rows() if rows.size else np.zeros(0, dtype=bool)
+    found += _padded(log, rows[padding])
+    rows = rows[~padding]
+    found += _backward(log, rows)
+    rows = rows[np.argsort(log.t[rows], kind="stable")]
+    again = np.concatenate([[False], np.diff(log.t[rows]) == 0.0]) if rows.size else np.zeros(0, dtype=bool)
+    found += _repeated(log, rows, again)
+    rows = rows[~again]
+    t = log.t[rows]
+    steps = np.diff(t)
+    step = float(np.clip(np.median(steps), 1e-9, 1e9)) if steps.size else 0.0
+    pieces = tuple(segments(t)) if len(t) else ()
+    chosen = log.rows(rows)
+    # As in a Run: what is recorded on change is filled in, latencies that are known are taken out.
+    channels = {name: chosen.aligned(name, values, []) for name, values in chosen.channels.items()} if len(t) else {}
+    work = _with_speed(Work(log, robot, rows, t, step, pieces, channels), found)
+    return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
+
+
+def _with_speed(work: Work, found: list[Finding]) -> Work:
+    """Where angles of wheels were logged and no speed, the work with their differences as speed, which is said."""
+    angle = work.get("wheel_angle")
+    if angle is None or work.get("wheel_speed") is not None or len(work) < MIN_ROWS:
+        return work
+    speed = np.full(angle.shape, np.nan)
+    for piece in work.pieces:
+        if piece.stop - piece.start > 2:
+            speed[piece] = np.gradient(angle[piece], work.t[piece], axis=0)
+    found.append(Finding(
+        "speed_from_angle", NOTE, "", "no speed of wheels was logged: w1, .. are differences of the angles a1, ..", "",
+        (), 0, {},
+    ))  # fmt: skip
+    return work.replace(wheel_speed=speed)
+
+
+def _empty_rows(log: Log, empty: NDArray[np.bool_]) -> list[Finding]:
+    count = int(empty.sum())
+    if not count:
+        return []
+    share = count / len(log)
+    return [
+        Finding(
+            "empty_rows", FATAL if share > MAX_MISSING else WARN, "",
+            f"{count} of {len(log)} rows hold no time or no number", "they are left out; mend the recording",
+            spans_of(empty, log.lines), count, {"share": share},
+        )
+    ]  # fmt: skip
+
+
+def _padded(log: Log, rows: NDArray[np.int64]) -> list[Finding]:
+    if not rows.size:
+        return []
+    bad = np.zeros(len(log), dtype=bool)
+    bad[rows] = True
+    return [
+        Finding(
+            "padding", WARN, "t",
+            f"{rows.size} rows at the end all repeat one row, at an earlier time: the recorder filled its buffer up",
+            "they are left out; cut them off", spans_of(bad, log.lines), int(rows.size),
+        )
+    ]  # fmt: skip
+
+
+def _backward(log: Log, rows: NDArray[np.int64]) -> list[Finding]:
+    back = np.diff(log.t[rows]) < 0.0
+    count = int(back.sum())
+    if not count:
+        return []
+    bad = np.concatenate([[False], back])
+    farthest = float(-np.diff(log.t[rows]).min())
+    return [
+        Finding(
+            "time_back", FATAL, "t", f"time goes back {count} times, by up to {farthest:.4g} s",
+            "sort the rows (--sort) where they were written out of order; split the file where two logs were joined",
+            spans_of(bad, log.lines[rows]), count, {"farthest_s": farthest},
+        )
+    ]  # fmt: skip
+
+
+def _repeated(log: Log, rows: NDArray[np.int64], again: NDArray[np.bool_]) -> list[Finding]:
+    count = int(again.sum())
+    if not count:
+        return []
+    share = count / len(rows)
+    words = f"{count} rows have the same time as the row before"
+    if share > MAX_MISSING:
+        words += ": the clock is too coarse for this rate, or the time stands still"
+    where = np.argsort(rows[again], kind="stable")
+    bad = np.zeros(len(log), dtype=bool)
+    bad[rows[again][where]] = True
+    return [
+        Finding(
+            "time_repeats", FATAL if share > MAX_MISSING else WARN, "t", words,
+            "only the first of them is used; log a finer clock" if share > 0.01 else "only the first of them is used",
+            spans_of(bad, log.lines), count, {"share": share},
+        )
+    ]  # fmt: skip
+
+
+def _gaps(work: Work) -> list[Finding]:
+    cuts = [piece.start for piece in work.pieces[1:]]
+    if not cuts:
+        return []
+    lengths = np.array([work.t[k] - work.t[k - 1] for k in cuts])
+    lost = int(min(np.round(lengths / work.step - 1.0).sum(), 1e15))
+    lines = work.log.lines[work.rows]
+    return [
+        Finding(
+            "gap", WARN, "t",
+            f"{len(cuts)} gap{'s' if len(cuts) > 1 else ''}, about {lost} rows lost; the longest lasts "
+            f"{lengths.max():.4g} s, at t = {work.t[cuts[int(lengths.argmax())] - 1]:.6g} s",
+            "nothing is integrated across a gap: the pieces count as separate runs",
+            tuple((int(lines[k - 1]), int(lines[k])) for k in cuts[:20]), len(cuts),
+            {"longest_s": float(lengths.max()), "lost_rows": float(lost)},
+        )
+    ]  # fmt: skip
+
+
+def _jitter(work: Work) -> list[Finding]:
+    steps = np.diff(work.t)
+    if len(steps) < MIN_ROWS or work.step <= 0.0:
+        return []
+    relative = float(MAD * np.median(np.abs(steps - work.step)) / work.step)
+    low, high = np.quantile(steps, [0.05, 0.95])
+    if relative < JITTER_NOTE and (high - low) < 4.0 * JITTER_NOTE * work.step:
+        return []
+    irregular = relative > JITTER_WARN
+    return [
+        Finding(
+            "jitter", WARN if irregular else NOTE, "t",
+            f"the steps of time vary: usually {work.step * 1e3:.4g} ms, 90 % between {low * 1e3:.4g} and "
+            f"{high * 1e3:.4g} ms",
+            "the times as logged are used, not a fixed rate", (), 0,
+            {"relative": relative, "step_s": work.step, "low_s": float(low), "high_s": float(high)},
+        )
+    ]  # fmt: skip
+
+
+def _unit(work: Work) -> list[Finding]:
+    if len(work) < MIN_ROWS or SHORTEST_STEP <= work.step <= LONGEST_STEP:
+        return []
+    likely = "ms, us or ticks read as seconds" if work.step > LONGEST_STEP else "seconds read as ms or us"
+    return [
+        Finding(
+            "time_unit", FATAL, "t",
+            f"one row every {work.step:.4g} s: the time is hardly in the unit given ({likely})",
+            "give the unit of the time column, such as --column t=NAME:ms", (), 0, {"step_s": work.step},
+        )
+    ]  # fmt: skip
+
+
+def _few(work: Work) -> list[Finding]:
+    if len(work) >= MIN_ROWS:
+        return []
+    return [
+        Finding(
+            "few_rows", FATAL if len(work) < 2 else NOTE, "",
+            f"{len(work)} rows with a time: too few to judge noise, wiring or scale from",
+            "log longer, 10 s or more", (), 0, {"rows": float(len(work))},
+        )
+    ]  # fmt: skip
+
+
+def between(last: tuple[float, int] | None, block: Log, rate: float) -> tuple[list[Finding], tuple[float, int] | None]:
+    """(findings on time where two blocks of a log meet, (time, line) of the last row of this one)."""
+    timed = np.flatnonzero(np.isfinite(block.t))
+    if not timed.size:
+        return [], last
+    here = float(block.t[timed[-1]]), int(block.lines[timed[-1]])
+    if last is None or rate <= 0.0:
+        return [], here
+    first, line = float(block.t[timed[0]]), int(block.lines[timed[0]])
+    step = first - last[0]
+    pair = Log(np.array([last[0], first]), {}, np.array([last[1], line]), source=block.source)
+    if step < 0.0:
+        return _backward(pair, np.arange(2)), here
+    if step == 0.0:
+        return _repeated(pair, np.arange(2), np.array([False, True])), here
+    if step * rate <= GAP:
+        return [], here
+    pieces = (slice(0, 1), slice(1, 2))
+    return _gaps(Work(pair, None, np.arange(2), pair.t, 1.0 / rate, pieces, {})), here

@@ -1,0 +1,1 @@
+"""Single channels: values, stuck, spikes, codes."""

@@ -1,0 +1,93 @@
+"""Cells that do not mean what they say: a number that stands for no value, and negative numbers read as unsigned."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.logs.channels import place
+from omnidyn.logs.column import MOTOR_SIDE
+from omnidyn.logs.log import MAX_MISSING
+
+FloatArray = NDArray[np.float64]
+
+CODES = frozenset((999, 9999, 99999, 999999, 32767, 32768, 65535, 2147483647, 2147483648, 4294967295))
+FAR = 3.0  # times all other values: what stands for no value lies so far out
+WRAPS = (2.0**16, 2.0**32)  # a negative number of two or four bytes, read as unsigned, is so much too large
+EITHER = 0.01  # of the rows on either side of 0
+Changed = tuple[list[Finding], Work, FloatArray]  # the findings, the work and the component without the fault
+SIGNED = ("current", "wheel_speed", "voltage", "duty", "twist")
+
+
+def check_codes(work: Work) -> tuple[list[Finding], Work]:
+    """Findings on such cells; they are put right, or masked."""
+    found: list[Finding] = []
+    if len(work) < MIN_ROWS:
+        return found, work
+    for channel in work.channels:
+        for component, values in work.columns(channel):
+            more, work, values = _wrapped(work, channel, component, values)
+            also, work, _ = _placeholder(work, channel, component, values)
+            found += more + also
+    return found, work
+
+
+def _wrapped(work: Work, channel: str, component: str, values: FloatArray) -> Changed:
+    """Values about 0 and values just below 2^16 (or 2^32), and nothing between."""
+    size = _cell_size(work, component)
+    cells = values / size
+    wrap = next((each for each in WRAPS if 0.75 * each < np.nanmax(cells) < each), None)
+    if channel not in SIGNED or wrap is None or np.nanmin(cells) < 0.0:
+        return [], work, values
+    with np.errstate(invalid="ignore"):
+        low, high = cells < 0.25 * wrap, cells > 0.75 * wrap
+        between = bool(((cells >= 0.25 * wrap) & (cells <= 0.75 * wrap)).any())
+    if between or low.mean() < EITHER or high.mean() < EITHER:
+        return [], work, values
+    bits = round(np.log2(wrap))
+    finding = Finding(
+        "wrapped", FATAL, component,
+        f"{component} is near 0 or near 2^{bits} in the units of the file, and never between: negative numbers of "
+        f"{bits} bits, read as unsigned", f"take 2^{bits} off those cells", work.lines(high), int(high.sum()),
+        {"share": float(high.mean())},
+    )  # fmt: skip
+    right = np.where(high, values - wrap * size, values)
+    return [finding], _changed(work, channel, component, right), right
+
+
+def _placeholder(work: Work, channel: str, component: str, values: FloatArray) -> Changed:
+    """One number such as -999 or 65535 in some rows, far beyond everything else of its channel."""
+    cells = values / _cell_size(work, component)
+    size = np.abs(cells)
+    top = float(np.nanmax(size))
+    bad = size == top
+    others = float(np.max(size[~bad & np.isfinite(size)], initial=0.0))
+    code = round(top) in CODES and abs(top - round(top)) <= 1e-9 * top
+    if not code or bad.sum() < 2 or bad.mean() > MAX_MISSING or not 0.0 < FAR * others < top:
+        return [], work, values
+    cell = float(cells[np.flatnonzero(bad)[0]])
+    finding = Finding(
+        "placeholder", FATAL, component,
+        f"{component} is {cell:.10g} in {int(bad.sum())} rows, {top / others:.3g} times what it is otherwise: it "
+        "stands for no value", "leave those cells blank", work.lines(bad), int(bad.sum()),
+        {"cell": cell, "share": float(bad.mean())},
+    )  # fmt: skip
+    kept = np.where(bad, np.nan, values)
+    return [finding], _changed(work, channel, component, kept), kept
+
+
+def _changed(work: Work, channel: str, component: str, values: FloatArray) -> Work:
+    whole = work.channels[channel].copy()
+    (whole if whole.ndim == 1 else whole[:, place(component)[1]])[:] = values  # type: ignore[index]
+    return work.replace(**{channel: whole})
+
+
+def _cell_size(work: Work, component: str) -> float:
+    """What one of the file's units is in SI, the gear included."""
+    column = work.log.columns.columns.get(component)
+    if column is None:
+        return 1.0
+    gear = float(np.mean(work.robot.motor.gear_ratio)) if column.side == MOTOR_SIDE and work.robot is not None else 1.0
+    return column.factor / gear

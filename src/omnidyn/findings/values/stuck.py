@@ -1,0 +1,288 @@
+"""Encoders and sensors that stick: one value repeated to the last digit for too long, or while the robot changes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property, lru_cache, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.signal.log_under_check import INPUTS, SENSORS, Work
+from omnidyn.findings.signal.predicted_wheel import Learner
+from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
+from omnidyn.findings.signal.robust import MAD, quantum, runs, smooth
+from omnidyn.logs.channels import place
+
+FloatArray = NDArray[np.float64]
+
+LONG = 5  # rows
+FOLLOWS = 0.5  # [s] after which a wheel follows its command
+IMPOSSIBLE = 1e-6  # chance, over the whole log, below which repeated values are no chance
+SURE = 2.0  # standard errors that a chance may be larger than seen
+PARTS = 4  # of a stretch, whose means are compared
+MARGIN = 1.25  # by which a stretch must differ more than any other of its length
+TOGETHER = 0.8  # of the rows of a stretch: so many repeats of all others say that the robot keeps its speed
+RESOLVES = 0.1  # of the top speed: a reference as exact as this would have seen a change that matters
+
+
+def check_stuck(work: Work) -> tuple[list[Finding], Work]:
+    """Stretches in which a sensor repeats one value to the last digit while it should not."""
+    found, learner = [], Learner(work)
+    expected = expected_wheel_speed(work, without="wheel_speed")
+    for channel in SENSORS:
+        # The longest repeat first: a wheel that sticks is no witness against the others.
+        columns = [(*each, _repeats(each[1])) for each in work.columns(channel)]
+        for component, values, stretches in sorted(columns, key=lambda each: -_longest(each[1], each[2])):
+            k = place(component)[1]  # type: ignore[index]
+            judge = _Judge(work, values, stretches)
+            judge.steady = _Steady(work, channel, k).during
+            if channel == "wheel_speed":
+                judge.learn = partial(learner.wheel_speed, k)
+            if channel == "wheel_speed" and expected is not None and k < expected[1].shape[1]:
+                judge.expected = _Away(values, expected[1][:, k])
+                judge.measured = expected[0] in MEASUREMENTS
+            bad = judge.frozen()
+            if not bad.any():
+                continue
+            each = runs(bad)
+            longest = max(work.t[b - 1] - work.t[a] for a, b in each)
+            found.append(Finding(
+                "stuck", WARN, component,
+                f"{component} repeats one value to the last digit {len(each)} time{'s' * (len(each) > 1)}, "
+                f"for up to {longest:.3g} s, while the robot moves",
+                "those rows of it are not used; look at the encoder and its cable", work.lines(bad), int(bad.sum()),
+                {"longest_s": float(longest), "share": float(bad.mean())},
+            ))  # fmt: skip
+            work = work.masked(channel, k, bad)
+            learner = Learner(work)
+    return found, work
+
+
+def _repeats(values: FloatArray) -> NDArray[np.int64]:
+    """(start, end) of each stretch of rows with one value. Shape (stretches, 2)."""
+    return runs(np.diff(values) == 0.0) + np.array([0, 1])
+
+
+def _longest(values: FloatArray, stretches: NDArray[np.int64]) -> int:
+    """Rows in the longest repeat of a value that is not 0."""
+    return int(np.diff(stretches, axis=1)[values[stretches[:, 0]] != 0.0].max(initial=0))
+
+
+class _Judge:
+    """Which of the repeats of one channel are too long for chance, or go on while something else changes."""
+
+    learn: Callable[[NDArray[np.bool_]], FloatArray] | None = None  # the channel by all others
+    expected: _Away | None = None
+    steady: Callable[[int, int], bool] | None = None  # whether nothing in the log changes, commands least of all
+    measured = False  # expected is what the wheel did; a command it follows later, or, at rest, not at all
+
+    def __init__(self, work: Work, values: FloatArray, stretches: NDArray[np.int64]) -> None:
+        self.values, self.stretches, self.slow = values, stretches, max(10, round(FOLLOWS / work.step))
+        self.lengths = stretches[:, 1] - stretches[:, 0]
+        self.long = self.lengths >= LONG
+        self.moving = values[stretches[:, 0]] != 0.0
+
+    @cached_property
+    def learned(self) -> _Walk | None:
+        """How far what all other columns say walks away."""
+        return None if self.learn is None else _Walk(self.values, self.learn(self.repeated), self.repeated)
+
+    @cached_property
+    def repeated(self) -> NDArray[np.bool_]:
+        """Rows in repeats that are asked about: nothing is learned from them."""
+        edges = np.zeros(len(self.values) + 1, dtype=np.int64)
+        asked = self.stretches[self.lengths >= max(LONG, self.slow // 2)]
+        np.add.at(edges, asked[:, 0], 1)
+        np.add.at(edges, asked[:, 1], -1)
+        return np.cumsum(edges[:-1]) > 0
+
+    def frozen(self) -> NDArray[np.bool_]:
+        """Rows that stick."""
+        bad = np.zeros(len(self.values), dtype=bool)
+        if not self.long.any():
+            return bad
+        chance, usual = _chance_of_a_repeat(self.lengths[self.moving])
+        for a, b in self.stretches[self.long]:
+            if self._unlikely(a, b, chance, usual) or self._walked(a, b):
+                bad[a:b] = True
+        return bad
+
+    def _unlikely(self, a: int, b: int, chance: float, usual: float) -> bool:
+        """Whether so many repeats of a speed are no chance: by other repeats of the log, and by the rows beside."""
+        length, n = b - a, len(self.values)
+        if self.values[a] == 0.0:
+            return False
+        if self._rough(a, b):
+            return n * self._rare ** (length - 1) < IMPOSSIBLE
+        beside = np.r_[self.values[max(0, a - 8) : a], self.values[b : b + 8]]
+        chance = max(chance, (float((beside == self.values[a]).sum()) + 1.0) / (len(beside) + 2.0))
+        unlikely = n * chance ** (length - 1)
+        if length <= 3 * usual or unlikely >= IMPOSSIBLE or (self.steady is not None and self.steady(a, b)):
+            return False
+        # Where the others say that the wheel kept its speed, the noise that the rest of the log has counts for less.
+        return unlikely < IMPOSSIBLE**2 or self.learned is None or not self.learned.stays(a, b)
+
+    @cached_property
+    def _rare(self) -> float:
+        """Chance of a repeat in a channel without steps, from all but its three longest repeats; 1 where not rare."""
+        moving = int((self.values != 0.0).sum())
+        repeats = float(np.sort(self.lengths[self.moving] - 1)[:-3].sum())
+        chance = (repeats + 1.0) / (moving + 2.0)
+        return chance if chance < 0.02 and not quantum(self.values) else 1.0
+
+    def _rough(self, a: int, b: int) -> bool:
+        """Whether a channel that hardly ever repeats a value is as noisy beside these repeats as anywhere.
+
+        A simulated speed without noise settles until it repeats: the rows before it hardly change.
+        """
+        if self._rare == 1.0:
+            return False
+        steps, usual = self._steps
+        ends = [steps[max(0, a - 4) : a], steps[b - 1 : b + 3]]
+        return all(part.size > 0 and bool(np.nanmedian(part) > 0.1 * usual) for part in ends)
+
+    @cached_property
+    def _steps(self) -> tuple[FloatArray, float]:
+        """(changes from row to row, the usual one)."""
+        steps = np.abs(np.diff(self.values))
+        return steps, float(np.nanmedian(steps[steps > 0.0])) if (steps > 0.0).any() else np.inf
+
+    def _walked(self, a: int, b: int) -> bool:
+        """Whether a reference walks away from the value that repeats."""
+        turning, length = self.values[a] != 0.0, b - a
+        asked = length >= (self.slow // 2 if self.measured else self.slow) and (self.measured or turning)
+        if self.expected is not None and asked and self.expected.during(a, b):
+            return True
+        if not turning or 2 * length < self.slow or self.learned is None:
+            return False
+        return self.learned.during(a, b)
+
+
+class _Steady:
+    """Whether commands stand still and all wheels repeat their speed together: a steady run seen in coarse steps."""
+
+    def __init__(self, work: Work, channel: str, k: int) -> None:
+        self.inputs = [np.nan_to_num(values) for name in INPUTS if (values := work.get(name)) is not None]
+        columns = [values for name, values in work.columns(channel) if place(name)[1] != k]  # type: ignore[index]
+        self.others = [np.diff(values) == 0.0 for values in columns]
+
+    def during(self, a: int, b: int) -> bool:
+        """Over rows a to b."""
+        settled = a + (b - a) // 10
+        still = bool(self.inputs) and all(not np.ptp(values[settled:b], axis=0).any() for values in self.inputs)
+        return still and bool(self.others) and all(same[a : b - 1].mean() > TOGETHER for same in self.others)
+
+
+class _Walk:
+    """How far a reference walks away during repeats, beside all other stretches of that length in the log."""
+
+    def __init__(self, values: FloatArray, reference: FloatArray, repeated: NDArray[np.bool_]) -> None:
+        off = values - reference
+        self.good = np.isfinite(off)
+        self.sums = np.concatenate([[0.0], np.cumsum(np.where(self.good, off, 0.0))])
+        self.gaps = np.concatenate([[0], np.cumsum(~self.good)])
+        self.holes = self.gaps + np.concatenate([[0], np.cumsum(repeated)])
+        self.step, self.top = quantum(values), float(np.nanmax(np.abs(values)))
+        self.known: dict[int, tuple[float, NDArray[np.int64], FloatArray, FloatArray]] = {}
+
+    def _range(self, starts: NDArray[np.int64], length: int) -> FloatArray:
+        """Range of the means over parts of each stretch."""
+        edges = starts[:, None] + np.round(np.linspace(0, length, PARTS + 1)).astype(np.int64)
+        means = np.diff(self.sums[edges], axis=1) / np.diff(edges, axis=1)
+        return means.max(axis=1) - means.min(axis=1)
+
+    def _usual(self, a: int, b: int) -> float:
+        """The largest range in other stretches of about this length; inf where too few are.
+
+        Stretches without repeats, where there are enough of them; in a log that stands still in steps, all others.
+        """
+        # Lengths in classes a fifth apart; the next shorter, whose means are noisier.
+        length = max(PARTS, int(1.2 ** math.floor(math.log(b - a, 1.2))))
+        if length not in self.known:
+            self.known[length] = self._others(length)
+        clean, starts, before, behind = self.known[length]
+        if np.isfinite(clean):
+            return clean
+        first, last = np.searchsorted(starts, [a - 2 * length, b + length])
+        if (first + len(starts) - last) * max(1, length // 8) < 5 * length:
+            return math.inf
+        return max(float(before[first - 1]) if first else 0.0, float(behind[last]) if last < len(starts) else 0.0)
+
+    def _others(self, length: int) -> tuple[float, NDArray[np.int64], FloatArray, FloatArray]:
+        """(largest range without repeats, starts of all stretches, largest range up to each and from each)."""
+        step = max(1, length // 8)
+        starts = np.arange(0, len(self.good) - length + 1, step)
+        starts = starts[self.gaps[starts + length] == self.gaps[starts]]
+        ranges = self._range(starts, length)
+        clean = ranges[self.holes[starts + length] == self.holes[starts]]
+        most = float(clean.max()) if len(clean) * step >= 5 * length else math.inf
+        return most, starts, np.maximum.accumulate(ranges), np.maximum.accumulate(ranges[::-1])[::-1]
+
+    def during(self, a: int, b: int) -> bool:
+        """Whether the reference changes over rows a to b by more than it is off anywhere else."""
+        if not self.good[a:b].all():
+            return False
+        walk = float(self._range(np.array([a]), b - a)[0])
+        return walk > max(MARGIN * self._usual(a, b), 2.0 * self.step)
+
+    def stays(self, a: int, b: int) -> bool:
+        """Whether a reference that would see a change sees none."""
+        return self._usual(a, b) < RESOLVES * self.top and bool(self.good[a:b].all()) and not self.during(a, b)
+
+
+class _Away:
+    """Whether a reference walks away from values that repeat, measured by how far it is from them at other times."""
+
+    def __init__(self, values: FloatArray, reference: FloatArray) -> None:
+        self.size, self.reference, self.step = np.abs(values - reference), reference, quantum(values)
+        self.good = np.isfinite(self.size)
+        self.least = max(MAD * float(np.median(self.size[self.good])), self.step) if self.good.any() else np.inf
+
+    def during(self, a: int, b: int) -> bool:
+        """Over rows a to b."""
+        part = self.good[a:b]
+        if part.sum() < 5:
+            return False
+        # A reference that is elsewhere but stays there says slip or a wrong scale, no sensor that sticks. Quantiles:
+        # where a command changes, a late channel makes a reference jump for a row or two.
+        low, high = np.quantile(smooth(self.reference[a:b][part], 3), [0.1, 0.9])
+        if not high - low > 6.0 * self.least:
+            return False
+        # Where the robot speeds up the two differ more, by a lag or by means: the larger of two measures counts.
+        others = np.concatenate([self.size[:a][self.good[:a]], self.size[b:][self.good[b:]]])
+        return bool(others.size) and bool(high - low > 6.0 * float(np.quantile(others, 0.95)) / 1.6)
+
+
+def _chance_of_a_repeat(lengths: NDArray[np.int64]) -> tuple[float, float]:
+    """(chance that a value is repeated once more, length of the fourth longest stretch), the longest left out.
+
+    Repeats after repeats tell how the noise compares with the step of the sensor, the less the fewer there are: the
+    upper end of what they allow counts. The chance is that of a speed in the middle of a step, where it is largest.
+    """
+    rest = np.sort(lengths)[:-3] - 1  # number of repeats in each stretch
+    repeats, again = float(rest.sum()), float((rest - 1).sum())
+    seen = (again + 3.0) / (repeats + 6.0)
+    seen = min(1.0, seen + SURE * math.sqrt(seen * max(0.0, 1.0 - seen) / (repeats + 6.0)))
+    after, middle = _repeats_by_noise()
+    return float(np.interp(seen, after[::-1], middle[::-1])), float(rest.max(initial=0) + 1)
+
+
+@lru_cache(maxsize=1)
+def _repeats_by_noise() -> tuple[FloatArray, FloatArray]:
+    """(chance of a repeat after a repeat, chance of one in the middle of a step) for noises of 0.05 to 20 steps.
+
+    A speed anywhere in a step, normal noise, rounding: with P_k the chance of level k, E[sum P_k^3]/E[sum P_k^2], and
+    P_0 in the middle. Noise is taken 20 % smaller than it is: changes of the speed look like noise too.
+    """
+    noises, places = np.geomspace(0.05, 20.0, 60), np.linspace(-0.5, 0.5, 21)
+    after, middle = [], []
+    for noise in noises:
+        edges = np.arange(-math.ceil(6 * noise) - 1, math.ceil(6 * noise) + 2) + 0.5
+        chances = np.diff(ndtr((edges[:, None] - places) / noise), axis=0)
+        after.append(float((chances**3).sum() / (chances**2).sum()))
+        middle.append(float(2.0 * ndtr(0.5 / (0.8 * noise)) - 1.0))
+    return np.array(after), np.array(middle)

@@ -1,0 +1,231 @@
+"""Single channels: missing values, channels that never change, steps of quantisation, spikes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, Work
+from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
+from omnidyn.findings.signal.robust import quantum, smooth, white_noise
+from omnidyn.findings.values.codes import check_codes
+from omnidyn.findings.values.spikes import check_spikes, recorded
+from omnidyn.findings.values.stuck import check_stuck
+from omnidyn.logs.channels import place
+from omnidyn.logs.column import MOTOR_SIDE
+from omnidyn.logs.log import MAX_MISSING
+from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.units import known_unit
+
+FloatArray = NDArray[np.float64]
+
+SAME = 0.03  # a scale so near 1 is 1, within what noise makes of it
+
+
+def check_values(work: Work) -> tuple[list[Finding], Work]:
+    """All findings on single channels; what sticks or spikes is masked, what is dead taken out."""
+    found = _missing(work)
+    if len(work) < MIN_ROWS:
+        return found, work
+    more, work = check_codes(work)
+    found += more + _quantised(work)
+    for family in (_constant, check_stuck, check_spikes):
+        more, work = family(work)
+        found += more
+    return found, _with_dead_wheel(work, found)
+
+
+def _with_dead_wheel(work: Work, found: list[Finding]) -> Work:
+    """The speed of one dead wheel as the other channels say it, on the scale of the other wheels.
+
+    Else it hides what is wrong with them: neither floor nor circuit can be held against a robot with a wheel missing.
+    """
+    dead = [at[1] for each in found if each.code == "dead" and (at := place(each.where)) and at[0] == "wheel_speed"]
+    expected = expected_wheel_speed(work, without="wheel_speed")
+    if len(dead) != 1 or expected is None or expected[0] not in MEASUREMENTS or expected[1].shape[1] != work.wheels:
+        return work
+    speed = work.channels["wheel_speed"].copy()
+    width = max(3, round(0.2 / work.step) | 1)  # noise of what tells the speed would make it look larger
+    own, told = np.delete(smooth(speed, width), dead, axis=1), np.delete(smooth(expected[1], width), dead, axis=1)
+    known = np.isfinite(own) & np.isfinite(told)
+    size, turned = float((told[known] ** 2).sum()), float((own[known] ** 2).sum())
+    if not size > 0.0 or not turned > 0.0:
+        return work
+    ratio = float(np.sqrt(turned / size))
+    speed[:, dead[0]] = expected[1][:, dead[0]] * (ratio if abs(ratio - 1.0) > SAME else 1.0)
+    return work.replace(wheel_speed=speed).knowing(dead_wheel=dead[0])
+
+
+def _missing(work: Work) -> list[Finding]:
+    found = []
+    for channel in work.channels:
+        for component, values in work.columns(channel):
+            bad = ~np.isfinite(values)
+            share = float(bad.mean())
+            if share > 0.0:
+                grave = share > MAX_MISSING and channel not in ("pose", "twist", "supply")
+                found.append(Finding(
+                    "missing", WARN if grave else NOTE, component, f"{100 * share:.3g} % of {component} is missing",
+                    "rows without it are not used where it is needed", work.lines(bad), int(bad.sum()),
+                    {"share": share},
+                ))  # fmt: skip
+    return found
+
+
+def _quantised(work: Work) -> list[Finding]:
+    """Steps of a sensor that matter: 2 % of what it usually reads, or more; sensors of one step in one finding."""
+    found: list[Finding] = []
+    command = work.get("wheel_speed_command")
+    expected = ("the commanded speed", command) if command is not None else expected_wheel_speed(work)
+    groups: dict[tuple[str, float], list[tuple[str, float, float]]] = {}
+    for channel in SENSORS:
+        for k, (component, values) in enumerate(work.columns(channel)):
+            step = quantum(values)
+            busy = np.abs(values[np.isfinite(values) & (values != 0.0)])
+            usual = float(np.median(busy)) if busy.size else 0.0
+            if not step or step < 0.02 * usual:
+                continue
+            key = next((known for known in groups if known[0] == channel and abs(known[1] / step - 1.0) < 0.01),
+                       (channel, step))  # fmt: skip
+            groups.setdefault(key, []).append((component, step / usual, white_noise(values)))
+            if channel == "wheel_speed" and expected is not None and expected[1].shape[1] > k:
+                found += _reads_zero(work, component, values, step, expected[0], expected[1][:, k])
+    for (_, step), members in groups.items():
+        names = [name for name, _, _ in members]
+        share, noise = max(each for _, each, _ in members), max(each for _, _, each in members)
+        hidden = f", hidden in a noise of {noise:.3g}" if noise > step else ""
+        found.append(Finding(
+            "quantised", NOTE, " ".join(names),
+            f"{' and '.join(names)} {'counts' if len(names) == 1 else 'count'} in steps of {step:.4g} "
+            f"{_unit_words(work, names[0], step)}, up to {100 * share:.0f} % of the usual value{hidden}",
+            "average over longer windows; a sample alone says little", (), 0,
+            {"step": step, "share": share, "noise": noise},
+        ))  # fmt: skip
+    return found
+
+
+def _reads_zero(
+    work: Work, component: str, values: FloatArray, step: float, source: str, reference: FloatArray
+) -> list[Finding]:
+    """A wheel slower than its encoder can say."""
+    width = max(3, round(0.1 / work.step) | 1)
+    # What lies between two measurements is no measurement, and a mean over such rows no better than they are.
+    own = _told(work, source)
+    turning = np.abs(smooth(reference, width))
+    sure = 5.0 * white_noise(reference[own]) / np.sqrt(max(1.0, width * len(own) / len(work)))
+    slow = (values == 0.0) & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
+    if slow.mean() < 0.2:
+        return []
+    return [Finding(
+        "reads_zero", WARN, component,
+        f"{component} reads 0 in {100 * slow.mean():.0f} % of the rows while {source} says it turns, slower than two "
+        f"steps of its encoder ({step:.4g} rad/s)",
+        "take its speed from counts over a longer time, or from the other wheels", work.lines(slow), int(slow.sum()),
+        {"step": step, "share": float(slow.mean())},
+    )]  # fmt: skip
+
+
+def _unit_words(work: Work, component: str, step: float) -> str:
+    """The step as it stands in the file, where its unit is another."""
+    column = work.log.columns.columns.get(component)
+    si = {"c": "A", "w": "rad/s", "t": "in SI"}[place(component)[0][0]]  # type: ignore[index]
+    unit = known_unit(column.unit) if column is not None else None
+    if column is None or unit is None:
+        return si
+    size = unit.size
+    if column.side == MOTOR_SIDE and work.robot is not None:
+        size /= float(np.mean(work.robot.motor.gear_ratio))
+    return si if abs(size - 1.0) < 1e-9 else f"{si} ({step / size:.4g} {unit.text} in column {column.name})"
+
+
+def _constant(work: Work) -> tuple[list[Finding], Work]:
+    """Channels that never change, while something says they should."""
+    found = []
+    for channel in work.channels:
+        columns = work.columns(channel)
+        flat = {name: bool(np.nanmax(values) == np.nanmin(values)) for name, values in columns}
+        for component, values in columns:
+            if not flat[component] or channel in ("supply",):
+                continue
+            k = place(component)[1]  # type: ignore[index]
+            reason = _should_move(work, channel, k, all(flat.values()))
+            if reason:
+                found.append(Finding(
+                    "dead", FATAL if channel not in ("pose", "twist_command", "wheel_speed_command") else WARN,
+                    component, f"{component} is {np.nanmax(values):.4g} in every row, while {reason}",
+                    "look at its sensor, its cable and its column; leave it out otherwise",
+                    work.lines(np.ones(len(work), dtype=bool)), len(work), {"value": float(np.nanmax(values))},
+                ))  # fmt: skip
+                work = work.masked(channel, k, np.ones(len(work), dtype=bool))
+    return found, work
+
+
+def _should_move(work: Work, channel: str, k: int, all_flat: bool) -> str:
+    """Why a constant component should change: what else moves. Empty where nothing says so."""
+    if channel in ("voltage", "duty"):
+        current, speed = work.get("current"), work.get("wheel_speed")
+        driven = current is not None and k < current.shape[1] and _moves(current[:, k])
+        turned = speed is not None and k < speed.shape[1] and _moves(speed[:, k])
+        return f"current and speed of motor {k + 1} change" if driven and turned and not all_flat else ""
+    if channel == "current":
+        for other in ("voltage", "duty"):
+            values = work.get(other)
+            if values is not None and k < values.shape[1] and _moves(values[:, k]):
+                return f"its motor gets a changing {other}"
+        return "the other motors draw current" if not all_flat and _wheel_moves(work, k) else ""
+    if channel in ("wheel_speed", "wheel_angle"):
+        return _wheel_reason(work, channel, k)
+    if channel == "twist" and not all_flat:
+        speed, robot = work.full("wheel_speed"), work.geometry
+        if speed is None or robot is None:
+            return ""
+        own = twist_from_wheel_speed(robot.wheels, speed)[:, k]
+        scale = float(np.nanstd(twist_from_wheel_speed(robot.wheels, speed), axis=0).max())
+        return "the wheels say it changes" if float(np.nanstd(own)) > 0.1 * scale and _moves(own) else ""
+    if channel == "pose" and k == 2:
+        twist, speed, robot = work.get("twist"), work.full("wheel_speed"), work.geometry
+        if twist is not None and _moves(twist[:, 2]):
+            return "omega says it turns"
+        if speed is None or robot is None:
+            return ""
+        own = smooth(twist_from_wheel_speed(robot.wheels, speed), max(3, round(0.3 / work.step) | 1))
+        turning = spread_of_motion(own[:, 2]) * float(np.mean(robot.wheels.robot_radius))
+        if turning > 0.3 * max(spread_of_motion(own[:, 0]), spread_of_motion(own[:, 1])):
+            return "the wheels say that the robot turns: the heading was not recorded, or the wheels ran in the air"
+    return ""
+
+
+def _wheel_reason(work: Work, channel: str, k: int) -> str:
+    expected = expected_wheel_speed(work, without=channel)
+    if expected is None or k >= expected[1].shape[1]:
+        return ""
+    own = expected[1][:, k]
+    others = np.delete(expected[1], k, axis=1)
+    sizes = [spread_of_motion(column) for column in others.T]
+    usual = max(sizes) if sizes else 0.0
+    return f"{expected[0]} says that the wheel turns" if spread_of_motion(own) > 0.1 * usual and _moves(own) else ""
+
+
+def spread_of_motion(values: FloatArray) -> float:
+    """How far a channel gets from 0, without its wildest rows."""
+    values = values[np.isfinite(values)]
+    return float(np.quantile(np.abs(values), 0.95)) if values.size else 0.0
+
+
+def _wheel_moves(work: Work, k: int) -> bool:
+    speed = work.get("wheel_speed")
+    return speed is not None and k < speed.shape[1] and _moves(speed[:, k])
+
+
+def _moves(values: FloatArray) -> bool:
+    """Whether a channel does more than its noise and one step of quantisation."""
+    noise = max(white_noise(values), quantum(values))
+    return spread_of_motion(values) > 5.0 * noise and float(np.nanstd(values)) > 0.0
+
+
+def _told(work: Work, source: str) -> NDArray[np.int64]:
+    """Rows in which what tells the speed of a wheel was recorded."""
+    if source not in MEASUREMENTS:
+        return np.arange(len(work))
+    return recorded(work, "current" if source == "voltage and current" else source.removeprefix("the "), 0)

@@ -1,0 +1,179 @@
+"""Order and sign of wheels and axes, by the motion over the floor and what the wheels must agree on."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.reference import ground, wheels_twist
+from omnidyn.findings.signal.robust import smooth
+from omnidyn.findings.wiring.frame import commands_agree
+from omnidyn.findings.wiring.orders import BETTER, WINDOWS, Answer, Wiring, choose, code_of, means, rivals_of, wirings
+from omnidyn.logs.channels import components
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
+
+FloatArray = NDArray[np.float64]
+
+Moments = tuple[FloatArray, FloatArray, FloatArray]  # sums of v v', v w', w w'
+
+# Of the motion of the wheels, that the floor must show to be a witness, by the number of its axes. All three show all
+# motion there is: wheels in rpm or deg/s, read as rad/s, are 10 or 57 times too fast and may be exchanged as well.
+SEEN_BY = (0.0, 0.3, 0.15, 0.01)
+
+
+def by_floor(work: Work) -> tuple[str, Answer] | None:
+    """What is wrong between wheels and floor; wheels that turn as the firmware tells them are wired as it thinks."""
+    answer = next(filter(None, (_within(work, seconds) for seconds in WINDOWS)), None)
+    return None if answer is not None and answer[0] == "wheels" and commands_agree(work) else answer
+
+
+def _within(work: Work, seconds: float) -> tuple[str, Answer] | None:
+    """("wheels" or "axes", what is wrong), from the motion over the floor and the wheels' own redundancy."""
+    speed, robot = work.full("wheel_speed"), work.geometry
+    if speed is None or robot is None:
+        return None
+    seen = ground(work)
+    floor, width = (work.get("twist_command"), 1) if seen is None else (seen.twist, seen.width)
+    n = robot.wheels.count
+    axes = [] if floor is None else [k for k in range(3) if np.isfinite(floor[:, k]).any()]
+    if not axes and n == 3:
+        return None
+    length = np.array([1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
+    columns = np.column_stack([_twist_of(work, unit) for unit in np.eye(n)]) * length[:, None]
+    null = _null_rows(robot)
+    rows = np.vstack([columns[axes], null])
+    w, *rest = means(
+        work, smooth(speed, width), *([floor[:, axes] * length[axes]] if floor is not None and axes else []),
+        seconds=seconds,
+    )  # fmt: skip
+    if len(w) < 8:
+        return None
+    v = rest[0] if rest else np.zeros((len(w), 0))
+    rims, least = float(((w * robot.wheels.radii) ** 2).sum()), SEEN_BY[len(axes)]
+    if axes and (v**2).sum() < least**2 * rims * len(axes) / n:
+        return None  # a robot that does not turn says nothing through its heading
+    target = np.column_stack([v, np.zeros((len(w), len(null)))])
+    moments = target.T @ target, target.T @ w, w.T @ w
+    tried = list(wirings(n))
+    costs = np.array([_cost(rows @ wiring.matrix, moments, bool(axes)) for wiring in tried])
+    total = float(np.trace(moments[0])) if axes else float(np.trace(rows @ moments[2] @ rows.T) + _size(rows, w))
+    answer = choose(tried, costs, total)
+    turned = _by_axes(rows, moments, axes, total) if axes and seen is not None else None
+    return _simpler(work, answer, turned)
+
+
+def _simpler(work: Work, answer: Answer | None, turned: Answer | None) -> tuple[str, Answer] | None:
+    """Wheels or axes: what explains much more, else what needs fewer changes.
+
+    One axis of the floor turned about is rarer than two motors exchanged, which may look the same.
+    """
+    if turned is None:
+        return None if answer is None else ("wheels", answer)
+    if answer is None or turned.best.changes + 1 < answer.best.changes or turned.left < BETTER * answer.left:
+        return "axes", turned
+    if turned.left < 2.0 * answer.left + 0.02:
+        answer = answer._replace(rival=turned.best.words(_axes_names(work)[1]))
+    return "wheels", answer
+
+
+def _twist_of(work: Work, unit: FloatArray) -> FloatArray:
+    twist = wheels_twist(work, unit[None])
+    assert twist is not None
+    return twist[0]
+
+
+def _null_rows(robot: Robot) -> FloatArray:
+    """Combinations of wheel speeds that are 0 whatever the robot does, in m/s. Shape (wheels - 3, wheels)."""
+    rims = wheel_speed(robot.wheels, np.eye(3))  # (3, wheels): wheel speed per unit of twist
+    _, _, basis = np.linalg.svd(rims)
+    return basis[3:] * float(np.mean(robot.wheels.radii))
+
+
+def _size(rows: FloatArray, w: FloatArray) -> float:
+    return float((w**2).sum()) * float((rows**2).sum()) / max(rows.shape[1], 1)
+
+
+def _cost(matrix: FloatArray, moments: Moments, scaled: bool) -> float:
+    """Least sum of squares of target - a matrix w over a scale a > 0, or a = 1 where there is no target."""
+    vv, vw, ww = moments
+    along, size = float((matrix * vw).sum()), float(((matrix @ ww) * matrix).sum())
+    if not scaled:
+        return size
+    if along <= 0.0 or size <= 0.0:
+        return float(np.trace(vv))
+    return float(np.trace(vv)) - along * (along / size)
+
+
+def _by_axes(rows: FloatArray, moments: Moments, axes: list[int], total: float) -> Answer | None:
+    """The same question with the wheels trusted and the axes of the floor's twist exchanged or turned about."""
+    vv, vw, ww = moments
+    n, free = len(axes), len(vv) - len(axes)
+    exchanges = [tuple(range(n))] + ([(1, 0, *range(2, n))] if axes[:2] == [0, 1] else [])
+    tried = [Wiring(order, tuple(sign)) for order in exchanges for sign in product((1.0, -1.0), repeat=n)]
+    costs = []
+    for wiring in tried:
+        turn = np.eye(n + free)
+        turn[:n, :n] = wiring.matrix
+        costs.append(_cost(rows, (turn @ vv @ turn.T, turn @ vw, ww), True))
+    return choose(tried, np.array(costs), total, 0.5)  # so few are tried that chance is no matter
+
+
+def _axes_names(work: Work) -> tuple[str, tuple[str, ...]]:
+    seen = ground(work)
+    assert seen is not None
+    names = components("twist", 0) if seen.name == "twist" else ("x", "y", "heading")
+    return seen.name, tuple(names[k] for k in seen.axes)
+
+
+def axes_finding(work: Work, answer: Answer) -> Finding:
+    """Fatal: axes of what was measured over the floor are exchanged, or have the opposite sign."""
+    channel, names = _axes_names(work)
+    wrong = answer.best.touched(names)
+    heading = wrong == ["heading"] or wrong == ["omega"]
+    also = " (a positive speed of all wheels must turn the robot counter-clockwise)" if heading else ""
+    return Finding(
+        code_of(answer.best), FATAL, " ".join(wrong),
+        f"{channel} against the wheels: {answer.best.words(names)}{also}; as logged they share "
+        f"{100 * (1 - answer.logged):.0f} % of their motion, put right {100 * (1 - answer.left):.0f} %"
+        + (", or else all wheels have the opposite sign" if heading else ""),
+        "set `invert` for that column in the mapping, or turn the wheels' signs in the same way",
+        (), 0, {"explained_as_logged": 1.0 - answer.logged, "explained_put_right": 1.0 - answer.left},
+    )  # fmt: skip
+
+
+def mended_axes(work: Work, wiring: Wiring) -> Work:
+    """The log with these axes put right; NaN where a pose cannot be."""
+    seen = ground(work)
+    assert seen is not None
+    values = work.channels[seen.name].copy()
+    if seen.name == "pose":
+        # A mirrored or turned picture: only the signs of the heading can be put right here.
+        signs = np.ones(3)
+        signs[seen.axes] = wiring.sign
+        values = values * signs if tuple(wiring.order) == tuple(range(len(wiring.order))) else values * np.nan
+    else:
+        values[:, seen.axes] = wiring.applied(values[:, seen.axes])
+    return work.replace(**{seen.name: values})
+
+
+def wheels_finding(work: Work, answer: Answer, blamed: str) -> Finding:
+    """Fatal: wheel speeds in another order, or of the opposite sign, than floor or commands say."""
+    seen = ground(work)
+    against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")
+    names = components("wheel_speed", work.wheels)
+    wrong = answer.best.touched(names)
+    what = f"the {against} of the robot" if against else "what the wheels must agree on"
+    also = "; its voltage, current and speed agree, so the whole motor is meant" if blamed == "motors" else ""
+    return Finding(
+        code_of(answer.best), FATAL, " ".join(wrong),
+        f"wheel_speed against {what}: {answer.best.words(names)}{also}{rivals_of(answer, names)}; as logged it "
+        f"leaves {100 * answer.logged:.0f} % of the motion unexplained, put right {100 * answer.left:.1f} %",
+        "put the columns right in the mapping (--column), or the order and signs of the wheels in the robot file",
+        (), 0, {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,
+                "as_good": float(answer.others)},
+    )  # fmt: skip

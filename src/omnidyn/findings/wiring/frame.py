@@ -1,0 +1,94 @@
+"""The frame of a pose against its own heading: turned, or mirrored; and whether the pose follows the wheels at all."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.reference import pose_twist, wheels_twist
+from omnidyn.findings.wiring.orders import means
+from omnidyn.model.wheels import wheel_speed
+
+FloatArray = NDArray[np.float64]
+
+
+def check_frame(work: Work, left: float) -> tuple[list[Finding], Work]:
+    """A pose whose x and y belong to another frame than its heading: turned, or mirrored as a picture from above is.
+
+    left: what the best other wiring of the wheels leaves unexplained.
+    """
+    speed, pose, robot = work.full("wheel_speed"), work.full("pose"), work.geometry
+    if speed is None or pose is None or robot is None or work.get("twist") is not None or len(work) < 3 * MIN_ROWS:
+        return [], work
+    best, plain = (0.0, 0.0 + 0.0j, 1.0), 0.0
+    for mirror in (1.0, -1.0):
+        turned = pose * [1.0, mirror, mirror]
+        twist, width = pose_twist(work, turned)
+        own = wheels_twist(work, speed, width)
+        assert own is not None
+        w, g = means(work, own[:, :2], twist[:, :2])
+        if len(w) < 8:
+            return [], work
+        wheel, floor = w @ [1.0, 1.0j], g @ [1.0, 1.0j]
+        size = np.sqrt((np.abs(wheel) ** 2).sum() * (np.abs(floor) ** 2).sum())
+        slope = (np.conj(wheel) * floor).sum() / size if size > 0.0 else 0.0j
+        if mirror > 0.0:
+            plain = float(slope.real)
+        if abs(slope) > best[0] + 0.05 * (mirror < 0.0):
+            best = float(abs(slope)), complex(slope), mirror
+    alike, slope, mirror = best
+    angle = float(np.degrees(np.angle(slope)))
+    trusted = commands_agree(work)
+    if trusted and plain < 0.5 and alike < 0.8:
+        return [_unlike(plain)], work.replace(pose=None)
+    if not trusted and left < 0.6 * (1.0 - alike**2) + 0.005:
+        return [], work
+    if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
+        return [], work
+    words = f"turned by {angle:.0f} deg" + (" and mirrored" if mirror < 0.0 else "")
+    mended = pose * [1.0, mirror, mirror]
+    unit = np.exp(-1.0j * np.radians(angle))
+    place = (mended[:, 0] + 1.0j * mended[:, 1]) * unit
+    mended = np.column_stack([place.real, place.imag, mended[:, 2]])
+    return [Finding(
+        "pose_frame", WARN, "x y", f"x and y of the pose are {words} against its heading and the wheels (likeness "
+        f"{plain:.2f} as logged, {alike:.2f} put right)",
+        "turn the frame of the pose, or correct its heading by that angle, before world speeds are used", (), 0,
+        {"angle_deg": angle, "mirrored": float(mirror < 0.0), "likeness": alike, "likeness_as_logged": plain},
+    )], work.replace(pose=mended)  # fmt: skip
+
+
+def _unlike(plain: float) -> Finding:
+    return Finding(
+        "pose_unlike", WARN, "x y heading",
+        f"the pose does not follow the wheels (likeness {plain:.2f}), which turn as "
+        "they are told; no turned or mirrored frame explains it",
+        "look at the tracking of the pose; it was not used", (), 0, {"likeness_as_logged": plain},
+    )  # fmt: skip
+
+
+def commands_agree(work: Work) -> bool:
+    """Whether the wheels turn as the commanded twist says: then they are wired as the firmware thinks."""
+    orders, speed, robot = work.full("twist_command"), work.full("wheel_speed"), work.geometry
+    if orders is None or speed is None or robot is None:
+        return False
+    wanted, turned = means(work, wheel_speed(robot.wheels, orders), speed)
+    size = np.sqrt((wanted**2).sum() * (turned**2).sum())
+    return bool(size > 0.0 and (wanted * turned).sum() > 0.9 * size)
+
+
+def _turns_say(work: Work, mirror: float) -> bool:
+    """Whether the robot turns enough to see that its wheels are right about yaw, whatever they are about x and y."""
+    speed, pose = work.full("wheel_speed"), work.full("pose")
+    if speed is None or pose is None:
+        return False
+    twist, width = pose_twist(work, pose * [1.0, mirror, mirror])
+    own = wheels_twist(work, speed, width)
+    assert own is not None
+    w, g = means(work, own[:, 2:], twist[:, 2:])
+    size = np.sqrt((w**2).sum() * (g**2).sum())
+    moved = np.sqrt((w**2).sum()) * float(np.mean(work.geometry.wheels.robot_radius))  # type: ignore[union-attr]
+    planar = np.sqrt((means(work, own[:, :2])[0] ** 2).sum())
+    return bool(size > 0.0 and (w * g).sum() > 0.97 * size and moved > 0.3 * planar)

@@ -1,0 +1,127 @@
+"""Orders and signs of columns, and the choice among them: which one the log calls for, and whether it can tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations, product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.robust import windowed
+
+FloatArray = NDArray[np.float64]
+
+BETTER = 0.35  # the right wiring leaves at most so much of what the logged one leaves
+POOR = 0.02  # a wiring that leaves less than this share of the motion unexplained is not doubted
+ALIKE = 0.15  # a wiring so close to the best one, of the way to the logged one, is as good
+MAX_TRIED = 4  # wheels up to which every order is tried; beyond, exchanges of two
+WINDOWS = (0.12, 0.5)  # [s]; the long one for speeds that drown in noise
+
+
+class Wiring(NamedTuple):
+    """Slot i takes column order[i] times sign[i]; slots are wheels, or axes of the floor."""
+
+    order: tuple[int, ...]
+    sign: tuple[float, ...]
+
+    @property
+    def changes(self) -> int:
+        """How many things are wrong in the log if this is right."""
+        return sum(k != j for k, j in enumerate(self.order)) + sum(s < 0.0 for s in self.sign)
+
+    @property
+    def matrix(self) -> FloatArray:
+        """slots = matrix @ columns."""
+        n = len(self.order)
+        matrix = np.zeros((n, n))
+        matrix[np.arange(n), self.order] = self.sign
+        return matrix
+
+    def applied(self, values: FloatArray) -> FloatArray:
+        """The columns put right. Shape (rows, n)."""
+        return values[:, self.order] * np.array(self.sign)
+
+    def words(self, names: tuple[str, ...]) -> str:
+        """What is wrong, by the names of the columns."""
+        parts = []
+        moved = [k for k, j in enumerate(self.order) if k != j]
+        if len(moved) == 2:
+            parts.append(f"{names[moved[0]]} and {names[moved[1]]} are exchanged")
+        elif moved:
+            parts.append("; ".join(f"{names[self.order[k]]} is in truth {names[k]}" for k in moved))
+        turned = [names[j] for j, s in zip(self.order, self.sign, strict=True) if s < 0.0]
+        if turned:
+            parts.append(f"{' and '.join(turned)} {'has' if len(turned) == 1 else 'have'} the opposite sign")
+        return ", and ".join(parts)
+
+    def touched(self, names: tuple[str, ...]) -> list[str]:
+        """The columns that are wrong."""
+        wrong = {j for k, (j, s) in enumerate(zip(self.order, self.sign, strict=True)) if j != k or s < 0.0}
+        return [names[j] for j in sorted(wrong)]
+
+
+class Answer(NamedTuple):
+    """best: the right wiring with fewest changes. others: as good ones. left, logged: share that best and log leave."""
+
+    best: Wiring
+    others: int
+    second: Wiring | None
+    left: float
+    logged: float
+    rival: str = ""  # the same seen from the floor
+
+
+def wirings(n: int) -> Iterator[Wiring]:
+    """Orders and signs of n columns to try."""
+    signs = list(product((1.0, -1.0), repeat=n)) if n <= 8 else [tuple([1.0] * n)]
+    if n <= MAX_TRIED:
+        orders: list[tuple[int, ...]] = list(permutations(range(n)))
+    else:
+        orders = [tuple(range(n))]
+        for a in range(n):
+            for b in range(a):
+                swapped = list(range(n))
+                swapped[a], swapped[b] = b, a
+                orders.append(tuple(swapped))
+    return (Wiring(order, tuple(sign)) for order in orders for sign in signs)
+
+
+def choose(
+    tried: list[Wiring], costs: FloatArray, total: float, better: float = BETTER, poor: float = POOR
+) -> Answer | None:
+    """The wiring that the costs call for; None where that of the log, the first, is not clearly wrong."""
+    logged, least = float(costs[0]), float(costs.min())
+    if not np.isfinite(logged) or total <= 0.0 or logged < poor * total or least > better * logged:
+        return None
+    alike = [k for k in np.flatnonzero(costs <= least + ALIKE * (logged - least))]
+    alike.sort(key=lambda k: (tried[k].changes, costs[k]))
+    # Of those with fewest changes the cheapest; a rival is one that does not need more changes.
+    best = tried[alike[0]]
+    rivals = [tried[k] for k in alike[1:] if tried[k].changes == best.changes]
+    return Answer(best, len(rivals), rivals[0] if rivals else None, float(costs[alike[0]]) / total, logged / total)
+
+
+def means(work: Work, *channels: FloatArray, seconds: float = WINDOWS[0]) -> list[FloatArray]:
+    """Means over short windows, rows without all channels left out. Shapes (windows, columns)."""
+    ids, count = work.windows(seconds)
+    table = np.column_stack(channels)
+    good = np.asarray(np.isfinite(table).all(axis=1))
+    number = windowed(ids, count, good)
+    sums = np.column_stack([windowed(ids, count, np.where(good, column, 0.0)) for column in table.T])
+    keep = number >= 3
+    means = sums[keep] / number[keep, None]
+    return np.split(means, np.cumsum([values.shape[1] for values in channels])[:-1], axis=1)
+
+
+def code_of(wiring: Wiring) -> str:
+    return "swapped" if any(k != j for k, j in enumerate(wiring.order)) else "inverted"
+
+
+def rivals_of(answer: Answer, names: tuple[str, ...]) -> str:
+    if answer.second is None:
+        return f" (or, which this log cannot tell apart, {answer.rival})" if answer.rival else ""
+    more = f", or {answer.others - 1} more" if answer.others > 1 else ""
+    return f" (or, which this log cannot tell apart, {answer.second.words(names)}{more})"

@@ -1,0 +1,207 @@
+"""What a fit to whole logs says in words and tables: numbers, doubts, and what to measure next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from omnidyn.findings.finding import FATAL, WARN, Verdict
+from omnidyn.identification.estimate import Estimate, unit
+from omnidyn.identification.motors.fit import MotorFit
+from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.shape_residual import between_axes
+from omnidyn.identification.steady.study_parts import Difference
+from omnidyn.identification.validation import FITTED, HELD_OUT, Validation, coloured
+from omnidyn.logs.steady_table import AXES
+from omnidyn.model.first_guess import GUESS
+
+NUMBER_HEAD = ("number", "value", "std error", "95 % interval", "unit", "")
+DIFFERENCE_HEAD = ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "")
+VERDICT_HEAD = ("log", "rows", "length s", "rate Hz", "fatal", "to heed", "what")
+MOTOR_HEAD = ("motor", "dead band fitted", "slope", "+-", "dead band", "95 % interval", "lag ms", "unit", "rmse rad/s",
+              "held out rad/s")  # fmt: skip
+WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
+LONGEST = 100.0  # times as long as now: nobody records more
+TOGETHER = 0.95  # correlation of two numbers that move together
+SHOWN = 6
+PAYS = 0.01  # share by which the error on held-out logs must fall for a number to pay
+# Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
+GOES_WITH_TORQUE = ("motor.emf_constant_Vs_rad", "motor.gear_ratio")
+FREEABLE = ("motor.torque_constant_Nm_A", "motor.resistance_ohm", "body.inertia_kg_m2")
+
+
+def number_rows(fit: OutputErrorEstimate) -> list[tuple[str, ...]]:
+    """Every fitted number, those of the log too, as cells under NUMBER_HEAD."""
+    rows = []
+    for name, value in fit.value.items():
+        mark = "not identifiable" if name in fit.unidentifiable else "at bound" if name in fit.at_bound else ""
+        rows.append((name, f"{value:.5g}", f"{fit.std[name]:.2g}", interval(fit.ci95[name]), unit(name), mark))
+    for name, own in fit.nuisances.items():
+        mark = "not identifiable" if name in fit.unidentifiable else "of the log"
+        rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval(own.ci95), own.unit, mark))
+    return rows
+
+
+def difference_rows(differences: Sequence[Difference]) -> list[tuple[str, ...]]:
+    """Cells under DIFFERENCE_HEAD."""
+    return [
+        (d.key, f"{d.first} {d.values[0]:.4g}", f"{d.second} {d.values[1]:.4g}", f"{d.difference:+.4g}", f"{d.std:.2g}",
+         interval((d.low, d.high)), unit(d.key), "differs" if d.differs else "no difference seen")
+        for d in differences
+    ]  # fmt: skip
+
+
+def verdict_rows(verdicts: Sequence[Verdict]) -> list[tuple[str, ...]]:
+    """What `check` says of each log, as cells under VERDICT_HEAD."""
+    rows = []
+    for each in verdicts:
+        what = [f"{f.code} {f.where}".rstrip() for f in each.findings if f.level in (FATAL, WARN)]
+        words = ", ".join(what[:SHOWN]) + (", ..." if len(what) > SHOWN else "")
+        rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[FATAL]),
+                     str(each.counts[WARN]), words or "fit for use"))  # fmt: skip
+    return rows
+
+
+def motor_rows(found: Sequence[tuple[MotorFit, MotorFit, float, float]]) -> list[tuple[str, ...]]:
+    """(with a dead band, without, rmse on held-out logs of each) of every motor, as cells under MOTOR_HEAD."""
+    rows = []
+    for band, plain, held, held_plain in found:
+        for fit, words, out in ((band, "yes", held), (plain, "no", held_plain)):
+            seen = "dead_band" in fit.value
+            rows.append((
+                str(fit.motor + 1), words, f"{fit.value['slope']:.5g}", f"{fit.std['slope']:.2g}",
+                f"{fit.value['dead_band']:.3g}" if seen else "-", interval(fit.ci95["dead_band"]) if seen else "-",
+                f"{1e3 * fit.value['lag']:.3g}", f"{fit.unit}, s/rad", f"{fit.rmse:.4g}",
+                f"{out:.4g}" if math.isfinite(out) else "-",
+            ))  # fmt: skip
+    return rows
+
+
+def motor_words(found: Sequence[tuple[MotorFit, MotorFit, float, float]]) -> list[str]:
+    """What each motor's fit says: its statement, its doubts, and whether the dead band is any use on held-out logs."""
+    words = []
+    for band, _, held, held_plain in found:
+        words += [band.statement(), *(f"motor {band.motor + 1}: {each}" for each in band.doubts)]
+        if band.dead_band_seen and held > (1.0 - PAYS) * held_plain:
+            words.append(
+                f"motor {band.motor + 1}: held-out logs are met no better with the dead band (error {held:.4g} rad/s, "
+                f"{held_plain:.4g} without): it may stand for something else"
+            )
+    return words
+
+
+def interval(pair: tuple[float, float]) -> str:
+    return f"[{pair[0]:.4g}, {pair[1]:.4g}]"
+
+
+def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]:
+    """What to measure or to ask for next, gravest first."""
+    words = [*_not_seen(fit), *_guesses(fit, validation), *_together(fit), *_wide(fit)]
+    words += _from_validation(fit, validation)
+    return list(dict.fromkeys(words))
+
+
+def verdict_advice(verdicts: Sequence[Verdict]) -> list[str]:
+    """What to mend in logs of which `check` says that they give wrong results as they stand."""
+    alike: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for each in verdicts:
+        for finding in each.findings:
+            if finding.level == FATAL:
+                remedy = finding.remedy or "see omnidyn check"
+                alike.setdefault((finding.code, remedy), []).append((each.source, finding.message))
+    return [
+        f"{found[0][0]}{f' and {len(found) - 1} more' if len(found) > 1 else ''}: {found[0][1]}: {remedy}"
+        for (_, remedy), found in alike.items()
+    ]
+
+
+def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
+    for name, bound in fit.lower_bound.items():
+        axis = AXES[int(name[-2])] if name[-1:] == "]" else name
+        yield f"drive {axis} harder than {bound:.3g} {unit(name)}: it never moved, so its friction is only bounded"
+    for name in fit.unidentifiable:
+        yield f"{name} cannot be told from these logs: {_remedy(name)}"
+    for words in fit.blind:
+        yield f"{words}: fix one of them to what was measured otherwise (--fix), or give it a std (--use-priors)"
+
+
+def _remedy(name: str) -> str:
+    if name.startswith("friction.axes."):
+        return f"drive {AXES[int(name[-2])]} both ways, at several speeds"
+    return "fix it (--fix), or record what depends on it: currents, or another load"
+
+
+def _guesses(fit: OutputErrorEstimate, validation: Validation | None) -> Iterator[str]:
+    """What the robot file only guesses, where the model misses something: no friction makes up for a wrong motor."""
+    guessed = [
+        key for key, prior in fit.robot.priors.items()
+        if prior.source == GUESS and key not in fit.value and key.startswith(("motor.", "body."))
+    ]  # fmt: skip
+    if FREEABLE[0] in fit.value:
+        guessed = [key for key in guessed if key not in GOES_WITH_TORQUE]
+    missed = validation is not None and bool(coloured(validation.scores.get(HELD_OUT) or validation.scores[FITTED]))
+    if guessed and missed:
+        free = " ".join(f"--free {key}" for key in FREEABLE if key in guessed)
+        are = "is a guess" if len(guessed) == 1 else "are guesses"
+        yield (
+            f"{', '.join(guessed)} {are} of the robot file, and the errors are not white: put in what you can "
+            f"measure{f', or fit what shows in the logs (--free friction {free})' if free else ''}"
+        )
+
+
+def _together(fit: OutputErrorEstimate) -> Iterator[str]:
+    names, matrix = fit.correlation.names, fit.correlation.matrix
+    pairs = [
+        f"{first} and {names[j]} move together (correlation {matrix[i, j]:+.2f})"
+        for i, first in enumerate(names) for j in range(i + 1, len(names))
+        if abs(matrix[i, j]) > TOGETHER and not {first, names[j]} & set(fit.unidentifiable)
+    ]  # fmt: skip
+    if pairs:
+        one = "one of them" if len(pairs) == 1 else "one of each pair"
+        yield f"{', '.join(pairs)}: measure {one} otherwise, or drive at more different speeds"
+
+
+def _wide(fit: Estimate) -> Iterator[str]:
+    shares = {
+        name: fit.std[name] / abs(value) for name, value in fit.value.items()
+        if value and math.isfinite(fit.std[name]) and name not in fit.at_bound
+    }  # fmt: skip
+    wide = {name: share for name, share in shares.items() if share > WIDE}
+    if wide:
+        known = ", ".join(f"{name} is known within {100.0 * share:.0f} % only" for name, share in wide.items())
+        longer = (max(wide.values()) / GOAL) ** 2
+        enough = f"a log {longer:.0f} times as long" if longer <= LONGEST else "no log of a usual length"
+        yield (
+            f"{known}: {enough} would bring {'it' if len(wide) == 1 else 'all of them'} to {100.0 * GOAL:.0f} %; more "
+            "motion where it matters would do so sooner"
+        )
+
+
+def _from_validation(fit: OutputErrorEstimate, validation: Validation | None) -> Iterator[str]:
+    if validation is None:
+        return
+    scores = validation.scores[FITTED]
+    late = {name: s.lag for name, s in scores.items() if s.lag}
+    if late and not any(name.startswith("latency") for name in fit.nuisances):
+        name, lag = next(iter(late.items()))
+        yield f"{name} is {lag:+.3f} s behind the model: fit it with --nuisance latency"
+    if coloured(scores) and not fit.nuisances:
+        yield (
+            "errors are not white, so the model misses something: try --nuisance latency, gain or dead_band, or free "
+            "motor.torque_constant_Nm_A"
+        )
+    yield from _shape(fit, validation)
+    if validation.held_out is None:
+        yield "record one more log, of other drives, and hold it out (--hold-out): only that shows what it is worth"
+
+
+def _shape(fit: OutputErrorEstimate, validation: Validation) -> Iterator[str]:
+    """Friction of another shape than that of the robot file, where errors that last depend on the direction."""
+    found = between_axes(validation.fitted, fit.robot) if coloured(validation.scores[FITTED]) else None
+    if found is not None and found.clear:
+        way = "faster" if found.change > 0.0 else "slower"
+        yield (
+            f"between its axes the robot is {abs(found.change):.2g} +- {found.std:.1g} m/s {way} against the model "
+            "than along them, as with friction of another shape than that of the robot file: --method steady-state "
+            "says which shape the logs have"
+        )

@@ -1,0 +1,278 @@
+"""The exact engine of a fit: robots whose axes do not couple, one march per piece."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
+from omnidyn.identification.output_error.kernel.march import (
+    FINAL,
+    KEEP,
+    PATH,
+    WAVES,
+    Loss,
+    Physics,
+    Slopes,
+    Sums,
+    march,
+)
+from omnidyn.identification.output_error.kernel.march_axis import (
+    BY,
+    GRAD,
+    LAG,
+    LOSS,
+    NUMBER,
+    SIZE,
+    SQUARE,
+    march_axis,
+    spread,
+)
+from omnidyn.identification.output_error.problem.primitives import Mapping, Primitives
+from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums, Point, Problem
+from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.frames import body_to_world
+from omnidyn.model.layout import AXES
+from omnidyn.simulation.exact.position import PLACE_SIZE
+
+FloatArray = NDArray[np.float64]
+
+VECTOR = 4  # rows of slopes are padded to a multiple
+LATE, GAIN, DEAD, FADE = "latency.", "gain", "dead_band", "fade"
+POSITION, HEADING = "position", ("heading", 0)
+TILT = ("tilt.x", "tilt.y", "tilt.yaw")
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel/march.py.
+
+    counted: whether counts are taken as such, or like any other output.
+    """
+
+    variance: FloatArray
+    nu: float = 0.0
+    mode: int = 0
+    block: int = 1
+    counted: bool = False
+
+
+class ExactEngine:
+    """Residuals and sensitivities of a problem by the exact step.
+
+    fast: whether the march of kernel/march_axis.py may serve where it can.
+    """
+
+    def __init__(self, problem: Problem, fast: bool = True):
+        self.problem = problem
+        self.mapping = Mapping(problem.robot, problem.parameters[: problem.robot_count])
+        self._columns = problem.columns
+        twists = all(name == "twist" for name, _ in self._columns)
+        margins = any(piece.margin.any() for piece in problem.pieces)
+        friction = self.mapping.linear and problem.robot_count == len(problem.parameters)
+        self._axes_only = fast and twists and friction and not margins
+
+    def on(self, problem: Problem) -> ExactEngine:
+        """The same engine on other pieces of the same logs, with the same parameters."""
+        engine = copy.copy(self)
+        engine.problem, engine._columns = problem, problem.columns
+        return engine
+
+    def with_breakaway(self, breakaway: FloatArray) -> ExactEngine:
+        """The same engine with other fixed levels of breakaway, shape (3,) [N, N, N m], NaN where S follows coulomb."""
+        engine = copy.copy(self)
+        engine.mapping = copy.copy(self.mapping)
+        engine.mapping.breakaway = breakaway
+        return engine
+
+    def drives(self, point: Point) -> list[FloatArray]:
+        """Drive of the axes [N, N, N m] in every row of every piece but the last, shape (rows, 3)."""
+        robot = self.mapping.robot_at(point.values[: self.problem.robot_count])
+        matrix = self.mapping.at(point.values[: self.problem.robot_count])[0].drive * mass_matrix(robot)[:, None]
+        gain, dead, fade = (
+            point.values[k] if (k := self.problem.where(name)) >= 0 else plain
+            for name, plain in ((GAIN, 1.0), (DEAD, 0.0), (FADE, 0.0))
+        )
+        found = []
+        for piece in self.problem.pieces:
+            u, t = piece.record.voltage[piece.first : piece.last], piece.record.t[piece.first : piece.last]
+            left = gain * (1.0 - fade * (t - piece.record.t[0]) / piece.record.span)
+            applied = left[:, None] * np.sign(u) * np.maximum(np.abs(u) - dead, 0.0)
+            found.append(applied @ matrix.T + self._tilt(point.values))
+        return found
+
+    def _tilt(self, values: FloatArray) -> FloatArray:
+        """The constant force on the axes [N, N, N m]."""
+        return np.array([values[k] if (k := self.problem.where(name)) >= 0 else 0.0 for name in TILT])
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the march over every piece adds up."""
+        now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
+        if self._axes_only:
+            return [
+                self._axes(piece, state, now, slopes, weighting)
+                for piece, state in zip(self.problem.pieces, point.states, strict=True)
+            ]
+        return [
+            self._piece(piece, state, point.values, now, slopes, weighting)[0]
+            for piece, state in zip(self.problem.pieces, point.states, strict=True)
+        ]
+
+    def outputs(self, point: Point) -> list[tuple[FloatArray, FloatArray]]:
+        """(outputs, slopes) of every piece, rows of its record, NaN outside: (rows, C) and (rows, C, P + 3 + C)."""
+        now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
+        plain = Weighting(np.ones(len(self._columns)), mode=KEEP)
+        return [
+            self._piece(piece, state, point.values, now, slopes, plain)[1]
+            for piece, state in zip(self.problem.pieces, point.states, strict=True)
+        ]
+
+    def _axes(
+        self, piece: Piece, state: FloatArray, now: Primitives, by: Primitives, weighting: Weighting
+    ) -> PieceSums:
+        """The sums of a piece, axis by axis."""
+        record, count = piece.record, len(self.problem.parameters)
+        width = count + AXES + AXES
+        rows, grad, info = np.zeros((AXES, SIZE)), np.zeros((AXES, width)), np.zeros((AXES, width, width))
+        blocks = _blocks(piece, weighting)
+        score, drift, scores = np.zeros((blocks, width)), np.zeros((blocks, AXES)), np.zeros((AXES, blocks, BY + 1))
+        for axis in range(AXES):
+            march_axis(
+                record.t, record.voltage, record.outputs, axis, piece.first, piece.last, now.drive[axis],
+                now.rate[axis], now.coulomb[axis], now.hold[axis], state[axis], weighting.variance[axis], weighting.nu,
+                weighting.block, weighting.mode, rows[axis], scores[axis],
+            )  # fmt: skip
+            slopes = np.zeros((BY, width))
+            slopes[0, :count], slopes[1, :count] = by.rate[axis], by.coulomb[axis]
+            slopes[2, count + axis] = piece.free[axis]
+            grad[axis], info[axis] = rows[axis, GRAD : GRAD + BY] @ slopes, spread(rows[axis], slopes)
+            if blocks:
+                score += scores[axis, :, :BY] @ slopes
+                drift[:, axis] = scores[axis, :, BY]
+        number, square, loss, lag = (rows[:, what] for what in (NUMBER, SQUARE, LOSS, LAG))
+        return PieceSums(np.arange(AXES), number, square, loss, lag, grad, info, score, drift)
+
+    def _piece(
+        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, weighting: Weighting
+    ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:
+        columns, count = piece.record.columns, len(self.problem.parameters)
+        known = np.array([self._columns.index(column) for column in columns])
+        total = count + AXES + len(columns)
+        used = np.concatenate([np.arange(count), count + np.flatnonzero(piece.free)])  # the kernel knows no others
+        physics, slopes, groups = self._numbers(piece, state, values, now, by, -(-len(used) // VECTOR) * VECTOR)
+        counted = weighting.counted and any(piece.record.ticks)
+        tick = np.array(piece.record.ticks) if counted else None
+        share = np.ones(len(known)) if tick is None else information(weighting.variance[known], tick)[0]
+        loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode, share)
+        moves = any(name == POSITION for name, _ in columns)
+        sums = _empty(
+            len(columns), slopes.law.shape[2], len(used), len(piece.record.t), weighting.mode, _blocks(piece, weighting)
+        )
+        march(
+            piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
+            float(piece.record.t[0]), piece.record.span, piece.margin, state[:AXES], state[AXES:], groups,
+            physics, slopes, loss, sums, tick, np.zeros((2, PLACE_SIZE)) if moves else None,
+            np.zeros((3, 3)) if moves else None,
+        )  # fmt: skip
+        grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
+        info = np.zeros((len(columns), total, total))
+        info[:, used[:, None], used] = sums.info[:, : len(used), : len(used)]
+        waves = _at(used, sums.waves, total) if weighting.mode & WAVES else None
+        tight = PieceSums(known, sums.number, sums.square, sums.loss, sums.lag, grad, info, score, sums.drift, waves)
+        return tight, (sums.predicted, _at(used, sums.slopes, total))
+
+    def _numbers(
+        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, padded: int
+    ) -> tuple[Physics, Slopes, NDArray[np.int64]]:
+        """Physics and slopes of the outputs of one piece."""
+        problem, columns = self.problem, piece.record.columns
+        count, robot_count, width = len(problem.parameters), problem.robot_count, len(columns)
+
+        def wide(slope: FloatArray) -> FloatArray:
+            out = np.zeros((*slope.shape[:-1], padded))
+            out[..., :robot_count] = slope
+            return out
+
+        facing = state[AXES + columns.index(HEADING)] if HEADING in columns else 0.0
+        maps, slopes = _maps(columns, now, facing), _maps(columns, by, facing, (robot_count,))
+        late = [problem.where(LATE + name) for name, _ in columns]
+        driver = [problem.where(name) for name in (GAIN, DEAD, FADE)]
+        fixed, tilt = (1.0, 0.0, 0.0), self._tilt(values)
+        physics = Physics(
+            np.stack([now.rate, now.coulomb, now.hold]), now.drive, now.per_force * tilt, maps[0], maps[1], maps[2],
+            _wheel_of(columns), np.array([values[k] if k >= 0 else 0.0 for k in late]),
+            np.array([values[k] if k >= 0 else fixed[i] for i, k in enumerate(driver)]), bool(maps[1].any()),
+        )  # fmt: skip
+        at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
+        push, travel = wide(by.per_force * tilt[:, None]), wide(slopes[1])
+        for axis, name in enumerate(TILT):
+            if (k := problem.where(name)) >= 0:
+                push[axis, k] = now.per_force[axis]
+        for c, (name, i) in enumerate(columns):
+            if name == POSITION:
+                travel[c, AXES:, at[AXES + columns.index(HEADING)]] = turned_by(facing)[i]
+        varies = np.array([bool(travel[c].any()) for c in range(width)])
+        derivatives = Slopes(
+            wide(np.stack([by.rate, by.coulomb])), wide(by.drive), push, wide(slopes[0]), travel, wide(slopes[2]),
+            not self.mapping.linear, varies, np.array(late), np.array(driver), at[:AXES], at[AXES:],
+        )  # fmt: skip
+        starts = [c for c in range(width) if c == 0 or columns[c][0] != columns[c - 1][0]]
+        return physics, derivatives, np.array([*starts, width])
+
+
+def _maps(columns: Sequence[Column], now: Primitives, facing: float, more: tuple[int, ...] = ()) -> list[FloatArray]:
+    """(M, Q, E) of the outputs, or their derivatives where `more` is the shape of the parameters.
+
+    facing: heading at the start of the piece [rad].
+    """
+    speed, travel = np.zeros((len(columns), AXES, *more)), np.zeros((len(columns), PATH, *more))
+    volts = np.zeros((len(columns), *more))
+    for c, (name, i) in enumerate(columns):
+        if name == "wheel_speed":
+            speed[c] = now.wheels[i]
+        elif name == "wheel_angle":
+            travel[c, :AXES] = now.wheels[i]
+        elif name == "current":
+            speed[c], volts[c] = now.braking[i], now.per_volt[i]
+        elif more:  # the twist and the pose themselves
+            continue
+        elif name == POSITION:
+            travel[c, AXES:] = body_to_world(facing)[i, : PATH - AXES]
+        else:
+            (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
+    return [speed, travel, volts]
+
+
+def turned_by(facing: float) -> FloatArray:
+    """d/d facing of what turns the displacement into the world: a quarter of a turn further. Shape (2, 2)."""
+    return body_to_world(facing + 0.5 * np.pi)[:2, :2]
+
+
+def _at(used: NDArray[np.int64], values: FloatArray, total: int) -> FloatArray:
+    """Values of the kernel's parameters among all, 0 for the rest. Shape (*batch, total)."""
+    wide = np.zeros((*values.shape[:-1], total))
+    wide[..., used] = values[..., : len(used)]
+    return wide
+
+
+def _wheel_of(columns: Sequence[Column]) -> NDArray[np.int64]:
+    return np.array([i if name == "current" else -1 for name, i in columns])
+
+
+def _blocks(piece: Piece, weighting: Weighting) -> int:
+    """Number of blocks of rows whose scores are kept."""
+    return -(-(piece.last - piece.first + 1) // weighting.block) if weighting.mode & FINAL else 0
+
+
+def _empty(columns: int, padded: int, total: int, rows: int, mode: int, blocks: int) -> Sums:
+    kept = (rows, columns) if mode & KEEP else (0, columns)
+    return Sums(
+        np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros((columns, padded)),
+        np.zeros((columns, padded, padded)), np.zeros((blocks, padded)), np.zeros((blocks, columns)),
+        np.full(kept, np.nan), np.full((*kept, total), np.nan),
+        np.zeros((columns, HARMONICS if mode & WAVES else 0, 2, padded)),
+    )  # fmt: skip

@@ -1,0 +1,174 @@
+"""The second engine of a fit: robots that the exact step cannot simulate, by the derivatives of the implicit engine.
+
+The same interface as exact.py, with arrays of the length of the log. A latency takes no steps of its own: the
+run is looked at between its rows (sensitivity/sample.py).
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import UnsupportedError
+from omnidyn.identification.output_error.engines.actuation import through_driver
+from omnidyn.identification.output_error.engines.exact import DEAD, FADE, GAIN, LATE, Weighting
+from omnidyn.identification.output_error.engines.sums import added
+from omnidyn.identification.output_error.problem.outputs import refuse_exact_only
+from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.problem.problem import Piece, PieceSums, Point, Problem
+from omnidyn.model.layout import AXES
+from omnidyn.model.motor import clip_voltage
+from omnidyn.model.robot import Robot
+from omnidyn.simulation.sensitivity.directions import difference
+from omnidyn.simulation.sensitivity.late_sample import Direction, Sight, sights
+from omnidyn.simulation.sensitivity.stage import EPS
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Found = tuple[FloatArray, FloatArray, IntArray]
+
+DRIVER = {GAIN: 1.0, DEAD: 0.0, FADE: 0.0}  # in the order of kernel/march.py, with what leaves the voltages as they are
+
+
+class TangentEngine:
+    """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
+
+    Raises UnsupportedError for nuisances and outputs that it does not know.
+    """
+
+    def __init__(self, problem: Problem, tol: float | None = None):
+        self.problem, self.tol, self._columns = problem, tol, problem.columns
+        nuisances = [p.name for p in problem.parameters[problem.robot_count :]]
+        other = [name for name in nuisances if not name.startswith(LATE) and name not in DRIVER]
+        if other:
+            raise UnsupportedError(
+                "this robot is fitted by the implicit engine, which does not know all that is asked for",
+                got=", ".join(other), where=problem.robot.name, expected=f"nuisances: latency, {', '.join(DRIVER)}",
+                remedy="leave it out of the nuisances",
+            )  # fmt: skip
+        refuse_exact_only(problem.columns, problem.robot.name)
+        self._known: dict[tuple[bytes, ...], list[Found]] = {}
+
+    def on(self, problem: Problem) -> TangentEngine:
+        """The same engine on other pieces of the same logs, with the same parameters."""
+        engine = copy.copy(self)
+        engine.problem, engine._columns, engine._known = problem, problem.columns, {}
+        return engine
+
+    def robot_at(self, values: FloatArray) -> Robot:
+        """The robot with these values, not checked."""
+        robot = self.problem.robot
+        for p, value in zip(self._own, values, strict=False):
+            robot = p.on(robot, float(value))
+        return robot
+
+    @property
+    def _own(self) -> tuple[Parameter, ...]:
+        """The parameters of the robot file."""
+        return self.problem.parameters[: self.problem.robot_count]
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the residuals of every piece add up to; see kernel/march.py."""
+        found = []
+        for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True):
+            columns = piece.record.columns
+            known = np.array([self._columns.index(column) for column in columns])
+            found.append(added(*parts, weighting, known, len(self.problem.parameters) + AXES + len(columns)))
+        return found
+
+    def residuals(self, point: Point) -> list[Found]:
+        """(residuals, slopes, at) of every piece, see `_piece`; those of the last two points are kept.
+
+        A fit ends where it was, or at its last trial, and is then asked again with other weights.
+        """
+        asked = (point.values.tobytes(), *(state.tobytes() for state in point.states))
+        found = self._known.pop(asked, None) or self._simulated(point)
+        while len(self._known) > 1:
+            del self._known[next(iter(self._known))]
+        self._known[asked] = found
+        return found
+
+    def _simulated(self, point: Point) -> list[Found]:
+        robot, values = self.robot_at(point.values), point.values
+        scales = [abs(float(value)) or 1.0 for value in values]
+        moved = [
+            tuple(p.on(robot, float(value) + side * EPS * scale) for side in (1.0, -1.0))
+            for p, value, scale in zip(self._own, values, scales, strict=False)
+        ]
+        return [
+            self._piece(robot, moved, scales, piece, state, values)
+            for piece, state in zip(self.problem.pieces, point.states, strict=True)
+        ]
+
+    def _piece(
+        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
+        values: FloatArray,
+    ) -> Found:  # fmt: skip
+        """(residuals (C, rows), slopes (C, rows, U), index of each of the U among the P parameters and the states)."""
+        record, count = piece.record, len(self.problem.parameters)
+        t, measured = record.t[piece.first : piece.last + 1], record.outputs[piece.first : piece.last + 1].T
+        voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
+        where = [self.problem.where(LATE + name) for name, _ in record.columns]
+        late = [float(values[k]) if k >= 0 else 0.0 for k in where]
+        distinct = sorted(set(late))
+        seen, _ = sights(robot, t, voltage, directions, state[:AXES], distinct, self.tol)
+        residual = np.empty(measured.shape)
+        keys = len(at)
+        at += [*dict.fromkeys(k for k in where if k >= 0), *(count + AXES + np.flatnonzero(piece.free[AXES:]))]
+        slopes = np.zeros((*measured.shape, len(at)))
+        shown: dict[tuple[str, float], tuple[FloatArray, FloatArray, FloatArray]] = {}
+        for c, (name, i) in enumerate(record.columns):
+            key = (name, late[c])
+            if key not in shown:
+                shown[key] = _shown(seen[distinct.index(late[c])], name)
+            value, pace, by = shown[key]
+            residual[c] = measured[c] - value[:, i] - state[AXES + c]
+            residual[c][t - t[0] < piece.margin[c]] = np.nan
+            np.multiply(by[:, :, i], factors, out=slopes[c, :, :keys])
+            if where[c] >= 0:
+                slopes[c, :, at.index(where[c])] = -pace[:, i]
+            if piece.free[AXES + c]:
+                slopes[c, :, at.index(count + AXES + c)] = 1.0
+        return residual, slopes, np.array(at)
+
+    def _directions(
+        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, values: FloatArray
+    ) -> tuple[FloatArray, list[Direction], list[int], FloatArray]:
+        """(voltages at the motors, directions, index of each among the slopes, what turns its derivative into that)."""
+        record, where, count = piece.record, self.problem.where, len(self.problem.parameters)
+        rows = slice(piece.first, piece.last)
+        at, directions = list(range(self.problem.robot_count)), []
+        logged = clip_voltage(robot.motor, record.voltage[rows])
+        found = [where(name) for name in DRIVER]
+        numbers = [float(values[k]) if k >= 0 else plain for k, plain in zip(found, DRIVER.values(), strict=True)]
+        share = (record.t[rows] - record.t[0]) / record.span
+        voltage, by = through_driver(logged, share, *numbers)
+        for p, (up, down) in zip(self._own, moved, strict=True):
+            rate = None
+            if up.motor.voltage_limit != down.motor.voltage_limit:
+                ends = [through_driver(clip_voltage(r.motor, logged), share, *numbers)[0] for r in (up, down)]
+                rate = difference(np.array(ends))[0]
+            directions.append(Direction(p.name, up, down, rate))
+        for name, k, rate in zip(DRIVER, found, by, strict=True):
+            if k >= 0:
+                directions.append(Direction(name, voltage=rate))
+                at.append(k)
+        for axis in np.flatnonzero(piece.free[:AXES]):
+            directions.append(Direction("start", start=np.eye(AXES)[axis]))
+            at.append(count + int(axis))
+        factors = np.ones(len(at))
+        factors[: self.problem.robot_count] = 1.0 / np.array(scales[: self.problem.robot_count])
+        return voltage, directions, at, factors
+
+
+def _shown(seen: Sight, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(value (rows, m), its time derivative (rows, m), its derivatives (rows, K, m)) of a channel of m columns."""
+    if name == "wheel_speed":
+        return seen.wheel_speeds()
+    if name == "current":
+        return seen.currents()
+    if name == "heading":
+        return seen.heading[:, None], seen.twist[:, 2:], seen.heading_by[:, :, None]
+    return seen.twist, seen.pace, seen.twist_by

@@ -1,0 +1,1 @@
+"""Compiled marches through a piece of a log: march, march_axis (the most common fit), counts (encoders)."""

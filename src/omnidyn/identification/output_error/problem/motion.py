@@ -1,0 +1,72 @@
+"""Which axes visibly moved in a log, and what drive those that did not have held."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.identification.output_error.problem.primitives import primitives
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.output_error.problem.starts import (
+    count_far,
+    difference_noise,
+    measured_rows,
+    measured_twist,
+    window_rows,
+)
+from omnidyn.logs.steady_table import AXES
+from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.robot import Robot
+
+FloatArray = NDArray[np.float64]
+
+CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any log
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """moved (3,): whether an axis visibly moved; True where no twist is known. held (3,): largest drive [N, N, N m].
+
+    seen (3,): whether anything tells of an axis; what was not measured has held nothing.
+    """
+
+    moved: NDArray[np.bool_]
+    held: FloatArray
+    seen: NDArray[np.bool_]
+
+    def words(self, axis: int, where: str = "") -> str:
+        """Why the friction of an axis that did not move is not fitted."""
+        place = f" in {where}" if where else ""
+        if not self.seen[axis]:
+            return f"axis {AXES[axis]} was not measured{place}: its friction is not fitted"
+        return f"axis {AXES[axis]} never visibly moved{place}: its friction is not fitted"
+
+
+def motion(records: Sequence[Record], robot: Robot) -> Motion:
+    """What all logs together show."""
+    moved, seen, held = np.zeros(3, bool), np.zeros(3, bool), np.zeros(3)
+    drive, mass = primitives(robot).drive, mass_matrix(robot)
+    for record in records:
+        twist = measured_twist(record, robot)
+        if twist is None:
+            return Motion(np.ones(3, bool), np.zeros(3), np.ones(3, bool))
+        known = np.isfinite(twist).any(axis=0)
+        others = any(name != "twist" for name, _ in record.columns)  # which may tell of an axis without a speed
+        seen |= known | others
+        moved |= others & ~known
+        for first, last in record.pieces:
+            wrench = record.voltage[first:last] @ drive.T * mass
+            held = np.maximum(held, np.where(known, np.abs(wrench).max(axis=0), 0.0))
+            for axis in np.flatnonzero(known).tolist():
+                moved[axis] |= _moved(record.t, twist, axis, first, last)
+    return Motion(moved, held, seen)
+
+
+def _moved(t: FloatArray, twist: FloatArray, axis: int, first: int, last: int) -> bool:
+    rows = max(window_rows(t[first : last + 1]) // 2, 1)
+    own = twist[first : last + 1, axis]
+    clear = CLEAR * difference_noise(own) / np.sqrt(measured_rows(own, rows))
+    return int(count_far(twist, axis, first, last, rows, clear)) >= rows

@@ -1,0 +1,145 @@
+"""What a log does to a model that is right: nuisances, fitted beside the robot so that they do not bias it.
+
+latency.CHANNEL   the channel shows what was t ago [s]; exact, by steps that end within a row
+gain              voltage at the motor = gain x logged; with a supply that is only nominal, a prior of 10 %
+dead_band         of the driver: (|u| - dead_band)+ sgn u reaches the motor [V]
+tilt.AXIS         constant force on x, y [N], yaw [N m] of the body: a floor that is not level, while the heading stays
+fade              share of the voltage lost from the start of a run to its end, evenly: a battery that sags
+start             twist at the start of each piece of the log; pose and angles of the wheels too
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.problem.problem import Piece
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.output_error.problem.starts import measured_twist
+from omnidyn.logs.steady_table import AXES
+from omnidyn.model.first_guess import GRAVITY
+from omnidyn.model.robot import Robot
+
+FloatArray = NDArray[np.float64]
+
+LATENCY, GAIN, DEAD, FADE, TILT = "latency", "gain", "dead_band", "fade", "tilt"
+NUISANCES = (LATENCY, GAIN, DEAD, FADE, TILT)
+TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an unknown start
+EARLIEST, LATEST = -0.1, 0.3  # [s]
+SUPPLY_STD = 0.1  # of a nominal supply: a battery is full or it is not
+MOST_FADE = 0.9
+AUTO, REST, FREE = "auto", "rest", "free"
+SILENT = 5  # rows without voltage that show a robot at rest
+CLEAR = 4.0  # standard errors from 0 that count as motion
+LEAD = 5  # rows whose mean is where a free start begins
+
+
+def nuisance_parameters(wanted: Sequence[str], records: Sequence[Record], robot: Robot) -> list[Parameter]:
+    """The nuisances asked for as free parameters. Raises InputError for a name that is none."""
+    unknown = [name for name in wanted if name.partition(".")[0] not in NUISANCES]
+    if unknown:
+        raise InputError("no such nuisance", got=unknown[0], expected=", ".join(NUISANCES), where="nuisances")
+    channels = measured_channels(records)
+    found: list[Parameter] = []
+    for name in wanted:
+        if name == LATENCY:
+            found += [Parameter(f"{LATENCY}.{channel}", 0.0, EARLIEST, LATEST) for channel in channels]
+        elif name.startswith(f"{LATENCY}."):
+            if name.partition(".")[2] not in channels:
+                raise InputError("no such channel", got=name, expected=", ".join(channels), where="nuisances")
+            found.append(Parameter(name, 0.0, EARLIEST, LATEST))
+        elif name == GAIN:
+            prior = (1.0, SUPPLY_STD) if any(record.supplied for record in records) else None
+            found.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
+        elif name == DEAD:
+            most = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
+            found.append(Parameter(DEAD, 0.0, 0.0, 0.5 * most))
+        elif name.partition(".")[0] == TILT:
+            found += _tilts(name, robot)
+        else:
+            found.append(Parameter(FADE, 0.0, -MOST_FADE, MOST_FADE))
+    return list({p.name: p for p in found}.values())
+
+
+def measured_channels(records: Sequence[Record]) -> list[str]:
+    """Channels with any measurement, each once."""
+    return list(
+        dict.fromkeys(
+            name for record in records for c, (name, _) in enumerate(record.columns)
+            if np.isfinite(record.outputs[:, c]).any()
+        )
+    )  # fmt: skip
+
+
+def _tilts(name: str, robot: Robot) -> list[Parameter]:
+    """The force on one axis, or on all; at most what the robot weighs, at its wheels for yaw."""
+    weight = GRAVITY * robot.body.mass
+    most = (weight, weight, weight * float(np.max(robot.wheels.robot_radius)))
+    every = [Parameter(f"{TILT}.{axis}", 0.0, -own, own) for axis, own in zip(AXES, most, strict=True)]
+    found = [p for p in every if name in (TILT, p.name)]
+    if not found:
+        raise InputError("no such axis", got=name, expected=", ".join(p.name for p in every), where="nuisances")
+    return found
+
+
+def automatic(records: Sequence[Record]) -> tuple[str, ...]:
+    """The nuisances that a log of a real robot is likely to have, before it is asked whether it determines them."""
+    return (LATENCY, DEAD, GAIN) if any(record.supplied for record in records) else (LATENCY, DEAD)
+
+
+def pieces(records: Sequence[Record], robot: Robot, start: str, late: bool) -> list[Piece]:
+    """The pieces of all records. start: "rest", "free" or "auto"; late: whether a latency is free.
+
+    "auto": at rest where the log begins without voltage and without visible motion; else free.
+    """
+    if start not in (AUTO, REST, FREE):
+        raise InputError("unknown start", got=start, expected=f"{AUTO}, {REST} or {FREE}", where="start")
+    found = []
+    for record in records:
+        twist = measured_twist(record, robot)
+        for number, (first, last) in enumerate(record.pieces):
+            rest = start == REST and number == 0
+            found.append(_piece(record, twist, first, last, rest, start == AUTO, late))
+    return found
+
+
+def _piece(
+    record: Record, twist: FloatArray | None, first: int, last: int, rest: bool, decide: bool, late: bool
+) -> Piece:
+    columns = record.columns
+    travels = np.array([name in TRAVELS for name, _ in columns])
+    rows = slice(first, min(first + LEAD, last + 1))
+    guess = np.zeros(3) if twist is None else np.array([_mean(twist[rows, axis]) for axis in range(3)])
+    if decide:
+        rest = _begins_at_rest(record, twist, first, last)
+    offset = np.array([_mean(record.outputs[rows, c]) if travels[c] else 0.0 for c in range(len(columns))])
+    duration = float(record.t[last] - record.t[first])
+    margin = min(LATEST, 0.1 * duration) if late else 0.0
+    return Piece(
+        record, first, last, np.zeros(3) if rest else guess, offset,
+        np.concatenate([np.full(3, not rest), travels]), np.full(len(columns), margin),
+    )  # fmt: skip
+
+
+def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: int) -> bool:
+    """Whether a piece begins with rows of no voltage in which nothing visibly moves."""
+    stop = min(first + 10 * SILENT, last + 1)
+    driven = np.flatnonzero((record.voltage[first:stop] != 0.0).any(axis=1))
+    silent = int(driven[0]) if driven.size else stop - first
+    if silent < SILENT or twist is None:
+        return False
+    rows = twist[first : first + silent]
+    rows = rows[:, np.isfinite(rows).any(axis=0)]
+    if not rows.size:
+        return False
+    spread = np.nanstd(rows, axis=0) / np.sqrt(np.isfinite(rows).sum(axis=0))
+    return bool((np.abs(np.nanmean(rows, axis=0)) <= CLEAR * spread).all())
+
+
+def _mean(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else 0.0

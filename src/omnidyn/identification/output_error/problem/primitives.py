@@ -1,0 +1,128 @@
+"""From the robot to the numbers of the exact step and of the outputs, and how these change with a free parameter.
+
+The physics stands in model/ and exact/march.py; here it is only read off, once for the value and once or twice
+for each derivative. The friction of the axes enters linearly, each axis for itself: there one probe serves all six
+numbers, and the whole fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.identification.output_error.problem.parameters import FRICTION, Parameter
+from omnidyn.model.dynamics import mass_matrix, settled_currents
+from omnidyn.model.robot import Robot
+from omnidyn.model.statespace import state_space
+from omnidyn.model.wheels import wheel_speed
+from omnidyn.simulation.exact.march import axis_levels
+from omnidyn.simulation.sensitivity.directions import parameter
+
+FloatArray = NDArray[np.float64]
+
+EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Primitives:
+    """Numbers of the exact step, and linear maps from twist and voltage to wheel speed and current.
+
+    rate, coulomb, hold (3,); drive (3, W); wheels (W, 3) [rad/s per twist]; braking (W, 3) [A per twist]; per_volt (W,)
+    [A/V]; per_force (3,) [1/kg, 1/kg, 1/(kg m^2)]. As derivatives all arrays have one more axis, the parameter, at the
+    end.
+    """
+
+    rate: FloatArray
+    coulomb: FloatArray
+    hold: FloatArray
+    drive: FloatArray
+    wheels: FloatArray
+    braking: FloatArray
+    per_volt: FloatArray
+    per_force: FloatArray
+
+    @property
+    def parts(self) -> tuple[FloatArray, ...]:
+        return self.rate, self.coulomb, self.hold, self.drive, self.wheels, self.braking, self.per_volt, self.per_force
+
+
+def primitives(robot: Robot) -> Primitives:
+    """The numbers of a robot that the exact engine takes."""
+    system, count = state_space(robot), robot.wheels.count
+    rate, coulomb, hold = axis_levels(robot, system)
+    return Primitives(
+        rate, coulomb, hold, system.B,
+        wheel_speed(robot.wheels, np.eye(3)).T,
+        settled_currents(robot, np.eye(3), np.zeros(count)).T,
+        np.diag(settled_currents(robot, np.zeros(3), np.eye(count))).copy(),
+        1.0 / mass_matrix(robot),
+    )  # fmt: skip
+
+
+class Mapping:
+    """From the free parameters of a robot to its primitives and their derivatives.
+
+    breakaway (3,): levels S that stay [N, N, N m]; NaN where S follows coulomb. By default as the robot file has it.
+    """
+
+    def __init__(self, robot: Robot, parameters: Sequence[Parameter], breakaway: FloatArray | None = None):
+        self.robot, self.parameters = robot, tuple(parameters)
+        own = robot.friction.axes.breakaway
+        self.breakaway = np.full(3, np.nan) if own is None else np.array(own)
+        self.breakaway = self.breakaway if breakaway is None else breakaway
+        self.linear = all(p.name in FRICTION for p in parameters)
+        self._start = np.array([parameter(robot, p.name) for p in parameters])
+        self._base = primitives(robot)
+        self._probe = self._friction_slopes()
+
+    def robot_at(self, values: FloatArray) -> Robot:
+        """The robot with these values, not checked."""
+        robot = self.robot
+        for p, value in zip(self.parameters, values, strict=True):
+            robot = p.on(robot, float(value))
+        return robot
+
+    def at(self, values: FloatArray) -> tuple[Primitives, Primitives]:
+        """(primitives, their derivatives by the values). `values`, shape (P,)."""
+        if self.linear:
+            moved = values - self._start
+            parts = [part + slope @ moved for part, slope in zip(self._base.parts, self._probe.parts, strict=True)]
+            now = Primitives(*parts)
+            return self._held(now, self.robot), self._probe
+        robot = self.robot_at(values)
+        slopes = [np.zeros((*part.shape, len(values))) for part in self._base.parts]
+        fast = self._friction_at(robot)
+        for j, (p, value) in enumerate(zip(self.parameters, values, strict=True)):
+            if p.name in FRICTION:
+                for slope, known in zip(slopes, fast.parts, strict=True):
+                    slope[..., j] = known[..., j]
+                continue
+            step = EPS * (abs(float(value)) or 1.0)
+            up, down = (primitives(p.on(robot, float(value) + side * step)) for side in (1.0, -1.0))
+            for slope, a, b in zip(slopes, up.parts, down.parts, strict=True):
+                slope[..., j] = (a - b) / (2.0 * step)
+        return self._held(primitives(robot), robot), Primitives(*slopes)
+
+    def _held(self, now: Primitives, robot: Robot) -> Primitives:
+        """With the breakaway of this mapping; never below coulomb."""
+        return replace(now, hold=np.fmax(now.coulomb, self.breakaway / mass_matrix(robot)))
+
+    def _friction_slopes(self) -> Primitives:
+        return self._friction_at(self.robot)
+
+    def _friction_at(self, robot: Robot) -> Primitives:
+        """Derivatives by the six levels of the axes, from one probe: B moves the rate of its axis, C its coulomb."""
+        base = self._base if robot is self.robot else primitives(robot)
+        slopes = [np.zeros((*part.shape, len(self.parameters))) for part in base.parts]
+        viscous, coulomb, _ = robot.friction.axes.levels
+        levels = {"viscous": tuple(viscous + 1.0), "coulomb": tuple(coulomb + 1.0), "breakaway": None}
+        friction = robot.friction.model_copy(update={"axes": robot.friction.axes.model_copy(update=levels)})
+        more = primitives(robot.model_copy(update={"friction": friction}))
+        for j, p in enumerate(self.parameters):
+            if p.name in FRICTION:
+                kind, axis = divmod(FRICTION.index(p.name), 3)
+                slopes[kind][axis, j] = (more.rate - base.rate, more.coulomb - base.coulomb)[kind][axis]
+        return Primitives(*slopes)

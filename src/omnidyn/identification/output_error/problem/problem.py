@@ -1,0 +1,116 @@
+"""What is to be fitted: free parameters, the pieces of the logs, and how each piece starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.model.robot import Robot
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+Column = tuple[str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Rows first..last of a record. start (3,): the twist there; offset (C,): of outputs that count from the start.
+
+    free: which of these 3 + C numbers are fitted. margin (C,): time after the start before which outputs are not used.
+    """
+
+    record: Record
+    first: int
+    last: int
+    start: FloatArray
+    offset: FloatArray
+    free: BoolArray
+    margin: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """robot: where the fit starts. parameters: of the robot file first, then nuisances. pieces: what is fitted to."""
+
+    robot: Robot
+    parameters: tuple[Parameter, ...]
+    robot_count: int
+    pieces: tuple[Piece, ...]
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """All output columns of all records, each once."""
+        return tuple(dict.fromkeys(column for piece in self.pieces for column in piece.record.columns))
+
+    @property
+    def tick(self) -> FloatArray:
+        """The largest tick of each column in any record, 0 where it is not counted. Shape (columns,)."""
+        most = dict.fromkeys(self.columns, 0.0)
+        for piece in self.pieces:
+            for column, tick in zip(piece.record.columns, piece.record.ticks, strict=True):
+                most[column] = max(most[column], tick)
+        return np.array(list(most.values()))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    def where(self, name: str) -> int:
+        """Index of a parameter by its name, -1 where it is not free."""
+        return self.names.index(name) if name in self.names else -1
+
+    def shortened(self, rows: int) -> Problem:
+        """The same problem on the first `rows` rows of all pieces together, each cut by the same share."""
+        total = sum(piece.last - piece.first + 1 for piece in self.pieces)
+        if total <= rows:
+            return self
+        share = rows / total
+        pieces = [
+            replace(piece, last=max(piece.first + int((piece.last - piece.first) * share), piece.first + 1))
+            for piece in self.pieces
+        ]
+        return replace(self, pieces=tuple(pieces))
+
+    def start(self) -> Point:
+        """Where the fit starts."""
+        values = np.array([p.value for p in self.parameters])
+        return Point(values, tuple(np.concatenate([piece.start, piece.offset]) for piece in self.pieces))
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """values (P,): of the parameters. states: of each piece, shape (3 + C,): start twist, offsets."""
+
+    values: FloatArray
+    states: tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PieceSums:
+    """What a kernel adds up over one piece; the last axes are the P parameters, then the 3 + C states of the piece."""
+
+    columns: IntArray  # index of each column among Problem.columns
+    number: FloatArray
+    square: FloatArray
+    loss: FloatArray
+    lag: FloatArray
+    grad: FloatArray  # (C, P + 3 + C)
+    info: FloatArray  # (C, P + 3 + C, P + 3 + C)
+    score: FloatArray  # (blocks, P + 3 + C)
+    drift: FloatArray  # (blocks, C)
+    waves: FloatArray | None = None  # (C, M, 2, P + 3 + C)
+
+
+def per_column(sums: Sequence[PieceSums], columns: int, name: str) -> FloatArray:
+    """One sum, `number`, `square`, `loss` or `lag`, over all pieces. Shape (columns,)."""
+    total = np.zeros(columns)
+    for piece in sums:
+        total[piece.columns] += getattr(piece, name)
+    return total

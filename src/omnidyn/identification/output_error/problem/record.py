@@ -1,0 +1,146 @@
+"""A Run as the kernels read it: voltages before the driver, outputs in columns, pieces without a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.identification.output_error.problem.outputs import outputs_of
+from omnidyn.logs.segments import segments
+from omnidyn.model.drive import SPEED
+from omnidyn.model.motor import clip_voltage
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
+from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
+
+SHORTEST = 3  # rows of a piece that is used
+LOOP_REMEDY = (
+    'write the speed loop of the firmware into the robot file: [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz '
+    "(the gains may be guesses: they are fitted)"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One run. t (rows,); voltage (rows, W); outputs (rows, C), columns named by (channel, index).
+
+    ticks (C,): of columns that are counts [rad], 0 for the others. pieces: (first, last) rows of what has no gap.
+    supplied: whether the voltage is a duty times a supply that was not logged. notes: what a reader should know.
+    set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
+    here then; else None.
+    """
+
+    t: FloatArray
+    voltage: FloatArray
+    outputs: FloatArray
+    columns: tuple[tuple[str, int], ...]
+    ticks: tuple[float, ...]
+    pieces: tuple[tuple[int, int], ...]
+    source: str
+    supplied: bool
+    notes: tuple[str, ...]
+    set_point: FloatArray | None = None
+
+    @property
+    def span(self) -> float:
+        return float(self.t[-1] - self.t[0]) or 1.0
+
+
+def record(
+    run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: bool = False, tick_rad: float | None = None
+) -> Record:
+    """Raises InputError for a run without inputs or outputs, InsufficientDataError where no piece is long enough.
+
+    loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad: as in
+    outputs.py.
+    """
+    made_up = [name.replace("_", " ") for name, mask in run.interpolated.items() if mask.any()]
+    run = run.as_measured()
+    set_point = _set_point(run, robot, loop)
+    voltage, supplied, notes = _voltage(run, robot) if set_point is None else (np.zeros_like(set_point), False, [])
+    clipped = clip_voltage(robot.motor, voltage)
+    beyond = int((np.abs(clipped) < np.abs(voltage)).any(axis=1).sum())
+    if beyond:
+        notes.append(f"{beyond} rows ask for more than the voltage limit: they are clipped to it")
+        voltage = clipped
+    if made_up:
+        notes.append(f"{', '.join(made_up)}: only what was measured is fitted, not what was interpolated in between")
+    found = outputs_of(run, robot, outputs, tick_rad, set_point is not None)
+    inputs = voltage if set_point is None else set_point
+    _refuse_wheels_without_input(run, robot, inputs)
+    known = np.asarray(np.isfinite(inputs).all(axis=1), dtype=bool)
+    pieces = [piece for s in segments(run.t) for piece in _whole(known, s.start, s.stop)]
+    if not pieces:
+        raise InsufficientDataError(
+            "no stretch of the log has inputs throughout", got=f"{int(known.sum())} rows of {len(run)} with all inputs",
+            expected=f"{SHORTEST} rows in a row", where=run.source,
+        )  # fmt: skip
+    if not known.all():
+        notes.append(f"{int((~known).sum())} rows lack an input: the log is split there")
+    return Record(
+        run.t, np.ascontiguousarray(voltage), found.values, found.columns, found.ticks, tuple(pieces), run.source,
+        supplied, (*notes, *found.notes), set_point,
+    )  # fmt: skip
+
+
+def _refuse_wheels_without_input(run: Run, robot: Robot, inputs: FloatArray) -> None:
+    """A log of fewer wheels than the robot has leaves the others without a number."""
+    empty = np.flatnonzero(~np.isfinite(inputs).any(axis=0))
+    if 0 < len(empty) < inputs.shape[1]:
+        raise InputError(
+            "wheels without any input", got=", ".join(f"none for wheel {w + 1}" for w in empty), where=run.source,
+            expected=f"one for each of the {robot.wheels.count} wheels of {robot.name}",
+            remedy="take the robot of this log, or map its column to the wheel",
+        )  # fmt: skip
+
+
+def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
+    """(voltages, whether the supply is only nominal, notes)."""
+    if run.wheels is not None and run.wheels != robot.wheels.count:
+        raise InputError(
+            "the log has another number of wheels", got=run.wheels,
+            expected=f"{robot.wheels.count}, as {robot.name} has", where=run.source,
+        )  # fmt: skip
+    if run.voltage is not None:
+        return run.voltage, False, []
+    if run.duty is not None:
+        if run.supply is not None:
+            return run.duty * run.supply[:, None], False, []
+        nominal = robot.drive.supply
+        if nominal is None:
+            raise InputError(
+                "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
+                remedy="add supply_V to the robot file",
+            )  # fmt: skip
+        note = f"the supply is not logged: its nominal {nominal:g} V is taken"
+        return run.duty * nominal, True, [note]
+    if run.wheel_speed_command is not None or run.twist_command is not None:
+        raise UnsupportedError(
+            "only set speeds are logged, and the robot has no speed loop to follow them", got=", ".join(run.channels),
+            expected="voltage or duty, or the speed loop of the firmware", where=run.source, remedy=LOOP_REMEDY,
+        )  # fmt: skip
+    raise InputError("the log has no input", got=", ".join(run.channels), expected="voltage or duty", where=run.source)
+
+
+def _set_point(run: Run, robot: Robot, loop: bool) -> FloatArray | None:
+    """Set speeds of the wheels [rad/s] where the loop of the robot file has to follow them. Shape (rows, W)."""
+    if robot.drive.kind != SPEED or (not loop and (run.voltage is not None or run.duty is not None)):
+        return None
+    if run.wheel_speed_command is not None:
+        return np.ascontiguousarray(run.wheel_speed_command)
+    return None if run.twist_command is None else wheel_speed(robot.wheels, run.twist_command)
+
+
+def _whole(known: NDArray[np.bool_], start: int, stop: int) -> list[tuple[int, int]]:
+    """Stretches of rows with all inputs, (first, last). The last row needs none: nothing follows it."""
+    if known[start : stop - 1].all():
+        return [(start, stop - 1)] if stop - start >= SHORTEST else []
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], known[start:stop].astype(int), [0]])))
+    runs = zip(start + edges[::2], start + edges[1::2] - 1, strict=True)
+    return [(int(a), int(b)) for a, b in runs if b - a + 1 >= SHORTEST]

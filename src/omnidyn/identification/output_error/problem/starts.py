@@ -1,0 +1,212 @@
+"""Where a fit of friction begins: the equation of motion integrated over short windows, solved by least squares.
+
+    v(t2) - v(t1) = int g dt - a int v dt - c int sgn v dt        over windows in which the axis does not turn round
+
+Nothing is differentiated, so noise does not bias a; windows near rest are left out, where noise decides sgn v. A level
+c that no drive seen in motion overcomes is cut: with too much of it the model never moves, and has no gradient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.compiled import kernel, maker
+from omnidyn.identification.output_error.problem.primitives import Mapping
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.model.frames import world_to_body
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import twist_from_wheel_speed
+
+FloatArray = NDArray[np.float64]
+
+WINDOW = 0.15  # [s], and at least so many rows:
+LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
+CLEAR = 4.0  # standard errors of the noise that a speed must be away from 0
+LEAST_WINDOWS = 8
+SLOPE = 0.05  # [s] over which an angle or a position is differentiated
+ENOUGH = 200_000  # rows of a piece that are looked at
+SAMPLE = 1500  # rows for a median
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """One axis: rows (windows, 3) of int g, int v, int sgn v, and the change of v. most: largest |g| in motion."""
+
+    design: FloatArray
+    change: FloatArray
+    most: float
+
+
+def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
+    """The twist of a record, measured or from wheel speeds, wheel angles or pose; None without. Shape (rows, 3)."""
+    names = [name for name, _ in record.columns]
+    if "twist" in names:
+        first = names.index("twist")
+        return record.outputs[:, first : first + 3]
+    if "wheel_speed" in names:
+        first = names.index("wheel_speed")
+        return twist_from_wheel_speed(robot.wheels, record.outputs[:, first : first + robot.wheels.count])
+    if "wheel_angle" in names:
+        first = names.index("wheel_angle")
+        return twist_from_wheel_speed(robot.wheels, _rates(record, slice(first, first + robot.wheels.count)))
+    if "position" in names and np.isfinite(heading := record.outputs[:, names.index("heading")]).any():
+        first = names.index("position")
+        rates = _rates(record, [first, first + 1, names.index("heading")])
+        return np.einsum("kij,kj->ki", world_to_body(heading), rates)
+    return None
+
+
+def _rates(record: Record, columns: slice | list[int]) -> FloatArray:
+    """Slope of columns over a few rows, NaN outside of the pieces. Shape (rows, columns)."""
+    values, t = record.outputs[:, columns], record.t
+    found = np.full(values.shape, np.nan)
+    for first, last in record.pieces:
+        near = max(1, round(0.5 * SLOPE / float(np.median(np.diff(t[first : min(last, first + SAMPLE) + 1])))))
+        rows = np.arange(first, last + 1)
+        low, high = np.maximum(rows - near, first), np.minimum(rows + near, last)
+        found[rows] = (values[high] - values[low]) / (t[high] - t[low])[:, None]
+    return found
+
+
+def integral_start(mapping: Mapping, values: FloatArray, records: Sequence[Record]) -> FloatArray:
+    """Rates and levels of the axes by the integral form. Shape (2, 3), NaN where an axis has too few windows."""
+    robot = mapping.robot_at(values)
+    now, _ = mapping.at(values)
+    found = np.full((2, 3), np.nan)
+    twists = [measured_twist(record, robot) for record in records]
+    for axis in range(3):
+        parts = [
+            _windows(record, twist, now.drive[axis], axis)
+            for record, twist in zip(records, twists, strict=True)
+            if twist is not None
+        ]
+        if not parts:
+            continue
+        design = np.concatenate([part.design for part in parts])
+        change = np.concatenate([part.change for part in parts])
+        if len(change) >= LEAST_WINDOWS:
+            rate, level = np.linalg.lstsq(design[:, 1:], design[:, 0] - change, rcond=None)[0]
+            most = max(part.most for part in parts)
+            found[:, axis] = max(rate, 0.05), min(max(level, 0.0), most)
+    return found
+
+
+def friction_values(mapping: Mapping, values: FloatArray, found: FloatArray) -> FloatArray:
+    """The friction parameters among `values` that give the rates and levels `found`, as far as 0 allows."""
+    now, slopes = mapping.at(values)
+    values = values.copy()
+    for j, p in enumerate(mapping.parameters):
+        for kind, (have, slope) in enumerate(((now.rate, slopes.rate), (now.coulomb, slopes.coulomb))):
+            axis = int(np.argmax(np.abs(slope[:, j])))
+            if p.name.startswith("friction.axes.") and slope[axis, j] != 0.0 and np.isfinite(found[kind, axis]):
+                values[j] = max(values[j] + (found[kind, axis] - have[axis]) / slope[axis, j], p.low)
+    return values
+
+
+def _windows(record: Record, twist: FloatArray, drive: FloatArray, axis: int) -> Windows:
+    """The windows of one axis of a log, all pieces."""
+    designs, changes, most = [np.zeros((0, 3))], [np.zeros(0)], 0.0
+    for first, last in record.pieces:
+        last = min(last, first + ENOUGH)
+        rows = window_rows(record.t[first : last + 1])
+        if last - first < 2 * rows or np.isfinite(twist[first : last + 1, axis]).sum() < 2 * LEAST_ROWS:
+            continue
+        noise = difference_noise(twist[first : last + 1, axis])
+        clear = CLEAR * noise / np.sqrt(measured_rows(twist[first : last + 1, axis], max(rows // 2, 1)))
+        design, change, own = window_sums(record.t, record.voltage, twist, axis, first, last, drive, rows, clear)
+        designs.append(design)
+        changes.append(change)
+        most = max(most, own)
+    return Windows(np.concatenate(designs), np.concatenate(changes), most)
+
+
+def window_rows(t: FloatArray) -> int:
+    """Rows of a window."""
+    return max(LEAST_ROWS, round(WINDOW / float(np.median(np.diff(t[: SAMPLE + 1])))))
+
+
+def measured_rows(v: FloatArray, rows: int) -> float:
+    """How many of so many rows hold a measurement, on average, and at least one: missing ones do not average noise."""
+    return max(rows * float(np.isfinite(v).mean()), 1.0)
+
+
+def difference_noise(v: FloatArray) -> float:
+    """Standard deviation of the noise of a signal that moves slowly, from the differences of its neighbours.
+
+    Their median is 0.954 sigma; where most are 0, the signal is quantised, and half of its step is taken.
+    """
+    size = np.abs(np.diff(v[np.isfinite(v)]))
+    size = size[:: max(len(size) // SAMPLE, 1)]
+    size = size[np.isfinite(size)]
+    middle = float(np.median(size)) / 0.954 if size.size else 0.0
+    return middle if middle > 0.0 else 0.5 * float(size[size > 0.0].min(initial=np.inf)) if size.any() else 0.0
+
+
+@maker
+def _smoothed(y, axis, first, last, width):
+    """(values, missing ones held; their centred mean over `width` rows, shorter at the ends) of rows first..last."""
+    count = last - first + 1
+    v, total, mean = np.empty(count), np.zeros(count + 1), np.empty(count)
+    known = 0.0
+    for k in range(count):
+        if y[first + k, axis] == y[first + k, axis]:
+            known = y[first + k, axis]
+        v[k] = known
+        total[k + 1] = total[k] + known
+    for k in range(count):
+        low, high = max(k - width // 2, 0), min(k + width - width // 2, count)
+        mean[k] = (total[high] - total[low]) / (high - low)
+    return v, mean
+
+
+@kernel
+def count_far(y, axis, first, last, width, limit):
+    """Rows first..last of column `axis` whose mean over `width` rows is beyond `limit`."""
+    _, mean = _smoothed(y, axis, first, last, width)
+    far = 0
+    for value in mean:
+        far += abs(value) > limit
+    return far
+
+
+@kernel
+def window_sums(t, u, y, axis, first, last, drive, rows, clear):
+    """(design (n, 3), change (n,), largest |g| in motion) of windows of `rows` rows, each half over the next."""
+    v, mean = _smoothed(y, axis, first, last, max(rows // 2, 1))
+    count, most = last - first + 1, 0.0
+    side, total = np.empty(count), np.zeros((4, count + 1))
+    sums, same = np.zeros(3), np.ones(count, np.int64)
+    for k in range(count):
+        side[k] = 0.0 if abs(mean[k]) <= clear else (1.0 if mean[k] > 0.0 else -1.0)
+        if k > 0:
+            same[k] = same[k - 1] + 1 if side[k] == side[k - 1] else 1
+            dt, g = t[first + k] - t[first + k - 1], 0.0
+            for w in range(len(drive)):
+                g += drive[w] * u[first + k - 1, w]
+            if side[k - 1] != 0.0:
+                most = max(most, abs(g))
+            sums[0] += g * dt
+            sums[1] += 0.5 * (v[k] + v[k - 1]) * dt
+            sums[2] += 0.5 * (side[k] + side[k - 1]) * dt
+        for i in range(3):
+            total[i, k + 1] = total[i, k] + sums[i]
+        total[3, k + 1] = total[3, k] + v[k]
+    step = max(rows // 2, 1)
+    size = max((count - rows) // step + 1, 0)
+    design, change, used = np.empty((size, 3)), np.empty(size), 0
+    for begin in range(0, count - rows + 1, step):
+        stop = begin + rows
+        if side[stop - 1] == 0.0 or same[stop - 1] < rows:
+            continue
+        for i in range(4):
+            ends = total[i, stop] - total[i, stop - EDGE] - total[i, begin + EDGE] + total[i, begin]
+            if i < 3:
+                design[used, i] = ends / EDGE
+            else:
+                change[used] = ends / EDGE
+        used += 1
+    return design[:used], change[:used], most

@@ -1,0 +1,93 @@
+"""Where a fit begins: near enough to the best point for the descent to find it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from omnidyn.identification.output_error.engines.exact import ExactEngine
+from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.problem.nuisances import LATENCY
+from omnidyn.identification.output_error.problem.problem import Point, Problem, per_column
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
+from omnidyn.identification.output_error.solve.progress import Onlooker
+from omnidyn.identification.output_error.solve.solver import Solver
+
+MANY = 100_000  # rows to which a long log is first fitted
+FEW = 1500  # the same for the implicit engine
+LATENCIES = 500  # steps for their median
+LESS = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
+NEAR = 0.1  # squared distance to the best point, in standard errors, that is near
+
+
+def first_point(solver: Solver, records: Sequence[Record]) -> Point:
+    """The better one of the robot as it is and the integral form; for long logs, the fit to their first part."""
+    problem, engine = solver.problem, solver.engine
+    assert isinstance(engine, ExactEngine)
+    own = problem.start()
+    count = problem.robot_count
+    found = integral_start(engine.mapping, own.values[:count], records)
+    values = own.values.copy()
+    values[:count] = friction_values(engine.mapping, own.values[:count], found)
+    short = problem.shortened(MANY)
+    trial = solver if short is problem else Solver(short, ExactEngine(short))
+    states = [trial.state(own), trial.state(Point(values, own.states))]
+    best = _with_latencies(trial, min(states, key=lambda state: state.objective).point)
+    return best if trial is solver else trial.minimise(best).state.point
+
+
+def _with_latencies(solver: Solver, point: Point) -> Point:
+    """The point with the best of a few latencies for each channel.
+
+    A current follows the voltage at once, so that its likelihood jumps where a latency passes a row: no descent crosses
+    that. What a channel shows depends on its own latency only, so that one march tries a latency for all of them.
+    """
+    problem = solver.problem
+    own = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
+    if not own:
+        return point
+    row = float(np.median(np.diff(problem.pieces[0].record.t[: 2 * LATENCIES + 1])))
+    tried = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
+    costs = []
+    for late in tried:
+        values = point.values.copy()
+        values[own] = late
+        state = solver.state(Point(values, point.states), np.ones(len(problem.columns)) if solver.nu else None)
+        square = per_column(state.sums, len(problem.columns), "square")
+        number = np.maximum(per_column(state.sums, len(problem.columns), "number"), 1.0)
+        costs.append(np.log(np.maximum(square / number, solver.floor)))
+    values = point.values.copy()
+    for j in own:
+        mine = [k for k, (channel, _) in enumerate(problem.columns) if f"{LATENCY}.{channel}" == problem.names[j]]
+        values[j] = tried[int(np.argmin([cost[mine].sum() for cost in costs]))]
+    return Point(values, point.states)
+
+
+def coarse_point(problem: Problem, nu: float, watch: Onlooker) -> Point:
+    """Near the best point, by one step a row; a long log is first fitted in part, of which `watch` hears only."""
+    watch.doing("looking for a start")
+    solver, short, own = (
+        Solver(problem, TangentEngine(problem), nu, NEAR),
+        problem.shortened(FEW),
+        moving_start(problem, nu),
+    )
+    if short is problem:
+        return solver.minimise(own, watch=watch).state.point
+    found = (
+        Solver(short, TangentEngine(short), nu, NEAR)
+        .minimise(own, watch=watch.aside("a part of the log first"))
+        .state.point
+    )
+    states = [solver.state(point) for point in (own, found)]
+    return solver.minimise(min(states, key=lambda state: state.objective).point, watch=watch).state.point
+
+
+def moving_start(problem: Problem, nu: float) -> Point:
+    """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes."""
+    own, short = problem.start(), problem.shortened(FEW)
+    solver = Solver(short, TangentEngine(short), nu)
+    friction = np.array([p.name.startswith("friction.") for p in problem.parameters], bool)
+    points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
+    return min(points, key=lambda point: solver.state(point).objective)

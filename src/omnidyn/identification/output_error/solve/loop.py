@@ -1,0 +1,293 @@
+"""Logs of a firmware's speed loop: what is free, how a piece begins, and where a fit of friction and gains starts.
+
+The voltage is not logged; the loop of the robot file makes it of the set speeds and of what the model itself does. A
+piece must begin at rest: the integral of the loop is 0 there, anywhere else it is not known.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InsufficientDataError, UnsupportedError
+from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
+from omnidyn.identification.output_error.problem.nuisances import EARLIEST, FREE, LATEST, REST
+from omnidyn.identification.output_error.problem.parameters import FRICTION, Parameter
+from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.output_error.problem.starts import measured_twist
+from omnidyn.identification.output_error.solve.progress import NOBODY, Onlooker
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
+from omnidyn.model.layout import YAW
+from omnidyn.model.robot import Robot
+from omnidyn.simulation.sensitivity.directions import GAINS, parameter
+
+FloatArray = NDArray[np.float64]
+
+FINE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
+SETTING_OFF = 60  # rows of each log on which starts are tried
+STILL = 3  # rows at the beginning in which nothing may move
+CLEAR = 6.0  # standard errors, of the scatter of these rows, that count as motion
+LATENCY, CURRENTS = "latency", "latency.current"
+AROUND = 3  # periods of the loop, each way, in which a latency of the currents is tried
+GAIN_FACTORS, LEVEL_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 1.0, 3.0)
+LATE = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
+BEST = 2  # of the starts from which the fit is carried on
+FAR = (1.0, -1.0, 3.0, -3.0, 6.0, -6.0)  # standard errors by which a gain is moved
+LESS, ROUNDS = 1.0, 10  # of -log likelihood that counts as another branch; how often
+FEW = 8  # iterations of each before the better one is taken
+
+
+def looped(records: Sequence[Record]) -> bool:
+    """Whether these are logs of set speeds."""
+    return records[0].set_point is not None
+
+
+def gain_keys(robot: Robot) -> list[str]:
+    """The gains of the loop, one for all wheels or one each, as far as they are not 0."""
+    values = zip(GAINS, (robot.drive.kp, robot.drive.ki), strict=True)
+    return [each for key, value in values for each in _each(key, value) if parameter(robot, each) > 0.0]
+
+
+def friction_keys(robot: Robot) -> list[str]:
+    """The numbers of friction that a robot has: those of every part that is not off."""
+    friction, keys = robot.friction, []
+    if any(friction.axes.viscous) or any(friction.axes.coulomb):
+        keys += FRICTION
+    direction, wheels = friction.direction, friction.wheels
+    if any(direction.coulomb):
+        keys += [f"friction.direction.coulomb[{axis}]" for axis in range(2)]
+    keys += [
+        f"friction.direction.{name}"
+        for name in ("viscous", "yaw_coulomb", "yaw_viscous")
+        if np.any(getattr(direction, name))
+    ]
+    for name in ("coulomb", "viscous"):
+        if np.any(getattr(wheels, name)):
+            keys += _each(f"friction.wheels.{name}", getattr(wheels, name))
+    return keys
+
+
+def loop_keys(robot: Robot, moved: NDArray[np.bool_], source: str = "") -> list[str]:
+    """What is free by default: friction, of axes that moved only, and the gains.
+
+    Raises InsufficientDataError where nothing moved.
+    """
+    if not moved.any():
+        raise InsufficientDataError(
+            "the robot never visibly moved: a speed loop shows its friction in motion only", got="rest",
+            expected="motion", remedy="ask for speeds at which it sets off", where=source,
+        )  # fmt: skip
+    still = np.flatnonzero(~moved)
+    kept = [key for key in friction_keys(robot) if not any(friction_of_axis(key, int(axis)) for axis in still)]
+    return [*kept, *gain_keys(robot)]
+
+
+def friction_of_axis(key: str, axis: int) -> bool:
+    """Whether a number of friction acts along one axis alone."""
+    if key in FRICTION:
+        return int(key[-2]) == axis
+    return axis == YAW and key.startswith("friction.direction.yaw")
+
+
+def _each(key: str, value: float | tuple[float, ...]) -> list[str]:
+    return [f"{key}[{k}]" for k in range(len(value))] if isinstance(value, tuple) else [key]
+
+
+def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Piece]:
+    """The first piece of each record that begins at rest. Raises InsufficientDataError where none does.
+
+    Raises UnsupportedError for a free start.
+    """
+    if start == FREE:
+        raise UnsupportedError(
+            "a log of set speeds begins at rest: the integral of the loop is not known elsewhere", got="a free start",
+            expected=f"{REST} or auto", where="start",
+        )  # fmt: skip
+    found = [
+        _piece(record, *record.pieces[0])
+        for record in records
+        if start == REST or _begins_at_rest(measured_twist(record, robot), *record.pieces[0])
+    ]
+    if not found:
+        raise InsufficientDataError(
+            "no log begins at rest, so what the speed loop remembers is not known",
+            got=f"{len(records)} logs in motion", where=records[0].source, expected="one that begins at rest",
+            remedy="cut the logs so that they begin before the robot sets off",
+        )  # fmt: skip
+    return found
+
+
+def left_out(records: Sequence[Record], pieces: Sequence[Piece]) -> list[str]:
+    """Which logs and pieces are not used, in words."""
+    used, words = {id(piece.record) for piece in pieces}, []
+    moving = sum(id(record) not in used for record in records)
+    later = sum(len(record.pieces) > 1 for record in records if id(record) in used)
+    if moving:
+        words.append(
+            f"{moving} of {len(records)} logs begin in motion: they are not used, their loop is not known there"
+        )
+    if later:
+        words.append(f"{later} logs have gaps: only what stands before the first one is used")
+    return words
+
+
+def _begins_at_rest(twist: FloatArray | None, first: int, last: int) -> bool:
+    if twist is None:
+        return True
+    rows = twist[first : min(first + STILL, last + 1)]
+    scatter = np.nanstd(np.diff(twist[first : last + 1], axis=0), axis=0) / np.sqrt(2.0 * len(rows))
+    return bool((np.abs(np.nanmean(rows, axis=0)) <= CLEAR * scatter).all())
+
+
+def _piece(record: Record, first: int, last: int) -> Piece:
+    columns = record.columns
+    travels = np.array([name == "heading" for name, _ in columns])
+    offset = np.where(travels, record.outputs[first], 0.0)
+    return Piece(
+        record, first, last, np.zeros(3), np.where(np.isfinite(offset), offset, 0.0),
+        np.concatenate([np.zeros(3, bool), travels]), np.zeros(len(columns)),
+    )  # fmt: skip
+
+
+def solve_loop(problem: Problem, nu: float, watch: Onlooker = NOBODY) -> tuple[Solver, Solution]:
+    """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
+    first = Solver(problem, LoopEngine(problem), nu)
+    coarse = first.minimise(loop_start(problem, nu, watch), FEW, watch)
+    coarse = first.minimise(retimed(first, coarse.state.point, watch), watch=watch)
+    watch.doing("the same as exactly as it must be")
+    fine = Solver(problem, LoopEngine(problem, FINE), nu)
+    return fine, beyond_jumps(fine, fine.minimise(coarse.state.point, watch=watch), watch)
+
+
+def loop_start(problem: Problem, nu: float, watch: Onlooker = NOBODY) -> Point:
+    """Where a fit begins: the best of several starts, tried on what sets off."""
+    short = shortened(problem, SETTING_OFF)
+    found = best_start(Solver(short, LoopEngine(short), nu), watch)
+    return Point(found.values, problem.start().states)
+
+
+def retimed(solver: Solver, point: Point, watch: Onlooker = NOBODY) -> Point:
+    """The point with the best latency of the currents, of one in the middle of each period of the loop.
+
+    A current jumps at every tick: no descent gets a latency across one, and one that has gone astray comes back only if
+    it is tried where it began and where the other channels are. Groups may have one each: KEY@GROUP.
+    """
+    problem, nu = solver.problem, solver.nu
+    period = 1.0 / (problem.robot.drive.rate or np.inf)
+    late = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
+    own = [j for j in late if problem.names[j].partition("@")[0] == CURRENTS]
+    short = shortened(problem, SETTING_OFF)
+    row = min(float(np.median(np.diff(p.record.t[p.first : p.last + 1]))) for p in short.pieces)
+    if not own or not period:
+        return point
+    reach = range(-AROUND, AROUND + 1) if period >= SLOW_LOOP * row else (-1, 0)  # a fast loop settles between rows
+    places = (0.0, *(float(point.values[j]) for j in late))
+    near = sorted({int(np.floor(place / period)) + k for place in places for k in reach})
+    middles = (np.array(near) + 0.5) * period
+    trial = Solver(short, solver.engine.on(short), nu)
+    for j in own:
+        now, states = float(point.values[j]), []
+        trials = (now, *middles[(middles > EARLIEST) & (middles < LATEST)])
+        for k, each in enumerate(trials):
+            watch.doing(f"trying {problem.names[j]}, {k + 1} of {len(trials)}")
+            values = point.values.copy()
+            values[j] = each
+            states.append(trial.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
+        point = min(states, key=lambda state: state.objective).point
+    return point
+
+
+def shortened(problem: Problem, rows: int) -> Problem:
+    """The same problem with at most so many rows of every piece: what sets off is at its beginning."""
+    return replace(problem, pieces=tuple(replace(p, last=min(p.last, p.first + rows)) for p in problem.pieces))
+
+
+def best_start(solver: Solver, watch: Onlooker = NOBODY) -> Point:
+    """The best of several starts: all gains, all friction and all latencies by factors, then a few steps of each."""
+    problem, seen = solver.problem, watch.below()
+    delays = _if_any(problem, LATENCY, LATE, 0.0)
+    by_delay = _tried(solver, [(late, 1.0, 1.0) for late in delays], "latencies", seen)
+    late = delays[int(np.argmin([state.objective for state in by_delay]))]
+    levels, gains = _if_any(problem, "friction.", LEVEL_FACTORS), _if_any(problem, "drive.", GAIN_FACTORS)
+    factors = [(late, *pair) for pair in itertools.product(levels, gains)]
+    states = sorted(_tried(solver, factors, "friction and gains", seen), key=lambda state: state.objective)
+    tried = [solver.minimise(state.point, FEW, seen) for state in states[:BEST]]
+    return min(tried, key=lambda solution: solution.state.objective).state.point
+
+
+def _tried(
+    solver: Solver, which: Sequence[tuple[float, float, float]], what: str, watch: Onlooker
+) -> list[State]:  # fmt: skip
+    """The states at each (latency [s], factor of friction, factor of gains)."""
+    found = []
+    for k, each in enumerate(which):
+        watch.doing(f"looking for a start, {what} {k + 1} of {len(which)}")
+        found.append(_moved(solver, *each))
+        watch(found[-1])
+    return found
+
+
+def _moved(solver: Solver, late: float, level: float, gain: float) -> State:
+    """All latencies [s], all friction and all gains at once, by factors of where they start."""
+    problem = solver.problem
+    own = problem.start()
+    values = own.values.copy()
+    for j, p in enumerate(problem.parameters):
+        if p.name.startswith(LATENCY):
+            values[j] = late
+        else:
+            values[j] = _within(p, p.value * (gain if p.name.startswith("drive.") else level))
+    return solver.state(Point(values, own.states), np.ones(len(problem.columns)) if solver.nu else None)
+
+
+def beyond_jumps(solver: Solver, solution: Solution, watch: Onlooker = NOBODY) -> Solution:
+    """The solution, or a better one behind a jump of the likelihood, which no descent crosses.
+
+    An integral that stands still at the voltage limit jumps by a whole tick where a number of the robot decides on
+    which side of the limit a tick is. So the gains are moved by some standard errors, the others following: where F
+    rises by less than the parabola says, there is another branch to descend into. A run away from the limit has
+    no such branch.
+    """
+    engine, seen = solver.engine, watch.below(solution.state.objective)
+    watch.doing("looking for a better branch, beyond jumps of the likelihood")
+    if not np.any(solver.problem.robot.drive.ki) or (
+        isinstance(engine, LoopEngine) and not engine.meets_limit(solution.state.point)
+    ):
+        return solution
+    gains = [j for j, p in enumerate(solver.problem.parameters) if p.name.startswith("drive.")]
+    for _ in range(ROUNDS):
+        better = next(_branches(solver, solution, gains), None)
+        found = None if better is None else solver.minimise(better.point, FEW, seen)
+        if found is None or found.state.objective >= solution.state.objective - LESS:
+            break
+        solution = found
+    return solver.minimise(solution.state.point, watch=seen)
+
+
+def _branches(solver: Solver, solution: Solution, gains: Sequence[int]) -> Iterator[State]:
+    """States at some standard errors in a gain where F has risen by less than it should have, nearest first."""
+    normal = Normal(solver, solution.state)
+    covariance = np.linalg.pinv(normal.information, hermitian=True)
+    for far, j in itertools.product(FAR, gains):
+        step = far * covariance[:, j] / np.sqrt(max(covariance[j, j], 1e-300))
+        values = solver.outer(solver.clipped(normal.inner + step))
+        state = solver.state(Point(values, solution.state.point.states), _scale(solver, solution))
+        if state.objective < solution.state.objective + 0.5 * far * far - LESS:
+            yield state
+
+
+def _scale(solver: Solver, solution: Solution) -> FloatArray | None:
+    return solution.state.variance if solver.nu else None
+
+
+def _if_any(problem: Problem, prefix: str, factors: tuple[float, ...], plain: float = 1.0) -> tuple[float, ...]:
+    return factors if any(p.name.startswith(prefix) for p in problem.parameters) else (plain,)
+
+
+def _within(p: Parameter, value: float) -> float:
+    return float(np.clip(value, p.low, p.high)) if p.name.startswith(("drive.", "friction.")) else p.value

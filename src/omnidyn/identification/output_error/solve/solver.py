@@ -1,0 +1,330 @@
+"""Levenberg-Marquardt on the likelihood of whole logs, the states at the start of each piece eliminated.
+
+Gauss: the noise of each column is concentrated out, F = 1/2 sum n_c log(sum of r^2 / n_c), so that one minimisation
+finds parameters and noise together. Student's t: F = sum of rho + n_c log s_c, steps in the parameters and in the
+scales s_c in turn. Counts (kernel/counts.py) are held like that too, beside the others. A prior adds
+((p - mean)/std)^2 / 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
+from omnidyn.identification.output_error.problem.problem import PieceSums, Point, Problem, per_column
+
+FloatArray = NDArray[np.float64]
+
+MAX_ITERATIONS = 60
+CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
+ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
+DAMPING, LEAST_DAMPING = 1e-4, 1e-10
+FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked by a jump
+PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
+UNSEEN = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
+SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
+
+
+class Engine(Protocol):
+    """What simulates a problem with its sensitivities: engines/exact.py, engines/implicit.py."""
+
+    problem: Problem
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the residuals of every piece add up to; see kernel/march.py."""
+        ...
+
+    def on(self, problem: Problem) -> Self:
+        """The same engine on other pieces of the same logs, with the same parameters."""
+        ...
+
+
+FASTEST = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A point, its sums, F there and the variance of each column."""
+
+    point: Point
+    sums: list[PieceSums]
+    objective: float
+    variance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short."""
+
+    state: State
+    held: NDArray[np.bool_]
+    iterations: int
+    converged: bool
+
+
+class Solver:
+    """Minimises F over a problem. `floor` (columns,): least variance of each column.
+
+    close: squared distance to the best point, in standard errors, at which it ends. counted: whether counts have a
+    likelihood of their own.
+    """
+
+    def __init__(self, problem: Problem, engine: Engine, nu: float = 0.0, close: float = CLOSE, counted: bool = True):
+        self.problem, self.engine, self.nu, self.close = problem, engine, nu, close
+        self.tick = problem.tick if counted else np.zeros(len(problem.columns))
+        self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
+        # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross.
+        self._jumps = np.array([p.name.partition("@")[0] == "latency.current" for p in problem.parameters], bool)
+        self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
+        self._high = np.array([p.inner(p.high) for p in problem.parameters])
+
+    def state(self, point: Point, variance: FloatArray | None = None) -> State:
+        """F and all sums at a point; at a fixed `variance` for Student's t and counts, which are none without."""
+        given = np.ones(len(self.problem.columns)) if variance is None else variance
+        scaled = self.scaled & (bool(self.nu) or variance is not None)
+        sums = self.engine.sums(
+            point, Weighting(given, self.nu, counted=bool(self.tick.any()) and variance is not None)
+        )
+        count = per_column(sums, len(given), "number")
+        mean = per_column(sums, len(given), "square") / np.maximum(count, 1.0)
+        now = np.where(scaled, given, np.maximum(mean, self.floor))
+        objective = float(0.5 * count @ np.log(now))
+        if scaled.any():
+            objective += float(per_column(sums, len(given), "loss")[scaled].sum())
+        return State(point, sums, objective + self._prior(point), now)
+
+    @property
+    def scaled(self) -> NDArray[np.bool_]:
+        """Columns whose scale is a number of its own, not the mean square of their residuals. Shape (columns,)."""
+        return np.full(len(self.tick), True) if self.nu else self.tick > 0.0
+
+    def minimise(
+        self, start: Point, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None
+    ) -> Solution:
+        """The best point from `start`; `watch` sees every better one on the way."""
+        if not self.scaled.any():
+            return self._descend(self.state(self._inside(start)), limit, watch)
+        plain = Solver(self.problem, self.engine, close=self.close, counted=False).minimise(start, limit)
+        now = self.state(plain.state.point, np.maximum(plain.state.variance - self.tick**2 / 12.0, self.floor))
+        return self._descend(self._rescaled(now)[0], limit, watch)
+
+    def _descend(self, now: State, limit: int, watch: Callable[[State], None] | None) -> Solution:
+        damping, change = DAMPING, 0.0
+        held = blocked = np.zeros(len(self.problem.parameters), bool)
+        released = False
+        for iteration in range(limit):
+            normal = Normal(self, now)
+            held, better = normal.held, False
+            still = held | blocked
+            while not better and normal.distance_without(still) / (1.0 + damping) > (
+                self.close if damping < FIRM else max(ENOUGH, self.close)
+            ):
+                trial = self.state(normal.moved(damping, still), now.variance if self.scaled.any() else None)
+                better = trial.objective < now.objective
+                if not better and not (still | self._jumps == still).all():
+                    blocked = self._jumps  # once more, and from here on, without what may have jumped
+                    still = still | blocked
+                    continue
+                damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
+                now = trial if better else now
+            if self.scaled.any():
+                now, change = self._rescaled(now)
+            if better and watch:
+                watch(now)
+            if not better and blocked.any() and not released:  # a shorter step may stay this side of the jump
+                blocked, released, damping = np.zeros_like(blocked), True, SHORT
+            elif not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
+                return Solution(now, held, iteration + 1, True)
+        return Solution(now, held, limit, False)
+
+    def _rescaled(self, now: State) -> tuple[State, float]:
+        """The same point at better scales of Student's t and counts, and the largest relative change.
+
+        With m = mean w z^2, which is 1 at the right scale, one Newton step per column: log s += (m - 1)/information,
+        that of log s being 2 nu/(nu + 3) a row for Student's t, and as in kernel/counts.py for counts.
+        """
+        number = np.maximum(per_column(now.sums, len(now.variance), "number"), 1.0)
+        mean = per_column(now.sums, len(now.variance), "square") / number / now.variance
+        known = information(now.variance, self.tick)[1]
+        if self.nu:
+            known = np.where(self.tick > 0.0, known, 2.0 * self.nu / (self.nu + 3.0))
+        step = np.where(self.scaled, np.clip(2.0 * (mean - 1.0) / known, -1.0, 1.0), 0.0)
+        variance = np.where(self.scaled, np.maximum(now.variance * np.exp(step), self.floor), now.variance)
+        change = float(np.abs(np.log(variance / now.variance)).max())
+        return (self.state(now.point, variance), change) if change >= SCALE_CHANGE else (now, change)
+
+    def inner(self, values: FloatArray) -> FloatArray:
+        return np.array([p.inner(float(v)) for p, v in zip(self.problem.parameters, values, strict=True)])
+
+    def outer(self, inner: FloatArray) -> FloatArray:
+        return np.array([p.outer(float(z)) for p, z in zip(self.problem.parameters, inner, strict=True)])
+
+    def clipped(self, inner: FloatArray) -> FloatArray:
+        return np.clip(inner, self._low, self._high)
+
+    def at_bound(self, inner: FloatArray, gradient: FloatArray) -> NDArray[np.bool_]:
+        """Which parameters stand at a bound and are pushed against it by `gradient` (downhill direction)."""
+        return ((inner <= self._low) & (gradient < 0.0)) | ((inner >= self._high) & (gradient > 0.0))
+
+    def _inside(self, point: Point) -> Point:
+        return Point(self.outer(self.clipped(self.inner(point.values))), point.states)
+
+    def _prior(self, point: Point) -> float:
+        total = 0.0
+        for p, value in zip(self.problem.parameters, point.values, strict=True):
+            if p.prior is not None:
+                total += 0.5 * ((float(value) - p.prior[0]) / p.prior[1]) ** 2
+        return total
+
+
+class Normal:
+    """The normal equations at a state, in the numbers that the solver sees, states of the pieces eliminated.
+
+    gradient (P,): downhill. information (P, P): of all parameters, free of the states. distance: squared length of the
+    Gauss-Newton step in standard errors, over what no bound holds.
+    """
+
+    def __init__(self, solver: Solver, state: State):
+        problem = solver.problem
+        self.solver, self.state, count = solver, state, len(problem.parameters)
+        self.scale = np.array([p.slope(float(v)) for p, v in zip(problem.parameters, state.point.values, strict=True)])
+        self.pieces = [
+            _weighted(sums, 1.0 / state.variance[sums.columns], self.scale, states)
+            for sums, states in zip(state.sums, state.point.states, strict=True)
+        ]
+        self._count = count
+        self.inner = solver.inner(state.point.values)
+        self._add_priors()
+        self.gradient, self.information = self._reduced(0.0)
+        self.held = solver.at_bound(self.inner, self.gradient)
+        self.distance = self.distance_without(self.held)
+
+    def _add_priors(self) -> None:
+        self.prior_gradient, self.prior_information = np.zeros(self._count), np.zeros(self._count)
+        for j, p in enumerate(self.solver.problem.parameters):
+            if p.prior is not None:
+                mean, std = p.prior
+                self.prior_information[j] = (self.scale[j] / std) ** 2
+                self.prior_gradient[j] = (mean - self.state.point.values[j]) / std**2 * self.scale[j]
+
+    def _reduced(self, damping: float) -> tuple[FloatArray, FloatArray]:
+        """Gradient and information of the parameters, the states of each piece eliminated."""
+        gradient, information = self.prior_gradient.copy(), np.diag(self.prior_information)
+        for grad, info in self.pieces:
+            k = self._count
+            damped = _damped(info, damping)
+            gradient += grad[:k]
+            information = information + damped[:k, :k]
+            if grad.shape[0] > k:
+                lift = of_states(damped[k:, k:], damped[k:, :k])
+                gradient -= lift.T @ grad[k:]
+                information -= damped[:k, k:] @ lift
+        return gradient, information
+
+    def distance_without(self, still: NDArray[np.bool_]) -> float:
+        """Squared length of the Gauss-Newton step in standard errors, over the parameters that are not `still`."""
+        free = ~still
+        step = _solve(self.information[np.ix_(free, free)], self.gradient[free])
+        total = float(step @ self.gradient[free])
+        for grad, info in self.pieces:  # what the states alone would gain
+            if grad.shape[0] > self._count:
+                k = self._count
+                total += float(grad[k:] @ of_states(info[k:, k:], grad[k:]))
+        return total
+
+    def scores(self) -> FloatArray:
+        """Score of each block of rows, the states eliminated. Shape (blocks, P). Needs sums of a final march."""
+        k, found = self._count, []
+        for sums, (_, info) in zip(self.state.sums, self.pieces, strict=True):
+            score = sums.score * np.concatenate([self.scale, np.ones(sums.score.shape[1] - k)])
+            own = score[:, :k]
+            if info.shape[0] > k:
+                own = own - score[:, k:] @ of_states(info[k:, k:], info[k:, :k])
+            found.append(own)
+        return np.concatenate(found)
+
+    def moved(self, damping: float, still: NDArray[np.bool_]) -> Point:
+        """The point of the damped step, within the bounds, without the parameters that are `still`."""
+        gradient, information = self._reduced(damping)
+        free = ~still
+        step = np.zeros(self._count)
+        step[free] = _solve(information[np.ix_(free, free)], gradient[free])
+        inner = self.solver.clipped(self.inner + step)
+        step = inner - self.inner
+        k, states = self._count, []
+        for (grad, info), old in zip(self.pieces, self.state.point.states, strict=True):
+            new = old.copy()
+            if grad.shape[0] > k:
+                damped = _damped(info, damping)
+                new += of_states(damped[k:, k:], grad[k:] - damped[k:, :k] @ step)
+                new[: len(FASTEST)] = np.clip(new[: len(FASTEST)], -FASTEST, FASTEST)
+            states.append(new)
+        return Point(self.solver.outer(inner), tuple(states))
+
+
+def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
+    """information^-1 right for the start of a piece; a state that no row tells of stays where it is.
+
+    Such is the speed of a motor that sticks from the start, or whose outputs are missing until it has stopped.
+    """
+    try:
+        return np.asarray(np.linalg.solve(information, right), dtype=float)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(information, hermitian=True) @ right, dtype=float)
+
+
+def _weighted(
+    sums: PieceSums, weight: FloatArray, scale: FloatArray, states: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gradient and information of a piece over its columns, in inner numbers.
+
+    States that are not free do not move. Nor does a speed that the rows only know to be below the fastest (a robot may
+    forget its start before the first row that is used), or that they would pull beyond it.
+    """
+    count = len(scale)
+    full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
+    grad = (weight @ sums.grad) * full
+    info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
+    if not np.diag(info)[count:].max(initial=0.0) > UNSEEN:
+        return grad[:count], info[:count, :count]
+    still = np.diag(info)[count:] <= UNSEEN
+    still[: len(FASTEST)] |= np.diag(info)[count : count + len(FASTEST)] < FASTEST**-2
+    speeds, pull = states[: len(FASTEST)], grad[count : count + len(FASTEST)]
+    still[: len(FASTEST)] |= (np.abs(speeds) >= FASTEST) & (np.sign(speeds) * pull > 0.0)
+    where = np.flatnonzero(still) + count
+    grad[where], info[where, :], info[:, where] = 0.0, 0.0, 0.0
+    info[where, where] = 1.0
+    return grad, info
+
+
+def _damped(info: FloatArray, damping: float) -> FloatArray:
+    return info + np.diag(damping * np.diag(info)) if damping else info
+
+
+def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
+    """information^-1 gradient in balanced units; directions that the data do not see stay where they are."""
+    size = np.sqrt(np.maximum(np.diag(information), 0.0))
+    size[size == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(information / np.outer(size, size))
+    seen = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
+    inverse = np.where(seen, 1.0 / np.where(seen, values, 1.0), 0.0)
+    return (vectors @ (inverse * (vectors.T @ (gradient / size)))) / size
+
+
+def _floor(problem: Problem) -> FloatArray:
+    """Least variance of each column: (PRECISION times its root mean square)^2."""
+    columns = problem.columns
+    size, count = np.zeros(len(columns)), np.zeros(len(columns))
+    for rec in {id(piece.record): piece.record for piece in problem.pieces}.values():
+        for c, column in enumerate(rec.columns):
+            values = rec.outputs[:, c]
+            k = columns.index(column)
+            size[k] += float(np.nansum(values * values))
+            count[k] += float(np.isfinite(values).sum())
+    return PRECISION**2 * np.maximum(size / np.maximum(count, 1.0), 1e-12)

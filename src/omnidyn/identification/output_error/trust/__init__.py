@@ -1,0 +1,2 @@
+"""How sure: uncertainty, rounding, support (of nuisances), resampling,
+breakaway."""

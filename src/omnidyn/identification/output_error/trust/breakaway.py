@@ -1,0 +1,181 @@
+"""Breakaway above coulomb: not a smooth number. What the log says of it is between which drives it lies.
+
+An axis at rest holds a drive up to S. Between two neighbouring drives of the log, S changes nothing; where it passes
+one, a release appears or vanishes, and the likelihood jumps. So S is profiled over these plateaus: the other numbers
+fitted anew at each S, the interval is where 2 (F - least F) stays below 7.35. That is the 95 % quantile for a number at
+which a model jumps (Hansen, Econometrica 68, 575 (2000), on thresholds); the 3.84 of chi^2 holds for smooth ones only.
+Where residuals are not white the likelihood is too steep, and the limit higher, as for coulomb (`Trust.rise`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.identification.output_error.engines.exact import ExactEngine
+from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.identification.output_error.solve.solver import Solution, Solver
+from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
+
+FloatArray = NDArray[np.float64]
+
+KEY = "friction.axes.breakaway"
+LIMIT = 7.35 / 2.0
+COARSE, NARROWER = 24, 0.2  # levels tried in a round, and the share of the range that the next one looks at
+HIGHEST = 3.0  # S/C is 1.1 to 1.6 in the literature
+REFIT = 8  # iterations at each level
+FAR = 12  # plateaus without a likely one after which the interval ends
+
+
+@dataclass(frozen=True)
+class Breakaway:
+    """One axis: level S and its 95 % interval [N, N m]; it is at least coulomb. tied: S = coulomb is as likely."""
+
+    axis: int
+    value: float
+    low: float
+    high: float
+    tied: bool
+
+
+def asked_axes(free: Sequence[str], fixed: Sequence[str] = ()) -> list[int]:
+    """The axes whose breakaway is among the free keys; without an index it stands for all three.
+
+    Raises InputError for a key of no axis.
+    """
+    known = {f"{KEY}[{axis}]": axis for axis in range(3)}
+    asked = [key for key in free if key.startswith(KEY)]
+    for key in asked:
+        if key != KEY and key not in known:
+            raise InputError("not an axis", got=key, expected=", ".join(known), where="free")
+    return [axis for key, axis in known.items() if {key, KEY} & set(asked) and not {key, KEY} & set(fixed)]
+
+
+class _Profile:
+    """Least F at levels of S of one axis, remembered."""
+
+    def __init__(self, solver: Solver, levels: FloatArray, axis: int, point: Point):
+        self.solver, self.levels, self.axis, self.point = solver, levels, axis, point
+        self.known: dict[float, Solution] = {}
+
+    def at(self, level: float) -> Solution:
+        if level not in self.known:
+            self.known[level] = with_breakaway(self.solver, self._with(level)).minimise(self.point, REFIT)
+        return self.known[level]
+
+    def cost(self, level: float) -> float:
+        return self.at(level).state.objective
+
+    def _with(self, level: float) -> FloatArray:
+        levels = self.levels.copy()
+        levels[self.axis] = level
+        return levels
+
+
+def with_breakaway(solver: Solver, levels: FloatArray) -> Solver:
+    """The solver at fixed levels of breakaway, shape (3,), NaN where S follows coulomb."""
+    assert isinstance(solver.engine, ExactEngine)
+    return Solver(solver.problem, solver.engine.with_breakaway(levels), solver.nu)
+
+
+def find_breakaway(
+    solver: Solver, solution: Solution, axes: list[int], known: Trust
+) -> tuple[Solver, Solution, list[Breakaway]]:
+    """Profile S of the axes, one after the other, twice where there are several: (solver, solution, levels) there.
+
+    known: how far the solution can be trusted.
+    """
+    assert isinstance(solver.engine, ExactEngine)
+    levels, found = solver.engine.mapping.breakaway.copy(), []
+    for _ in range(1 if len(axes) == 1 else 2):
+        found = []
+        for axis in axes:
+            one = _one_axis(solver, solution, levels, axis, LIMIT * _steeper(solver, known, axis))
+            levels[axis] = np.nan if one.tied and one.value <= one.low else one.value
+            solution = with_breakaway(solver, levels).minimise(solution.state.point)
+            found.append(one)
+    return with_breakaway(solver, levels), solution, found
+
+
+def _steeper(solver: Solver, known: Trust, axis: int) -> float:
+    """What the likelihood is too steep by where residuals are not white, as for coulomb; 1 where they are."""
+    key = f"friction.axes.coulomb[{axis}]"
+    if key in solver.problem.names and not known.blind[j := solver.problem.names.index(key)]:
+        return known.rise(np.eye(len(known.std))[j]) / RISE
+    return known.widening**2 if known.kind == SANDWICH else 1.0
+
+
+def _one_axis(solver: Solver, solution: Solution, levels: FloatArray, axis: int, limit: float) -> Breakaway:
+    """The plateau of the least F, and the likely ones around it."""
+    point = solution.state.point
+    coulomb = _coulomb(solver, point, axis)
+    edges = _edges(solver, point, axis, 0.5 * coulomb)
+    profile = _Profile(solver, levels, axis, point)
+    if len(edges) < 2:
+        return Breakaway(axis, coulomb, coulomb, np.inf, True)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    best, reach = _search(profile, middles)
+    profile.point = profile.at(middles[best]).state.point
+    profile.known.clear()
+    best = _descend(profile, middles, best, reach)
+    least = min(profile.cost(middles[best]), profile.cost(0.0))
+    low, high = (_walk(profile, middles, best, way, least + limit) for way in (-1, 1))
+    own = _coulomb(solver, profile.at(middles[best]).state.point, axis)
+    tied = profile.cost(0.0) <= least + limit
+    floor = _coulomb(solver, profile.at(0.0).state.point, axis)
+    if profile.cost(0.0) <= profile.cost(middles[best]):
+        return Breakaway(axis, floor, 0.0, max(float(edges[high + 1]), floor), True)
+    return Breakaway(
+        axis, max(float(middles[best]), own), 0.0 if tied else max(float(edges[low]), 0.0), float(edges[high + 1]), tied
+    )
+
+
+def _coulomb(solver: Solver, point: Point, axis: int) -> float:
+    assert isinstance(solver.engine, ExactEngine)
+    robot = solver.engine.mapping.robot_at(point.values[: solver.problem.robot_count])
+    return float(robot.friction.axes.coulomb[axis])
+
+
+def _edges(solver: Solver, point: Point, axis: int, lowest: float) -> FloatArray:
+    """Drives of the log at which S may matter, increasing: from `lowest` to HIGHEST times twice that."""
+    assert isinstance(solver.engine, ExactEngine)
+    drives = np.concatenate([np.abs(drive[:, axis]) for drive in solver.engine.drives(point)])
+    inside = drives[(drives >= lowest) & (drives <= 2.0 * HIGHEST * lowest)]
+    return np.unique(np.round(inside, 12)).astype(float)
+
+
+def _search(profile: _Profile, middles: FloatArray) -> tuple[int, int]:
+    """Index of the best plateau, by ever finer rounds; and half the width of the last round."""
+    low, high = 0, len(middles) - 1
+    while True:
+        tried = np.unique(np.linspace(low, high, COARSE).round().astype(int))
+        costs = [profile.cost(float(middles[k])) for k in tried]
+        best = int(tried[int(np.argmin(costs))])
+        if len(tried) == high - low + 1:
+            return best, max(high - low, 1)
+        half = max(int(NARROWER * (high - low) / 2.0), COARSE // 2 - 1)
+        low, high = max(best - half, 0), min(best + half, len(middles) - 1)
+        if high - low >= len(tried) * 4 and half == 0:
+            return best, 1
+
+
+def _descend(profile: _Profile, middles: FloatArray, best: int, reach: int) -> int:
+    """The best plateau near `best`, the other numbers now fitted from there."""
+    near = range(max(best - min(reach, FAR), 0), min(best + min(reach, FAR), len(middles) - 1) + 1)
+    return min(near, key=lambda k: profile.cost(float(middles[k])))
+
+
+def _walk(profile: _Profile, middles: FloatArray, best: int, way: int, limit: float) -> int:
+    """Index of the last likely plateau from `best` in one direction."""
+    last, k, unlikely = best, best, 0
+    while 0 <= k + way < len(middles) and unlikely < FAR:
+        k += way
+        if profile.cost(float(middles[k])) <= limit:
+            last, unlikely = k, 0
+        else:
+            unlikely += 1
+    return last

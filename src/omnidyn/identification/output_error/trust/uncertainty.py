@@ -1,0 +1,252 @@
+"""How far a fit can be trusted: information, sandwich for coloured residuals, intervals, blind directions.
+
+    white residuals      cov = (J' W J)^-1
+    coloured residuals   cov = (J' W J)^-1 (sum over blocks of s s') (J' W J)^-1,   s the score of a block of rows
+
+The blocks are longer than the residuals remember, so that the sandwich needs no model of their colour: it is consistent
+under heteroskedasticity and autocorrelation, and its intervals take the quantile of Student's t for the number of
+blocks that carry the information. Which of the two is used is decided by the residuals. Where there are many runs,
+each is one block: a floor or a battery that differs from run to run is then in the intervals too (Liang, Zeger,
+Biometrika 73 (1986); n/(n - 1) for n runs).
+
+Counts without noise are neither: no variance is less than what rounding.py finds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, ndtri, stdtrit
+
+from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.kernel.march import FINAL
+from omnidyn.identification.output_error.problem.problem import PieceSums, per_column
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
+from omnidyn.identification.output_error.trust.rounding import rounding_scatter, silent
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
+MANY_RUNS = 20  # from so many on each run is a block
+COLOURED = 4.0  # standard errors of a correlation of neighbours, and of a variance ratio
+BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below which a direction is not seen
+WEAK = 1e-4  # below it, is hardly seen
+SHARE = 0.05  # of a blind direction that a parameter must have to be named
+WHITE, SANDWICH = "white", "sandwich"
+TAIL = 0.975
+RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
+
+
+@dataclass(frozen=True, eq=False)
+class Trust:
+    """Covariance of the parameters in the numbers that the solver sees, and what is behind it.
+
+    covariance (P, P): infinite variances where the data are blind. held: at a bound. blind: not determined by the data,
+    alone or only together with others; unseen: not even together. free_step (P,): from a bound to where the fit would
+    go without it. kind: white or sandwich. widening: largest ratio of the sandwich's std to the plain one. quantile:
+    standard errors in half a 95 % interval. degrees: of freedom behind it. neighbours (columns,): correlation of
+    successive residuals. directions: blind or weak ones: (eigenvalue, relative change of each parameter). runs: that
+    were the blocks, 0 where these were shorter than a run. plain (P, P): inverse of the information, which is what the
+    likelihood itself curves by; the covariance where the noise is white.
+    """
+
+    covariance: FloatArray
+    held: BoolArray
+    blind: BoolArray
+    unseen: BoolArray
+    free_step: FloatArray
+    kind: str
+    widening: float
+    quantile: float
+    degrees: int
+    neighbours: FloatArray
+    directions: tuple[tuple[float, FloatArray], ...]
+    runs: int
+    plain: FloatArray
+
+    @property
+    def std(self) -> FloatArray:
+        return np.sqrt(np.diag(self.covariance))
+
+    def rise(self, way: FloatArray) -> float:
+        """2 (F - least F) at the ends of a 95 % interval of the sum of way (P,) times the parameters.
+
+        3.84 where noise is white. Elsewhere the likelihood is too steep, and as much more of it as the variance is
+        larger than its curvature tells: Kent, Biometrika 69 (1982); Royall, Tsou, J. R. Stat. Soc. B 65 (2003).
+        """
+        steep = float(way @ self.plain @ way)
+        if self.kind == WHITE or steep <= 0.0:
+            return RISE
+        known = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
+        return self.quantile**2 * float(way @ known @ way) / steep
+
+
+def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
+    """The covariance at a solution; `kind`: "white", "sandwich" or "auto"."""
+    counted = bool(solver.tick.any())
+    sums = solver.engine.sums(solution.state.point, final_weighting(solver, solution.state.variance))
+    normal = Normal(solver, State(solution.state.point, sums, solution.state.objective, solution.state.variance))
+    relative = _relative(solver, solution)
+    seen, directions, lost = _seen(normal.information, relative)
+    plain = _inverse(normal.information, lost)
+    runs = _runs(solver, sums)
+    count = len(runs) if len(runs) >= MANY_RUNS else 0
+    influence = normal.scores() @ plain  # what each block moves each parameter by
+    if count:
+        influence = np.array([influence[own].sum(axis=0) for own in runs]) * np.sqrt(count / (count - 1.0))
+    coloured, neighbours = _coloured(solver, sums, runs if count else None)
+    if kind == "auto":  # a loss that is not the likelihood of the noise says nothing by its curvature alone
+        kind = SANDWICH if coloured or solver.nu or counted else WHITE  # nor does an encoder at rest, which repeats
+    wide = influence.T @ influence + plain @ np.diag(normal.prior_information) @ plain
+    degrees = _degrees(influence, seen) if kind == SANDWICH else _rows(solver, sums) - int(seen.sum())
+    if len(influence) <= len(plain):
+        kind, degrees = WHITE, _rows(solver, sums) - int(seen.sum())
+    least = _least(solver, solution, plain, lost)
+    covariance = _at_least(wide, least) if kind == SANDWICH else least.copy()
+    widening = float(np.sqrt(_ratio(np.maximum(np.diag(wide), np.diag(least)), np.diag(plain), seen)))
+    covariance[~seen, ~seen] = np.inf
+    return Trust(
+        covariance, normal.held, ~seen, np.diag(normal.information) <= 0.0, _free_step(plain, normal), kind, widening,
+        float(stdtrit(degrees, TAIL) if degrees > 0 else ndtri(TAIL)), max(int(degrees), 0), neighbours, directions,
+        count if kind == SANDWICH else 0, plain,
+    )  # fmt: skip
+
+
+def final_weighting(solver: Solver, variance: FloatArray) -> Weighting:
+    """A march that keeps the score of each block of rows. variance (columns,)."""
+    rows = sum(piece.last - piece.first + 1 for piece in solver.problem.pieces)
+    block = max(LEAST_BLOCK, -(-rows // BLOCKS))
+    return Weighting(variance, solver.nu, FINAL, block, bool(solver.tick.any()))
+
+
+def _rows(solver: Solver, sums: list[PieceSums]) -> int:
+    return int(per_column(sums, len(solver.problem.columns), "number").sum())
+
+
+def _runs(solver: Solver, sums: list[PieceSums]) -> list[NDArray[np.intp]]:
+    """The blocks of each run."""
+    of = [id(piece.record) for piece, own in zip(solver.problem.pieces, sums, strict=True) for _ in own.score]
+    names = np.array(of)
+    return [np.flatnonzero(names == run) for run in dict.fromkeys(of)]
+
+
+def _coloured(
+    solver: Solver, sums: list[PieceSums], runs: list[NDArray[np.intp]] | None = None
+) -> tuple[bool, FloatArray]:
+    """Whether the residuals of any column remember: (verdict, correlation of neighbours of each column).
+
+    runs: the blocks of each, where runs are the blocks.
+
+    For white noise the correlation of neighbours is 0 +- 1/sqrt(n), and the squared sums over blocks add up to the sum
+    of squares, +- sqrt(2/blocks) of it: the first sees fast colours, the second slow ones.
+    """
+    columns = len(solver.problem.columns)
+    square = np.maximum(per_column(sums, columns, "square"), 1e-300)
+    neighbours = per_column(sums, columns, "lag") / square
+    drift = np.zeros((sum(len(piece.drift) for piece in sums), columns))
+    first = 0
+    for piece in sums:
+        drift[first : first + len(piece.drift), piece.columns] = piece.drift
+        first += len(piece.drift)
+    if runs is not None:
+        drift = np.array([drift[own].sum(axis=0) for own in runs])
+    slow, blocks = (drift**2).sum(axis=0), (drift != 0.0).sum(axis=0)
+    fast = np.abs(neighbours) * np.sqrt(np.maximum(per_column(sums, columns, "number"), 1.0)) > COLOURED
+    return bool((fast | (slow / square > 1.0 + COLOURED * np.sqrt(2.0 / np.maximum(blocks, 1.0)))).any()), neighbours
+
+
+def _degrees(influence: FloatArray, seen: BoolArray) -> float:
+    """Degrees of freedom of a sum of squares over blocks of unlike weight (Satterthwaite), the least of all parameters.
+
+    (sum of variances)^2 / (sum of their squares), the latter from fourth powers, which are 3 times as large.
+    """
+    chosen = influence[:, seen]
+    second, fourth = (chosen**2).sum(axis=0), (chosen**4).sum(axis=0)
+    if not chosen.size or not fourth.all():
+        return float(len(influence))
+    return float(np.clip((3.0 * second**2 / fourth).min(), 3.0, len(influence) - 1))
+
+
+def _relative(solver: Solver, solution: Solution) -> FloatArray:
+    """What a relative change of 1 is in the numbers that the solver sees. Shape (P,)."""
+    pairs = zip(solver.problem.parameters, solution.state.point.values, strict=True)
+    return np.array([1.0 if p.log else abs(float(value)) or 1.0 for p, value in pairs])
+
+
+def _seen(
+    information: FloatArray, relative: FloatArray
+) -> tuple[BoolArray, tuple[tuple[float, FloatArray], ...], FloatArray]:
+    """Which parameters the data determine; the directions that they hardly do, in relative changes, largest 1; and
+    those that they do not at all, with the diagonal of the information scaled to 1, shape (P, directions).
+
+    A parameter is lost with a direction that moves it further than all that the data see leaves open. That its share
+    of the direction is small says nothing: of a resistance, a torque constant and friction that only show together,
+    1 % of the first two goes with 30 % of the third.
+    """
+    diagonal = np.diag(information)
+    seen = diagonal > 0.0
+    chosen = np.flatnonzero(seen)  # those at a bound too: what is lost with them is lost on the other side
+    directions, lost = [], []
+    if chosen.size:
+        size = np.sqrt(diagonal[chosen])
+        values, vectors = np.linalg.eigh(information[np.ix_(chosen, chosen)] / np.outer(size, size))
+        open_ = (vectors[:, values >= BLIND] ** 2 / values[values >= BLIND]).sum(axis=1)
+        for value, vector in zip(values, vectors.T, strict=True):
+            if value < WEAK:
+                way = np.zeros(len(diagonal))
+                way[chosen] = vector / size / relative[chosen]
+                way /= np.abs(way).max()
+                directions.append((float(value), way))
+                if value < BLIND:
+                    lost.append(np.zeros(len(diagonal)))
+                    lost[-1][chosen] = vector
+                    seen[chosen[vector**2 / BLIND > open_]] = False
+    return seen, tuple(directions), np.array(lost).reshape(-1, len(diagonal)).T
+
+
+def _inverse(information: FloatArray, lost: FloatArray) -> FloatArray:
+    """Inverse without the directions that are lost, (P, directions), the diagonal scaled to 1; 0 where that is 0.
+
+    What a lost direction does not move keeps the variance that it has beside all others, not the one that it would have
+    if these were known.
+    """
+    inverse = np.zeros_like(information)
+    there = np.diag(information) > 0.0
+    if there.any():
+        chosen = np.ix_(there, there)
+        size = np.sqrt(np.diag(information)[there])
+        left = np.eye(len(size)) - lost[there] @ lost[there].T
+        part = left @ (information[chosen] / np.outer(size, size)) @ left
+        inverse[chosen] = left @ np.linalg.pinv(part, rcond=1e-14, hermitian=True) @ left / np.outer(size, size)
+    return inverse
+
+
+def _ratio(wide: FloatArray, plain: FloatArray, seen: BoolArray) -> float:
+    """The largest ratio of two variances among what is seen. Shapes (P,)."""
+    if not seen.any():
+        return 1.0
+    return float((wide[seen] / np.maximum(plain[seen], 1e-300)).max())
+
+
+def _least(solver: Solver, solution: Solution, plain: FloatArray, lost: FloatArray) -> FloatArray:
+    """The least covariance: the plain one, or what rounding alone makes of counts that show no noise."""
+    if not silent(solver, solution).any():
+        return plain
+    information, scatter = rounding_scatter(solver, solution)
+    inverse = _inverse(information, lost)
+    return inverse @ scatter @ inverse
+
+
+def _at_least(wide: FloatArray, plain: FloatArray) -> FloatArray:
+    """The sandwich, with no variance below the plain one: few blocks may also err to the good side."""
+    own, least = np.diag(wide), np.diag(plain)
+    stretch = np.sqrt(np.maximum(least, own) / np.where(own > 0.0, own, 1.0))
+    return wide * np.outer(stretch, stretch)
+
+
+def _free_step(plain: FloatArray, normal: Normal) -> FloatArray:
+    """From where a bound holds a parameter to where the fit would be without the bound, to first order."""
+    return np.where(normal.held, plain @ normal.gradient, 0.0)

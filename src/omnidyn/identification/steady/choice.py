@@ -1,0 +1,226 @@
+"""Which shape has the least error on directions it has not seen, and which the data cannot tell apart from it.
+
+Shapes are compared by the root mean square of the left-out error of the full force vector. A difference is that of the
+squared errors at the same points, so what all shapes share drops out; its standard error counts that neighbouring
+directions err alike. Of the shapes that cannot be told from the best (within two standard errors of the difference, and
+of the best's own error), the one with the fewest levels is taken, much as with the one-standard-error rule of Breiman
+et al., Classification and Regression Trees (1984), section 3.4.3.
+
+What decides is robust where the fits are: beyond two scales of the shape that has the least, an error counts by its
+length (Huber's loss), not by its square. A wheel at rest holds any force up to its level, which no shape foretells: by
+squares, the four directions of 24 in which a wheel of the axebot rests decide alone, and the others hardly count.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.steady.operating_points import ForcePoints
+from omnidyn.identification.steady.shape_fit import (
+    HUBER,
+    RAYLEIGH,
+    ShapeFit,
+    fit_shape,
+    is_turning,
+    mean_error,
+    rms_and_error,
+)
+from omnidyn.identification.steady.shapes import SHAPES, VISCOUS
+from omnidyn.model.robot import Robot
+
+FloatArray = NDArray[np.float64]
+
+AUTO = "auto"
+APART = 2.0  # standard errors from which two shapes are told apart
+SPEED_RATIO = 1.25  # speeds that differ by less do not show a viscous friction
+
+
+@dataclass(frozen=True)
+class ShapeScore:
+    """How well a shape does. All errors in N.
+
+    levels: how many numbers it has, per group. loo, loo_std: left-out error of the full force vector and its standard
+    error. along, along_std: the same along travel. behind, behind_std: how much more than the best shape, and the
+    standard error of that difference. apart: the same in standard errors, by what decides. told_apart: whether the data
+    tell it from the best. in_model: whether a robot
+    file can hold it. at_bound: a level came out negative, so it adds nothing real.
+    """
+
+    name: str
+    words: str
+    levels: int
+    loo: float
+    loo_std: float
+    along: float
+    along_std: float
+    behind: float
+    behind_std: float
+    apart: float
+    told_apart: bool
+    in_model: bool
+    at_bound: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeChoice:
+    """The scores, best first by what decides; the name of the chosen shape.
+
+    fits: shape -> group -> fit; missing: shape -> why not.
+    """
+
+    scores: tuple[ShapeScore, ...]
+    chosen: str
+    fits: Mapping[str, Mapping[str, ShapeFit]]
+    missing: Mapping[str, str]
+
+    @property
+    def score(self) -> ShapeScore:
+        """The score of the chosen shape."""
+        return next(score for score in self.scores if score.name == self.chosen)
+
+
+def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust: bool = True) -> ShapeChoice:
+    """Fit every shape to every group, each with its own levels, and choose.
+
+    shape: "auto", or the name of the one that is wanted; the others are still compared.
+    Raises InputError for an unknown shape, InsufficientDataError when the wanted shape, or all, cannot be fitted.
+    """
+    if shape not in (AUTO, *SHAPES):
+        raise InputError("no such shape", got=shape, expected=", ".join((AUTO, *SHAPES)), where="shape")
+    _refuse_lost_signs(points)
+    parts = {group: points.chosen(np.array([name == group for name in points.group])) for group in points.groups}
+    fits: dict[str, dict[str, ShapeFit]] = {}
+    missing: dict[str, str] = {}
+    for name, candidate in SHAPES.items():
+        if candidate.viscous and not all(map(speeds_differ, parts.values())):
+            missing[name] = "the points of a group have nearly one speed"
+            continue
+        fitted = {
+            group: fit_shape(candidate, robot, own, turning=is_turning(robot, own), robust=robust)
+            for group, own in parts.items()
+        }
+        if all(fit is not None for fit in fitted.values()):
+            fits[name] = {group: fit for group, fit in fitted.items() if fit is not None}
+        else:
+            missing[name] = "the directions do not determine all of its levels"
+    if not fits or (shape != AUTO and shape not in fits):
+        raise InsufficientDataError(
+            f"the shape {shape} cannot be fitted" if shape != AUTO else "no shape can be fitted",
+            got=f"{len(points)} points: {missing.get(shape, 'too few')}",
+            expected="steady runs in six directions or more", remedy="drive in more directions, each at a held speed",
+        )  # fmt: skip
+    judge = _Judge(fits, robust)
+    scores = _scores(fits, judge)
+    return ShapeChoice(scores, shape if shape != AUTO else _choice(scores, judge), fits, missing)
+
+
+def _refuse_lost_signs(points: ForcePoints) -> None:
+    along = points.along[np.isfinite(points.along)]
+    wrong = int((along < 0.0).sum())
+    if wrong > len(along) / 2:
+        raise InsufficientDataError(
+            "the force points against the motion, as if friction drove the robot", got=f"in {wrong} of {len(along)} "
+            "points", expected="forces along the motion",
+            remedy="check the sign of the currents (--current-unsigned) and which wheel is which",
+        )  # fmt: skip
+
+
+def speeds_differ(points: ForcePoints) -> bool:
+    """Whether the speeds of the points differ enough to show a viscous friction."""
+    moving = points.speed > points.still
+    speed = points.speed[moving] if moving.any() else np.abs(points.twist[:, 2])
+    return bool(speed.size > 1 and np.quantile(speed, 0.9) > SPEED_RATIO * np.quantile(speed, 0.1))
+
+
+class _Judge:
+    """What decides between shapes. squares: shape -> squared left-out errors; fold: of each point."""
+
+    def __init__(self, fits: Mapping[str, Mapping[str, ShapeFit]], robust: bool):
+        self.squares = {
+            name: _joined([(fit.error**2).sum(axis=1) for fit in own.values()]) for name, own in fits.items()
+        }
+        self.fold = _folds(next(iter(fits.values())).values())
+        self._loss = _capped(self.squares) if robust else self.squares
+
+    @property
+    def order(self) -> list[str]:
+        """The shapes, best first."""
+        return sorted(self._loss, key=lambda name: float(np.mean(self._loss[name])))
+
+    def apart(self, name: str, best: str) -> float:
+        """How much worse than the best, in standard errors: of the difference or of the best's own, the smaller."""
+        behind, error = _difference(self._loss[name], self._loss[best], self.fold)
+        error = min(error, rms_and_error(self._loss[best], self.fold)[1])
+        if not behind or math.isnan(error):
+            return 0.0
+        return behind / error if error > 0.0 else math.copysign(math.inf, behind)
+
+
+def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], judge: _Judge) -> tuple[ShapeScore, ...]:
+    along = {name: _joined([fit.along_error**2 for fit in own.values()]) for name, own in fits.items()}
+    squares, fold, order = judge.squares, judge.fold, judge.order
+    found = []
+    for name in order:
+        apart = judge.apart(name, order[0])
+        own = list(fits[name].values())
+        found.append(
+            ShapeScore(
+                name, SHAPES[name].words, len(own[0].keys), *rms_and_error(squares[name], fold),
+                *rms_and_error(along[name], fold), *_difference(squares[name], squares[order[0]], fold), apart,
+                apart > APART, SHAPES[name].in_model, any((fit.free <= 0.0).any() for fit in own),
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _capped(squares: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Huber's loss of squared lengths: l^2 up to k, then 2 k l - k^2, k two scales of the shape that has the least."""
+    limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(each) for each in squares.values())))
+    return {
+        name: np.where(each <= limit**2, each, 2.0 * limit * np.sqrt(each) - limit**2) for name, each in squares.items()
+    }
+
+
+def _difference(first: FloatArray, second: FloatArray, fold: NDArray[np.int64]) -> tuple[float, float]:
+    """rms(first) - rms(second) and its standard error, from squared errors at the same points."""
+    sizes = float(np.sqrt(np.mean(first))) + float(np.sqrt(np.mean(second)))
+    if sizes == 0.0:
+        return 0.0, 0.0
+    return float(np.mean(first - second)) / sizes, mean_error(first - second, fold) / sizes
+
+
+def _joined(parts: Sequence[FloatArray]) -> FloatArray:
+    return np.concatenate(list(parts))
+
+
+def _folds(fits) -> NDArray[np.int64]:
+    """Numbers of the folds of all groups, one group after the other."""
+    found, first = [], 0
+    for fit in fits:
+        found.append(fit.fold + first)
+        first += int(fit.fold.max()) + 1
+    return np.concatenate(found)
+
+
+def _choice(scores: Sequence[ShapeScore], judge: _Judge) -> str:
+    """The simplest shape that a robot file can hold and that the data cannot tell from the best of those."""
+    able = [score for score in scores if score.in_model and not score.at_bound]
+    if not able:
+        raise InsufficientDataError(
+            "no shape of friction fits: every one has a level below 0",
+            got=", ".join(score.name for score in scores), expected="forces that point along the motion",
+            remedy="check the sign of the currents, and which wheel is which",
+        )  # fmt: skip
+    equal = [score for score in able if judge.apart(score.name, able[0].name) <= APART]
+    return min(equal, key=lambda score: (score.levels, score.loo)).name
+
+
+def base_name(name: str) -> str:
+    """The shape without its viscous term."""
+    return name.removesuffix(VISCOUS)

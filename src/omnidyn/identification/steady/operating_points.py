@@ -1,0 +1,297 @@
+"""Points at constant speed with all axes at once: the motion, and the force of the motors that friction balances there.
+
+traction   f = l K_t i / r from currents, or with i = (u - K_v l w)/R from voltage and speed, eqs (10) (11)
+wrench     G f, eqs (7)-(9); in a turning frame friction also balances M omega v
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.steady.points import refuse_losses
+from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
+from omnidyn.model.dynamics import frame_wrench
+from omnidyn.model.motor import settled_current, traction
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wrench_from_traction
+from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
+
+WHEEL, SET, GROUND = "wheel", "set", "ground"
+SPEEDS = {
+    WHEEL: "speed of the wheels",
+    SET: "set speed",
+    GROUND: "speed over the ground",
+}
+CURRENT, VOLTAGE = "current", "voltage"
+STILL_SHARE = 1e-6  # of the fastest rim: slower is not moving, whatever the speed is
+STILL_ERRORS = 2.0  # standard errors: a measured speed below is not known to move
+AT_REST = 1e-3  # [m/s] at the rim
+UNSIGNED_SHARE = 0.1  # of the windows, in which a wheel turns backward while no current is below 0
+
+
+@dataclass(frozen=True, eq=False)
+class ForcePoints:
+    """Points at constant speed. One row per point; the arrays have shape (points, ...).
+
+    twist [m/s, m/s, rad/s], (points, 3), by `speed_from`. traction [N], (points, wheels); wrench [N, N, N m], (points,
+    3): what friction balances; wrench_std: of its mean over the window. still [m/s], (points,): a component of the
+    motion slower than this is not known to move. direction: of the commanded motion [degree], or of the twist where no
+    command was logged. group: name of each point's group. run: number of its run. rows: rows of the log behind it.
+    speed_from: "wheel", "set" or "ground". force_from: "current" or "voltage". notes: in words.
+    """
+
+    twist: FloatArray
+    traction: FloatArray
+    wrench: FloatArray
+    wrench_std: FloatArray
+    still: FloatArray
+    direction: FloatArray
+    group: tuple[str, ...]
+    run: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    speed_from: str
+    force_from: str
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.twist)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the groups in order of appearance."""
+        return tuple(dict.fromkeys(self.group))
+
+    @property
+    def speed(self) -> FloatArray:
+        """|(v_x, v_y)| [m/s]. Shape (points,)."""
+        return np.hypot(self.twist[:, 0], self.twist[:, 1])
+
+    @property
+    def along(self) -> FloatArray:
+        """Force along travel [N]; NaN where the robot does not travel. Shape (points,)."""
+        speed = self.speed
+        with np.errstate(invalid="ignore", divide="ignore"):
+            along = (self.wrench[:, :2] * self.twist[:, :2]).sum(axis=1) / speed
+        return np.where(speed > self.still, along, np.nan)
+
+    def chosen(self, keep: NDArray) -> ForcePoints:
+        """Some of the points: a mask or indices."""
+        index = np.arange(len(self))[keep]
+        arrays = ("twist", "traction", "wrench", "wrench_std", "still", "direction", "run", "rows")
+        parts = {name: getattr(self, name)[index] for name in arrays}
+        return replace(self, **parts, group=tuple(self.group[k] for k in index))
+
+
+def force_points(
+    runs: Sequence[Run],
+    robot: Robot,
+    *,
+    groups: Sequence[str] | None = None,
+    speed: str = WHEEL,
+    force_from: str = "",
+    window: tuple[float, float] | None = None,
+) -> ForcePoints:
+    """Points from the steady windows of runs; windows of one run and one command are one point.
+
+    groups: name of the group of each run. speed: which speed the points have, "wheel", "set" or "ground". force_from:
+    "current" or "voltage"; "" takes current where all runs have it. window: shares of each command's rows instead of
+    steady rows found, see `find_plateaus`.
+    Currents must carry the sign of the torque. Voltage may be duty times supply.
+    Raises InputError for a run without what is asked for, InsufficientDataError when no window is steady and moves,
+    UnsupportedError for losses in the gear.
+    """
+    if speed not in SPEEDS:
+        raise InputError("no such speed", got=speed, expected=", ".join(SPEEDS), where="speed")
+    refuse_losses(robot)
+    names = tuple(groups) if groups is not None else ("all",) * len(runs)
+    if len(names) != len(runs):
+        raise InputError("one group per run", got=f"{len(names)} groups", expected=str(len(runs)), where="groups")
+    origin = _origin(runs, force_from)
+    found, notes, empty = [], [], []
+    for number, run in enumerate(runs):
+        _check_wheels(run, robot)
+        run = _with_voltage(run, robot) if origin == VOLTAGE else run
+        windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
+        empty += [] if windows else [run.source]
+        found += [(number, _point(run, robot, each, speed, origin), each) for each in windows]
+    if empty:
+        notes.append(f"{len(empty)} of {len(runs)} runs have no steady window, such as {empty[0] or 'run 0'}")
+    if origin == CURRENT:
+        _refuse_unsigned(runs, [each for *_, each in found])
+    points = _stacked(found, robot, names, speed, origin, notes)
+    return _moving(points, robot)
+
+
+def _origin(runs: Sequence[Run], asked: str) -> str:
+    if not runs:
+        raise InsufficientDataError("no runs", got="0 runs", expected="at least one")
+    if asked not in ("", CURRENT, VOLTAGE):
+        raise InputError("no such origin of the force", got=asked, expected="current or voltage", where="force_from")
+    if asked:
+        return asked
+    if all(run.current is not None for run in runs):
+        return CURRENT
+    if all(run.voltage is not None or run.duty is not None for run in runs):
+        return VOLTAGE
+    lacking = next(run for run in runs if run.current is None)
+    raise InputError(
+        "no force can be had from this run", got=", ".join(lacking.channels) or "no channels",
+        expected="current, or voltage (or duty and supply) with a speed", where=lacking.source,
+    )  # fmt: skip
+
+
+def _check_wheels(run: Run, robot: Robot) -> None:
+    if run.wheels is not None and run.wheels != robot.wheels.count:
+        raise InputError(
+            "the run has another number of wheels than the robot", got=str(run.wheels),
+            expected=f"{robot.wheels.count} ({robot.name})", where=run.source,
+        )  # fmt: skip
+
+
+def _with_voltage(run: Run, robot: Robot) -> Run:
+    """The run with the voltage that a duty of the supply makes, where no voltage was logged."""
+    if run.voltage is not None or run.duty is None:
+        return run
+    supply = robot.drive.supply if run.supply is None else run.supply[:, None]
+    if supply is None:
+        raise InputError(
+            "a duty needs the voltage of the supply", got="neither logged nor in the robot file",
+            expected="a column supply, or [drive] supply_V", where=run.source,
+        )  # fmt: skip
+    return run.replace(voltage=run.duty * supply)
+
+
+def _point(run: Run, robot: Robot, each: Plateau, speed: str, origin: str) -> dict[str, FloatArray]:
+    """Motion and force of one window."""
+    moves = _twist(run, robot, each, speed)
+    current, current_std = _current(run, robot, each, origin)
+    force = traction(robot.motor, robot.wheels, current)
+    unit_force = traction(robot.motor, robot.wheels, np.eye(len(current)))
+    per_wheel = wrench_from_traction(robot.wheels, unit_force)  # of one ampere in each motor, (wheels, 3)
+    twist, still = moves
+    return {
+        "twist": twist,
+        "still": still,
+        "traction": force,
+        "wrench": wrench_from_traction(robot.wheels, force) + frame_wrench(robot, twist),
+        "wrench_std": np.sqrt(current_std**2 @ per_wheel**2),
+        "direction": _direction(robot, each, twist),
+    }
+
+
+def _current(run: Run, robot: Robot, each: Plateau, origin: str) -> tuple[FloatArray, FloatArray]:
+    """Current of each motor and its standard error [A]."""
+    if origin == CURRENT:
+        _need(run, each, "current")
+        return each.mean["current"], each.std["current"]
+    _need(run, each, "voltage")
+    _need(run, each, "wheel_speed")
+    volts, speed = each.mean["voltage"], each.mean["wheel_speed"]
+    current = settled_current(robot.motor, volts, speed)
+    by_volts = settled_current(robot.motor, volts + each.std["voltage"], speed) - current
+    by_speed = settled_current(robot.motor, volts, speed + each.std["wheel_speed"]) - current
+    return current, np.hypot(by_volts, by_speed)
+
+
+def _need(run: Run, each: Plateau, channel: str) -> None:
+    if channel not in each.mean or not np.isfinite(each.mean[channel]).all():
+        raise InputError(
+            "the run lacks a channel", got=", ".join(run.channels) or "no channels", expected=channel, where=run.source
+        )
+
+
+def _twist(run: Run, robot: Robot, each: Plateau, speed: str) -> tuple[FloatArray, FloatArray]:
+    """(twist, what counts as still [m/s]) of one window."""
+    if speed == GROUND:
+        _need(run, each, "twist")
+        rims, spread = rim_speed(robot.wheels, each.mean["twist"]), np.hypot(*each.std["twist"][:2])
+        return each.mean["twist"], _still(rims, STILL_ERRORS * float(spread))
+    if speed == SET:
+        commanded = _commanded(robot, each)
+        if commanded is None:
+            raise InputError(
+                "the run lacks a set speed", got=", ".join(run.channels), expected="twist_command or "
+                "wheel_speed_command", remedy="use --speed wheel", where=run.source,
+            )  # fmt: skip
+        return commanded, _still(rim_speed(robot.wheels, commanded), 0.0)
+    _need(run, each, "wheel_speed")
+    twist = twist_from_wheel_speed(robot.wheels, each.mean["wheel_speed"])
+    spread = float((each.std["wheel_speed"] * robot.wheels.radii).max())
+    return twist, _still(rim_speed(robot.wheels, twist), STILL_ERRORS * spread)
+
+
+def _still(rims: FloatArray, floor: float) -> FloatArray:
+    return np.asarray(max(STILL_SHARE * float(np.abs(rims).max()), floor))
+
+
+def _commanded(robot: Robot, each: Plateau) -> FloatArray | None:
+    """The commanded twist of a window, None where no set speed was logged."""
+    for name in ("twist_command", "wheel_speed_command"):
+        command = each.mean.get(name)
+        if command is not None and np.isfinite(command).all():
+            return command if name == "twist_command" else twist_from_wheel_speed(robot.wheels, command)
+    return None
+
+
+def _direction(robot: Robot, each: Plateau, twist: FloatArray) -> FloatArray:
+    commanded = _commanded(robot, each)
+    way = twist if commanded is None or not commanded.any() else commanded
+    return np.degrees(np.arctan2(way[1], way[0]))
+
+
+def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
+    """A sensor without sign: no current is ever below 0 although wheels turn both ways."""
+    lowest = min((float(np.nanmin(run.current, initial=0.0)) for run in runs if run.current is not None), default=0.0)
+    speeds = [each.mean.get("wheel_speed", each.mean.get("wheel_speed_command")) for each in windows]
+    back = sum(bool((speed < 0.0).any()) for speed in speeds if speed is not None)
+    if lowest >= 0.0 and back > UNSIGNED_SHARE * len(windows):
+        raise InputError(
+            "the currents have no sign: none is below 0", got=f"wheels that turn backward in {back} of {len(windows)} "
+            "windows", expected="currents signed as the torque", remedy="use --current-unsigned",
+            where=runs[0].source,
+        )  # fmt: skip
+
+
+def _stacked(
+    found: list[tuple[int, dict[str, FloatArray], Plateau]], robot: Robot, names: tuple[str, ...], speed: str,
+    origin: str, notes: list[str],
+) -> ForcePoints:  # fmt: skip
+    if not found:
+        raise InsufficientDataError(
+            "no steady window was found", got="; ".join(notes) or "no rows",
+            expected="stretches of constant speed, half a second or longer", remedy="hold each command longer",
+        )  # fmt: skip
+    arrays = {name: np.array([point[name] for _, point, _ in found]) for name in found[0][1]}
+    if any(each.speed_from == ANGLE for *_, each in found) and speed == WHEEL:
+        notes = [*notes, f"speeds of the wheels are from {ANGLE}, finer than a quantised speed"]
+    return ForcePoints(
+        **arrays,
+        group=tuple(names[number] for number, _, _ in found),
+        run=np.array([number for number, _, _ in found]),
+        rows=np.array([each.count for *_, each in found]),
+        speed_from=speed,
+        force_from=origin,
+        notes=tuple(notes),
+    )
+
+
+def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
+    """The points in motion. Raises InsufficientDataError where the robot never moved; friction is then bounded only."""
+    fastest = np.abs(rim_speed(robot.wheels, points.twist)).max(axis=1)
+    moves = fastest > np.maximum(points.still, AT_REST)
+    if not moves.any():
+        force = np.hypot(points.wrench[:, 0], points.wrench[:, 1]).max()
+        raise InsufficientDataError(
+            "the robot never moved: it stayed inside its dead zone, so friction is only known to hold what pushed",
+            got=f"at most {force:.3g} N of push", expected="windows in motion",
+        )  # fmt: skip
+    resting = int((~moves).sum())
+    kept = points.chosen(moves)
+    return replace(kept, notes=(*kept.notes, f"{resting} windows at rest were left out")) if resting else kept

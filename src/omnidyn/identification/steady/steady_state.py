@@ -1,0 +1,275 @@
+"""The paper's identification: friction from points at constant speed, eqs (15)-(17).
+
+    force = B speed + C sgn(speed)        per body axis: v (15), v_n (16), w (17)
+
+At constant speed the friction balances what drives the robot. The driving force comes from a table, from motor
+currents or from voltages (points.py); B and C of each axis from weighted least squares (line.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.identification.estimate import Correlation, Estimate, identified, unit
+from omnidyn.identification.steady.doubts import ORIGIN, about_line, about_points
+from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
+from omnidyn.logs.steady_table import AXES, SteadyTable
+from omnidyn.model.friction import AxesFriction
+from omnidyn.model.robot import Robot
+
+FloatArray = NDArray[np.float64]
+
+REST = ("bound", "line", "ignore")
+MAX_FRICTION = 1e6  # what a robot file takes
+ONE_SPEED = 1e-4  # speeds that differ by less than this share are one speed
+
+
+@dataclass
+class _Findings:
+    """What the axes gave so far: lines and bounds by axis, and doubts in words."""
+
+    lines: dict[int, Line] = field(default_factory=dict)
+    bounds: dict[int, float] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    unfitted: list[str] = field(default_factory=list)
+
+
+def fit_steady_state(
+    robot: Robot,
+    data: SteadyTable,
+    *,
+    rest: str = "bound",
+    rest_speed: Sequence[float] = (0.0, 0.0, 0.0),
+    absolute_std: bool = False,
+) -> Estimate:
+    """Identify B and C of every axis in `data`, eqs (15)-(17).
+
+    data: from `read_steady_table`, `SteadyTable(axis, speed, force)` or the functions of points.py.
+    rest: what a row at rest says. "bound": friction can hold that force, so breakaway is at least that; the line is
+    fitted to the moving rows. "line": it is a point of the sliding line, force = C (the paper's way). "ignore": no more
+    than that it is there.
+    rest_speed: speeds up to this count as rest, per axis [m/s, m/s, rad/s].
+    absolute_std: speed_std and force_std are exact; by default only their ratios count and the scatter sets the scale.
+
+    Returns an Estimate; its robot has the new B and C. An axis without data, or with one speed only, keeps what the
+    robot had, and a warning says so. A B or C that would be negative is 0, listed in `at_bound`. A bound from rest
+    above C becomes the breakaway of the robot (the smallest one that agrees with the data), with a warning.
+    Raises InsufficientDataError when an axis has one or two moving rows (a line with intervals needs three), or when no
+    axis can be fitted; UnsupportedError for a robot with friction on the direction of travel or at the wheels, which
+    would count twice; InputError for a wrong option.
+    """
+    limits = _options(rest, rest_speed, absolute_std, data)
+    _refuse_other_friction(robot)
+    found = _Findings(warnings=about_points(robot, data))
+    for axis in range(len(AXES)):
+        _study(axis, data, rest, limits[axis], absolute_std, found)
+    if not found.lines:
+        raise InsufficientDataError(
+            "; ".join(["no axis can be fitted", *found.unfitted, *_bound_words(found.bounds)]),
+            expected="three rows in motion or more, at two speeds or more, per axis",
+            where=data.source,
+        )
+    found.warnings += found.unfitted
+    if data.force_from == "voltage":
+        found.warnings.append(f"forces are from {ORIGIN['voltage']}: as right as the R, K_t and K_v of the robot file")
+    friction = _friction(robot.friction.axes, found)
+    return _estimate(robot, friction, found, _method(data, rest, absolute_std), _data(data))
+
+
+def _options(rest: str, rest_speed: Sequence[float], absolute_std: bool, data: SteadyTable) -> FloatArray:
+    if rest not in REST:
+        raise InputError("unknown use of rows at rest", got=rest, expected=" or ".join(REST), where="rest")
+    limits = np.asarray(rest_speed, dtype=float)
+    if limits.shape != (3,) or not ((limits >= 0.0) & np.isfinite(limits)).all():
+        raise InputError(
+            "cannot tell rest from motion", got=rest_speed, expected="three speeds, 0 or above", where="rest_speed"
+        )
+    if absolute_std and data.force_std is None:
+        raise InputError(
+            "absolute_std needs the std of the forces", got="none", expected="a column force_std", where=data.source
+        )
+    return limits
+
+
+def _refuse_other_friction(robot: Robot) -> None:
+    if not robot.friction.only_axes:
+        raise UnsupportedError(
+            "this fit knows friction on the body axes only",
+            got=f"{robot.name} with friction elsewhere too",
+            expected="[friction.axes] alone",
+            remedy="remove [friction.direction] and [friction.wheels]",
+        )
+
+
+def _study(axis: int, data: SteadyTable, rest: str, limit: float, absolute_std: bool, found: _Findings) -> None:
+    """One axis: its bound from rest, its line, its doubts."""
+    mine = data.axis_index == axis
+    moving = mine & (np.abs(data.speed) > limit)
+    resting = mine & ~moving
+    if not mine.any():
+        found.unfitted.append(f"axis {AXES[axis]}: no data, B and C stay as they were")
+        return
+    _say_rest(axis, int(resting.sum()), rest, found.warnings)
+    if rest == "bound" and resting.any():
+        found.bounds[axis] = float(np.abs(data.force[resting]).max())
+    used = moving | (resting & (data.force != 0.0)) if rest == "line" else moving
+    speed = np.where(moving, data.speed, 0.0)[used]
+    if not _identifiable(axis, speed, data.force[used], absolute_std, found, data.source):
+        return
+    spreads = [None if std is None else std[used] for std in (data.speed_std, data.force_std)]
+    line = fit_line(speed, data.force[used], *spreads, absolute_std=absolute_std)
+    if (line.estimate > MAX_FRICTION).any():
+        size = f"{line.estimate.max():.3g}"
+        found.unfitted.append(f"axis {AXES[axis]}: the fit gives {size}, beyond any robot; B and C stay")
+        return
+    found.lines[axis] = line
+    found.warnings += about_line(axis, line, _names(axis), data.force_std is not None, absolute_std)
+
+
+def _say_rest(axis: int, resting: int, rest: str, warnings: list[str]) -> None:
+    rows = f"{resting} row" + ("" if resting == 1 else "s")
+    if resting and rest == "line":
+        warnings.append(
+            f"axis {AXES[axis]}: {rows} at rest used as a sliding point: there friction only balances the drive, "
+            f"anywhere up to breakaway, so B and C may be wrong by more than the intervals say"
+        )
+    if resting and rest == "ignore":
+        warnings.append(f"axis {AXES[axis]}: {rows} at rest not used")
+
+
+def _identifiable(
+    axis: int, speed: FloatArray, force: FloatArray, absolute_std: bool, found: _Findings, source: str
+) -> bool:
+    """Whether the rows determine a line; what is known instead goes to the words.
+
+    Raises InsufficientDataError for too few rows: to leave such an axis out would hide the user's own points.
+    """
+    size = np.abs(speed)
+    name = f"axis {AXES[axis]}"
+    if not size.any():
+        found.unfitted.append(f"{name}: the robot never moved, B and C stay as they were")
+        return False
+    needed = PARAMETERS if absolute_std else PARAMETERS + 1
+    if len(speed) < needed:
+        raise InsufficientDataError(
+            f"{name}: too few rows for a line with intervals",
+            got=f"{len(speed)} usable rows",
+            expected=f"{needed} or more at two speeds or more",
+            where=source,
+            remedy="measure more points, or remove this axis from the data",
+        )
+    if np.ptp(size) > ONE_SPEED * size.max():
+        return True
+    total = float(np.mean(force * np.sign(speed)))
+    found.unfitted.append(
+        f"{name}: all rows have the same speed, {size.max():.4g}: B and C cannot be told apart and stay as they "
+        f"were; only their sum is known there, B speed + C = {total:.4g}"
+    )
+    return False
+
+
+def _names(axis: int) -> tuple[str, str]:
+    return f"friction.axes.viscous[{axis}]", f"friction.axes.coulomb[{axis}]"
+
+
+def _breakaway(axis: int) -> str:
+    return f"friction.axes.breakaway[{axis}]"
+
+
+def _friction(before: AxesFriction, found: _Findings) -> AxesFriction:
+    """The friction with the fitted B and C; breakaway raised only as far as C or a row at rest demands, in words."""
+    viscous, coulomb, breakaway = (level.copy() for level in before.levels)
+    for axis, line in found.lines.items():
+        viscous[axis], coulomb[axis] = line.estimate
+        if before.breakaway is None:
+            breakaway[axis] = coulomb[axis]
+        elif breakaway[axis] < coulomb[axis]:
+            found.warnings.append(f"{_breakaway(axis)} raised from {breakaway[axis]:.4g} to the new coulomb friction")
+            breakaway[axis] = coulomb[axis]
+        else:
+            found.warnings.append(f"{_breakaway(axis)} stays at {breakaway[axis]:.4g}: rows in motion do not show it")
+    for axis, bound in found.bounds.items():
+        if bound > breakaway[axis]:
+            found.warnings.append(
+                f"{_breakaway(axis)} set to {bound:.4g} {unit(_breakaway(axis))}: the robot stayed at rest under that "
+                f"force, more than the coulomb friction {coulomb[axis]:.4g}; it is a lower bound, not an estimate"
+            )
+            breakaway[axis] = bound
+    raised = before.breakaway is not None or bool((breakaway > coulomb).any())
+    return before.replace(
+        viscous=viscous.tolist(), coulomb=coulomb.tolist(), breakaway=breakaway.tolist() if raised else None
+    )
+
+
+def _estimate(robot: Robot, friction: AxesFriction, found: _Findings, method: str, data: str) -> Estimate:
+    value, std, ci95, degrees = {}, {}, {}, {}
+    at_bound: list[str] = []
+    for axis, line in sorted(found.lines.items()):
+        for k, name in enumerate(_names(axis)):
+            value[name], std[name] = float(line.estimate[k]), float(line.std[k])
+            ci95[name] = (float(line.ci95[k, 0]), float(line.ci95[k, 1]))
+            degrees[name] = line.degrees_of_freedom
+            at_bound += [name] if line.at_bound[k] else []
+    fitted = robot.replace(
+        friction=robot.friction.replace(axes=friction), priors=_priors(robot, friction, std, found, data)
+    )
+    return Estimate(
+        robot=fitted,
+        value=value,
+        std=std,
+        ci95=ci95,
+        correlation=_correlation(found.lines),
+        degrees_of_freedom=degrees,
+        at_bound=tuple(at_bound),
+        lower_bound={_breakaway(axis): bound for axis, bound in found.bounds.items()},
+        warnings=tuple(found.warnings),
+        method=method,
+        data=data,
+    )
+
+
+def _priors(robot: Robot, friction: AxesFriction, std: dict[str, float], found: _Findings, data: str) -> dict:
+    """The robot's priors with the fitted numbers in them. What is known of a list as a whole goes to its items."""
+    priors = dict(robot.priors)
+    for key in ("viscous", "coulomb", "breakaway"):
+        whole = priors.pop(f"friction.axes.{key}", None)
+        if whole is not None:
+            priors.update({f"friction.axes.{key}[{axis}]": whole for axis in range(len(AXES))})
+    for name, deviation in std.items():
+        priors[name] = identified(deviation, f"steady state, {data}")
+    for axis, bound in found.bounds.items():
+        if friction.breakaway is not None and friction.breakaway[axis] == bound:
+            priors[_breakaway(axis)] = identified(None, f"lower bound from rest, {data}")
+    return priors
+
+
+def _correlation(lines: dict[int, Line]) -> Correlation:
+    """B and C of one axis are correlated; the axes are fitted apart."""
+    names = [name for axis in sorted(lines) for name in _names(axis)]
+    matrix = np.eye(len(names))
+    for k, axis in enumerate(sorted(lines)):
+        matrix[2 * k, 2 * k + 1] = matrix[2 * k + 1, 2 * k] = lines[axis].correlation
+    return Correlation(tuple(names), matrix)
+
+
+def _method(data: SteadyTable, rest: str, absolute_std: bool) -> str:
+    weights = "weighted least squares" if data.force_std is not None else "least squares"
+    weights += ", std taken as exact" if absolute_std else ""
+    use = {"bound": "bound breakaway", "line": "count as sliding", "ignore": "are not used"}[rest]
+    return f"steady state, eqs (15)-(17), {weights}; forces from {ORIGIN[data.force_from]}; rows at rest {use}"
+
+
+def _data(data: SteadyTable) -> str:
+    name = Path(data.source).name if data.sha256 else data.source
+    words = f"{name or 'unnamed'}, {len(data)} points"
+    return f"{words}, sha256 {data.sha256}" if data.sha256 else words
+
+
+def _bound_words(bounds: dict[int, float]) -> list[str]:
+    return [f"axis {AXES[axis]} holds at least {bound:.4g} {unit(_breakaway(axis))}" for axis, bound in bounds.items()]

@@ -1,0 +1,221 @@
+"""Steady-state identification from logs: the force over direction and speed, the shape of friction, groups compared.
+
+points   one per run and command, at constant speed (operating_points.py)
+shape    the one with the least error on directions it has not seen (choice.py)
+levels   of each group, with 95 % intervals; what differs between groups, and what does not
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+
+from omnidyn.errors import InsufficientDataError
+from omnidyn.identification.estimate import Correlation, Estimate, identified
+from omnidyn.identification.steady import study_words as words
+from omnidyn.identification.steady.choice import AUTO, ShapeChoice, base_name, choose_shape, speeds_differ
+from omnidyn.identification.steady.line import quantile
+from omnidyn.identification.steady.operating_points import WHEEL, ForcePoints, force_points
+from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
+from omnidyn.identification.steady.shapes import AXES, DIRECTION, SHAPES, VISCOUS, friction_of
+from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
+from omnidyn.model.friction import Friction
+from omnidyn.model.robot import Prior, Robot
+from omnidyn.run import Run
+
+FloatArray = NDArray[np.float64]
+
+MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyStudy:
+    """All that steady windows say about friction.
+
+    points: what was used. choice: shapes compared. estimates: group -> Estimate, whose robot holds that group's
+    friction. travel: group -> force along travel. viscous: group -> what is known of the viscous levels. differences
+    between groups. internal: group -> rms of the forces with which the wheels work against each other [N], where there
+    are more than three. statements, warnings, advice: in words.
+    """
+
+    robot: Robot
+    points: ForcePoints
+    choice: ShapeChoice
+    estimates: Mapping[str, Estimate]
+    travel: Mapping[str, Travel]
+    viscous: Mapping[str, tuple[Viscous, ...]]
+    differences: tuple[Difference, ...]
+    internal: Mapping[str, float]
+    statements: tuple[str, ...]
+    warnings: tuple[str, ...]
+    advice: tuple[str, ...]
+
+    @property
+    def estimate(self) -> Estimate:
+        """The estimate of the first group; the only one where there are no groups."""
+        return next(iter(self.estimates.values()))
+
+
+def identify_steady(
+    runs: Sequence[Run],
+    robot: Robot,
+    *,
+    groups: Sequence[str] | None = None,
+    shape: str = AUTO,
+    speed: str = WHEEL,
+    force_from: str = "",
+    robust: bool = True,
+    window: tuple[float, float] | None = None,
+) -> SteadyStudy:
+    """Identify friction from the steady windows of runs.
+
+    groups: name of each run's group (a floor, a load); every group has its own levels of one shape. shape: "auto" or a
+    name of `shapes.SHAPES`. speed: "wheel", "set" or "ground": which speed the friction is a function of. force_from:
+    "current" (signed as the torque) or "voltage"; "" takes what all runs have. robust: points far from the shape pull
+    less. window: shares of each command's rows, instead of steady rows found.
+    The friction of `robot` is replaced; its motor and wheels are taken as they are.
+    Raises InsufficientDataError when nothing is steady, nothing moves, or no shape is determined; InputError for a run
+    without the channels needed, or for a wrong option.
+    """
+    points = force_points(runs, robot, groups=groups, speed=speed, force_from=force_from, window=window)
+    choice = choose_shape(robot, points, shape=shape, robust=robust)
+    if not SHAPES[choice.chosen].in_model:
+        raise InsufficientDataError(
+            "a robot file cannot hold this shape: it is for comparison only", got=choice.chosen,
+            expected=", ".join(name for name, each in SHAPES.items() if each.in_model), where="shape",
+        )  # fmt: skip
+    parts = {group: points.chosen(np.array([name == group for name in points.group])) for group in points.groups}
+    travel = {group: _travel(own) for group, own in parts.items()}
+    viscous = {group: _viscous(robot, choice, group, own, travel[group], robust) for group, own in parts.items()}
+    estimates = {group: _estimate(robot, own, choice, group, robust) for group, own in parts.items()}
+    differences = _differences(choice)
+    internal = {group: _internal(robot, own) for group, own in parts.items()} if robot.wheels.count > 3 else {}
+    turning = any(is_turning(robot, own) for own in parts.values())
+    return SteadyStudy(
+        robot=robot, points=points, choice=choice, estimates=estimates, travel=travel, viscous=viscous,
+        differences=differences, internal=internal,
+        statements=words.statements(choice, viscous, differences, internal, MATTERS),
+        warnings=(*points.notes, *words.doubts(points, choice, turning)),
+        advice=words.advice(choice, viscous, turning, points.force_from),
+    )  # fmt: skip
+
+
+def _travel(points: ForcePoints) -> Travel:
+    along = points.along[np.isfinite(points.along)]
+    n = len(along)
+    spread = float(np.std(along, ddof=1)) if n > 1 else float("nan")
+    mean, error = (float(np.mean(along)), spread / np.sqrt(n)) if n else (float("nan"), float("nan"))
+    speed = points.speed
+    return Travel(
+        mean, error, spread, float(speed.min()), float(speed.max()), len(points), len(set(points.run.tolist())),
+        int(points.rows.sum()),
+    )  # fmt: skip
+
+
+def _viscous(
+    robot: Robot, choice: ShapeChoice, group: str, points: ForcePoints, travel: Travel, robust: bool
+) -> tuple[Viscous, ...]:
+    """The viscous levels of the chosen shape, fitted beside its other levels."""
+    name, found = base_name(choice.chosen) + VISCOUS, []
+    fit = choice.fits[name][group] if name in choice.fits else None
+    if fit is None and speeds_differ(points):  # the other groups may have one speed only
+        fit = fit_shape(SHAPES[name], robot, points, turning=is_turning(robot, points), robust=robust)
+    if fit is None:
+        return ()
+    for k, key in enumerate(fit.keys):
+        if ".viscous" in key:
+            half = quantile(fit.degrees_of_freedom) * float(fit.std[k])
+            value, low, high = float(fit.free[k]), float(fit.free[k]) - half, float(fit.free[k]) + half
+            effect = max(abs(low), abs(high)) * (travel.fast - travel.slow)
+            seen = not low <= 0.0 <= high
+            found.append(
+                Viscous(key, value, float(fit.std[k]), low, high, seen, effect, travel.mean, travel.slow, travel.fast)
+            )
+    return tuple(found)
+
+
+def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool) -> Estimate:
+    fit = choice.fits[choice.chosen][group]
+    value = dict(zip(fit.keys, fit.level.tolist(), strict=True))
+    std = dict(zip(fit.keys, fit.std.tolist(), strict=True))
+    turning = is_turning(robot, points)
+    data = words.data(points, group)
+    friction, kept = _friction(robot, fit, value, turning)
+    return Estimate(
+        robot=robot.replace(friction=friction, priors=_priors(robot, std, kept, data)),
+        value=value,
+        std=std,
+        ci95=_intervals(fit),
+        correlation=Correlation(fit.keys, _correlation(fit.covariance)),
+        degrees_of_freedom=dict.fromkeys(fit.keys, fit.degrees_of_freedom),
+        at_bound=tuple(key for key, free in zip(fit.keys, fit.free, strict=True) if free < 0.0),
+        warnings=words.about_fit(fit, robust, kept),
+        method=words.method(points, fit, robust),
+        data=data,
+    )
+
+
+def _intervals(fit: ShapeFit) -> dict[str, tuple[float, float]]:
+    """95 % intervals; at a bound from 0 to what the free fit would reach from 0, as with a line."""
+    half = quantile(fit.degrees_of_freedom) * fit.std
+    low, high = fit.free - half, fit.free + half
+    bound = fit.free < 0.0
+    low = np.where(bound, 0.0, np.minimum(low, fit.level))
+    high = np.where(bound, np.maximum(high, half), np.maximum(high, fit.level))
+    return {key: (float(a), float(b)) for key, a, b in zip(fit.keys, low, high, strict=True)}
+
+
+def _correlation(covariance: FloatArray) -> FloatArray:
+    std = np.sqrt(np.diag(covariance))
+    std = np.where(std > 0.0, std, 1.0)
+    matrix = covariance / np.outer(std, std)
+    np.fill_diagonal(matrix, 1.0)
+    return matrix
+
+
+def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: bool) -> tuple[Friction, dict[str, float]]:
+    """The new friction; what the robot had about yaw is kept where the data do not turn, and named."""
+    if turning or fit.shape.name.startswith("wheel"):  # friction at the wheels resists turning by itself
+        return friction_of(fit.shape, robot, value), {}
+    before = robot.friction
+    coulomb = before.axes.coulomb[2] + before.direction.yaw_coulomb
+    viscous = before.axes.viscous[2] + before.direction.yaw_viscous
+    on_axes = fit.shape.name.startswith("box")
+    names = (f"{AXES}.coulomb[2]", f"{AXES}.viscous[2]") if on_axes else (
+        f"{DIRECTION}.yaw_coulomb", f"{DIRECTION}.yaw_viscous"
+    )  # fmt: skip
+    kept = {key: level for key, level in zip(names, (coulomb, viscous), strict=True) if level > 0.0}
+    return friction_of(fit.shape, robot, value | kept), kept
+
+
+def _priors(robot: Robot, std: dict[str, float], kept: dict[str, float], data: str) -> dict[str, Prior]:
+    priors = {key: prior for key, prior in robot.priors.items() if not key.startswith("friction.") or key in kept}
+    return priors | {key: identified(deviation, f"steady state, {data}") for key, deviation in std.items()}
+
+
+def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
+    """Every level between every two groups: independent data, so their variances add up."""
+    fits, found = choice.fits[choice.chosen], []
+    for first, second in combinations(fits, 2):
+        one, other = fits[first], fits[second]
+        for k, key in enumerate(one.keys):
+            if key not in other.keys:  # only one of the groups turns
+                continue
+            j = other.keys.index(key)
+            values = float(one.free[k]), float(other.free[j])
+            std = float(np.hypot(one.std[k], other.std[j]))
+            half = quantile(min(one.degrees_of_freedom, other.degrees_of_freedom)) * std
+            gap = values[1] - values[0]
+            found.append(Difference(key, first, second, values, gap, std, gap - half, gap + half))
+    return tuple(found)
+
+
+def _internal(robot: Robot, points: ForcePoints) -> float:
+    """rms [N] of the part of the traction that pushes nowhere: G f = 0."""
+    against = points.traction @ null_space(robot.wheels.wrench_matrix)
+    return float(np.sqrt(np.mean((against**2).sum(axis=1))))

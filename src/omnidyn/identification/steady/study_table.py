@@ -1,0 +1,129 @@
+"""A steady-state study as text for people and as dictionaries for machines."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from omnidyn.identification.estimate import unit
+from omnidyn.identification.steady.operating_points import SPEEDS
+from omnidyn.identification.steady.study import SteadyStudy
+from omnidyn.identification.steady.study_words import FORCES, label
+
+WIDTH = 100
+
+
+def table_text(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Aligned columns, the first to the left, the others to the right."""
+    widths = [max(len(str(row[k])) for row in (head, *rows)) for k in range(len(head))]
+    lines = []
+    for row in (head, *rows):
+        cells = [
+            str(cell).ljust(w) if k == 0 else str(cell).rjust(w)
+            for k, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return lines
+
+
+def study_summary(study: SteadyStudy) -> str:
+    """The study as plain text: what was used, the shapes, the levels, what it says and what is doubtful."""
+    points = study.points
+    lines = [
+        f"{study.robot.name}: steady state from logs; forces from {FORCES[points.force_from]}; friction over the "
+        f"{SPEEDS[points.speed_from]}",
+        "",
+        *table_text(TRAVEL_HEAD, travel_rows(study)),
+        "",
+        *table_text(SHAPE_HEAD, shape_rows(study)),
+        "",
+        *table_text(LEVEL_HEAD, level_rows(study)),
+        "",
+    ]
+    for words in study.statements:
+        lines += bullet("-", words)
+    for head, several in (("warning:", study.warnings), ("next:", study.advice)):
+        for words in several:
+            lines += bullet(head, words)
+    for group, estimate in study.estimates.items():
+        for words in estimate.warnings:
+            lines += bullet("warning:", words if group == "all" else f"{group}: {words}")
+    return "\n".join(lines) + "\n"
+
+
+def bullet(head: str, words: str) -> list[str]:
+    """One point of a list, wrapped."""
+    return textwrap.wrap(f"{head} {words}", WIDTH, subsequent_indent="  ")
+
+
+TRAVEL_HEAD = ("group", "runs", "points", "rows", "speed m/s", "along travel N", "+-", "scatter N")
+SHAPE_HEAD = ("shape", "levels", "left-out error N", "+-", "along N", "behind best N", "+-", "")
+LEVEL_HEAD = ("group", "level", "value", "std error", "95 % interval", "unit")
+
+
+def travel_rows(study: SteadyStudy) -> list[list[str]]:
+    """What was used, and the force along travel, a row per group."""
+    return [
+        [
+            group, f"{each.runs}", f"{each.points}", f"{each.rows}", f"{each.slow:.3g} .. {each.fast:.3g}",
+            f"{each.mean:.2f}", f"{each.std:.2f}", f"{each.deviation:.2f}",
+        ]
+        for group, each in study.travel.items()
+    ]  # fmt: skip
+
+
+def shape_rows(study: SteadyStudy) -> list[list[str]]:
+    """The shapes compared, best first."""
+    rows = []
+    for score in study.choice.scores:
+        marks = ["chosen"] if score.name == study.choice.chosen else []
+        marks += [] if score.told_apart or score.behind == 0.0 else ["not told apart"]
+        marks += [] if score.in_model else ["not in a robot file"]
+        marks += ["a level below 0"] if score.at_bound else []
+        best = score.behind == 0.0 and score.behind_std == 0.0
+        behind, error = ("", "") if best else (f"{score.behind:.2f}", f"{score.behind_std:.2f}")
+        rows.append(
+            [
+                score.name, f"{score.levels}", f"{score.loo:.2f}", f"{score.loo_std:.2f}", f"{score.along:.2f}", behind,
+                error, ", ".join(marks),
+            ]
+        )  # fmt: skip
+    return rows
+
+
+def level_rows(study: SteadyStudy) -> list[list[str]]:
+    """The levels of the chosen shape, a row per group and level."""
+    rows = []
+    for group, estimate in study.estimates.items():
+        for key, value in estimate.value.items():
+            low, high = estimate.ci95[key]
+            mark = " at bound" if key in estimate.at_bound else ""
+            interval = f"[{low:.4g}, {high:.4g}]"
+            rows.append([group, label(key), f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, unit(key) + mark])
+    return rows
+
+
+def study_to_dict(study: SteadyStudy) -> dict[str, Any]:
+    """The study as JSON can hold it."""
+    return {
+        "force_from": study.points.force_from,
+        "speed_from": study.points.speed_from,
+        "shape": study.choice.chosen,
+        "shapes": [asdict(score) for score in study.choice.scores],
+        "not_compared": dict(study.choice.missing),
+        "groups": {
+            group: {
+                **study.estimates[group].to_dict(),
+                "along_travel": asdict(study.travel[group]),
+                "viscous": [asdict(each) for each in study.viscous[group]],
+                "internal_force_N": study.internal.get(group),
+            }
+            for group in study.estimates
+        },
+        "differences": [{**asdict(each), "differs": each.differs} for each in study.differences],
+        "statements": list(study.statements),
+        "warnings": list(study.warnings),
+        "advice": list(study.advice),
+    }

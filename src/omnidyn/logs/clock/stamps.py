@@ -1,0 +1,44 @@
+"""Times in two columns, as ROS writes them: header.stamp.sec and header.stamp.nanosec are one time in seconds."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from omnidyn.logs.channels import TIME
+from omnidyn.logs.table.table import Table
+
+_WHOLE = ("sec", "secs", "seconds")
+_REST = {"nanoseconds": 1e-9, "nanosecs": 1e-9, "nanosec": 1e-9, "nsecs": 1e-9, "nsec": 1e-9,
+         "microseconds": 1e-6, "usecs": 1e-6, "usec": 1e-6}  # fmt: skip
+_NAME = re.compile(rf"(?P<stem>.*?)(?P<rest>{'|'.join(_REST)})", re.IGNORECASE | re.DOTALL)
+
+
+def with_joined_stamp(table: Table) -> Table:
+    """The table with a column t in front where whole seconds and the rest of a second stand in two columns.
+
+    The first such pair counts. A table that has a column t stays as it is.
+    """
+    lower = {name.lower(): name for name in reversed(table.names)}
+    for name in table.names if TIME not in lower else ():
+        match = _NAME.fullmatch(name)
+        stem = match["stem"].lower() if match else ""
+        seconds = next((lower[stem + word] for word in _WHOLE if stem + word in lower), None) if match else None
+        if match is None or seconds is None:
+            continue
+        whole, rest = table.columns[seconds], table.columns[name]
+        size = _REST[match["rest"].lower()]
+        if isinstance(whole, tuple) or isinstance(rest, tuple) or not _rest_of_a_second(rest * size):
+            continue
+        columns = {TIME: whole + size * rest, **table.columns}
+        note = f"{TIME} is {seconds} + {size:g} {name}"
+        units, names = {**table.units, TIME: "s"}, (TIME, *table.names)
+        return replace(table, names=names, columns=columns, units=units, notes=(*table.notes, note))
+    return table
+
+
+def _rest_of_a_second(values: np.ndarray) -> bool:
+    known = values[np.isfinite(values)]
+    return bool(known.size) and float(known.min()) >= 0.0 and float(known.max()) < 1.0

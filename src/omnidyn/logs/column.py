@@ -1,0 +1,45 @@
+"""Column: which column of a file is one component of a log, in which unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from omnidyn.errors import InputError
+from omnidyn.units import parse_unit
+
+WHEEL_SIDE, MOTOR_SIDE = "wheel", "motor"
+MAX_LATENCY = 10.0  # [s]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column as a component.
+
+    name: of the column in the file. unit: as units.py writes it. side: "motor" for a speed or an angle before the
+    gear, "wheel" behind it. invert: the column has the opposite sign. latency: how late it was recorded [s]; a value
+    of row time t happened at t - latency.
+    Raises InputError for an unknown unit or side, or a latency beyond 10 s.
+    """
+
+    name: str
+    unit: str
+    side: str = WHEEL_SIDE
+    invert: bool = False
+    latency: float = 0.0
+
+    def __post_init__(self) -> None:
+        parse_unit(self.unit)
+        if self.side not in (WHEEL_SIDE, MOTOR_SIDE):
+            raise InputError("unknown side of the gear", got=self.side, expected="wheel or motor")
+        if not abs(self.latency) <= MAX_LATENCY:
+            raise InputError("not a latency", got=self.latency, expected=f"seconds, at most {MAX_LATENCY:g}")
+
+    @property
+    def factor(self) -> float:
+        """SI value behind the gear of the motor side = factor * cell; the gear is not in it."""
+        return parse_unit(self.unit).size * (-1.0 if self.invert else 1.0)
+
+    def __str__(self) -> str:
+        side = f" at the {self.side}" if self.side == MOTOR_SIDE else ""
+        late = f", {self.latency:g} s late" if self.latency else ""
+        return f"{'-' if self.invert else ''}{self.name} [{self.unit}{side}{late}]"

@@ -1,0 +1,332 @@
+"""Guess which column is which component, from names and units. A doubtful column is not taken: it is named, with
+the words that would settle it. What was guessed is always shown.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError
+from omnidyn.logs.channels import TIME, place, si_suffix
+from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
+from omnidyn.logs.columns import names as words
+from omnidyn.logs.columns.guess_time import take_time
+from omnidyn.logs.columns.guess_unit import unit_of
+from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, is_numeric, letter_of
+from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, quantity_of
+from omnidyn.logs.columns.names import Words, read_name
+from omnidyn.logs.table.table import Table
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import MAX_WHEELS, per_wheel, wheel_speed
+from omnidyn.units import COUNT, Unit, known_unit, parse_unit
+from omnidyn.units import CURRENT as CURRENT_UNIT
+from omnidyn.units import DUTY as DUTY_UNIT
+from omnidyn.units import TURN_RATE as TURN_RATE_UNIT
+from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
+
+FloatArray = NDArray[np.float64]
+Numbers = Mapping[tuple[str, int], int]  # (letter of a component, number in the file) -> number of the wheel from 1
+
+SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
+_BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
+
+# Kinds of columns that have a number: role -> letter of the component. The first that fits counts.
+_NUMBERED = (
+    (words.CURRENT, "i"), (words.DUTY, "d"), (words.VOLTAGE, "u"), (words.RATE, "w"), (words.ANGLE, "a"),
+)  # fmt: skip
+_BY_UNIT = {VOLTAGE_UNIT: "u", CURRENT_UNIT: "i", DUTY_UNIT: "d", TURN_RATE_UNIT: "w", "angle": "a", COUNT: "a"}
+NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPLY, words.TIME})
+_BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
+
+
+def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str, str] | None = None) -> ColumnMap:
+    """Guess the map of a table. robot: settles what a name leaves open (volts or duty, which side of the gear).
+
+    assume: name of a column or letter of a component ("u", "w1", "vx") -> unit, where the file gives none. A name that
+    a units row or its own ending gives a unit needs none. Raises InputError for an unknown unit in `assume`.
+    """
+    assumed = {name: parse_unit(text).text for name, text in (assume or {}).items()}
+    found = Guess()
+    names = [name for name in table.names if is_numeric(table.columns[name])]
+    numbers = _wheel_numbers(table, names, found)
+    for name in names:
+        _take(table, name, numbers, assumed, robot, found)
+    _doubt_words(table, _wheel_numbers(table, table.names, Guess()), found)
+    _doubt_letters(names, found)
+    take_time(table, assumed, found)
+    if not numbers:
+        _take_bench(table, names, assumed, found)
+    _settle_side(table, robot, found)
+    used = {column.name for column in found.columns.values()}
+    unused = tuple(name for name in table.names if name not in used)
+    ordered = dict(sorted(found.columns.items(), key=lambda item: _order(item[0])))
+    return ColumnMap(ordered, unused, found.doubt_words(), found.note_words())
+
+
+def _order(component: str) -> tuple[int, str, int]:
+    found = place(component)
+    return (0, "", 0) if found is None else (1, found[0], found[1])
+
+
+def _wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> Numbers:
+    """(letter, number in a name) -> number of the wheel from 1; a log that counts from 0 is shifted.
+
+    A letter that does not count from 0 itself is shifted too (the current of wheel 0 may not be logged), unless it
+    counts farther than wheels that are counted from 0 can: u0 u1 u2 beside w1 w2 w3.
+    """
+    seen: dict[str, set[int]] = {}
+    for name in names:
+        parts = read_name(name)
+        letter = _numbered_kind(parts, known_unit(table.units.get(name, "")))
+        if letter is not None and parts.number is not None:
+            seen.setdefault(letter, set()).add(parts.number)
+    count = max((max(mine) + 1 for mine in seen.values() if 0 in mine), default=0)
+    shifted = [letter for letter, mine in seen.items() if 0 in mine or max(mine) < count]
+    if shifted:
+        others = ", ".join(letter for letter in seen if letter not in shifted)
+        but = f" ({others} from 1)" if others else ""
+        found.notes.append(f"wheels are numbered from 0 in the file: 0 is wheel 1{but}")
+    numbers = {(letter, number): number + (letter in shifted) for letter, mine in seen.items() for number in mine}
+    return {key: number for key, number in numbers.items() if 0 < number <= MAX_WHEELS}
+
+
+def _numbered_kind(name: Words, unit: Unit | None) -> str | None:
+    """The letter of a component of a wheel, None where the words do not say. A unit outweighs a word."""
+    if name.number is None:
+        return None
+    unit = unit or name.unit
+    if unit is not None and unit.quantity in _BY_UNIT:
+        by_word = any(role in name.roles for role, _ in _NUMBERED)
+        volts = unit.quantity == VOLTAGE_UNIT and name.roles == {words.LINEAR}  # V1 [V]
+        if by_word or volts or name.roles & {words.MOTOR, words.WHEEL} or not name.roles - {words.OTHER}:
+            return _BY_UNIT[unit.quantity]
+    return next((letter for role, letter in _NUMBERED if role in name.roles), None)
+
+
+def _take(
+    table: Table, name: str, numbers: Numbers, assumed: Mapping[str, str], robot: Robot | None, found: Guess
+) -> None:
+    """One column: which component it is, in which unit; or a doubt."""
+    given = table.units.get(name, "")
+    unit = known_unit(assumed[name]) if name in assumed else known_unit(given) if given else None
+    parts = read_name(name)
+    component = _component_of(name, unit, numbers)
+    if component is None:
+        _doubt_brackets(name, numbers, found)
+        return
+    if component in found.columns:
+        found.doubts.append(Doubt(name, component, f"which is {found.columns[component].name} already", ()))
+        return
+    assumption = assumed.get(component) or assumed.get(component.rstrip("0123456789"))
+    if assumption is not None:
+        unit = parse_unit(assumption)
+    unit = unit or parts.unit
+    if unit is None and given and given not in ("-", "SI"):
+        found.doubts.append(Doubt(name, component, f"the unit {given} is unknown"))
+        return
+    if unit is None:
+        unit = unit_of(table, name, component, robot, found)
+    if unit is not None:
+        _enter(name, component, unit, parts, found)
+
+
+def _doubt_words(table: Table, numbers: Numbers, found: Guess) -> None:
+    """Columns that are called like a component, and whose cells begin like numbers but are none: 5.0V, 1.250.000."""
+    for name in table.names:
+        cells = table.columns[name]
+        component = None if is_numeric(cells) else _component_of(name, None, numbers)
+        if component is not None and (cell := first_word(cells)).lstrip("+-.")[:1].isdigit():
+            found.doubts.append(Doubt(name, component, f"but cells such as {cell} are no numbers", ()))
+
+
+def _doubt_brackets(name: str, numbers: Numbers, found: Guess) -> None:
+    """A column that is called like a component, with an unknown unit in brackets behind: speed1 [pix/s]."""
+    match = _BRACKETS.fullmatch(name)
+    component = _component(read_name(match[1]), None, numbers) if match else None
+    if match and component is not None:
+        found.doubts.append(Doubt(name, component, f"the unit {match[2]} is unknown"))
+
+
+def _doubt_letters(names: list[str], found: Guess) -> None:
+    """V1, V2, ..: volts, or speeds of the rims? Nobody knows."""
+    parts = {name: read_name(name) for name in names}
+    mine = [name for name in names if _is_letter_v(parts[name])]
+    if mine and "u1" not in found.columns:
+        why = f"which may be voltages or speeds (say --column u1={mine[0]}:V and so on)"
+        found.doubts += [Doubt(name, f"u{parts[name].number}", why, ()) for name in mine]
+
+
+def _is_letter_v(name: Words) -> bool:
+    return name.number is not None and name.unit is None and name.roles == {words.LINEAR}
+
+
+def _exact(name: str) -> str | None:
+    """The component of a column named as in a run file, such as w1_cmd_rad_s."""
+    for size in (1, 2):
+        component, suffix = "_".join(name.split("_")[:-size]), "_".join(name.split("_")[-size:])
+        if component and (place(component) or component == TIME) and si_suffix(component) == suffix:
+            return component
+    return None
+
+
+def _component_of(name: str, unit: Unit | None, numbers: Numbers) -> str | None:
+    """The component that a column is called, as in a run file or in other words."""
+    exact, parts = _exact(name), read_name(name)
+    number = parts.number
+    if exact is not None and number is not None and numbers.get((exact[0], number), number) != number:
+        exact = None  # a run file counts from 1, this one does not
+    return exact or _component(parts, unit, numbers)
+
+
+def _component(name: Words, unit: Unit | None, numbers: Numbers) -> str | None:
+    """The component that the words of a name say, None where they say none or too many."""
+    if words.OTHER in name.roles and not (name.number is not None and (unit or name.unit)):
+        return None
+    command = "_cmd" if words.COMMAND in name.roles else ""
+    letter = _numbered_kind(name, unit)
+    if name.number is not None:
+        wheel = numbers.get((letter or "", name.number))
+        if wheel is None or (command and letter in ("i", "a")):
+            return None
+        return f"{letter}{wheel}{command if letter == 'w' else ''}"
+    if words.SUPPLY in name.roles:
+        return None if words.CURRENT in name.roles else "supply"
+    return _body_component(name, unit or name.unit, command)
+
+
+def _body_component(name: Words, unit: Unit | None, command: str) -> str | None:
+    roles = name.roles
+    if roles & {words.CURRENT, words.VOLTAGE, words.DUTY, words.TIME, words.MOTOR}:
+        return None
+    rate = bool(roles & {words.RATE, words.ANGULAR})
+    turning = unit is None or unit.quantity == TURN_RATE_UNIT
+    if words.ANGULAR in roles and roles & {words.X, words.Y}:
+        return None  # roll and pitch
+    if words.LINEAR in roles and words.YAW in roles:  # linear.z goes up; v_theta turns
+        return "omega" + command if unit is not None and turning else None
+    for letter, (speed, position) in _BODY.items():
+        if speed in roles or (letter in roles and roles & {words.RATE, words.LINEAR}):
+            return speed + command
+        if letter in roles and not command:
+            return position
+    if rate and turning and (words.YAW in roles or words.BODY in roles or command):
+        return "omega" + command
+    if words.YAW in roles and not rate and not command:
+        return "heading"
+    if words.LINEAR in roles and not rate:
+        return "vx" + command  # the paper's v
+    if rate and not command and turning and words.ANGLE not in roles:
+        return "omega"
+    return "heading" if roles == {words.ANGLE} and unit is not None and unit.quantity == "angle" else None
+
+
+def _enter(name: str, component: str, unit: Unit, parts: Words, found: Guess) -> None:
+    """Take a column, where its unit measures what the component is."""
+    wanted = quantity_of(component)
+    if unit.quantity == DUTY_UNIT and wanted == VOLTAGE_UNIT and component != "supply":
+        component = "d" + component[1:]
+    elif unit.quantity == VOLTAGE_UNIT and wanted == DUTY_UNIT:
+        component = "u" + component[1:]
+    elif unit.quantity == COUNT:
+        found.doubts.append(Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
+        return
+    elif unit.quantity != wanted:
+        found.doubts.append(Doubt(name, component, f"{unit.text} is no unit of a {wanted}"))
+        return
+    side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in parts.roles else WHEEL_SIDE
+    found.columns[component] = Column(name, unit.text, side)
+
+
+def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], found: Guess) -> None:
+    """A log of one motor, whose columns need no number: voltage, current, velocity, position.
+
+    Several columns of one kind, such as left_speed and right_speed, are wheels, and nobody knows which is which.
+    """
+    alike: dict[str, list[str]] = {}
+    for name in names:
+        component = _bench_component(table, name)
+        if component:
+            alike.setdefault(component, []).append(name)
+    body = {component for component in found.columns if component not in (TIME, "supply")} - {"omega", "heading"}
+    for component, mine in alike.items():
+        if len(mine) > 1:
+            _forget(mine, found)
+            why = f"but no number says which wheel each is (say --column {component}={mine[0]} and so on)"
+            found.doubts += [Doubt(name, component, why, ()) for name in mine]
+        elif not body:
+            _forget(mine, found)
+            _take_single(table, mine[0], component, assumed, found)
+    if any(place(component) and component.endswith(("1", "1_cmd")) for component in found.columns):
+        found.notes.append("no wheel has a number: taken as a log of one motor")
+
+
+def _bench_component(table: Table, name: str) -> str:
+    """The component of a motor that a name without a number says, "" where it says none."""
+    parts = read_name(name)
+    letter = _numbered_kind(parts._replace(number=1), known_unit(table.units.get(name, "")))
+    command = words.COMMAND in parts.roles
+    if letter is None or parts.number is not None or parts.roles & NOT_OF_A_MOTOR or (command and letter in "ia"):
+        return ""
+    return f"{letter}1_cmd" if command and letter == "w" else f"{letter}1"
+
+
+def _forget(names: list[str], found: Guess) -> None:
+    """Take back what was said about some columns."""
+    for component in [key for key, column in found.columns.items() if column.name in names]:
+        del found.columns[component]
+    found.doubts = [doubt for doubt in found.doubts if doubt.name not in names]
+    for name in names:
+        found.si.pop(name, None)
+
+
+def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, str], found: Guess) -> None:
+    parts = read_name(name)
+    text = assumed.get(name) or assumed.get(letter_of(component)) or table.units.get(name, "")
+    unit = known_unit(text) or parts.unit or unit_of(table, name, component, None, found)
+    if unit is not None:
+        _enter(name, component, unit, parts._replace(number=1), found)
+
+
+def _settle_side(table: Table, robot: Robot | None, found: Guess) -> None:
+    """Commands of body and of wheels tell the side of the gear: they differ by the gear ratio on the other one."""
+    if robot is None:
+        return
+    count = robot.wheels.count
+    body = [found.columns.get(name) for name in ("vx_cmd", "vy_cmd", "omega_cmd")]
+    mine = [found.columns.get(f"w{wheel + 1}_cmd") for wheel in range(count)]
+    gear = per_wheel(robot.motor.gear_ratio, count)
+    if None in body or None in mine or np.all(np.abs(gear - 1.0) < 2.0 * SAME_SIDE):
+        return
+    twist, speed = (_values(table, columns) for columns in (body, mine))
+    expected = wheel_speed(robot.wheels, twist)
+    size = float(np.nansum(np.abs(expected)))
+    if not size > 0.0:
+        return
+    ratio = float(np.nansum(np.abs(speed))) / size
+    for side, factor in ((WHEEL_SIDE, 1.0), (MOTOR_SIDE, float(np.mean(gear)))):
+        if abs(ratio / factor - 1.0) < SAME_SIDE and mine[0].side != side:  # type: ignore[union-attr]
+            for component, column in found.columns.items():
+                if component_channel(component) in SIDED:
+                    found.columns[component] = Column(column.name, column.unit, side)
+            found.notes.append(
+                f"speeds of wheels are on the {side} side: the commands are {ratio:.4g} times those of the body"
+            )
+
+
+def _values(table: Table, columns: list[Column | None]) -> FloatArray:
+    return np.column_stack([table.numbers(c.name, missing=True) * c.factor for c in columns if c is not None])
+
+
+def refuse_doubtful(columns: ColumnMap, where: str) -> None:
+    """Raises InputError where nothing tells the time: without it there is no log."""
+    if TIME not in columns.columns:
+        doubt = next((doubt for doubt in columns.doubts if f" {TIME}, " in doubt), "")
+        settled = doubt.rpartition("; ")[2] if "; " in doubt else ""
+        written = "write seconds, or dates such as 2026-11-20T10:00:00.125" if doubt else ""
+        remedy = settled or written or "say which column it is: --column t=COLUMN:s"
+        got = doubt.partition(": not taken")[0] or "no column that looks like a time"
+        raise InputError("cannot tell the time of the rows", got=got, remedy=remedy, where=where)

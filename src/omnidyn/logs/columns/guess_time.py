@@ -1,0 +1,91 @@
+"""Guess which column is the time, and in which unit: given, or unmistakable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.logs.channels import TIME
+from omnidyn.logs.clock.clock import is_dates
+from omnidyn.logs.column import Column
+from omnidyn.logs.columns import names as words
+from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, floats, is_numeric
+from omnidyn.logs.columns.names import read_name
+from omnidyn.logs.table.table import Table
+from omnidyn.units import TIME as TIME_UNIT
+from omnidyn.units import Unit, known_unit, parse_unit
+
+FloatArray = NDArray[np.float64]
+
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0  # [s] between rows: what a log of a robot may have
+TIME_NAMES = ("s", "ms", "us", "ns")
+
+
+def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
+    """The column of time and its unit, which must be given or unmistakable."""
+    candidates = [name for name in table.names if words.TIME in read_name(name).roles]
+    dates = [name for name in candidates if is_dates(table.columns[name])]
+    wordy = [name for name in candidates if not is_numeric(table.columns[name]) and name not in dates]
+    candidates = [name for name in candidates if is_numeric(table.columns[name])]
+    candidates = [name for name in candidates if not read_name(name).roles - {words.TIME, words.BODY, words.MEASURED}]
+    if not candidates and not wordy:  # in any language: the one column with a unit of time
+        timed = [name for name in table.names if _has_unit(table, name, assumed) and _increases(table.columns[name])]
+        candidates = timed if len(timed) == 1 else []
+    candidates.sort(key=lambda name: (name != "t_s", table.names.index(name)))
+    if dates and not candidates:
+        found.columns[TIME] = Column(dates[0], "s")
+        found.notes.append(f"{dates[0]} holds dates: time begins at 0 with the first")
+        return
+    if not candidates and wordy:
+        cell = first_word(table.columns[wordy[0]])
+        found.doubts.append(Doubt(wordy[0], TIME, f"but cells such as {cell} are no numbers and no known dates", ()))
+        return
+    if not candidates:
+        increasing = [name for name in table.names if _increases(table.columns[name])]
+        if increasing:
+            found.doubts.append(Doubt(increasing[0], TIME, "its name and unit do not say how long one count is"))
+        return
+    name = candidates[0]
+    text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
+    unit = known_unit(text) or read_name(name).unit
+    if unit is None:
+        unit = _plausible_time(floats(table.columns[name]), name, text, found)
+    if unit is not None and unit.quantity == TIME_UNIT:
+        found.columns[TIME] = Column(name, unit.text)
+    elif unit is not None:
+        found.doubts.append(Doubt(name, TIME, f"{unit.text} is no unit of time"))
+
+
+def _has_unit(table: Table, name: str, assumed: Mapping[str, str]) -> bool:
+    unit = known_unit(assumed.get(name) or table.units.get(name, ""))
+    return unit is not None and unit.quantity == TIME_UNIT
+
+
+def _increases(values: FloatArray | tuple[str, ...]) -> bool:
+    """Whether nearly every row is later than the one before: it may be a clock."""
+    values = floats(values)
+    known = values[np.isfinite(values)]
+    return len(known) > 1 and float(np.mean(known[1:] > known[:-1])) > 0.9
+
+
+def _plausible_time(values: FloatArray, name: str, given: str, found: Guess) -> Unit | None:
+    """The one unit under which rows are 0.1 ms to 1 s apart; None where there are two or none."""
+    finite = values[np.isfinite(values)]
+    steps = np.diff(finite)
+    steps = steps[steps > 0.0]
+    step = float(np.median(steps)) if steps.size else 0.0
+    units = [parse_unit(text) for text in TIME_NAMES]
+    possible = [unit for unit in units if SHORTEST_STEP <= step * unit.size <= LONGEST_STEP]
+    if given and given not in ("-", "SI"):
+        found.doubts.append(Doubt(name, TIME, f"the unit {given} is unknown"))
+        return None
+    if len(possible) != 1:
+        texts = tuple(unit.text for unit in possible)
+        found.doubts.append(Doubt(name, TIME, f"no unit is given and rows are {step:.4g} apart", texts or ("UNIT",)))
+        return None
+    found.notes.append(
+        f"{name} has no unit: taken as {possible[0].text}, rows are {step * possible[0].size:.4g} s apart"
+    )
+    return possible[0]

@@ -1,0 +1,346 @@
+"""Parquet files to the same Table as CSV, and a Table's columns to Parquet. Needs pyarrow: the extra `logs`.
+
+Numbers of any kind become floats, true and false 1 and 0, a moment its seconds since 1970 (UTC), a duration its
+seconds, null NaN. A unit stands in the metadata of a column ("unit"), or in brackets behind its name.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from omnidyn.errors import InputError, MissingExtraError
+from omnidyn.files import default_max_bytes, open_regular, too_large
+from omnidyn.logs.readers.parquet_pages import declared_bytes
+from omnidyn.logs.table.header import MAX_COLUMNS, split_units
+from omnidyn.logs.table.rows import INFINITE, Column, FloatArray, column_of, refuse_infinite, skip_note
+from omnidyn.logs.table.table import MAX_CELLS, ROWS, Table, join
+from omnidyn.logs.table.text import BLOCK_BYTES, TOO_LARGE_REMEDY, Progress
+
+MAX_EXPANSION, MIN_EXPANDED_BYTES = 200, 64 * 2**20
+MAX_THRIFT_STRING, MAX_THRIFT_ITEMS = 16 * 2**20, 10**6
+EXACT_WHOLE = 2**53  # beyond, a float does not hold every whole number
+SUFFIXES = (".parquet", ".pq")
+
+NUMBER, TRUTH, MOMENT, DURATION, DAY, WORDS = "number", "truth", "moment", "duration", "day", "words"
+
+_UNIT_KEYS, _TITLE_KEYS = (b"unit", b"units"), (b"title", b"long_name", b"description")
+_TICKS = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+
+
+def import_pyarrow(where: str = "") -> tuple[Any, Any]:
+    """pyarrow and pyarrow.parquet. Raises MissingExtraError with the line that installs them."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise MissingExtraError(
+            "Parquet files need pyarrow", remedy='pip install "omnidyn[logs]"', where=where
+        ) from None
+    return pyarrow, pyarrow.parquet
+
+
+def read_parquet(
+    path: str | os.PathLike,
+    *,
+    skip_bad_rows: bool = False,
+    max_bytes: int | None = None,
+    progress: Progress | None = None,
+) -> Table:
+    """Read a Parquet file; its rows are numbered from 1 in `Table.lines`. Options as those of `read_table`.
+
+    Raises InputError for a file that is damaged, has nested columns, or whose rows take more than `max_bytes`, or 200
+    times the size of the file and more than 64 MB; MissingExtraError without pyarrow.
+    """
+    limit = default_max_bytes() if max_bytes is None else max_bytes
+    return join(_tables(path, ROWS, skip_bad_rows, limit, progress), limit)
+
+
+def iter_parquet(
+    path: str | os.PathLike,
+    rows: int = ROWS,
+    *,
+    skip_bad_rows: bool = False,
+    progress: Progress | None = None,
+) -> Iterator[Table]:
+    """The tables of a Parquet file of any size, at most `rows` rows each; joined they are what `read_parquet` reads."""
+    return _tables(path, rows, skip_bad_rows, None, progress)
+
+
+def parquet_bytes(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -> bytes:
+    """Columns of floats as a Parquet file, to the last bit: NaN stays NaN and is no null.
+
+    Raises MissingExtraError without pyarrow.
+    """
+    pyarrow, parquet = import_pyarrow()
+    fields = [
+        pyarrow.field(name, pyarrow.float64(), metadata={"unit": units[name]} if name in units else None)
+        for name in columns
+    ]
+    arrays = [pyarrow.array(np.ascontiguousarray(values)) for values in columns.values()]
+    sink = io.BytesIO()
+    table = pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields))
+    parquet.write_table(table, sink, use_dictionary=False, write_page_checksum=True)
+    return sink.getvalue()
+
+
+# ---- reading -------------------------------------------------------------------------------------------
+
+
+def _tables(
+    path: str | os.PathLike, rows: int, skip: bool, max_bytes: int | None, progress: Progress | None
+) -> Iterator[Table]:
+    """The tables one after the other; the last one has the hash of the file and all notes."""
+    if rows < 1:
+        raise InputError("no rows in a piece", got=rows, expected="1 or more")
+    source = str(path)
+    pyarrow, parquet = import_pyarrow(source)
+    with open_regular(path) as stream:
+        size, digest = os.fstat(stream.fileno()).st_size, _sha256(stream)
+        with _damage(pyarrow, source):
+            file, columns = _opened(pyarrow, parquet, stream, source)
+            pages = declared_bytes(stream)
+        _check_size(file.metadata, pages, len(columns.names), size, max_bytes, source)
+        reader = _Rows(columns, source, skip)
+        waiting: Table | None = None
+        for done, batch in _batches(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
+            with _damage(pyarrow, source):
+                values, lines = reader.read(batch, done)
+            if progress is not None:
+                progress(size * (done + batch.num_rows) // max(1, file.metadata.num_rows), size)
+            if len(lines) and waiting is not None:
+                yield waiting
+            if len(lines):
+                waiting = Table(columns.names, values, lines, columns.units, source, "", reader.notes, columns.titles)
+    if waiting is None:
+        raise InputError("no rows", got="0 samples", expected="at least one row", where=source)
+    yield replace(waiting, sha256=digest, notes=reader.notes)
+
+
+def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[Any, _Columns]:
+    """The file and its columns. Words stay a dictionary and indices: a long word repeated often takes no memory."""
+    options = {
+        "page_checksum_verification": True, "pre_buffer": False, "buffer_size": BLOCK_BYTES,
+        "thrift_string_size_limit": MAX_THRIFT_STRING, "thrift_container_size_limit": MAX_THRIFT_ITEMS,
+    }  # fmt: skip
+    file = parquet.ParquetFile(stream, **options)
+    columns = _Columns(pyarrow, file.schema_arrow, source)
+    words = [name for name, kind in zip(columns.raw, columns.kinds, strict=True) if kind == WORDS]
+    return parquet.ParquetFile(stream, read_dictionary=words, **options), columns
+
+
+def _check_size(metadata: Any, pages: int, columns: int, size: int, max_bytes: int | None, source: str) -> None:
+    """Refuse what would take much more memory than the file, before it is read.
+
+    A constant column packs to nothing: so the numbers in memory count as well, and not only what the pages declare.
+    """
+    expanded = max(pages, 8 * columns * metadata.num_rows)
+    if expanded > max(MAX_EXPANSION * size, MIN_EXPANDED_BYTES):
+        raise InputError(
+            "the file would grow too much",
+            got=f"{expanded} bytes from {size}",
+            expected=f"at most {MAX_EXPANSION} times its size",
+            remedy="a log does not shrink that much: write it again from its source",
+            where=source,
+        )
+    if max_bytes is not None and max(size, expanded) > max_bytes:
+        raise too_large(source, max_bytes, TOO_LARGE_REMEDY)
+
+
+def _batches(pyarrow: Any, file: Any, rows: int, source: str) -> Iterator[tuple[int, Any]]:
+    """Pieces of the file, and how many rows stand before each."""
+    done = 0
+    with _damage(pyarrow, source):
+        batches = iter(file.iter_batches(batch_size=rows, use_threads=False))
+    while True:
+        with _damage(pyarrow, source):
+            batch = next(batches, None)
+        if batch is None:
+            return
+        yield done, batch
+        done += batch.num_rows
+
+
+@contextlib.contextmanager
+def _damage(pyarrow: Any, source: str) -> Iterator[None]:
+    """Every way in which pyarrow stumbles over a broken file, as an InputError."""
+    try:
+        yield
+    except (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError, MemoryError) as error:
+        raise InputError(
+            "the Parquet file is damaged or cut short",
+            got=" ".join(str(error).split()) or type(error).__name__,
+            expected="a whole file",
+            remedy="copy or write it again; a writer that was killed leaves no footer",
+            where=source,
+        ) from None
+
+
+def _sha256(stream: BinaryIO) -> str:
+    digest = hashlib.sha256()
+    while block := stream.read(BLOCK_BYTES):
+        digest.update(block)
+    stream.seek(0)
+    return digest.hexdigest()
+
+
+class _Columns:
+    """What the columns of a file are: `raw` names in the file, `names` without units, `kinds`, units and titles.
+
+    Raises InputError for nested columns, raw bytes, blank or repeated names, and too many columns.
+    """
+
+    def __init__(self, pyarrow: Any, schema: Any, source: str):
+        self.raw = list(schema.names)
+        if not 0 < len(self.raw) <= MAX_COLUMNS:
+            raise InputError(
+                "too many columns" if self.raw else "no columns", got=len(self.raw),
+                expected=f"1 to {MAX_COLUMNS}", where=source,
+            )  # fmt: skip
+        for k, name in enumerate(self.raw):
+            if not name.strip():
+                raise InputError(f"column {k + 1} has no name", expected="a name for every column", where=source)
+            if name in self.raw[:k]:
+                raise InputError("two columns have the same name", got=name, expected="different names", where=source)
+        self.kinds = [_kind(pyarrow.types, field.type) for field in schema]
+        self._refuse(schema, source)
+        names, self.units = split_units(self.raw)
+        self.names = tuple(names)
+        self.titles: dict[str, str] = {}
+        for name, field, kind in zip(names, schema, self.kinds, strict=True):
+            if kind in (MOMENT, DURATION, DAY):
+                self.units[name] = "s"
+            _take(self.units, name, field.metadata, _UNIT_KEYS)
+            _take(self.titles, name, field.metadata, _TITLE_KEYS)
+        moments = [name for name, kind in zip(names, self.kinds, strict=True) if kind in (MOMENT, DAY)]
+        self.notes = [f"{', '.join(moments)}: moments were read as seconds since 1970 (UTC)"] if moments else []
+
+    def _refuse(self, schema: Any, source: str) -> None:
+        bad = [f"{field.name} ({field.type})" for field, kind in zip(schema, self.kinds, strict=True) if not kind]
+        if bad:
+            raise InputError(
+                f"{'columns' if len(bad) > 1 else 'a column'} that hold no single numbers or words",
+                got=", ".join(bad),
+                expected="plain columns, one for each wheel or axis",
+                remedy="write each component as a column of its own",
+                where=source,
+            )
+
+
+def _take(into: dict[str, str], name: str, metadata: Mapping[bytes, bytes] | None, keys: tuple[bytes, ...]) -> None:
+    for key in keys:
+        text = (metadata or {}).get(key, b"").decode("utf-8", "replace").strip()
+        if text:
+            into[name] = text
+            return
+
+
+def _kind(types: Any, kind: Any) -> str:
+    """What a column holds; "" for what no column of a table can hold."""
+    if types.is_dictionary(kind):
+        kind = kind.value_type
+    tests = {
+        TRUTH: types.is_boolean,
+        NUMBER: lambda k: types.is_floating(k) or types.is_integer(k) or types.is_decimal(k) or types.is_null(k),
+        MOMENT: types.is_timestamp,
+        DURATION: lambda k: types.is_duration(k) or types.is_time(k),
+        DAY: types.is_date,
+        WORDS: lambda k: types.is_string(k) or types.is_large_string(k),
+    }
+    return next((name for name, test in tests.items() if test(kind)), "")
+
+
+class _Rows:
+    """Batches into columns of floats and words."""
+
+    def __init__(self, columns: _Columns, source: str, skip: bool):
+        self.columns, self.source, self.skip = columns, source, skip
+        self.rounded: set[str] = set()
+        self.skipped: list[int] = []
+        self.words: set[str] = set()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was decided so far, in words."""
+        rounded = [f"{name}: whole numbers beyond 2^53 were rounded" for name in sorted(self.rounded)]
+        return (*self.columns.notes, *rounded, *([skip_note(INFINITE, self.skipped)] if self.skipped else []))
+
+    def read(self, batch: Any, done: int) -> tuple[dict[str, Column], Any]:
+        """Columns and numbers of the rows, counted from 1. Raises InputError for an infinite number."""
+        columns = {
+            name: self._column(name, kind, array)
+            for name, kind, array in zip(self.columns.names, self.columns.kinds, batch.columns, strict=True)
+        }
+        lines = np.arange(done + 1, done + 1 + batch.num_rows)
+        if not self.skip:
+            refuse_infinite(columns, lines, self.source)
+            return columns, lines
+        good = np.ones(len(lines), dtype=bool)
+        for column in columns.values():
+            good &= True if isinstance(column, tuple) else ~np.isinf(column)
+        if good.all():
+            return columns, lines
+        self.skipped += lines[~good].tolist()
+        return {name: _where(column, good) for name, column in columns.items()}, lines[good]
+
+    def _column(self, name: str, kind: str, array: Any) -> Column:
+        if hasattr(array, "dictionary"):
+            array.validate(full=True)  # a broken file may point beyond its dictionary; nothing else checks that
+        if kind == WORDS:
+            column = _words(array, name in self.words)
+            if isinstance(column, tuple):
+                self.words.add(name)
+            return column
+        if hasattr(array, "dictionary_decode"):
+            array = array.dictionary_decode()
+        missing = np.array(array.is_null())
+        if kind in (MOMENT, DURATION, DAY):
+            return np.where(missing, np.nan, _seconds(array))
+        if str(array.type) in ("int64", "uint64") and not _is_exact(_whole(array)).all():
+            self.rounded.add(name)
+        if kind == TRUTH:
+            array = array.cast("int8")
+        return np.array(array.cast("float64", safe=False).to_numpy(zero_copy_only=False), dtype=float)
+
+
+def _whole(array: Any) -> Any:
+    """Whole numbers, 0 where missing."""
+    return array.fill_null(0).to_numpy(zero_copy_only=False)
+
+
+def _is_exact(whole: Any) -> Any:
+    return (whole <= EXACT_WHOLE) & (whole >= -EXACT_WHOLE) if whole.dtype.kind == "i" else whole <= EXACT_WHOLE
+
+
+def _seconds(array: Any) -> FloatArray:
+    """Seconds of moments, durations, times and days, as near as a float can be."""
+    kind = str(array.type)
+    if kind.startswith("date32"):
+        return _whole(array.cast("int32")).astype(float) * 86400.0
+    ticks = 1000 if kind.startswith("date64") else _TICKS[array.type.unit]
+    values = _whole(array.cast("int32").cast("int64") if kind.startswith("time32") else array.cast("int64"))
+    # Beyond 2^53 a division would round twice: whole seconds and the rest apart.
+    return np.where(_is_exact(values), values / ticks, values // ticks + (values % ticks) / ticks)
+
+
+def _words(array: Any, before: bool) -> Column:
+    """Words, or the numbers that are all they hold, as in a CSV file; words where an earlier piece held some."""
+    if hasattr(array, "dictionary"):
+        known = [word or "" for word in array.dictionary.to_pylist()]
+        cells = ["" if k is None else known[k] for k in array.indices.to_pylist()]
+    else:
+        cells = [word or "" for word in array.to_pylist()]
+    return tuple(cells) if before else column_of([cell.strip() for cell in cells])
+
+
+def _where(column: Column, keep: Any) -> Column:
+    if isinstance(column, tuple):
+        return tuple(cell for cell, good in zip(column, keep, strict=True) if good)
+    return column[keep]

@@ -1,0 +1,198 @@
+"""The paper's law, exact: twist by `exact_step`, heading in closed form, position by Gauss nodes between events.
+
+It serves robots whose axes do not couple: equal motors, G G^T diagonal, friction on the body axes, no turning frame,
+no current limit. `why_not_exact` says by name what stands against it. Winding inductance: inductance.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.compiled import kernel, maker, part
+from omnidyn.errors import InputError
+from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.robot import Robot
+from omnidyn.model.statespace import StateSpace, discretise, is_decoupled, state_space
+from omnidyn.simulation.exact import step as formula
+from omnidyn.simulation.pose import put_next_pose, rotated
+
+FloatArray = NDArray[np.float64]
+
+# 4 Gauss-Legendre nodes on [0, 1]; a piece is at most PIECE / (fastest rate) long: 2e-13 m over 10 s of 20 ms steps.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+NODES, WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
+PIECE = 0.4
+SPIN_UP = 3.0  # weight of the yaw acceleration among the rates
+SETTLED = 40.0  # a t beyond which e^(-a t) is below the last bit
+MAX_TURN_PER_STEP = 1e5  # [rad]: more would be minutes of quadrature for one row
+
+_step, _pieces = part(formula.exact_step), part(formula.pieces)
+_speed_within, _turned_within = part(formula.speed_within), part(formula.turned_within)
+
+
+def why_not_exact(robot: Robot) -> list[str]:
+    """What the exact engine cannot do about this robot, each in words; empty when it can."""
+    motor, reasons = robot.motor, []
+    if motor.current_limit is not None:
+        reasons.append("current limit ([motor] current_limit_A)")
+    if robot.body.rotating_frame:
+        reasons.append("rotating frame ([body] rotating_frame = true)")
+    if not robot.friction.only_axes:
+        reasons.append(
+            "friction along the direction of travel or at the wheels ([friction.direction], [friction.wheels])"
+        )
+    if np.any(np.asarray(motor.voltage_drop) != 0.0):
+        reasons.append("voltage drop ([motor] voltage_drop_V)")
+    if np.any(np.asarray(motor.gear_efficiency) != 1.0):
+        reasons.append("gear efficiency ([motor] gear_efficiency)")
+    per_wheel = [motor.resistance, motor.torque_constant, motor.emf_constant, motor.gear_ratio]
+    if motor.electrical == DYNAMIC:
+        per_wheel.append(motor.inductance or 0.0)
+    if any(isinstance(value, tuple) and len(set(value)) > 1 for value in (*per_wheel, robot.wheels.wheel_radius)):
+        reasons.append("unequal motors or wheel radii (a list in [motor] or [wheels])")
+    elif not is_decoupled(state_space(robot)):
+        reasons.append("a wheel layout whose axes couple (G G^T is not diagonal)")
+    return reasons
+
+
+def simulate_exact(
+    robot: Robot, voltage: FloatArray, dt: FloatArray, twist: FloatArray, pose: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Twist and pose after each of n steps, the start in row 0. Shapes (n + 1, 3) each.
+
+    `voltage` [V] is within limits, shape (n, wheels); `dt` [s], shape (n,); `twist` and `pose` the start, shape (3,).
+    Raises InputError when one step turns the robot further than MAX_TURN_PER_STEP.
+    """
+    system = state_space(robot)
+    rate, coulomb, breakaway = axis_levels(robot, system)
+    drive = drive_acceleration(system, voltage)
+    steps, which = np.unique(dt, return_inverse=True)
+    phi = discretise(system, steps)
+    twists = _twists(drive, phi, which, rate, coulomb, breakaway, twist)
+    refuse_spin(np.abs(twists[:-1, 2]) * dt)
+    poses = _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, pose, NODES, WEIGHTS)
+    return twists, poses
+
+
+def axis_levels(robot: Robot, system: StateSpace) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(rate a [1/s], coulomb c, breakaway S [m/s^2, m/s^2, rad/s^2]) of the three axes. Shape (3,) each."""
+    return -np.diag(system.A), -np.diag(system.K), robot.friction.axes.levels[2] / mass_matrix(robot)
+
+
+def drive_acceleration(system: StateSpace, voltage: FloatArray) -> FloatArray:
+    """B u, summed in a fixed order so that equal voltages cancel to an exact 0. Shape (n, 3)."""
+    total = np.zeros((len(voltage), 3))
+    for wheel in range(voltage.shape[1]):
+        total += voltage[:, wheel, None] * system.B[:, wheel]
+    return total
+
+
+def refuse_spin(turn: FloatArray) -> None:
+    """Raises InputError when one step turns the robot by more than MAX_TURN_PER_STEP. `turn` [rad], shape (n,)."""
+    row = int(np.argmax(turn))
+    if not turn[row] <= MAX_TURN_PER_STEP:
+        raise InputError(
+            "one step turns the robot too far",
+            got=f"{turn[row]:.3g} rad in row {row}",
+            expected=f"at most {MAX_TURN_PER_STEP:g} rad",
+            remedy="use a shorter dt",
+        )
+
+
+@kernel
+def _twists(drive, phi, which, rate, coulomb, breakaway, start):
+    """Twist after each step; axis by axis, which keeps the state in registers."""
+    out = np.empty((len(drive) + 1, 3))
+    for axis in range(3):
+        speed, a, c, s = start[axis], rate[axis], coulomb[axis], breakaway[axis]
+        out[0, axis] = speed
+        for k in range(len(drive)):
+            speed = _step(speed, drive[k, axis], c, s, a, phi[which[k], axis], 0.0)
+            out[k + 1, axis] = speed
+    return out
+
+
+@part
+def turning(start, end, before, after, rate):
+    """How fast the heading turns in a step, as a rate [1/s] beside those of the axes; arguments as for the yaw axis.
+
+    A heading that speeds up is e^(i alpha t^2/2) to the nodes: sqrt(alpha) is a rate too.
+    """
+    return max(abs(start), abs(end)) + SPIN_UP * math.sqrt(max(abs(before - rate * start), abs(after)))
+
+
+@part
+def next_cut(left, dt, event, rate, spin):
+    """Where the quadrature that begins at `left` [s] ends: at the next event, sooner where the motion is fast."""
+    right = dt
+    for axis in range(3):
+        if left < event[axis] < right:
+            right = event[axis]
+    return min(right, left + PIECE / _fastest_rate(left, event, rate, spin))
+
+
+@part
+def _fastest_rate(t, event, rate, spin):
+    """How fast the motion still changes at time t of a step: the fastest axis not yet settled, plus the turning."""
+    fastest = 0.0
+    for axis in range(3):
+        since = t - event[axis] if t >= event[axis] else t
+        if rate[axis] * since < SETTLED and rate[axis] > fastest:
+            fastest = rate[axis]
+    return fastest + spin
+
+
+@maker
+def _displacement(start, event, before, after, rate, left, right, nodes, weights):
+    """Displacement between two times of a step that no event separates, in the body frame at its start [m]."""
+    x = y = 0.0
+    now = np.empty(3)
+    for node in range(len(nodes)):
+        t = left + (right - left) * nodes[node]
+        for axis in range(3):
+            now[axis] = _speed_within(t, start[axis], event[axis], before[axis], after[axis], rate[axis])
+        turned = _turned_within(t, start[2], now[2], event[2], before[2], after[2], rate[2])
+        dx, dy = rotated(turned, now[0], now[1])
+        x += (right - left) * weights[node] * dx
+        y += (right - left) * weights[node] * dy
+    return x, y
+
+
+@maker
+def _travel(start, end, event, before, after, rate, dt, nodes, weights):
+    """Displacement over a whole step in the body frame at its start: pieces between events, short where it is fast."""
+    x = y = left = 0.0
+    spin = turning(start[2], end[2], before[2], after[2], rate[2])
+    while left < dt:
+        right = next_cut(left, dt, event, rate, spin)
+        dx, dy = _displacement(start, event, before, after, rate, left, right, nodes, weights)
+        x, y, left = x + dx, y + dy, right
+    return x, y
+
+
+@kernel
+def _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, start, nodes, weights):
+    """Pose after each step from the twists; the heading is a compensated sum of closed forms."""
+    out = np.empty((len(drive) + 1, 3))
+    for i in range(3):  # row by row, numba compiles the words of an error too: 1.2 s
+        out[0, i] = start[i]
+    event, before, after = np.empty(3), np.empty(3), np.empty(3)
+    lost = 0.0
+    for k in range(len(drive)):
+        dt, moving = steps[which[k]], False
+        for axis in range(3):
+            event[axis], before[axis], after[axis] = _pieces(
+                twists[k, axis], drive[k, axis], coulomb[axis], breakaway[axis], rate[axis], phi[which[k], axis], dt
+            )
+            moving |= (twists[k, axis] != 0.0) | (before[axis] != 0.0)
+        for i in range(3):
+            out[k + 1, i] = out[k, i]
+        if moving:
+            x, y = _travel(twists[k], twists[k + 1], event, before, after, rate, dt, nodes, weights)
+            turn = _turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2])
+            lost = put_next_pose(out, k, x, y, turn, lost)
+    return out

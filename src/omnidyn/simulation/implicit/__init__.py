@@ -1,0 +1,1 @@
+"""Every other law: one implicit step (step) whose stages are inclusions, and a run of them (march)."""

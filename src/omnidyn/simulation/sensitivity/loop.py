@@ -1,0 +1,200 @@
+"""The march with derivatives through the firmware's speed loop: the loop's memory and its derivatives go along.
+
+At a tick the voltage answers the state, so that its derivative is that of the loop on the branch that the run took:
+by the gains, by the speed at the tick and by the integral, all central differences of `tick_answer`, which is bilinear,
+so that they are exact to rounding. A voltage at its limit has the derivative of the limit; between ticks it stays.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.compiled import kernel, part
+from omnidyn.model.layout import AXES, BOUND, LENGTH, LIMIT, VOLTAGE
+from omnidyn.model.robot import Robot
+from omnidyn.model.stick_slip.plant import Plant
+from omnidyn.model.stick_slip.release import SIGNS, with_given_currents
+from omnidyn.model.stick_slip.workspace import copy_row, copy_table, scratch
+from omnidyn.simulation.commands import Commands, loop_gains, on_ticks
+from omnidyn.simulation.implicit.march import SIMPSON, STAGES, Outcome, advance_pose, begun, room
+from omnidyn.simulation.sensitivity.march import advance_pose_tangent, row_tangent
+from omnidyn.simulation.sensitivity.sample import Looks, looks
+from omnidyn.simulation.sensitivity.stage import EPS, Ways, step_tangent
+from omnidyn.simulation.speed_loop import close_loop, loop_of, seen_speed, tick_answer, tick_branch
+
+FloatArray = NDArray[np.float64]
+
+
+class LoopWays(NamedTuple):
+    """The loop a little up (2k) and down (2k + 1) each of the K parameters, and what the loop remembers."""
+
+    gain: FloatArray  # (2 K, 4, n) kp, ki, limit, radius
+    command: FloatArray  # (K, rows, n) derivative of the set points, rows as commanded
+    sum: FloatArray  # (K, n) derivative of the integral
+    voltage: FloatArray  # (K, n) derivative of the voltage now
+    state: FloatArray  # (size of a state,) at the last tick
+    slope: FloatArray  # (K, 3 + n) derivative there
+    total: FloatArray  # (2, n) integral before this tick, and at the last one
+
+
+class LoopRun(NamedTuple):
+    """Row 0 is the start. voltage: after the tick of a row, the last one repeats."""
+
+    outcome: Outcome
+    state: FloatArray  # (rows + 1, K, 3 + n)
+    pose: FloatArray  # (rows + 1, K, 3)
+    voltage: FloatArray  # (rows, n)
+    by_key: FloatArray  # (K, rows, n) derivative of the voltage
+    seen: Looks  # none
+
+
+def run_tangent_loop(
+    robots: list[Robot], robot: Robot, numbers: Plant, ways: Ways, given: Commands, rates: FloatArray,
+    bound: FloatArray, start: tuple[FloatArray, FloatArray], first: FloatArray, tol: float, settled: float,
+    travels: bool,
+) -> LoopRun:  # fmt: skip
+    """The run of set points, with derivatives; see `tangent.derivatives`.
+
+    robots: up and down each key; rates: derivatives of the set points, shape (K, rows, n); bound (n,): current limits
+    [A]; start: state and pose. settled: a run whose state and derivatives change by less than this from tick to tick
+    [m/s, A, V] stays as it is until the next command; 0: never. travels: whether the pose is wanted.
+    """
+    dt, _, tick, keep = on_ticks(robot, given)
+    assert given.set_point is not None
+    count, n, rows = len(first), numbers.wheels, len(given.dt)
+    loop = loop_of(robot, np.ascontiguousarray(given.set_point), tick)
+    gain = np.array([loop_gains(r) for r in robots]).reshape(-1, 4, n)
+    extra = LoopWays(
+        gain, rates, np.zeros((count, n)), np.zeros((count, n)), np.zeros(len(start[0])), np.zeros_like(first),
+        np.zeros((2, n)),
+    )  # fmt: skip
+    out = begun(rows, start[0], start[1])
+    found = LoopRun(
+        out, np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, count, 3)), np.zeros((rows, n)),
+        np.zeros((count, rows, n)), looks(np.zeros(1), np.zeros(0), 3, count),
+    )  # fmt: skip
+    found.state[0] = first
+    march_loop(
+        *numbers.copy(), *with_given_currents(numbers), scratch(), room(start[0]), ways, loop, extra, bound, dt,
+        keep.astype(np.int64), tol, settled, travels, found,
+    )  # fmt: skip
+    return found
+
+
+@part
+def _tick_tangent(element, ways, loop, extra, state, d, row, w):
+    """Derivatives of the voltage and the integral of wheel w; extra.total[0] is the integral before the tick."""
+    e, moves = AXES + w, state[SIGNS + AXES + w] != 0.0
+    error = loop.command[row, w] - seen_speed(element, e, state, loop.radius[w], moves)
+    total, period = extra.total[0, w], loop.period
+    takes, side = tick_branch(loop.kp[w], loop.ki[w], loop.limit[w], period, error, total)
+    point = ways.point[0]
+    for k in range(len(d)):
+        volts, integral = 0.0, 0.0
+        for up in range(2):
+            sign, g = 1.0 - 2.0 * up, extra.gain[2 * k + up]
+            for a in range(3):
+                point[a] = state[a] + sign * EPS * d[k, a]
+            seen = seen_speed(ways.element[2 * k + up], e, point, g[3, w], moves)
+            own = loop.command[row, w] + sign * EPS * extra.command[k, row, w] - seen
+            before = total + sign * EPS * extra.sum[k, w]
+            u, after = tick_answer(g[0, w], g[1, w], g[2, w], period, own, before, takes, side)
+            volts, integral = volts + sign * u, integral + sign * after
+        extra.voltage[k, w], extra.sum[k, w] = volts / (2.0 * EPS), integral / (2.0 * EPS)
+
+
+@part
+def _tick(element, ways, loop, extra, state, d, row, voltage, flag):
+    """One tick, or none, of all wheels, with derivatives; voltage (1, n), flag (1,) and command (1, n) of this tick."""
+    if not flag[0]:
+        return
+    copy_row(extra.total[0], loop.sum)
+    for w in range(len(loop.kp)):
+        _tick_tangent(element, ways, loop, extra, state, d, row, w)
+    close_loop(
+        element, state, 0, voltage, loop.kp, loop.ki, loop.limit, loop.radius, loop.command[row : row + 1], flag,
+        loop.period, loop.sum,
+    )  # fmt: skip
+
+
+@part
+def _as_before(loop, extra, state, d, settled):
+    """Whether nothing has changed since the last tick; and remembers this one."""
+    change = 0.0
+    for j in range(len(state)):
+        change = max(change, abs(state[j] - extra.state[j]))
+        extra.state[j] = state[j]
+    for k in range(d.shape[0]):
+        for j in range(d.shape[1]):
+            change = max(change, abs(d[k, j] - extra.slope[k, j]))
+            extra.slope[k, j] = d[k, j]
+    for w in range(len(loop.sum)):
+        change = max(change, abs(loop.sum[w] - extra.total[1, w]))
+        extra.total[1, w] = loop.sum[w]
+    return change < settled
+
+
+@part
+def _apply(element, ways, extra, voltage, bound):
+    """Voltages, their derivatives and the current limits into the plants."""
+    for w in range(len(bound)):
+        e = AXES + w
+        element[e, VOLTAGE], element[e, BOUND] = voltage[0, w], bound[w]
+        for j in range(2 * len(extra.sum)):
+            ways.element[j, e, BOUND] = ways.element[j, e, LIMIT]
+        for k in range(len(extra.sum)):
+            ways.element[2 * k, e, VOLTAGE] = voltage[0, w] + EPS * extra.voltage[k, w]
+            ways.element[2 * k + 1, e, VOLTAGE] = voltage[0, w] - EPS * extra.voltage[k, w]
+
+
+@kernel
+def march_loop(
+    body, element, bare_body, bare_element, s, spare, ways, loop, extra, bound, dt, keep, tol, settled, travels, found
+):
+    """All rows, cut at the ticks; what is at keep[i] goes to row i. See run_tangent_loop."""
+    out = found.outcome
+    state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
+    d, dnext, dpose, h = found.state[0].copy(), found.state[0].copy(), found.pose[0].copy(), dt[0]
+    voltage, row, still = np.zeros((1, len(bound))), 0, False
+    for j in range(len(dt)):
+        if j == keep[row + 1]:
+            row += 1
+            changed = False
+            for w in range(len(bound)):
+                changed |= loop.command[row, w] != loop.command[row - 1, w]
+            still = still and not changed
+        if loop.tick[j] and not still:
+            still = settled > 0.0 and j > keep[row] and _as_before(loop, extra, state, d, settled)
+            _tick(element, ways, loop, extra, state, d, row, voltage, loop.tick[j : j + 1])
+        if j == keep[row]:
+            copy_row(found.voltage[row], voltage[0])
+            for k in range(len(d)):
+                copy_row(found.by_key[k, row], extra.voltage[k])
+        if not still:
+            _apply(element, ways, extra, voltage, bound)
+            counts[0] = counts[1] = 0
+            if tol > 0.0:
+                h = row_tangent(
+                    body, element, bare_body, bare_element, s, spare, ways, state, dt[j], tol, h, pose, d, dnext,
+                    dpose, counts, True, found.seen, 0.0,
+                )  # fmt: skip
+            else:
+                counts[0] = step_tangent(body, element, s, ways, state, spare[2], spare[3], dt[j], d, dnext)
+                counts[1] = 1
+                advance_pose_tangent(ways, pose, dpose, state, spare[3], spare[2], d, ways.middle, dnext, dt[j], STAGES)
+                advance_pose(pose, state, spare[3], spare[2], body[LENGTH], dt[j], STAGES)
+                copy_row(state, spare[2])
+                copy_table(d, dnext)
+            out.iterations[row] = max(out.iterations[row], counts[0])
+            out.steps[row] += counts[1]
+        elif travels:
+            advance_pose_tangent(ways, pose, dpose, state, state, state, d, d, d, dt[j], SIMPSON)
+            advance_pose(pose, state, state, state, body[LENGTH], dt[j], SIMPSON)
+        if j + 1 == keep[row + 1]:
+            copy_row(out.state[row + 1], state)
+            copy_row(out.pose[row + 1], pose)
+            copy_table(found.state[row + 1], d)
+            copy_table(found.pose[row + 1], dpose)

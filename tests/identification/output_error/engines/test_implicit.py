@@ -1,0 +1,192 @@
+"""Robots that only the implicit engine simulates: an ellipse of friction in a turning frame, seen late."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from omnidyn.errors import UnsupportedError
+from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem
+from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.identification.output_error.problem.record import record
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
+from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import with_parameter
+from omnidyn.simulation.simulate import simulate
+from tests.identification.output_error.test_axebot import NOISE, voltages
+
+TRUTH = {
+    "friction.direction.coulomb[0]": 2.2,
+    "friction.direction.coulomb[1]": 1.5,
+    "friction.direction.viscous": 0.95,
+    "friction.direction.yaw_coulomb": 0.099,
+    "friction.direction.yaw_viscous": 0.01,
+}
+
+
+@pytest.fixture(scope="module")
+def ellipse(axebot):
+    direction = DirectionFriction(coulomb=(2.2, 1.5), viscous=0.95, yaw_coulomb=0.099, yaw_viscous=0.01)
+    none = AxesFriction(viscous=(0.0, 0.0, 0.0), coulomb=(0.0, 0.0, 0.0))
+    return axebot.replace(
+        body=axebot.body.replace(rotating_frame=True), friction=Friction(axes=none, direction=direction)
+    )
+
+
+@pytest.fixture(scope="module")
+def log(ellipse):
+    """10 s, instruments 7 ms late: simulated on a grid ten times as fine."""
+    voltage = voltages(np.random.default_rng(21), 10.0)
+    fine = simulate(ellipse, np.repeat(voltage, 10, axis=0), 0.001)
+    seen = np.maximum(np.arange(len(voltage)) * 10 - 7, 0)
+    twist = fine.twist[seen] + np.random.default_rng(22).normal(size=(len(seen), 3)) * NOISE
+    return Run(t=np.arange(len(voltage)) * 0.01, voltage=voltage, twist=twist)
+
+
+def test_an_ellipse_in_a_turning_frame_seen_late(ellipse, log):
+    start = ellipse
+    for key, true in TRUTH.items():
+        start = with_parameter(start, key, 1.4 * true)
+    fit = fit_output_error(log, start, free=list(TRUTH), start="rest")
+    for key, true in TRUTH.items():
+        assert abs(fit.value[key] - true) < 4.5 * fit.std[key]
+        assert fit.std[key] < 0.3 * true
+    late = fit.nuisances["latency.twist"]
+    assert abs(late.value - 0.007) < 4.5 * late.std
+    assert late.std < 1e-3
+    np.testing.assert_allclose(list(fit.noise.values()), NOISE, rtol=0.1)
+
+
+def test_what_the_second_engine_does_not_know(ellipse, log):
+    with pytest.raises(UnsupportedError, match="breakaway is profiled with the exact engine only"):
+        fit_output_error(log, ellipse, free=[*TRUTH, "friction.axes.breakaway[0]"], start="rest", nuisances=())
+    problem = make_problem([record(log, ellipse)], ellipse, Options(free=tuple(TRUTH), start="rest"))
+    unknown = replace(problem, parameters=(*problem.parameters, Parameter("slip", 0.0, 0.0, 1.0)))
+    with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got slip.*leave it out"):
+        TangentEngine(unknown)
+    placed = log.replace(pose=np.zeros((len(log), 3)))
+    with pytest.raises(UnsupportedError, match=r"by the exact engine only; got position.*leave it out of the outputs"):
+        fit_output_error(placed, ellipse, outputs=["twist", "position"], start="rest", nuisances=())
+
+
+def test_the_fast_fit_ends_where_an_independent_optimiser_does(ellipse, log):
+    """scipy's least_squares on runs of simulate() at tol 1e-7, with a row at every t - latency."""
+    fit = fit_output_error(log, ellipse, free=list(TRUTH), start="rest", nuisances=["latency"])
+    noise, t = np.array(list(fit.noise.values())), log.t
+    rows = t - t[0] >= 0.3  # of which a fit with a latency makes use
+
+    def residual(scaled):
+        robot, late = ellipse, float(scaled[-1]) * 0.007
+        for key, value in zip(TRUTH, scaled, strict=False):
+            robot = with_parameter(robot, key, float(value) * TRUTH[key])
+        share = 1.0 - late / 0.01
+        dt = np.tile([share * 0.01, (1.0 - share) * 0.01], len(t) - 1)
+        twist = simulate(robot, np.repeat(log.voltage[:-1], 2, axis=0), dt, tol=1e-7).twist
+        seen = np.concatenate([[0], 2 * np.arange(1, len(t)) - 1])
+        return ((twist[seen] - log.twist) / noise)[rows].ravel()
+
+    own = np.array(
+        [*(fit.value[key] / true for key, true in TRUTH.items()), fit.nuisances["latency.twist"].value / 0.007]
+    )
+    std = np.array([*(fit.std[key] / true for key, true in TRUTH.items()), fit.nuisances["latency.twist"].std / 0.007])
+    best = least_squares(residual, own + 0.3 * std, x_scale=std, diff_step=1e-4, xtol=1e-7, ftol=1e-10)
+    print("distance from the optimum, standard errors:", np.round((own - best.x) / std, 4))
+    assert (np.abs(own - best.x) < 0.02 * std).all()
+
+
+NUISANCES = {"gain": 1.04, "dead_band": 0.1, "fade": 0.03, "latency.twist": 0.004, "latency.current": 0.0021}
+START = (0.4, -0.3, 1.0)
+
+
+def applied(voltage, values):
+    """What the driver makes of the voltages, written anew."""
+    share = np.arange(len(voltage)) / len(voltage)
+    left = values["gain"] * (1.0 - values["fade"] * share)
+    return left[:, None] * np.sign(voltage) * np.maximum(np.abs(voltage) - values["dead_band"], 0.0)
+
+
+def shown(robot, voltage, values, start=START, tol=1e-9):
+    """Twist, wheel speeds, currents and heading as a log has them, each late, by runs with rows there."""
+    for key, value in values.items():
+        robot = with_parameter(robot, key, value) if key.startswith(("friction", "body", "motor")) else robot
+    found = []
+    for channel, width in (("twist", 3), ("wheel_speed", 3), ("current", 3), ("heading", 1)):
+        late = values.get(f"latency.{channel}", 0.0)
+        u = np.repeat(applied(voltage, values), 2, axis=0)
+        dt = np.tile([0.01 - late, late] if late else [0.005, 0.005], len(voltage))
+        run = simulate(robot, u, dt, twist=start, tol=tol)
+        value = run.pose[:, 2:] if channel == "heading" else getattr(run, channel)
+        rows = 2 * np.arange(len(voltage) + 1) - (1 if late else 0)
+        known = np.where((rows >= 0)[:, None], value[np.maximum(rows, 0)], np.nan)
+        found.append(known.reshape(-1, width))
+    return np.hstack(found)
+
+
+def test_every_slope_against_differences_of_simulated_logs(ellipse):
+    """Robot, driver, latencies and start, in all outputs; the model of the log is written anew above."""
+    t = np.arange(41) * 0.01
+    voltage = np.stack([4.0 + np.sin(9.0 * t), 1.0 + np.cos(5.0 * t), -3.0 + np.sin(7.0 * t)], axis=1)[:-1]
+    values = {**TRUTH, "body.mass_kg": 1.5, "motor.resistance_ohm": 1.69, **NUISANCES, "latency.wheel_speed": 0.0}
+    values["latency.heading"] = 0.006
+    clean = shown(ellipse, voltage, values)
+    run = Run(
+        t=t, voltage=np.vstack([voltage, voltage[-1:]]), twist=clean[:, :3], wheel_speed=clean[:, 3:6],
+        current=clean[:, 6:9], pose=np.column_stack([t, t, clean[:, 9]]),
+    )  # fmt: skip
+    keys = [*TRUTH, "body.mass_kg", "motor.resistance_ohm"]
+    given = Options(tuple(keys), nuisances=("gain", "dead_band", "fade", "latency"), start="free")
+    problem = make_problem([record(run, ellipse)], ellipse, given)
+    piece = replace(problem.pieces[0], margin=np.zeros(10))
+    engine = TangentEngine(replace(problem, pieces=(piece,)), 1e-8)
+    point = Point(np.array([values[name] for name in problem.names]), (np.concatenate([START, np.zeros(10)]),))
+    residual, slopes, at = engine.residuals(point)[0]
+    share = np.arange(40) / 40
+    np.testing.assert_allclose((run.t[:-1] - run.t[0]) / problem.pieces[0].record.span, share)
+    assert np.nanmax(np.abs(residual)) < 2e-6
+    inner = slice(1, 40)  # the first row of a late channel has nothing to show, the last current another voltage
+    names = [*problem.names, "vx", "vy", "omega"]
+    for column, index in zip(slopes.transpose(2, 1, 0), at, strict=True):
+        if index >= len(names):  # the offset of the heading
+            np.testing.assert_array_equal(column[:, 9], 1.0)
+            continue
+        if names[index] == "latency.wheel_speed":
+            continue  # it is 0: at a row the rate jumps
+        ends = []
+        for side in (1.0, -1.0):
+            moved, start = dict(values), list(START)
+            width = 1e-4 * (abs(values.get(names[index], 1.0)) or 0.01)
+            if names[index] in values:
+                moved[names[index]] += side * width
+            else:
+                start[index - len(problem.names)] += side * width
+            ends.append(shown(ellipse, voltage, moved, start))
+        expected = (ends[0] - ends[1])[inner] / (2.0 * width)
+        error = np.nanmax(np.abs(column[inner] - expected), axis=0)
+        size = np.nanmax(np.abs(expected), axis=0)
+        print(f"{names[index]:34}", np.round(error / np.maximum(size, 1e-9), 7))
+        assert (error <= 1e-3 * size + 1e-9 / width).all(), names[index]  # what the runs' tolerance leaves of 0
+
+
+def test_gain_dead_band_and_latency_from_a_log_that_starts_in_motion(ellipse):
+    """12 s with currents; the first 2 s are cut off, so that it starts somewhere."""
+    rng, true = np.random.default_rng(31), {**TRUTH, "gain": 0.97, "dead_band": 0.15, "fade": 0.0}
+    true |= {"latency.twist": 0.006, "latency.current": 0.002}
+    voltage = voltages(rng, 14.0)
+    full = shown(ellipse, voltage, true, (0.0, 0.0, 0.0), 1e-6)[:-1]
+    full += np.random.default_rng(32).normal(size=full.shape) * np.array([*NOISE, *(3 * [9.0]), *(3 * [0.05]), 9.0])
+    log = Run(t=np.arange(1200) * 0.01, voltage=voltage[200:], twist=full[200:, :3], current=full[200:, 6:9])
+    assert np.abs(full[200, :3]).max() > 0.2
+    wanted = ["gain", "dead_band", "latency"]
+    for start in ("free", "auto"):
+        fit = fit_output_error(log, ellipse, free=list(TRUTH), nuisances=wanted, start=start)
+        found = {**{k: (v, fit.std[k]) for k, v in fit.value.items()}}
+        found |= {k: (n.value, n.std) for k, n in fit.nuisances.items()}
+        assert set(found) == set(true) - {"fade"}
+        for name, (value, std) in found.items():
+            print(start, name, round((value - true[name]) / std, 2), std)
+            assert abs(value - true[name]) < 4.5 * std, name
+        assert fit.nuisances["gain"].std < 0.01
+    assert fit.covariance == "white"

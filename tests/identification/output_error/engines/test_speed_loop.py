@@ -1,0 +1,234 @@
+"""Logs of set speeds: friction, gains and latency through the firmware's speed loop, against simulated truth."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.identification.as_fitted import as_fitted
+from omnidyn.identification.identify import identify
+from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
+from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem, read_records
+from omnidyn.identification.output_error.group_fit import identify_groups
+from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.identification.output_error.solve.loop import friction_keys, gain_keys, retimed
+from omnidyn.identification.output_error.solve.solver import Solver
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
+from omnidyn.simulation.simulate import simulate
+
+KP, KI = "drive.kp_V_s_rad", "drive.ki_V_rad"
+NOISE, CURRENT_NOISE = np.array([0.02, 0.02, 0.1]), 0.05
+
+
+@pytest.fixture(scope="module")
+def looped(axebot):
+    return axebot.replace(name="loop", drive=axebot.drive.replace(kind="speed", kp=0.25, ki=1.0, rate=100.0))
+
+
+@pytest.fixture(scope="module")
+def ellipse(looped):
+    direction = DirectionFriction(coulomb=(2.2, 1.5), viscous=0.95, yaw_coulomb=0.099, yaw_viscous=0.01)
+    return looped.replace(
+        friction=Friction(direction=direction), drive=looped.drive.replace(ki=0.0, kp=0.4, rate=200.0)
+    )
+
+
+def twists(seed, rows=500):
+    """Set twists at 100 Hz: rest, then levels held 0.3 to 1.2 s."""
+    rng, found, row = np.random.default_rng(seed), np.zeros((rows, 3)), 20
+    while row < rows:
+        end = min(rows, row + int(rng.uniform(30, 120)))
+        found[row:end] = rng.uniform(-1.0, 1.0, 3) * [0.6, 0.6, 4.0] * (rng.random(3) < 0.8)
+        row = end
+    return found
+
+
+def log(robot, seed, rows=500, late=0, channels=("twist", "current")):
+    """A run at 100 Hz with noise, seen `late` ms late."""
+    command = twists(seed, rows)
+    fine = simulate(robot, dt=1e-3, twist_command=np.repeat(command, 10, axis=0), tol=1e-7)
+    rng, seen = np.random.default_rng(1000 + seed), np.maximum(np.arange(rows) * 10 - late, 0)
+    found = {}
+    for name in channels:
+        values = getattr(fine, name)[seen]
+        found[name] = values + rng.normal(size=values.shape) * (NOISE if name == "twist" else CURRENT_NOISE)
+    return Run(t=np.arange(rows) * 0.01, twist_command=command, source=f"log {seed}", **found)
+
+
+def wrong(robot, **factors):
+    for key, factor in {KP: 3.0, **factors}.items():
+        robot = with_parameter(robot, key, factor * parameter(robot, key))
+    return robot
+
+
+def assert_near(fit, robot, most=4.5):
+    for key, value in fit.value.items():
+        assert abs(value - parameter(robot, key)) < most * fit.std[key], key
+
+
+def test_gains_and_friction_that_are_not_known(looped):
+    start = wrong(looped, **{KI: 0.3, "friction.axes.coulomb[0]": 0.5, "friction.axes.viscous[2]": 2.0})
+    fit = fit_output_error(log(looped, 1), start, nuisances=())
+    assert list(fit.value) == [*friction_keys(looped), *gain_keys(looped)]
+    assert {KP, KI} < set(fit.value)
+    assert_near(fit, looped)
+    assert fit.std[KP] < 0.02 * 0.25
+    np.testing.assert_allclose(list(fit.noise.values()), [*NOISE, *[CURRENT_NOISE] * 3], rtol=0.15)
+
+
+def test_an_ellipse_robot_seen_late(ellipse):
+    run = log(ellipse, 2, late=7, channels=("twist", "current"))
+    fit = fit_output_error(run, wrong(ellipse, **{"friction.direction.coulomb[1]": 0.6}))
+    assert_near(fit, ellipse)
+    for name in ("latency.twist", "latency.current"):
+        late = fit.nuisances[name]
+        assert abs(late.value - 0.007) < max(4.5 * late.std, 5e-4), name
+    moved = as_fitted(run, fit)
+    free = simulate(ellipse, dt=np.diff(moved.t), wheel_speed_command=moved.wheel_speed_command[:-1])
+    error = np.sqrt(np.mean((free.twist - moved.twist) ** 2, axis=0))
+    np.testing.assert_allclose(error, NOISE, rtol=0.15)
+
+
+def test_an_independent_optimiser_ends_at_the_same_point(ellipse):
+    """scipy's least squares on `simulate`, by its own differences, weighted with the true noise."""
+    run, keys = log(ellipse, 3, 250), ["friction.direction.coulomb[0]", "friction.direction.viscous", KP]
+    true = np.array([parameter(ellipse, key) for key in keys])
+
+    def residual(scaled):
+        robot = ellipse
+        for key, value in zip(keys, scaled * true, strict=True):
+            robot = with_parameter(robot, key, float(value))
+        model = simulate(robot, dt=0.01, twist_command=run.twist_command[:-1], tol=1e-8)
+        parts = (model.twist - run.twist) / NOISE, (model.current - run.current) / CURRENT_NOISE
+        return np.hstack(parts).ravel()
+
+    found = least_squares(residual, np.ones(3), diff_step=1e-4, x_scale=0.1)
+    fit = fit_output_error(run, ellipse, free=keys, nuisances=())
+    for key, value in zip(keys, found.x * true, strict=True):
+        assert abs(fit.value[key] - value) < 0.15 * fit.std[key], key  # its noise is estimated, not given
+
+
+@pytest.mark.parametrize("late", [0.0, 0.0123])
+def test_outputs_and_slopes(ellipse, late):
+    """Outputs against `simulate` on a fine grid; slopes against differences of the outputs. Latency of a twist too."""
+    run = log(ellipse, 4, 200)
+    run = run.replace(wheel_speed=np.zeros((200, 3)), pose=np.zeros((200, 3)))
+    free = (*friction_keys(ellipse), KP, "body.mass_kg")
+    records = read_records([run], ellipse, Options(free=free))
+    problem = make_problem(records, ellipse, Options(free=free, nuisances=("latency",)))
+    engine, piece, start = LoopEngine(problem, 1e-8), problem.pieces[0], problem.start()
+    values = start.values.copy()
+    values[problem.robot_count :] = late
+
+    def at(values):
+        return engine.outputs(engine.ready_at(values), piece, start.states[0], values)
+
+    outputs, slopes = at(values)
+    fine = simulate(ellipse, dt=1e-4, twist_command=np.repeat(run.twist_command, 100, axis=0), tol=1e-8)
+    seen = np.maximum(np.arange(200) * 100 - round(late * 1e4), 0)
+    late_enough = np.arange(200) * 100 >= round(late * 1e4)
+    for c, (name, i) in enumerate(piece.record.columns):
+        model = fine.pose[:, 2] if name == "heading" else getattr(fine, name)[:, i]
+        last = -1 if name == "current" and not late else None  # the loop has not answered there yet
+        np.testing.assert_allclose(outputs[late_enough, c][:last], model[seen][late_enough][:last], atol=2e-6)
+        assert np.isnan(outputs[-1, c]) == (last is not None)
+    for j, p in enumerate(problem.parameters):
+        if p.name.startswith("latency") and not late:
+            continue  # rows stand on ticks, where a twist has a kink
+        width = 1e-4 if p.name.startswith("latency") else 1e-4 * values[j]
+        up, down = values.copy(), values.copy()
+        up[j], down[j] = values[j] + width, values[j] - width
+        change = (at(up)[0] - at(down)[0]) / (2.0 * width)
+        error = np.abs(slopes[:, :, j] - change)
+        size = np.nanmax(np.abs(change), axis=0)
+        current = np.array([name == "current" for name, _ in piece.record.columns])
+        if p.name.startswith("latency"):  # of a current: the slope is a mean over a tick, by intent
+            error = error[:, ~current]
+            size = size[~current]
+        good = ~(error > 1e-3 * size + 3e-4)  # the tolerance over the width is 1e-4
+        assert good.mean() > 0.97, p.name  # a row beside an event or a tick is not differentiable
+
+
+def test_two_floors_share_the_gains(looped):
+    rough = looped
+    for axis in range(3):
+        key = f"friction.axes.coulomb[{axis}]"
+        rough = with_parameter(rough, key, 1.3 * parameter(looped, key))
+    runs = [log(looped, 5, 300), log(rough, 6, 300), log(looped, 7, 300), log(rough, 8, 300)]
+    found = identify_groups(runs, wrong(looped), ["smooth", "rough"] * 2, nuisances=())
+    assert set(found.shared) == {KP, KI}
+    assert_near(found.estimates["smooth"], looped)
+    assert_near(found.estimates["rough"], rough)
+    change = {d.key: d for d in found.differences}["friction.axes.coulomb[0]"]
+    assert abs(change.difference - 0.66) < 4.5 * change.std
+
+
+def test_groups_find_the_latency_of_currents_behind_a_slow_loop(looped):
+    """No descent crosses a tick of 20 ms: each group alone tries one after the other, and so must all together."""
+    slow = looped.replace(drive=looped.drive.replace(rate=50.0))
+    runs = [log(slow, seed, late=23) for seed in (1, 2)]
+    for own in ((), ("friction", "latency.current")):
+        found = identify_groups(runs, slow, ["a", "b"], per_free=own, nuisances=("latency",))
+        for estimate in found.estimates.values():
+            late = estimate.nuisances["latency.current"]
+            assert abs(late.value - 0.023) < max(4.5 * late.std, 5e-4)
+            assert late.std < 1e-3
+
+
+def test_a_voltage_beside_the_set_speeds_is_the_input_unless_a_gain_is_asked_for(looped):
+    command = twists(9, 300)
+    clean = simulate(looped, dt=0.01, twist_command=command[:-1])
+    noise = np.random.default_rng(9).normal(size=clean.twist.shape) * NOISE
+    run = Run(t=clean.t, twist_command=clean.twist_command, voltage=clean.voltage, twist=clean.twist + noise)
+    plain = fit_output_error(run, looped, nuisances=())
+    assert KP not in plain.value
+    both = fit_output_error(run, wrong(looped), free=[*plain.value, KP], nuisances=())
+    assert_near(both, looped)
+
+
+def test_a_robot_without_a_loop_is_told_what_to_write(axebot, looped):
+    run = log(looped, 10, 100)
+    with pytest.raises(UnsupportedError, match=r"no speed loop.*\[drive\] kind = \"speed\", kp_V_s_rad, ki_V_rad"):
+        identify(run, axebot, method="output-error")
+    still = log(looped, 1, 300, channels=("twist", "current"))
+    assert "output error" in identify(still, looped).method
+
+
+def test_what_cannot_be_used(looped):
+    run = log(looped, 11, 200)
+    with pytest.raises(UnsupportedError, match="no voltage that could be changed on its way; got gain"):
+        fit_output_error(run, looped, nuisances=["gain"])
+    with pytest.raises(UnsupportedError, match="integral of the loop is not known elsewhere"):
+        fit_output_error(run, looped, start="free")
+    moving = Run(t=run.t[60:], twist_command=run.twist_command[60:], twist=run.twist[60:] + 0.5, source="moving")
+    with pytest.raises(InsufficientDataError, match="no log begins at rest"):
+        fit_output_error(moving, looped)
+    silent = Run(t=run.t, twist_command=0.0 * run.twist_command, twist=0.0 * run.twist)
+    with pytest.raises(InsufficientDataError, match="never visibly moved"):
+        fit_output_error(silent, looped)
+    powered = run.replace(voltage=np.zeros_like(run.twist))
+    with pytest.raises(InputError, match="some logs have voltages, others set speeds only"):
+        fit_output_error([run, powered], looped)
+
+
+def test_friction_keys_name_what_is_there(looped, ellipse):
+    wheels = looped.replace(friction=Friction(wheels=WheelFriction(coulomb=(0.3, 0.2, 0.25), viscous=0.1)))
+    assert friction_keys(wheels) == [*(f"friction.wheels.coulomb[{w}]" for w in range(3)), "friction.wheels.viscous"]
+    assert friction_keys(ellipse)[0] == "friction.direction.coulomb[0]"
+    none = looped.replace(friction=Friction(axes=AxesFriction(viscous=(0.0,) * 3, coulomb=(0.0,) * 3)))
+    assert friction_keys(none) == []
+
+
+def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(looped):
+    """A loop of 500 Hz in rows at 100 Hz: after a few steps with wrong gains a latency may stand anywhere."""
+    fast = looped.replace(drive=looped.drive.replace(rate=500.0))
+    given = Options(nuisances=("latency",), free=(KP,))
+    problem = make_problem(read_records([log(fast, 3, 300)], fast, given), fast, given)
+    point = problem.start()
+    values = point.values.copy()
+    astray = problem.where("latency.current")
+    values[astray] = 0.15
+    found = retimed(Solver(problem, LoopEngine(problem)), Point(values, point.states))
+    assert abs(found.values[astray]) <= 0.01

@@ -1,0 +1,101 @@
+"""Who looks on while a fit goes on: it hears of every phase, and an interrupt leaves the best so far of set speeds."""
+
+import numpy as np
+import pytest
+
+from omnidyn.identification.output_error.best_so_far import WORDS, best_so_far
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.identification.output_error.solve.progress import Onlooker, onlooker
+from omnidyn.identification.output_error.solve.solver import State
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def looped(axebot):
+    return axebot.replace(name="loop", drive=axebot.drive.replace(kind="speed", kp=0.25, ki=1.0, rate=100.0))
+
+
+@pytest.fixture(scope="module")
+def log(looped):
+    """2.5 s of set speeds on all axes, at 100 Hz, with noise."""
+    rng, command = np.random.default_rng(5), np.zeros((250, 3))
+    command[20:90], command[90:170], command[170:] = (0.5, 0.2, 2.0), (-0.4, 0.5, -3.0), (0.1, -0.6, 1.0)
+    fine = simulate(looped, dt=1e-3, twist_command=np.repeat(command, 10, axis=0), tol=1e-6)
+    twist = fine.twist[:-1:10] + rng.normal(size=command.shape) * [0.02, 0.02, 0.1]
+    current = fine.current[:-1:10] + rng.normal(size=command.shape) * 0.05
+    return Run(t=np.arange(250) * 0.01, twist_command=command, twist=twist, current=current, source="log")
+
+
+class Cut(Onlooker):
+    """Interrupts at so many better states, or at the first of these words."""
+
+    def __init__(self, count=0, words=None):
+        super().__init__(self.kept, self.heard_of)
+        self.states, self.heard, self.count, self.until = [], [], count, words
+
+    def kept(self, state):
+        self.states.append(state)
+        if len(self.states) == self.count:
+            raise KeyboardInterrupt
+
+    def heard_of(self, words):
+        self.heard.append(words)
+        if self.until and words.startswith(self.until):
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    "cut", [Cut(count=1), Cut(words="trying latency.current"), Cut(words="finding how sure")], ids=["1", "2", "3"]
+)
+def test_an_interrupted_fit_of_set_speeds_leaves_the_best_so_far(looped, log, cut):
+    """In the first search for a start, between two descents, and after the last one."""
+    with pytest.raises(KeyboardInterrupt):
+        fit_output_error(log, looped, watch=cut)
+    fit = best_so_far(cut.states, [log], looped, {})
+    assert WORDS in fit.warnings
+    values = {**fit.value, **{name: own.value for name, own in fit.nuisances.items()}}
+    assert list(values.values()) == pytest.approx(list(cut.states[-1].point.values))
+    assert "drive.kp_V_s_rad" in fit.value
+
+
+def test_every_phase_is_told_before_it_begins(looped, log):
+    seen = Cut()
+    fit_output_error(log, looped, watch=seen)
+    first = [next(k for k, words in enumerate(seen.heard) if words.startswith(phase)) for phase in (
+        "looking for what moved", "looking for a start, latencies 1 of 5", "looking for a start, friction and gains 1",
+        "trying latency.current, 1 of", "the same as exactly", "looking for a better branch", "finding how sure",
+    )]  # fmt: skip
+    assert first == sorted(first)
+
+
+def test_a_robot_of_the_exact_engine_tells_its_phases_too(axebot):
+    run = simulate(axebot, np.repeat([[3.0, -1.0, 2.5], [-4.0, 3.0, 1.0]], 50, axis=0), 0.02)
+    seen = Cut()
+    fit_output_error(Run(t=run.t, voltage=run.voltage, twist=run.twist, source="log"), axebot, watch=seen)
+    assert {"looking for what moved", "looking for a start", "finding how sure the numbers are"} < set(seen.heard)
+
+
+def test_a_search_that_goes_several_ways_shows_only_what_is_better_than_all_before():
+    seen = []
+    watch = Onlooker(seen.append).below(10.0)
+    states = [State(Point(np.zeros(0), ()), [], objective, np.zeros(0)) for objective in (11.0, 9.0, 9.5, 8.0, 8.0)]
+    for state in states:
+        watch(state)
+    assert seen == [states[1], states[3]]
+
+
+def test_the_states_of_a_fit_beside_become_words():
+    seen, heard = [], []
+    watch = Onlooker(seen.append, heard.append).aside("once more")
+    watch(State(Point(np.zeros(0), ()), [], -12.5, np.zeros(0)))
+    watch.doing("trying")
+    assert (seen, heard) == ([], ["once more, -log likelihood -12.5", "trying"])
+
+
+def test_any_function_may_look_on():
+    seen = []
+    onlooker(seen.append)("a state")
+    onlooker(None)("a state")
+    assert seen == ["a state"]

@@ -1,0 +1,131 @@
+"""Groups fitted together: shared and own numbers against simulated floors, and against what must be equal to it."""
+
+import numpy as np
+import pytest
+
+from benchmarks.identify import excitation, noisy
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.group_fit import expand_keys, identify_groups
+from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.robot_file import load_robot
+from omnidyn.simulation.sensitivity.directions import with_parameter
+from omnidyn.simulation.simulate import simulate
+
+AXEBOT = load_robot("axebot")
+TORQUE, EMF, COULOMB, MASS = (
+    "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad", "friction.axes.coulomb[0]", "body.mass_kg",
+)  # fmt: skip
+MAGNET, ROUGH = 0.0062, 2.6
+FREE = ["friction", TORQUE]
+
+
+@pytest.fixture(scope="module")
+def clean():
+    """15 s on a smooth and a rough floor; the magnet is stronger than the robot file says."""
+    found = {}
+    for k, (name, level) in enumerate((("smooth", 2.2), ("rough", ROUGH))):
+        robot = with_parameter(with_parameter(with_parameter(AXEBOT, COULOMB, level), TORQUE, MAGNET), EMF, MAGNET)
+        found[name] = simulate(robot, excitation(15.0, seed=k), 0.01)
+    return found
+
+
+def fitted(clean, seed, **options):
+    runs = [noisy(run, 10 * seed + k) for k, run in enumerate(clean.values())]
+    return runs, identify_groups(runs, AXEBOT, [*clean], free=FREE, nuisances=(), start="rest", **options)
+
+
+def test_differences_and_shared_numbers_hold_the_truth(clean):
+    """20 draws of noise, 7 x 20 intervals of 95 %: 126 or more hold with probability 0.99."""
+    held = coulomb = 0
+    for seed in range(20):
+        _, study = fitted(clean, seed)
+        for d in study.differences:
+            true = ROUGH - 2.2 if d.key == COULOMB else 0.0
+            held += d.low <= true <= d.high
+            coulomb += d.key == COULOMB and d.differs
+        ends = {group: e.ci95[TORQUE] for group, e in study.estimates.items()}
+        assert ends["smooth"] == ends["rough"]
+        held += ends["smooth"][0] <= MAGNET <= ends["smooth"][1]
+    assert held >= 126
+    assert coulomb == 20
+
+
+def test_with_nothing_shared_it_is_two_fits(clean):
+    """Independent: each group alone. The noise is common, so that the weights, hence the last digits, differ."""
+    runs = [noisy(run, k) for k, run in enumerate(clean.values())]
+    study = identify_groups(runs, AXEBOT, [*clean], nuisances=(), start="rest", covariance="white")
+    for run, estimate in zip(runs, study.estimates.values(), strict=True):
+        alone = fit_output_error(run, AXEBOT, nuisances=(), start="rest", covariance="white")
+        for key in FRICTION:
+            assert abs(estimate.value[key] - alone.value[key]) < 0.02 * alone.std[key]
+            assert estimate.std[key] == pytest.approx(alone.std[key], rel=0.05)
+    assert study.shared == ()
+
+
+def test_with_everything_shared_it_is_one_fit(clean):
+    """All but one number shared between two logs of the same floor: the shared ones are those of one fit to both."""
+    runs = [noisy(clean["smooth"], k) for k in range(2)]
+    both = fit_output_error(runs, AXEBOT, free=[*FRICTION, TORQUE], nuisances=(), start="rest")
+    study = identify_groups(
+        runs, AXEBOT, ["a", "b"], free=FREE, per_free=["friction.axes.viscous[2]"], nuisances=(), start="rest"
+    )
+    for name in study.shared:
+        assert abs(study.estimates["a"].value[name] - both.value[name]) < 0.3 * both.std[name]
+    assert set(study.shared) == {*FRICTION, TORQUE} - {"friction.axes.viscous[2]"}
+
+
+def test_sharing_makes_the_motor_surer(clean):
+    runs, study = fitted(clean, 3)
+    alone = [fit_output_error(run, AXEBOT, free=[*FRICTION, TORQUE], nuisances=(), start="rest") for run in runs]
+    expected = sum(a.std[TORQUE] ** -2 for a in alone) ** -0.5  # independent logs, to first order
+    assert study.estimates["smooth"].std[TORQUE] == pytest.approx(expected, rel=0.05)
+
+
+def test_a_load_is_a_mass_of_its_own():
+    """Friction is the same, the second log carries 0.3 kg more."""
+    runs = []
+    for k, mass in enumerate((1.5, 1.8)):
+        runs.append(noisy(simulate(with_parameter(AXEBOT, MASS, mass), excitation(20.0, seed=k), 0.01), k))
+    study = identify_groups(
+        runs, AXEBOT, ["empty", "loaded"], free=["friction", MASS], per_free=[MASS], nuisances=(), start="rest"
+    )
+    (difference,) = study.differences
+    assert difference.key == MASS
+    assert difference.differs
+    assert abs(difference.difference - 0.3) < 4.0 * difference.std
+
+
+def test_automatic_nuisances_are_those_that_every_group_supports(clean):
+    runs = [noisy(run, k) for k, run in enumerate(clean.values())]
+    study = identify_groups(runs, AXEBOT, [*clean], free=FREE, start="rest")
+    for estimate in study.estimates.values():
+        late = estimate.nuisances["latency.twist"]
+        assert abs(late.value) < 4.0 * late.std
+        assert late.std < 5e-3
+
+
+def test_keys_that_stand_for_several():
+    assert expand_keys(["friction"]) == [*FRICTION]
+    assert expand_keys(["friction.axes.coulomb", TORQUE]) == [*FRICTION[3:], TORQUE]
+
+
+def test_refusals(clean):
+    runs = [*clean.values()]
+    with pytest.raises(
+        InputError, match="groups need a name for every run; got 2 names, 1 of them different, for 2 runs"
+    ):
+        identify_groups(runs, AXEBOT, ["a", "a"])
+    with pytest.raises(InputError, match=r"not free, so no group can have its own; got body\.mass_kg"):
+        identify_groups(runs, AXEBOT, ["a", "b"], per_free=[MASS])
+    with pytest.raises(InputError, match="nothing differs between the groups"):
+        identify_groups(runs, AXEBOT, ["a", "b"], free=[TORQUE], nuisances=())
+    with pytest.raises(InputError, match=r"implicit engine, which does not know all that is asked for; got tilt\.x"):
+        identify_groups(runs, load_robot("robotino"), ["a", "b"], nuisances=["tilt"])
+    with pytest.raises(UnsupportedError, match="holds no voltage"):
+        identify_groups([np_free(run) for run in runs], AXEBOT, ["a", "b"])
+
+
+def np_free(run):
+    """Without inputs."""
+    return run.replace(voltage=None, current=np.asarray(run.current))

@@ -1,0 +1,206 @@
+"""Intervals under colour, at bounds, from profiles and bootstrap; directions that the data do not show."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from benchmarks.identify import excitation
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.output_error import fit as whole
+from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.run import Run
+from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
+from omnidyn.simulation.simulate import simulate
+from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+
+fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
+
+KT = "motor.torque_constant_Nm_A"
+
+
+@pytest.fixture(scope="module")
+def clean(axebot):
+    return simulate(axebot, voltages(np.random.default_rng(11)), 0.01)
+
+
+def coloured(run, seed, memory=0.9):
+    """Noise of the same size with a correlation of 0.9 from sample to sample: its slow part is 4.4 times as large."""
+    rng = np.random.default_rng(seed)
+    noise = np.zeros(run.twist.shape)
+    fresh = rng.normal(size=noise.shape) * NOISE * np.sqrt(1.0 - memory**2)
+    for k in range(1, len(noise)):
+        noise[k] = memory * noise[k - 1] + fresh[k]
+    return Run(t=run.t, voltage=run.voltage, twist=run.twist + noise)
+
+
+def test_coloured_noise_is_seen_and_the_intervals_follow(axebot, clean):
+    """25 logs, 150 intervals: with white intervals fewer than 85 % would hold the truth, the sandwich's do."""
+    held = {"auto": 0, "white": 0}
+    for seed in range(25):
+        log = coloured(clean, seed)
+        for kind in held:
+            fit = fit_output_error(log, axebot, start="rest", covariance=kind)
+            held[kind] += sum(fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in TRUTH.items())
+        assert fit_output_error(log, axebot, start="rest").covariance == "sandwich"
+    assert held["white"] < 0.85 * 150
+    assert held["auto"] >= 0.90 * 150
+
+
+def test_no_friction_stands_at_the_bound_with_an_interval_that_holds_it(axebot, clean):
+    none = axebot
+    for key in FRICTION:
+        none = with_parameter(none, key, 0.0)
+    fit = fit_output_error(noisy(simulate(none, clean.voltage[:-1], 0.01), 5), axebot, start="rest")
+    assert all(fit.ci95[key][0] <= 0.0 <= fit.ci95[key][1] for key in FRICTION)
+    assert fit.at_bound
+    for key in fit.at_bound:
+        assert fit.value[key] == 0.0
+        assert any(f"{key} is at its bound 0" in words for words in fit.warnings)
+
+
+def test_what_only_the_product_shows_is_named(axebot, clean):
+    """Torque constant times gear ratio is all that voltage and speed see of the two; from 1.5x wrong constants."""
+    start = with_parameter(with_parameter(axebot, KT, 1.5 * 0.0059), "motor.emf_constant_Vs_rad", 1.5 * 0.0059)
+    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, "motor.gear_ratio"], start="rest")
+    assert set(fit.unidentifiable) == {KT, "motor.gear_ratio"}
+    assert fit.value[KT] * fit.value["motor.gear_ratio"] == pytest.approx(0.0059 * 19.0, rel=0.01)
+    (words,) = fit.blind
+    assert "motor.gear_ratio +1 %" in words or "motor.gear_ratio -1 %" in words
+    assert "friction" not in words
+    assert np.isfinite([fit.std[key] for key in FRICTION]).all()
+
+
+def test_physical_numbers_with_currents(axebot, clean):
+    """Mass, inertia, resistance and torque constant are identifiable once currents are measured."""
+    rng, keys = np.random.default_rng(2), ("body.mass_kg", "body.inertia_kg_m2", "motor.resistance_ohm", KT)
+    log = noisy(clean, 2).replace(current=clean.current + 0.05 * rng.normal(size=clean.current.shape))
+    start = axebot
+    for key, wrong in zip((*keys, "motor.emf_constant_Vs_rad"), (2.5, 0.015, 2.6, 0.009, 0.009), strict=True):
+        start = with_parameter(start, key, wrong)
+    fit = fit_output_error(log, start, free=[*FRICTION, *keys], start="rest")
+    for key, true in zip(keys, (1.5, 0.025, 1.69, 0.0059), strict=True):
+        assert abs(fit.value[key] - true) < 4.0 * fit.std[key]
+        assert fit.std[key] < 0.005 * true
+    assert fit.robot.motor.emf_constant == pytest.approx(fit.robot.motor.torque_constant)
+
+
+def test_the_profile_agrees_where_the_likelihood_is_quadratic(axebot, clean):
+    key = FRICTION[0]
+    log = noisy(clean, 3)
+    plain = fit_output_error(log, axebot, start="rest")
+    profiled = fit_output_error(log, axebot, start="rest", profile=[key])
+    np.testing.assert_allclose(profiled.ci95[key], plain.ci95[key], atol=0.15 * plain.std[key])
+    with pytest.raises(InputError, match=r"not a free number; got body\.mass_kg"):
+        fit_output_error(log, axebot, profile=["body.mass_kg"])
+
+
+@pytest.mark.parametrize("loss", ["gaussian", "student-t"])
+def test_a_profile_knows_of_colour(axebot, clean, loss):
+    """Errors that remember make the likelihood too steep; it is all but a parabola, so both ways say the same."""
+    keys, how = [FRICTION[0], FRICTION[4]], {"start": "rest", "loss": loss}
+    log = coloured(clean, 3)
+    plain = fit_output_error(log, axebot, **how)
+    profiled = fit_output_error(log, axebot, profile=keys, **how)
+    white = fit_output_error(log, axebot, covariance="white", **how)
+    for key in keys:
+        assert plain.std[key] > 2.0 * white.std[key]
+        assert np.ptp(profiled.ci95[key]) == pytest.approx(np.ptp(plain.ci95[key]), rel=0.15)
+
+
+def test_breakaway_knows_of_colour(axebot):
+    """Of 30 intervals 27 or more hold the truth; by the limit for white noise 19 did."""
+    levels = tuple(1.2 * c for c in axebot.friction.axes.coulomb)
+    axes = axebot.friction.axes.model_copy(update={"breakaway": levels})
+    robot = axebot.replace(friction=axebot.friction.model_copy(update={"axes": axes}))
+    keys, held = [f"friction.axes.breakaway[{axis}]" for axis in range(3)], 0
+    for seed in range(10):
+        log = coloured(simulate(robot, excitation(30.0, seed=200 + seed), 0.01), seed)
+        fit = fit_output_error(log, axebot, free=[*FRICTION, *keys], start="rest")
+        held += sum(fit.ci95[key][0] <= level <= fit.ci95[key][1] for key, level in zip(keys, levels, strict=True))
+    assert held >= 27
+
+
+def test_bootstrap_over_runs(axebot):
+    rng = np.random.default_rng(4)
+    runs = [noisy(simulate(axebot, voltages(rng, 10.0), 0.01), k) for k in range(12)]
+    plain = fit_output_error(runs, axebot, start="rest")
+    drawn, again = (fit_output_error(runs, axebot, start="rest", bootstrap=60) for _ in range(2))
+    assert drawn.std == again.std
+    ratio = np.array([drawn.std[key] / plain.std[key] for key in FRICTION])
+    assert (ratio > 0.5).all()
+    assert (ratio < 2.0).all()
+    with pytest.raises(InsufficientDataError, match="too few runs for a bootstrap; got 1; expected 5"):
+        fit_output_error(runs[0], axebot, bootstrap=10)
+
+
+def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
+    """25 short runs, Coulomb friction of each 15 % off at random; the truth is their expected value.
+
+    40 draws: errors in standard errors scatter by 1, within three counting errors of 40; by white noise they
+    scatter by nearly 2.
+    """
+    rng, key = np.random.default_rng(5), "friction.axes.coulomb[0]"
+    base = voltages(np.random.default_rng(3))[:100]
+    errors = {"auto": [], "white": []}
+    for _ in range(40):
+        runs = []
+        for level in TRUTH[key] * (1.0 + 0.15 * rng.normal(size=25)):
+            run = simulate(with_parameter(axebot, key, float(level)), base, 0.01)
+            runs.append(Run(t=run.t, voltage=run.voltage, twist=run.twist + rng.normal(size=run.twist.shape) * NOISE))
+        for kind, found in errors.items():
+            fit = fit_output_error(runs, axebot, start="rest", covariance=kind)
+            found.append((fit.value[key] - TRUTH[key]) / fit.std[key])
+        assert fit_output_error(runs, axebot, start="rest").covariance == "sandwich"
+    assert any("from run to run (25 runs)" in words for words in fit_output_error(runs, axebot, start="rest").warnings)
+    assert abs(np.std(errors["auto"]) - 1.0) < 3.0 / np.sqrt(2.0 * 40)
+    assert np.std(errors["white"]) > 1.6
+
+
+def test_a_number_with_a_small_share_of_a_lost_direction_is_lost_too(axebot, clean):
+    """Twist tells of K/R, and of K^2/R only with viscous friction: 1 % of K and R is worth 5 % of it or more."""
+    start = axebot
+    for key in (KT, "motor.emf_constant_Vs_rad"):
+        start = with_parameter(start, key, 0.95 * 0.0059)
+    resistance = "motor.resistance_ohm"
+    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, resistance], start="rest")
+    lost = {KT, resistance, *FRICTION[:3]}
+    assert set(fit.unidentifiable) == lost
+    assert all(np.isinf(fit.std[key]) for key in lost)
+    (words,) = fit.blind
+    assert all(key in words for key in lost)
+    known = fit_output_error(noisy(clean, 1), axebot, start="rest")
+    for key in FRICTION[3:]:  # as well known as where the other numbers are: no better
+        assert fit.value[key] == pytest.approx(known.value[key], abs=0.2 * known.std[key])
+        assert 0.95 * known.std[key] < fit.std[key] < 2.0 * known.std[key]
+    for key in lost:  # together they are right, so the robot has all of them
+        assert parameter(fit.robot, key) == fit.value[key]
+
+
+def test_what_lies_on_the_other_side_of_a_bound_is_lost_too(axebot, clean):
+    """With the torque constant too large, viscous friction stops at 0; that does not tell the constant."""
+    start = axebot
+    for key in (KT, "motor.emf_constant_Vs_rad"):
+        start = with_parameter(start, key, 1.3 * 0.0059)
+    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, "motor.resistance_ohm"], start="rest")
+    assert {KT, "motor.resistance_ohm"} <= set(fit.unidentifiable)
+
+
+def test_a_model_that_does_not_follow_the_log_is_said(axebot, clean):
+    log = noisy(clean, 1)
+    assert not any("does not follow" in words for words in fit_output_error(log, axebot, start="rest").warnings)
+    wrong = Run(t=log.t, voltage=log.voltage, twist=log.twist * [1.0, -1.0, 1.0])
+    fit = fit_output_error(wrong, axebot, start="rest")
+    assert any("the model does not follow twist[1]" in words for words in fit.warnings)
+    for key in fit.unidentifiable:
+        assert fit.value[key] == TRUTH[key]  # as the robot had it
+    backward = Run(t=log.t, voltage=-log.voltage, twist=log.twist)
+    with pytest.raises(InsufficientDataError, match=r"the robot moved, but with no value .* check signs, units"):
+        fit_output_error(backward, axebot, start="rest")
+
+
+def test_errors_that_remember_ask_for_no_nuisance(axebot, clean):
+    """The scatter of white noise is too small a measure: five of its standard errors are one or two of theirs."""
+    for seed in range(6):
+        fit = whole.fit_output_error(coloured(clean, seed), axebot, start="rest")
+        assert not any("would fit better" in words for words in fit.warnings)

@@ -1,0 +1,241 @@
+"""fit_steady_state: what it takes, what it refuses, and every doubt it utters."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.identification.steady.steady_state import fit_steady_state
+from omnidyn.logs.steady_table import SteadyTable
+from omnidyn.model.friction import AxesFriction, WheelFriction
+from omnidyn.model.robot import Prior
+from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+
+ROBOT = load_robot("axebot")
+SPEED = np.array([0.2, 0.5, 0.8, 1.1, -0.3, -0.9])
+NOISE = np.array([0.01, -0.02, 0.015, -0.005, 0.01, -0.01])
+
+
+def line(axis="x", speed=SPEED, b=0.94, c=2.2, noise=NOISE, **more):
+    speed = np.asarray(speed, dtype=float)
+    return SteadyTable(axis, speed, b * speed + c * np.sign(speed) + noise[: len(speed)], **more)
+
+
+def both(one, other):
+    return SteadyTable(
+        [*one.axis, *other.axis], np.concatenate([one.speed, other.speed]), np.concatenate([one.force, other.force])
+    )
+
+
+def said(fit, words):
+    """The one warning with these words."""
+    (found,) = [each for each in fit.warnings if words in each]
+    return found
+
+
+def test_exact_points_give_exact_numbers():
+    fit = fit_steady_state(ROBOT, line(b=1.25, c=2.5, speed=[0.25, 0.5, 1.0, -2.0], noise=np.zeros(4)))
+    assert fit.value["friction.axes.viscous[0]"] == pytest.approx(1.25, rel=1e-14)
+    assert fit.value["friction.axes.coulomb[0]"] == pytest.approx(2.5, rel=1e-14)
+    assert fit.std["friction.axes.viscous[0]"] < 1e-13
+    assert parse_robot(robot_to_toml(fit.robot)) == fit.robot  # a std of 0 or nearly so does no harm
+
+
+def test_axes_without_data_keep_their_friction_and_say_so():
+    fit = fit_steady_state(ROBOT, line("y", b=1.0, c=1.0))
+    assert fit.robot.friction.axes.viscous[::2] == ROBOT.friction.axes.viscous[::2]
+    assert fit.robot.friction.axes.coulomb[::2] == ROBOT.friction.axes.coulomb[::2]
+    assert set(fit.value) == {"friction.axes.viscous[1]", "friction.axes.coulomb[1]"}
+    assert "axis x: no data, B and C stay as they were" in fit.warnings
+    assert "axis yaw: no data, B and C stay as they were" in fit.warnings
+
+
+# ---- doubts, each in words ------------------------------------------------------------------------------
+
+
+def test_two_degrees_of_freedom_or_fewer_are_told_with_the_t_factor():
+    assert "1 degree of freedom (3 rows, 2 parameters): the 95 % interval reaches 12.7 standard" in said(
+        fit_steady_state(ROBOT, line(speed=SPEED[:3])), "of freedom"
+    )
+    assert "2 degrees of freedom (4 rows, 2 parameters): the 95 % interval reaches 4.3 standard" in said(
+        fit_steady_state(ROBOT, line(speed=SPEED[:4])), "of freedom"
+    )
+    assert not [words for words in fit_steady_state(ROBOT, line(speed=SPEED[:5])).warnings if "of freedom" in words]
+
+
+def test_an_interval_that_contains_zero():
+    fit = fit_steady_state(ROBOT, line(b=0.001))
+    low, high = fit.ci95["friction.axes.viscous[0]"]
+    assert low < 0.0 < high
+    assert "N s/m contains zero: the data do not show it" in said(fit, "friction.axes.viscous[0]")
+
+
+def test_a_negative_estimate_is_at_bound_not_silently_clamped():  # BAD_INPUTS 30
+    fit = fit_steady_state(ROBOT, line(b=-0.5))
+    assert fit.at_bound == ("friction.axes.viscous[0]",)
+    assert fit.robot.friction.axes.viscous[0] == 0.0
+    low, high = fit.ci95["friction.axes.viscous[0]"]
+    assert low == 0.0 < high
+    words = said(fit, "friction.axes.viscous[0] is at bound")
+    side = np.sign(SPEED)
+    slope = stats.linregress(np.abs(SPEED), side * line(b=-0.5).force).slope
+    assert f"the best line has {slope:.4g} N s/m, friction cannot be negative, 0 is taken; it may be up to" in words
+    assert "at bound" in fit.summary()
+    assert fit.to_dict()["parameters"]["friction.axes.viscous[0]"]["at_bound"] is True
+    assert parse_robot(robot_to_toml(fit.robot)) == fit.robot
+
+
+def test_a_row_at_rest_used_as_a_sliding_point():
+    points = both(line(speed=SPEED[:4]), SteadyTable("x", [0.0], [2.3]))
+    assert "axis x: 1 row at rest used as a sliding point" in said(
+        fit_steady_state(ROBOT, points, rest="line"), "at rest"
+    )
+    assert "axis x: 1 row at rest not used" in fit_steady_state(ROBOT, points, rest="ignore").warnings
+
+
+def test_one_speed_only_is_no_line():
+    fit = fit_steady_state(ROBOT, both(line("y"), line("x", speed=[0.5, 0.5, -0.5, 0.5], noise=np.zeros(4))))
+    assert "all rows have the same speed, 0.5: B and C cannot be told apart" in said(fit, "axis x: all rows")
+    assert "B speed + C = 2.67" in said(fit, "axis x: all rows")
+    assert fit.robot.friction.axes.viscous[0] == ROBOT.friction.axes.viscous[0]
+
+
+def test_force_against_the_motion():  # BAD_INPUTS 23
+    points = line()
+    unsigned = points.replace(force=np.abs(points.force))
+    words = said(fit_steady_state(ROBOT, unsigned), "against the motion")
+    assert words.startswith("axis x: in 2 rows of 6 the force points against the motion")
+    assert "unsigned current sensor" in words
+
+
+def test_scatter_that_contradicts_the_std_given():
+    small = line(force_std=np.full(6, 0.001))
+    assert "scatter 15 times as much as their std says; the intervals follow the scatter itself" in said(
+        fit_steady_state(ROBOT, small), "scatter"
+    )
+    assert "the intervals follow the std given" in said(fit_steady_state(ROBOT, small, absolute_std=True), "scatter")
+    assert not [
+        each for each in fit_steady_state(ROBOT, line(force_std=np.full(6, 0.015))).warnings if "scatter" in each
+    ]
+
+
+def test_an_iteration_that_does_not_settle_is_told(monkeypatch):
+    monkeypatch.setattr("omnidyn.identification.steady.line.MAX_ITERATIONS", 2)
+    points = line(force_std=np.full(6, 0.015), speed_std=np.full(6, 0.2))
+    assert "axis x: the iteration for speed_std did not settle" in said(fit_steady_state(ROBOT, points), "settle")
+
+
+def test_notes_of_the_points_become_warnings():
+    assert (
+        "numbers have a decimal comma"
+        in fit_steady_state(ROBOT, line(notes=("numbers have a decimal comma",))).warnings
+    )
+
+
+# ---- breakaway ------------------------------------------------------------------------------------------
+
+
+def with_breakaway(*levels):
+    old = ROBOT.friction.axes
+    friction = AxesFriction(viscous=old.viscous, coulomb=old.coulomb, breakaway=levels)
+    return ROBOT.replace(friction=ROBOT.friction.replace(axes=friction))
+
+
+def test_a_breakaway_below_the_new_coulomb_friction_is_raised_in_words():
+    fit = fit_steady_state(with_breakaway(2.3, 1.8, 0.1), line(c=2.6))
+    new = fit.robot.friction.axes
+    assert new.breakaway == (new.coulomb[0], 1.8, 0.1)
+    assert "friction.axes.breakaway[0] raised from 2.3 to the new coulomb friction" in fit.warnings
+
+
+def test_a_breakaway_above_it_stays_in_words():
+    fit = fit_steady_state(with_breakaway(3.0, 1.8, 0.1), line())
+    assert fit.robot.friction.axes.breakaway == (3.0, 1.8, 0.1)
+    assert "friction.axes.breakaway[0] stays at 3: rows in motion do not show it" in fit.warnings
+
+
+def test_slow_rows_count_as_rest_below_rest_speed():
+    points = both(line(), SteadyTable("x", [0.004, -0.003], [1.0, -2.9]))
+    fit = fit_steady_state(ROBOT, points, rest_speed=(0.005, 0.0, 0.0))
+    assert fit.value == fit_steady_state(ROBOT, line()).value
+    assert fit.robot.friction.axes.breakaway[0] == fit.lower_bound["friction.axes.breakaway[0]"] == 2.9
+
+
+def test_a_prior_of_a_whole_list_goes_to_its_items():
+    robot = ROBOT.replace(priors={"friction.axes.coulomb": Prior(std=0.2, source="datasheet")})
+    fit = fit_steady_state(robot, line())
+    assert fit.robot.priors["friction.axes.coulomb[1]"] == Prior(std=0.2, source="datasheet")
+    assert fit.robot.priors["friction.axes.coulomb[0]"].source.startswith("identified")
+    assert parse_robot(robot_to_toml(fit.robot)) == fit.robot
+
+
+# ---- refusals -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speed", [[0.5], [0.5, 1.0]])
+def test_too_few_rows_say_how_many_are_needed(speed):  # BAD_INPUTS 4
+    with pytest.raises(
+        InsufficientDataError, match=rf"axis x: too few rows .*; got {len(speed)} usable rows; expected 3 or more"
+    ):
+        fit_steady_state(ROBOT, line(speed=speed))
+
+
+def test_two_rows_do_when_their_std_is_known():
+    fit = fit_steady_state(ROBOT, line(speed=[0.5, 1.0], force_std=[0.05, 0.05]), absolute_std=True)
+    assert fit.std["friction.axes.viscous[0]"] == pytest.approx(0.05 * np.sqrt(2) / 0.5, rel=1e-12)
+    assert fit.degrees_of_freedom["friction.axes.viscous[0]"] == 0
+
+
+def test_a_robot_that_never_moved_gives_a_bound_only():  # BAD_INPUTS 27
+    points = SteadyTable(["x", "x", "yaw"], [0, 0, 0], [1.0, -2.0, 0.05])
+    with pytest.raises(InsufficientDataError, match=r"never moved.*axis x holds at least 2 N; axis yaw"):
+        fit_steady_state(ROBOT, points)
+    assert InsufficientDataError.exit_code == 4
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"rest": "maybe"}, "rest: unknown use of rows at rest; got maybe; expected bound or line or ignore"),
+        ({"rest_speed": (0.1, 0.1)}, "rest_speed: cannot tell rest from motion; .*three speeds"),
+        ({"rest_speed": (0.1, -0.1, 0.0)}, "rest_speed: cannot tell rest from motion"),
+        ({"absolute_std": True}, "absolute_std needs the std of the forces"),
+    ],
+)
+def test_wrong_options(options, words):
+    with pytest.raises(InputError, match=words):
+        fit_steady_state(ROBOT, line(), **options)
+
+
+def test_friction_elsewhere_would_count_twice():
+    robot = ROBOT.replace(friction=ROBOT.friction.replace(wheels=WheelFriction(coulomb=0.5)))
+    with pytest.raises(
+        UnsupportedError, match=r"friction on the body axes only; got axebot with friction elsewhere too"
+    ):
+        fit_steady_state(robot, line())
+
+
+def test_friction_beyond_any_robot_is_not_put_into_one():
+    points = both(line("y"), SteadyTable("x", [1e-9, 2e-9, 3e-9], [1.0, 2.0, 3.0]))
+    fit = fit_steady_state(ROBOT, points)
+    assert "axis x: the fit gives 1e+09, beyond any robot; B and C stay" in fit.warnings
+
+
+# ---- coverage through the whole function ----------------------------------------------------------------
+
+
+def test_coverage_of_the_whole_fit():
+    """600 draws with weights, three axes each: 95 % within three standard errors of a share (0.005)."""
+    names = ["x"] * 5 + ["y"] * 5 + ["yaw"] * 5
+    speed = np.tile([0.2, 0.5, 0.8, 1.1, -0.9], 3) * np.repeat([1, 1, 8], 5)
+    b, c = np.repeat(ROBOT.friction.axes.viscous, 5), np.repeat(ROBOT.friction.axes.coulomb, 5)
+    std = np.tile([0.01, 0.03, 0.02, 0.05, 0.02], 3) * np.repeat([1, 1, 0.1], 5)
+    hits = []
+    for seed in range(600):
+        noise = std * np.random.default_rng(seed).standard_normal(15)
+        fit = fit_steady_state(ROBOT, SteadyTable(names, speed, b * speed + c * np.sign(speed) + noise, force_std=std))
+        for axis in range(3):
+            for key, true in (("viscous", ROBOT.friction.axes.viscous), ("coulomb", ROBOT.friction.axes.coulomb)):
+                low, high = fit.ci95[f"friction.axes.{key}[{axis}]"]
+                hits.append(low <= true[axis] <= high)
+    assert np.mean(hits) == pytest.approx(0.95, abs=0.015)

@@ -1,0 +1,57 @@
+"""Encoders that start over, against the angle they were made from."""
+
+import numpy as np
+import pytest
+
+from omnidyn import read_log
+from omnidyn.errors import InputError
+from omnidyn.logs.clock.counters import unrolled
+
+TURNS = np.cumsum(np.concatenate([np.linspace(0.0, 0.04, 600), np.linspace(0.04, -0.06, 1200)]))
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "period"),
+    [
+        ("ticks/2000", 2000.0, 2000.0),
+        ("ticks/32768", 32768.0, 2.0**16),
+        ("counts/32768", 32768.0, 2.0**32),
+        ("rad", 2.0 * np.pi, 2.0 * np.pi),
+        ("deg", 360.0, 360.0),
+        ("turns", 1.0, 1.0),
+    ],
+)
+@pytest.mark.parametrize("signed", [False, True])
+def test_an_encoder_that_starts_over_goes_on(unit, size, period, signed):
+    counts = TURNS * size
+    offset = period - 0.5 * size - signed * period / 2.0
+    seen = np.mod(counts + offset, period)
+    seen = np.where(seen >= period / 2.0, seen - period, seen) if signed else seen
+    seen[5] = np.nan
+    again, found = unrolled(seen, unit, "log.csv")
+    assert found == pytest.approx(period)
+    np.testing.assert_allclose(np.delete(again - again[0], 5), np.delete(counts - counts[0], 5), atol=1e-4)
+    assert np.isnan(again[5])
+
+
+@pytest.mark.parametrize("counts", [TURNS * 2000.0, np.zeros(50), np.array([3.0]), np.array([]), TURNS * 0.04])
+def test_an_encoder_that_goes_on_is_left_alone(counts):
+    again, found = unrolled(counts, "ticks/2000", "log.csv")
+    assert found is None
+    np.testing.assert_array_equal(again, counts)
+
+
+def test_a_wheel_too_fast_for_its_rows_is_refused():
+    seen = np.mod(0.45 * 2.0 * np.pi * np.arange(200) + 0.1, 2.0 * np.pi)
+    with pytest.raises(InputError, match=r"log.csv: an angle starts over after 6.28319 and moves too far between rows"):
+        unrolled(seen, "rad", "log.csv")
+
+
+def test_a_log_says_that_its_counter_starts_over(tmp_path):
+    counts = np.mod(np.round(TURNS * 32768.0) + 60_000, 2**16)
+    rows = [f"{0.01 * k:.2f},{count:.0f}" for k, count in enumerate(counts)]
+    path = tmp_path / "log.csv"
+    path.write_text("t_s,enc1_ticks\n" + "\n".join(rows))
+    run = read_log(path, assume={"a": "ticks/32768"})
+    np.testing.assert_allclose(np.ptp(run.wheel_angle), np.ptp(TURNS) * 2.0 * np.pi, rtol=1e-3)
+    assert any("enc1_ticks starts over after 65536 ticks: it is taken to go on" in words for words in run.warnings)

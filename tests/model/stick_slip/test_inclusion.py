@@ -1,0 +1,250 @@
+"""The inclusion solver against the conditions of the law itself, put down anew in NumPy, and against brute force.
+
+A solution is one exactly when (1) what is stuck has no speed and what slides has the sign it is given, and (2) the
+forces at x leave a residual that lies in the sum of the sets of what is stuck: a linear program (scipy's linprog), with
+an ellipse a bounded least-squares problem (lsq_linear). Where breakaway is Coulomb the solution is unique, and
+minimising the convex potential must give it too.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog, lsq_linear, minimize
+
+from omnidyn.model.layout import (
+    AXES,
+    BOUND,
+    CURRENT,
+    DROP,
+    EFFICIENCY,
+    ELLIPSE,
+    EMF,
+    GAIN,
+    GOAL,
+    GX,
+    GZ,
+    HOLD,
+    HOLD_X,
+    HOLD_Y,
+    INDUCTANCE,
+    LENGTH,
+    MASS,
+    NOW,
+    PUSH,
+    RESISTANCE,
+    SIGN,
+    SLIDE,
+    SLIDE_X,
+    SLIDE_Y,
+    TAU,
+    TURNING,
+    VISCOUS,
+    VOLTAGE,
+)
+from omnidyn.model.stick_slip.inclusion import CAP, solve
+from omnidyn.model.stick_slip.plant import plant
+from omnidyn.model.stick_slip.release import put, start_state
+from omnidyn.model.stick_slip.workspace import scratch
+from tests.reference.random_robots import random_robot
+
+PROBLEMS = 25  # for each of the 100 robots
+ROBOTS = 100
+COUNTS: list[int] = []
+
+
+def problem(seed, turning=True):
+    """(plant, x): a random robot in the middle of a random stage, from a random first guess."""
+    random = np.random.default_rng(seed)
+    robot = random_robot(seed // PROBLEMS)
+    p = plant(robot)
+    body, element = p.body, p.element
+    scale = 10.0 ** random.uniform(-3.0, 0.5)
+    twist = scale * random.normal(size=3) * [1.0, 1.0, 8.0] * (random.random(3) < 0.8)
+    if random.random() < 0.3:
+        twist[:] = 0.0
+    state = start_state(p, twist, np.zeros(p.wheels))
+    put(body, element, state)
+    body[TAU] = 10.0 ** random.uniform(-5.0, -2.3)
+    body[GOAL : GOAL + 3] = state[:3] + scale * 0.2 * random.normal(size=3) * (random.random(3) < 0.7)
+    body[PUSH : PUSH + 3] = random.normal(size=3) * (random.random() < 0.2)
+    if not turning:
+        body[TURNING] = 0.0
+    wheels = element[AXES:]
+    wheels[:, VOLTAGE] = np.round(random.uniform(-6.0, 6.0) * random.normal(size=p.wheels), 3).clip(-6.0, 6.0)
+    wheels[:, VOLTAGE] *= random.random(p.wheels) < 0.8
+    wheels[:, NOW] = random.normal(size=p.wheels)
+    if random.random() < 0.2:
+        wheels[random.integers(p.wheels), BOUND] = 0.0  # a motor that coasts
+    return p, state[:3].copy()
+
+
+def current(e, tau, speed):
+    """clip((L i + tau (u - E s -+ V_d))/(L + tau R)) of one motor."""
+    flux = e[INDUCTANCE] * e[NOW] + tau * (e[VOLTAGE] - e[EMF] * speed)
+    i = np.sign(flux) * max(abs(flux) - tau * e[DROP], 0.0) / (e[INDUCTANCE] + tau * e[RESISTANCE])
+    return min(max(i, -e[BOUND]), e[BOUND])
+
+
+def force(e, tau, speed, sign, wheel):
+    """All that acts along element e at `speed` with `sign` of motion: motor and gear, viscous and dry friction."""
+    total = -e[VISCOUS] * speed
+    if sign != 0.0:
+        total -= e[SLIDE] if sign > 0.0 else -e[SLIDE + 1]
+    if wheel:
+        i = current(e, tau, speed)
+        factor = 1.0 if i * sign == 0.0 else (e[EFFICIENCY] if i * sign > 0.0 else 1.0 / e[EFFICIENCY])
+        total += e[GAIN] * i * factor
+    return total
+
+
+def residual_and_sets(p, x):
+    """(what the stuck must balance, generators (k, 3), lower (k,), upper (k,), ellipse stuck) at a claimed solution."""
+    body, tau = p.body, p.body[TAU]
+    rest = body[MASS] / tau * (x - body[GOAL : GOAL + 3]) - body[PUSH : PUSH + 3]
+    turn = body[MASS] / body[LENGTH] if body[TURNING] else 0.0
+    rest -= turn * np.array([x[2] * x[1], -x[2] * x[0], 0.0])
+    rows, low, high = [], [], []
+    for k, e in enumerate(p.element):
+        g, sign, wheel = e[GX : GZ + 1], e[SIGN], k >= AXES
+        dry = e[HOLD] > 0.0 or e[HOLD + 1] > 0.0 or (wheel and e[EFFICIENCY] < 1.0)
+        assert (sign == 2.0) == (not dry)
+        if sign == 0.0 and dry:
+            rows.append(g)
+            plain = (force(e, tau, 0.0, 1.0, wheel) + e[SLIDE], force(e, tau, 0.0, -1.0, wheel) - e[SLIDE + 1])
+            low.append(plain[0] - e[HOLD])
+            high.append(plain[1] + e[HOLD + 1])
+        else:
+            rest -= g * force(e, tau, g @ x, np.sign(g @ x) if dry else 0.0, wheel)
+    ellipse = body[HOLD_X] > 0.0 and body[ELLIPSE] == 0.0
+    if body[HOLD_X] > 0.0 and not ellipse:
+        c = body[[SLIDE_X, SLIDE_Y]]
+        rest[:2] += c**2 * x[:2] / np.hypot(*(c * x[:2]))
+    return rest, np.array(rows).reshape(-1, 3), np.array(low), np.array(high), ellipse
+
+
+def distance(p, x):
+    """How far the residual is from the sum of the sets [N]; a force of 1 N counts as 1 N in every direction."""
+    rest, g, low, high, ellipse = residual_and_sets(p, x)
+    if not len(g) and not ellipse:
+        return np.abs(rest).max()
+    if ellipse:  # rest = g . f + S p, |p| <= 1: the least |p|, the third row met by weight
+        weight, hold = 1e5, p.body[[HOLD_X, HOLD_Y]]
+        scale = np.array([1.0 / hold[0], 1.0 / hold[1], weight])
+        if not len(g):
+            return max((np.hypot(*(rest[:2] / hold)) - 1.0) * hold.max(), abs(rest[2]))
+        span = np.maximum(high - low, 1e-9)
+        best = lsq_linear((g * scale).T * span, rest * scale - low @ (g * scale), (0.0, 1.0), "bvls", tol=1e-14)
+        left = rest * scale - (low + best.x * span) @ (g * scale)
+        return max((np.hypot(*left[:2]) - 1.0) * hold.max(), abs(left[2]) / weight, 0.0)
+    k = len(g)  # rest = g . f + slack: the least sum of slacks
+    cost = np.r_[np.zeros(k), np.ones(6)]
+    bounds = [*zip(low, high, strict=True), *[(0.0, None)] * 6]
+    best = linprog(cost, A_eq=np.hstack([g.T, np.eye(3), -np.eye(3)]), b_eq=rest, bounds=bounds, method="highs")
+    assert best.status == 0
+    return best.fun
+
+
+def faults(p, x, count):
+    """What is wrong with a claimed solution, in words; empty when the conditions (1) and (2) hold."""
+    g = p.element[:, GX : GZ + 1]
+    sign, speeds, size = p.element[:, SIGN], g @ x, np.abs(g) @ np.abs(x)
+    inertia = p.body[MASS] / p.body[TAU] * np.abs(p.body[GOAL : GOAL + 3]).max()
+    found = {
+        "hit its cap": count >= CAP,
+        "stuck, but moves": (np.abs(speeds[sign == 0.0]) > 4e-16 * size[sign == 0.0]).any(),
+        "a sign against its speed": (speeds * sign <= 0.0)[np.abs(sign) == 1.0].any(),
+        "an axis stuck, but not 0.0": (x[sign[:AXES] == 0.0] != 0.0).any(),
+        "an ellipse stuck, but not 0.0": p.body[ELLIPSE] == 0.0 and (x[:2] != 0.0).any(),
+        "forces out of balance": distance(p, x) > 1e-6 + 1e-11 * inertia,
+    }
+    return [words for words, wrong in found.items() if wrong]
+
+
+@pytest.mark.parametrize("part", range(10))
+def test_solutions_satisfy_the_law(part):
+    """2500 problems: all shapes, sums, asymmetric levels, breakaway, gears, drops, limits, 3 to 6 wheels, turning."""
+    per_part, wrong = ROBOTS * PROBLEMS // 10, {}
+    for seed in range(part * per_part, (part + 1) * per_part):
+        p, x = problem(seed)
+        COUNTS.append(solve(p.body, p.element, x, scratch()))
+        found = faults(p, x, COUNTS[-1])
+        for e in p.element[AXES:]:
+            speed = e[GX : GZ + 1] @ x if e[SIGN] != 0.0 else 0.0
+            if abs(e[CURRENT] - current(e, p.body[TAU], speed)) > 1e-12 * (1.0 + abs(e[CURRENT])):
+                found.append("another current")
+        if found:
+            wrong[seed] = found
+    assert not wrong
+
+
+def test_iterations():
+    """The counts of the problems above; a stage is solved in a handful of steps, and none comes near the cap."""
+    assert COUNTS, "run the whole file"
+    p50, p99 = np.percentile(COUNTS, [50, 99])
+    print(f"\niterations of {len(COUNTS)} problems: p50 {p50:.0f}, p99 {p99:.0f}, max {max(COUNTS)}, cap {CAP}")
+    assert p50 <= 4
+    assert p99 <= 20
+    assert max(COUNTS) <= CAP // 2
+
+
+def potential(p, x):
+    """The convex function whose minimum solves a problem without turning and with breakaway = Coulomb.
+
+    The work of the motors is the integral of their force over speed, by Gauss-Legendre between all its kinks.
+    """
+    body, tau = p.body, p.body[TAU]
+    d = x - body[GOAL : GOAL + 3]
+    total = body[MASS] / (2 * tau) * d @ d - body[PUSH : PUSH + 3] @ x
+    total += np.hypot(body[SLIDE_X] * x[0], body[SLIDE_Y] * x[1])
+    nodes, weights = np.polynomial.legendre.leggauss(2)
+    for k, e in enumerate(p.element):
+        speed = e[GX : GZ + 1] @ x
+        cuts = [0.0, speed]
+        if k >= AXES:
+            below, top = e[INDUCTANCE] + tau * e[RESISTANCE], min(e[BOUND], 1e9)
+            for flux in (-tau * e[DROP] - below * top, -tau * e[DROP], tau * e[DROP], tau * e[DROP] + below * top):
+                cut = (e[VOLTAGE] + (e[INDUCTANCE] * e[NOW] - flux) / tau) / e[EMF]
+                cuts += [cut] if min(0.0, speed) < cut < max(0.0, speed) else []
+        cuts = sorted(cuts, reverse=bool(speed < 0.0))
+        for a, b in pairwise(cuts):
+            points = 0.5 * (a + b) + 0.5 * (b - a) * nodes
+            values = [force(e, tau, s, np.sign(speed), k >= AXES) for s in points]
+            total -= 0.5 * (b - a) * (weights @ values)
+    return total
+
+
+@pytest.mark.parametrize("seed", range(0, 40, 2))
+def test_the_solution_is_the_minimum_of_the_potential(seed):
+    """Brute force: no point near or far, nor what Nelder-Mead finds from three starts, lies below it."""
+    random = np.random.default_rng(seed)
+    for draw in range(3):
+        p, x = problem(seed * PROBLEMS + draw, turning=False)
+        solve(p.body, p.element, x, scratch())
+        least = potential(p, x)
+        for scale in 10.0 ** np.arange(-7.0, 1.0):
+            for change in scale * random.normal(size=(8, 3)):
+                assert potential(p, x + change) >= least - 1e-12 * (1.0 + abs(least))
+        for start in random.normal(size=(2, 3)) * 0.1:
+            options = {"xatol": 1e-7, "fatol": 1e-12, "maxiter": 600}
+            found = minimize(lambda y, p=p: potential(p, y), x + start, method="Nelder-Mead", options=options)
+            assert found.fun >= least - 1e-12 * (1.0 + abs(least))
+            assert np.abs(found.x - x).max() <= 1e-3
+
+
+@pytest.mark.parametrize("seed", range(0, 200, 20))
+def test_the_first_guess_does_not_matter(seed):
+    """Breakaway = Coulomb, so one solution: from 20 guesses it is the same to rounding, and so is what is stuck."""
+    random = np.random.default_rng(seed)
+    p, x = problem(seed)
+    base = p.copy()
+    solve(p.body, p.element, x, scratch())
+    for _ in range(20):
+        q, y = base.copy(), random.normal(size=3)
+        state = start_state(q, y / [1.0, 1.0, q.body[LENGTH]], np.zeros(q.wheels))
+        put(q.body, q.element, state)
+        y = state[:3].copy()
+        solve(q.body, q.element, y, scratch())
+        np.testing.assert_allclose(y, x, rtol=1e-10, atol=1e-13)
+        np.testing.assert_array_equal(y == 0.0, x == 0.0)
+        np.testing.assert_array_equal(q.element[:, SIGN], p.element[:, SIGN])
