@@ -13,7 +13,8 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.simulation.sensitivity.directions import derivatives, parameter, with_parameter
+from omnidyn.simulation.sensitivity.derivatives import derivatives
+from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
 from tests.reference.modes import reference
 
