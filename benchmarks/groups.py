@@ -9,10 +9,10 @@ import numpy as np
 from benchmarks.identify import NOISE, excitation, noisy
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.group_fit import GroupFit, identify_groups
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
 
 PAIRS, SECONDS = 200, 20.0
@@ -47,7 +47,7 @@ def floors() -> dict[str, Robot]:
     """The preset on its floor and on a rough one."""
     smooth = rough = load_robot("axebot")
     for key, value in ROUGH.items():
-        rough = with_parameter(rough, key, value)
+        rough = Key.parse(key).set(rough, value)
     return {"smooth": smooth, "rough": rough}
 
 

@@ -15,10 +15,9 @@ import numpy as np
 
 from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a row asks for
 
@@ -55,13 +54,13 @@ def noisy(run: Run, seed: int) -> Run:
 
 
 def truth(robot: Robot) -> dict[str, float]:
-    return {key: float(parameter(robot, key)) for key in FRICTION}
+    return {key: float(Key.parse(key).get(robot)) for key in BOX}
 
 
 def with_friction(robot: Robot, values: np.ndarray) -> Robot:
-    """The robot with these six numbers, in the order of FRICTION."""
-    for key, value in zip(FRICTION, values, strict=True):
-        robot = with_parameter(robot, key, float(value))
+    """The robot with these six numbers, in the order of BOX."""
+    for key, value in zip(BOX, values, strict=True):
+        robot = Key.parse(key).set(robot, float(value))
     return robot
 
 
@@ -74,7 +73,7 @@ def cramer_rao(robot: Robot, clean: Run) -> np.ndarray:
     """Least standard errors that any unbiased fit of this log has, from the log without noise. Shape (6,)."""
     fit = fit_output_error(bare(clean), robot, start="rest", covariance="white")
     noise = np.array(list(fit.noise.values()))
-    return np.array([fit.std[key] for key in FRICTION]) / np.tile(noise / NOISE, 2)
+    return np.array([fit.std[key] for key in BOX]) / np.tile(noise / NOISE, 2)
 
 
 class Draws:

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.output_error import fit as whole
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX, Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
-TRUTH = dict(zip(FRICTION, (0.94, 0.96, 0.01, 2.2, 1.5, 0.099), strict=True))
+TRUTH = dict(zip(BOX, (0.94, 0.96, 0.01, 2.2, 1.5, 0.099), strict=True))
 NOISE = np.array([0.02, 0.02, 0.10])
 
 
@@ -47,7 +46,7 @@ def test_a_clean_log_gives_the_truth(axebot, clean):
     """Start 3x wrong; what is left is the precision at which the search ends."""
     start = axebot
     for key, value in TRUTH.items():
-        start = with_parameter(start, key, 3.0 * value)
+        start = Key.parse(key).set(start, 3.0 * value)
     fit = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=clean.twist), start, start="rest")
     assert fit.converged
     for key, value in TRUTH.items():

@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
+from omnidyn.model.keys import BREAKAWAY, EMF, TORQUE, Key
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.sensitivity.directions import changed_parameter, parameter
 
 FloatArray = NDArray[np.float64]
 
-FRICTION = tuple(f"friction.axes.{name}[{axis}]" for name in ("viscous", "coulomb") for axis in range(3))
-TORQUE, EMF = "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad"
 FRICTION_LIMIT = 1e6  # what a robot file takes
 SPAN = 1e4  # a number that must be positive stays within so many times its start, either way
 
@@ -39,6 +37,11 @@ class Parameter:
     prior: tuple[float, float] | None = None
     also: tuple[tuple[str, float], ...] = ()
 
+    @property
+    def part(self) -> str:
+        """What it belongs to: the part of the robot, such as "motor"; of a nuisance its kind, such as "latency"."""
+        return self.name.partition(".")[0].partition("@")[0]
+
     def inner(self, value: float) -> float:
         """The number that the solver sees."""
         return math.log(value) if self.log else value
@@ -53,9 +56,9 @@ class Parameter:
 
     def on(self, robot: Robot, value: float) -> Robot:
         """The robot with this number and those tied to it; not checked, for speed."""
-        robot = changed_parameter(robot, self.name, value, checked=False)
+        robot = Key.parse(self.name).set(robot, value, checked=False)
         for key, factor in self.also:
-            robot = changed_parameter(robot, key, factor * value, checked=False)
+            robot = Key.parse(key).set(robot, factor * value, checked=False)
         return robot
 
 
@@ -66,12 +69,13 @@ def robot_parameter(robot: Robot, key: str, tied: bool, prior: tuple[float, floa
     EMF constant keeps its ratio to the torque constant, for both are one number of the magnet.
     Raises InputError for an unknown key, and for a number that is not positive and has no bound at 0.
     """
-    value = float(parameter(robot, key))
-    if key.startswith("friction."):
+    place = Key.parse(key)
+    value = float(place.get(robot))
+    if place.level:
         return Parameter(key, value, 0.0, FRICTION_LIMIT, prior=prior)
     if value <= 0.0:
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")
-    also = ((EMF, float(parameter(robot, EMF)) / value),) if tied and key == TORQUE else ()
+    also = ((EMF, float(Key.parse(EMF).get(robot)) / value),) if tied and key == TORQUE else ()
     return Parameter(key, value, value / SPAN, value * SPAN, True, prior, also)
 
 
@@ -85,9 +89,9 @@ def refuse_unknown(keys: Sequence[str], robot: Robot) -> None:
 
     Breakaway may be fixed where the robot has none: it follows coulomb then.
     """
-    for key in keys:
-        if not key.startswith("friction.axes.breakaway"):
-            parameter(robot, key)
+    for key in map(Key.parse, keys):
+        if key.level != BREAKAWAY:
+            key.get(robot)
 
 
 def robot_parameters(robot: Robot, keys: Sequence[str], priors: dict[str, tuple[float, float]]) -> list[Parameter]:
