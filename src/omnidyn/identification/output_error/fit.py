@@ -26,6 +26,7 @@ from omnidyn.identification.output_error.problem.nuisances import (
 from omnidyn.identification.output_error.problem.parameters import (
     Parameter,
     names_of,
+    refuse_repeated,
     refuse_unknown,
     robot_parameters,
 )
@@ -125,6 +126,7 @@ def fit_output_error(
     know. Of the nuisances, robots that need the implicit engine have latencies by default; they know the others, but
     no position and no wheel angle as outputs.
     """
+    refuse_repeated(names_of(free or ()))
     given = Options(
         None if free is None else expand_keys(free, robot), expand_keys(fixed, robot), nuisance_names(nuisances),
         start, use_priors,
@@ -382,9 +384,9 @@ def expand_keys(names: str | Sequence[str], robot: Robot) -> tuple[str, ...]:
 
 
 def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Priors of the robot file that are independent of any log: key -> (mean, std)."""
+    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry."""
     found = {}
-    for key, prior in robot.priors.items():
+    for name, prior in robot.priors.items():
         if prior.std is not None and not prior.source.startswith(IDENTIFIED):
-            found[key] = (float(Key.parse(key).get(robot)), prior.std)
+            found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
     return found
