@@ -14,8 +14,9 @@ PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
 # One list for each folder, from what knows nothing to what knows all. A name is a file or a folder.
 # `__init__` comes last in its folder unless it is named. A name may be listed before its file exists.
 ORDER = {
-    "": """errors files units pieces compiled run model simulation logs comparison identification control campaigns
+    "": """errors files units compiled run model simulation logs comparison identification control campaigns
         paper report export interop __init__ cli studio __main__""",
+    "compiled": "hearing stamp entries linking kernel",
     "model": """frames value layout wheels motor drive friction robot robot_file starter plant scratch
         forces face holding inclusion rest dynamics statespace deadzone""",
     "model/friction": "law axes direction wheels",

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.face import FLAT, absorb, face, moves_along, newton_direction, onto_face
 from omnidyn.model.forces import forces_at_work, residual, set_losses
 from omnidyn.model.holding import worst_direction

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.compiled import kernel, maker, part
+from omnidyn.compiled.kernel import kernel, maker, part
 from omnidyn.simulation.exact import SETTLED
 from omnidyn.simulation.exact_inductance_step import forces, law_of, response, roots, segment
 from omnidyn.simulation.travel import put_next_pose, rotated

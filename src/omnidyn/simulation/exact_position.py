@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.simulation import exact_step as formula
 from omnidyn.simulation.exact import NODES, WEIGHTS, next_cut, turning
 from omnidyn.simulation.exact_sensitivity import hold_slopes, step_slopes, travel_slopes

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.forces import forces_at_work
 from omnidyn.model.inclusion import solve
 from omnidyn.model.layout import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.face import face, newton_direction
 from omnidyn.model.forces import forces_at_work, residual, set_losses, winding
 from omnidyn.model.holding import worst_direction

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import AXES, BOUND, LENGTH, LIMIT, VOLTAGE
 from omnidyn.model.rest import SIGNS, settle, sticks
 from omnidyn.model.scratch import copy_row, copy_table

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.face import FLAT, face, newton_direction
 from omnidyn.model.forces import gear, residual, winding_answer, winding_branch
 from omnidyn.model.layout import (
