@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation
 from omnidyn.identification.fit_words import advice
 from omnidyn.identification.joint_fit import expand_keys
 from omnidyn.identification.output_error.fit import fit_output_error, free_by_default
@@ -13,6 +12,7 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.model.starter import first_guess
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.tangent import with_parameter
+from tests.support.axebot_logs import excitation
 
 DIRECTION = [
     "friction.direction.coulomb[0]", "friction.direction.coulomb[1]", "friction.direction.viscous",

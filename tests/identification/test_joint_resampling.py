@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.groups import coloured
-from benchmarks.identify import excitation, noisy
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.best_so_far import WORDS, best_groups_so_far
 from omnidyn.identification.joint_fit import identify_groups, join_groups
@@ -13,6 +11,7 @@ from omnidyn.identification.output_error.parameters import FRICTION
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.tangent import with_parameter
+from tests.support.axebot_logs import coloured, excitation, noisy
 
 AXEBOT = load_robot("axebot")
 TORQUE, COULOMB, MASS = "motor.torque_constant_Nm_A", "friction.axes.coulomb[0]", "body.mass_kg"

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled, steady_voltage
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.operating import force_points
 from omnidyn.identification.shape_choice import choose_shape
@@ -14,6 +13,7 @@ from omnidyn.identification.study_table import study_summary, study_to_dict
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
+from tests.support.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled, steady_voltage
 
 AXEBOT = load_robot("axebot")
 DIRECTIONS = range(0, 360, 15)

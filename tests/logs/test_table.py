@@ -11,16 +11,6 @@ from omnidyn.errors import InputError
 from omnidyn.logs.table import iter_text, read_table
 
 
-@pytest.fixture
-def write(tmp_path):
-    def to_file(content, name="table.csv"):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
-
-    return to_file
-
-
 def numbers(path, missing=False):
     table = read_table(path)
     return {name: table.numbers(name, missing=missing).tolist() for name in table.names}
@@ -457,7 +447,7 @@ def test_check_names_tells_the_nearest(write):
         table.check_names(["axis", "speed", "forse", "t"])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("separator, limit", [(",", 15.0), (";", 15.0)])  # limits for a busy machine; some 2 s alone
 def test_a_million_rows_take_seconds(write, separator, limit):
     comma = separator == ";"

@@ -46,7 +46,7 @@ from omnidyn.model.layout import (
 from omnidyn.model.plant import plant
 from omnidyn.model.rest import put, start_state
 from omnidyn.model.scratch import scratch
-from tests.reference.random_robots import random_robot
+from tests.support.mixed_robots import random_robot
 
 PROBLEMS = 25  # for each of the 100 robots
 ROBOTS = 100

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from benchmarks import real_fit, udea
-from benchmarks import real_logs as logs
 from omnidyn.identification.motor_choice import choose_motor
 from omnidyn.identification.motor_fit import fit_motor
 from omnidyn.identification.motor_run import fit_rmse
+from tests.support import real_logs as logs
 
 TURN = 2.0 * np.pi
 

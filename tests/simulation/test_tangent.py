@@ -6,7 +6,6 @@ sample; their instants move. An error is relative to the largest value that the 
 """
 
 import time
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -16,36 +15,9 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, Wh
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.tangent import derivatives, parameter, with_parameter
 from tests.reference.modes import reference
+from tests.support.run_differences import AGREES, BODY, CHANNELS, MOTOR, differences, held, worst
 
-AGREES = 1e-5
 TIGHT = 1e-8
-CHANNELS = ("twist", "pose", "current")
-BODY = ["body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m"]
-MOTOR = ["motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad", "motor.resistance_ohm"]
-
-
-def differences(run: Callable, robot, key, width, watched=slice(None)):
-    """(twist, pose, current) by key, of `run(robot)`; asserts that all four runs show the same events.
-
-    watched: axes whose dry friction makes a change of sign an event.
-    """
-    value, kept = parameter(robot, key), {}
-    for steps in (-2, -1, 1, 2):
-        kept[steps] = run(with_parameter(robot, key, value + steps * width * value))
-    pattern = [np.sign(one.twist[:, watched]).tolist() for one in kept.values()]
-    assert all(p == pattern[0] for p in pattern), f"events do not pair up: {key}"
-    assert len({getattr(one, "events", 0) for one in kept.values()}) == 1
-
-    def slope(channel, n):
-        return (getattr(kept[n], channel) - getattr(kept[-n], channel)) / (2 * n * width * value)
-
-    return [(4 * slope(channel, 1) - slope(channel, 2)) / 3 for channel in CHANNELS]
-
-
-def worst(found, expected):
-    """Largest error of a derivative, relative to its largest value; 0 where both are exactly 0."""
-    error, size = np.abs(found - expected).max(), np.abs(expected).max()
-    return error / size if size > 0.0 else error
 
 
 def check(run, robot, voltage, keys, width, tol=TIGHT, channels=CHANNELS, agrees=AGREES, **start):
@@ -58,11 +30,6 @@ def check(run, robot, voltage, keys, width, tol=TIGHT, channels=CHANNELS, agrees
         print(f"{robot.name:12} {key:34}", *(f"{name} {e:.1e}" for name, e in zip(channels, errors[key], strict=True)))
     assert max(max(e) for e in errors.values()) <= agrees, errors
     return found
-
-
-def held(*rows):
-    """Voltage rows from (how often, voltages)."""
-    return np.array([row for count, row in rows for _ in range(count)], dtype=float)
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.tangent import parameter, with_parameter
-from tests.identification.output_error.test_axebot import voltages
-from tests.identification.output_error.test_travel import truth
+from tests.support.axebot_logs import voltages
+from tests.support.march_cases import truth
 
 mpmath.mp.dps = 50
 WIDE = np.exp(np.linspace(np.log(1e-9), np.log(30.0), 12))
