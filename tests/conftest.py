@@ -10,6 +10,9 @@ from hypothesis import HealthCheck, settings
 
 from omnidyn.model.robot_file import load_robot
 
+# Output is wrapped as it is without a terminal; the processes of pytest-xdist are told 80 columns.
+os.environ.pop("COLUMNS", None)
+
 settings.register_profile(
     "ci",
     max_examples=60,

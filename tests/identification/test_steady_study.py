@@ -57,6 +57,7 @@ def test_the_true_shape_is_chosen_and_its_intervals_hold_the_truth(shape):
     assert np.mean(held) >= 0.6
 
 
+@pytest.mark.long
 def test_wheels_at_rest_do_not_decide_the_shape():
     """Draws of the benchmark in which squared errors told a level per wheel, and a disc, from one level for all."""
     rng, chosen = np.random.default_rng(0), []

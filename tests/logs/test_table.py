@@ -448,7 +448,7 @@ def test_check_names_tells_the_nearest(write):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("separator, limit", [(",", 15.0), (";", 15.0)])  # limits for a busy machine; some 2 s alone
+@pytest.mark.parametrize("separator, limit", [(",", 15.0), (";", 15.0)])  # limits for a slow machine; some 2 s here
 def test_a_million_rows_take_seconds(write, separator, limit):
     comma = separator == ";"
     rows = (
@@ -456,8 +456,8 @@ def test_a_million_rows_take_seconds(write, separator, limit):
         for k in range(10**6)
     )
     path = write(f"a{separator}b{separator}c\n" + "\n".join(rows))
-    start = time.perf_counter()
+    start = time.process_time()
     table = read_table(path)
-    assert time.perf_counter() - start < limit
+    assert time.process_time() - start < limit
     assert table.numbers("a")[-1] == 999.999
     assert table.numbers("b")[:4].tolist() == [-3.25, -2.25, -1.25, -0.25]
