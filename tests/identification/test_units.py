@@ -3,7 +3,7 @@
 import pytest
 
 from omnidyn.identification.estimate import unit
-from tests.house.test_robot_file_page import KEYS
+from tests.support.robot_keys import KEYS
 
 PLAIN = {"kg m²": "kg m^2", "degree": "deg", "Ω": "ohm", "1": ""}
 NUMBERS = [key for key in KEYS if key.unit]

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation, noisy
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.group_fit import expand_keys, identify_groups
@@ -11,6 +10,7 @@ from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation, noisy
 
 AXEBOT = load_robot("axebot")
 TORQUE, EMF, COULOMB, MASS = (

@@ -12,7 +12,7 @@ from omnidyn.identification.output_error.solve.solver import of_states
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+from tests.support.axebot_logs import NOISE, TRUTH, noisy, voltages
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
