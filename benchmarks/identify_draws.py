@@ -6,24 +6,13 @@ import time
 
 import numpy as np
 
-from benchmarks.identify_log import (
-    COUNTING,
-    NOISE,
-    RATE,
-    SHARE,
-    Draws,
-    cramer_rao,
-    excitation,
-    fit_output_error,
-    noisy,
-    truth,
-    with_friction,
-)
+from benchmarks.identify_log import COUNTING, SHARE, Draws, cramer_rao, fit_output_error
 from benchmarks.table import Table
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, RATE, excitation, noisy, truth, with_friction
 
 LOGS, IMPAIRED, STARTS, BREAKAWAYS = (max(int(n * SHARE), 10) for n in (10_000, 1000, 1000, 200))
 LATE, GAIN, DEAD = 0.013, 0.97, 0.15

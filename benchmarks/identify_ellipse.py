@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, NOISE, RATE, SHARE, Draws, excitation, noisy
+from benchmarks.identify_log import COUNTING, SHARE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.engines.exact import Weighting
@@ -28,6 +28,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, RATE, excitation, noisy
 
 LOGS = max(int(300 * SHARE), 10)
 LATE, FINE_ROWS = 0.013, 10  # [s]; rows of the truth in a row of the log

@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, NOISE, Draws
+from benchmarks.identify_log import COUNTING, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.model.friction import DirectionFriction, Friction
@@ -21,6 +21,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE
 
 SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
 LOGS = max(int(100 * SHARE), 5)

@@ -21,17 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from benchmarks.identify_log import (
-    NOISE,
-    RATE,
-    bare,
-    cpu,
-    cramer_rao,
-    fit_output_error,
-    noisy,
-    truth,
-    with_friction,
-)
+from benchmarks.identify_log import cpu, cramer_rao, fit_output_error
 from benchmarks.table import Table
 from benchmarks.tanh import run_tanh
 from omnidyn.model.dynamics import mass_matrix
@@ -39,6 +29,7 @@ from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.run import Run
+from tests.support.axebot_logs import NOISE, RATE, bare, noisy, truth, with_friction
 
 WRONG = 2.0  # times the truth: where all begin
 FASTER_SYSID, FASTER_LMFIT, SYSTEMATIC = 500.0, 5000.0, 0.1  # the goals

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.identify_log import NOISE, SHARE, Draws, excitation, truth
+from benchmarks.identify_log import SHARE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem, read_records
@@ -22,6 +22,7 @@ from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, excitation, truth
 
 TICKED, TILTED, CAPTURED = (max(int(n * SHARE), 10) for n in (300, 200, 200))
 COUNTS, JITTERS = (64, 512, 2048), (0.3, 0.0)  # counts a turn; noise before the encoder rounds, in ticks

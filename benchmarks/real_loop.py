@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 
-from benchmarks import real_logs as logs
 from benchmarks.table import Table
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.group_fit import identify_groups
@@ -16,6 +15,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support import real_logs as logs
 
 SETS_OFF = 0.5  # [s] of each run that the fit does not see: the robot sets off within it, between two rows
 SECONDS = 6.0  # [s] of each run that are used: the shortest have as many, and nothing changes after the start

@@ -1,11 +1,8 @@
 """omnidyn identify by output error: the default method, groups, held-out logs, the report, refusals, an interrupt."""
 
-import json
-
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation, noisy
 from omnidyn.cli import main
 from omnidyn.cli.identify_fit import _Watch
 from omnidyn.identification.output_error.solve.solver import Solver
@@ -14,6 +11,8 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation, noisy
+from tests.support.outputs import strict
 
 ROUGH = 2.6  # N along x; the preset has 2.2
 COULOMB = "friction.axes.coulomb[0]"
@@ -41,13 +40,6 @@ def call(logs, tmp_path, monkeypatch, capsys):
         return code, *capsys.readouterr()
 
     return run
-
-
-def strict(text):
-    def refuse(name):
-        raise AssertionError(name)
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def test_output_error_is_the_default_and_predicts_a_log_it_never_saw(call, tmp_path):

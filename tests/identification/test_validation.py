@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import quad
 
 import omnidyn
-from benchmarks.identify import NOISE, excitation, noisy
 from omnidyn.errors import InputError
 from omnidyn.identification.as_fitted import as_fitted, at_motors, mean_before
 from omnidyn.identification.identify import choose_method, options_of
@@ -16,6 +15,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, excitation, noisy
 
 AXEBOT = load_robot("axebot")
 LATE, GAIN, DEAD = 0.013, 0.95, 0.2

@@ -9,7 +9,7 @@ from omnidyn.model.keys import BOX, TORQUE, Key, all_keys, expand, find_key, fri
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, preset_names, robot_to_toml
 from omnidyn.model.wheels import Wheels
-from tests.house.test_robot_file_page import KEYS
+from tests.support.robot_keys import KEYS
 
 PLAIN = {"kg m²": "kg m^2", "degree": "deg", "Ω": "ohm", "1": ""}
 NUMBERS = [key for key in KEYS if key.unit]

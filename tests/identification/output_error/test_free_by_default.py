@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation
 from omnidyn.identification.advice import advice
 from omnidyn.identification.output_error.fit import expand_keys, fit_output_error, free_by_default
 from omnidyn.identification.validation import validate
@@ -11,6 +10,7 @@ from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation
 
 DIRECTION = (
     "friction.direction.coulomb[0]", "friction.direction.coulomb[1]", "friction.direction.viscous",

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation, noisy
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.output_error.fit import expand_keys, fit_output_error
 from omnidyn.identification.output_error.group_fit import identify_groups
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation, noisy
 
 AXEBOT = load_robot("axebot")
 TORQUE, EMF, COULOMB, MASS = (

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.groups import coloured
-from benchmarks.identify import excitation, noisy
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.best_so_far import WORDS, best_groups_so_far
 from omnidyn.identification.output_error.engines.exact import Weighting
@@ -12,6 +10,7 @@ from omnidyn.identification.output_error.group_fit import identify_groups, join_
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import coloured, excitation, noisy
 
 AXEBOT = load_robot("axebot")
 TORQUE, COULOMB, MASS = "motor.torque_constant_Nm_A", "friction.axes.coulomb[0]", "body.mass_kg"

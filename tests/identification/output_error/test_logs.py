@@ -12,7 +12,7 @@ from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+from tests.support.axebot_logs import NOISE, TRUTH, noisy, voltages
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 

@@ -5,13 +5,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.group_fit import identify_groups
 from omnidyn.model.keys import BOX
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import noisy
+from tests.support.axebot_logs import excitation, noisy
 
 fit_output_error = partial(whole.fit_output_error, nuisances=(), start="rest")
 

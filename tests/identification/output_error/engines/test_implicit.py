@@ -16,7 +16,7 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, voltages
+from tests.support.axebot_logs import NOISE, voltages
 
 TRUTH = {
     "friction.direction.coulomb[0]": 2.2,

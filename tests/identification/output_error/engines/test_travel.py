@@ -8,29 +8,12 @@ from omnidyn.identification.output_error.fit import Options, make_problem, read_
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.model.keys import Key
 from omnidyn.model.statespace import state_space
-from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
-from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.engines.test_engine import ROBOT_KEYS, a_case
+from tests.support.march_cases import FACING, ROBOT_KEYS, a_case, truth
 
 OUTPUTS = ("heading", "position", "wheel_angle")
-FACING = 0.7  # heading at the start [rad]
 LATE = {"latency.heading": 0.0137, "latency.position": 0.0071, "latency.wheel_angle": 0.0113}
 TILT = {"tilt.x": 0.31, "tilt.y": -0.22, "tilt.yaw": 0.013}
-
-
-def truth(robot, voltage, dt, start, facing=FACING):
-    """(heading, x, y, angles of the wheels) at every row.
-
-    The axes do not couple: with a yaw that cannot move, the path of simulate is the integral of the speeds, which the
-    wheels have rolled.
-    """
-    run = simulate(robot, voltage, dt, twist=start, pose=[0.0, 0.0, facing])
-    levels = [*robot.friction.axes.coulomb[:2], 1e5]
-    stuck = robot.replace(friction=robot.friction.replace(axes=robot.friction.axes.replace(coulomb=tuple(levels))))
-    rolled = simulate(stuck, voltage, dt, twist=[*start[:2], 0.0]).pose.copy()
-    rolled[:, 2] = run.pose[:, 2] - facing
-    return np.hstack([run.pose[:, 2:], run.pose[:, :2], wheel_speed(robot.wheels, rolled)])
 
 
 def problem_of(robot, voltage, dt, values, nuisances=(), free=ROBOT_KEYS):

@@ -13,8 +13,8 @@ from omnidyn.identification.output_error.kernel.counts import count_terms, find_
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.engines.test_travel import truth
-from tests.identification.output_error.test_axebot import voltages
+from tests.support.axebot_logs import voltages
+from tests.support.march_cases import truth
 
 mpmath.mp.dps = 50
 WIDE = np.exp(np.linspace(np.log(1e-9), np.log(30.0), 12))

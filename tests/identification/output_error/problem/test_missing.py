@@ -13,7 +13,7 @@ from omnidyn.logs.run_file import write_run
 from omnidyn.model.keys import BOX, Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import TRUTH, noisy, voltages
+from tests.support.axebot_logs import TRUTH, noisy, voltages
 
 fit_output_error = partial(whole.fit_output_error, nuisances=(), start="rest")
 EVERY = 5

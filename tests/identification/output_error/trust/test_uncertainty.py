@@ -5,13 +5,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error import fit as whole
 from omnidyn.model.keys import BOX, Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+from tests.support.axebot_logs import NOISE, TRUTH, excitation, noisy, voltages
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 

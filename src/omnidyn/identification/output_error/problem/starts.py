@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, maker
+from omnidyn.compiled.kernel import kernel, maker
 from omnidyn.identification.output_error.problem.primitives import Mapping
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.frames import world_to_body
