@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.simulation.exact.step import course, crossing_time
 
 SHORT = 1e-2  # a h below which the closed forms lose digits to cancellation and a series takes over

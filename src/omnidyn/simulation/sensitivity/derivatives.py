@@ -57,8 +57,8 @@ def derivatives(
     """Simulate and differentiate with respect to numbers of the robot file, such as "friction.axes.coulomb[1]".
 
     robot, voltage or duty or set points of a speed loop, dt, supply, twist, pose, tol: as for `simulate`; the implicit
-    engine runs whatever the robot. keys: numbers that the robot has; `with_parameter` says how they are named. tol
-    None: derivatives of the fixed-step map itself.
+    engine runs whatever the robot. keys: numbers that the robot has, see `Key`. tol None: derivatives of
+    the fixed-step map itself.
 
     They belong to the sequence of starts, stops and reversals that the run shows. Not differentiable, and not seen:
     whether something breaks away at all, a stop that only just happens, an ellipse crossing rest at an angle, a voltage

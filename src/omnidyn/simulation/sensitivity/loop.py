@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import BOUND, LENGTH, LIMIT, N_AXES, VOLTAGE
 from omnidyn.model.stick_slip.release import SIGNS, start_state, with_given_currents
 from omnidyn.model.stick_slip.workspace import copy_row, copy_table, workspace

@@ -12,7 +12,7 @@ and a current limit or a voltage drop within the reach of the difference is not 
 
 from __future__ import annotations
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
     BRANCH,
     CURRENT,

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 from omnidyn.identification.output_error.kernel.counts import count_terms
 from omnidyn.model.actuation import Driver, at_motor
 from omnidyn.simulation.exact.position import move_on, put_displacement
