@@ -9,8 +9,8 @@ from typing import Any
 
 from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
-from omnidyn.identification.steady.study_words import FORCES, label
-from omnidyn.model.keys import unit
+from omnidyn.identification.steady.study_words import FORCES
+from omnidyn.model.keys import Key, unit
 
 WIDTH = 100
 
@@ -101,7 +101,9 @@ def level_rows(study: SteadyStudy) -> list[list[str]]:
             low, high = estimate.ci95[key]
             mark = " at bound" if key in estimate.at_bound else ""
             interval = f"[{low:.4g}, {high:.4g}]"
-            rows.append([group, label(key), f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, unit(key) + mark])
+            rows.append(
+                [group, Key.parse(key).symbol, f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, unit(key) + mark]
+            )
     return rows
 
 
