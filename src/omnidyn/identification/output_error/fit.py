@@ -12,7 +12,7 @@ from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.motion import Motion, motion
 from omnidyn.identification.output_error.problem.nuisances import (
@@ -199,7 +199,7 @@ def _solve(
         watch.doing("looking for a start")
         solver = Solver(problem, ExactEngine(problem), nu)
         return solver, solver.minimise(first_point(solver, records), watch=watch)
-    fine = Solver(problem, TangentEngine(problem, FINE), nu, CLOSE)
+    fine = Solver(problem, ImplicitEngine(problem, FINE), nu, CLOSE)
     return fine, fine.minimise(coarse_point(problem, nu, watch), watch=watch)
 
 
@@ -213,11 +213,11 @@ def loss_words(loss: str) -> str:
     return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
 
 
-def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | TangentEngine | LoopEngine:
+def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
     """The engine of the robot and its logs; tol [m/s]: of the implicit one, None for a step a row."""
     if looped([piece.record for piece in problem.pieces]):
         return LoopEngine(problem, tol)
-    return ExactEngine(problem) if is_exact(problem.robot) else TangentEngine(problem, tol)
+    return ExactEngine(problem) if is_exact(problem.robot) else ImplicitEngine(problem, tol)
 
 
 def loop_options(given: Options, found: Motion, records: Sequence[Record], robot: Robot) -> Options:
