@@ -18,9 +18,9 @@ from omnidyn.logs.column import MOTOR_SIDE, Column
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel, load_map, parse_column
 from omnidyn.logs.log import Log
-from omnidyn.logs.readers.any_table import iter_tables, read_any
+from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.table.table import ROWS, Table
-from omnidyn.logs.table.text import Progress
+from omnidyn.logs.table.text_file import Progress
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
@@ -83,7 +83,7 @@ def read_log(
 def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None) -> Log:
     """Read a log as it was recorded: in SI, by channel, time not yet trusted. Raises InputError."""
     options = options or LogOptions()
-    table = with_joined_stamp(read_any(path, header=options.header, skip_bad_rows=options.skip_bad_rows))
+    table = with_joined_stamp(read_table(path, header=options.header, skip_bad_rows=options.skip_bad_rows))
     return log_from_table(table, map_columns(table, robot, options), robot, options)
 
 
