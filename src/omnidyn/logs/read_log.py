@@ -121,7 +121,7 @@ def _delayed(columns: ColumnMap, latency: Mapping[str, float]) -> ColumnMap:
 def log_from_table(
     table: Table, columns: ColumnMap, robot: Robot | None, options: LogOptions, clock: Clock | None = None
 ) -> Log:
-    """The Log of a table under a map; `clock` has seen the pieces before this one.
+    """The Log of a table under a map; `clock` has seen the blocks before this one.
 
     Raises InputError for text where numbers are needed, and for a robot with another number of wheels.
     """
@@ -213,9 +213,9 @@ def iter_logs(
     path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None, *,
     rows: int = ROWS, progress: Progress | None = None,
 ) -> Iterator[Log]:  # fmt: skip
-    """The pieces of a log too long for memory, at most `rows` rows each, all under the map of the first.
+    """The blocks of a log too long for memory, at most `rows` rows each, all under the map of the first.
 
-    progress(bytes_done, bytes_total) is called now and then. Time counts from the first piece. Raises InputError.
+    progress(bytes_done, bytes_total) is called now and then. Time counts from the first block. Raises InputError.
     """
     options, columns, clock = options or LogOptions(), None, Clock()
     how = {"header": options.header, "skip_bad_rows": options.skip_bad_rows}

@@ -31,8 +31,8 @@ def sample(values: FloatArray) -> FloatArray:
     n = len(values)
     if n <= SAMPLE:
         return values
-    pieces, length = 8, SAMPLE // 8
-    starts = np.linspace(0, n - length, pieces).astype(int)
+    parts, length = 8, SAMPLE // 8
+    starts = np.linspace(0, n - length, parts).astype(int)
     return np.concatenate([values[a : a + length] for a in starts])
 
 

@@ -129,7 +129,7 @@ def _check_size(metadata: Any, pages: int, columns: int, size: int, max_bytes: i
 
 
 def _batches(pyarrow: Any, file: Any, rows: int, source: str) -> Iterator[tuple[int, Any]]:
-    """Pieces of the file, and how many rows stand before each."""
+    """Blocks of the file, and how many rows stand before each."""
     done = 0
     with _damage(pyarrow, source):
         batches = iter(file.iter_batches(batch_size=rows, use_threads=False))
@@ -302,7 +302,7 @@ def _seconds(array: Any) -> FloatArray:
 
 
 def _words(array: Any, before: bool) -> Column:
-    """Words, or the numbers that are all they hold, as in a CSV file; words where an earlier piece held some."""
+    """Words, or the numbers that are all they hold, as in a CSV file; words where an earlier block held some."""
     if hasattr(array, "dictionary"):
         known = [word or "" for word in array.dictionary.to_pylist()]
         cells = ["" if k is None else known[k] for k in array.indices.to_pylist()]
