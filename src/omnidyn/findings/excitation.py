@@ -47,7 +47,7 @@ def excitation(work: LogUnderCheck) -> dict[str, float]:
         return {}
     robot = work.geometry
     length = float(np.mean(robot.wheels.robot_radius)) if robot is not None else 0.15
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     level = smooth(twist, width) * [1.0, 1.0, length]
     size = np.sqrt(np.nansum(level**2, axis=1))
     top = float(np.quantile(size, 0.95))

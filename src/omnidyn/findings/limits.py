@@ -45,7 +45,7 @@ def _one_way_drive(work: LogUnderCheck, channel: str) -> list[Finding]:
     with np.errstate(invalid="ignore"):
         if high <= 0.0 or (driven < -0.01 * high).any():
             return []
-        width = max(3, round(0.2 / work.step) | 1) if work.step > 0.0 else 3
+        width = work.width(0.2)
         mean, noise = smooth(speed, width), np.array([white_noise(column) for column in speed.T])
         usual = np.maximum(0.3 * np.nanquantile(np.abs(mean), 0.9), 5.0 * noise / np.sqrt(width))
         pushed = driven > 0.2 * high
@@ -129,7 +129,7 @@ def _sag(work: LogUnderCheck) -> list[Finding]:
     supply = work.get("supply")
     if supply is None or not np.isfinite(supply).any():
         return []
-    width = max(3, round(0.1 / work.step) | 1) if work.step > 0.0 else 3
+    width = work.width(0.1)
     level = smooth(supply, width)
     high = float(np.nanquantile(level, 0.98))
     noise = white_noise(supply) / np.sqrt(width)

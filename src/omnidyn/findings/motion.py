@@ -59,7 +59,7 @@ def _still(work: LogUnderCheck) -> NDArray[np.bool_] | None:
         speed = seen.twist
     if speed is None:  # a gyro alone does not know
         return None
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     still = np.asarray(np.isfinite(speed).any(axis=1))  # what is not known is no rest
     for column in speed.T:
         if np.isfinite(column).any():
@@ -79,7 +79,7 @@ def _level(work: LogUnderCheck) -> float:
     seen = ground(work)
     if speed is None and seen is not None and robot is not None:
         speed = wheel_speed(robot.wheels, seen.twist)
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     return np.inf if speed is None else max(_rest_level(column, width) for column in speed.T)
 
 
@@ -90,7 +90,7 @@ def _never_moved(work: LogUnderCheck) -> Finding:
     return Finding(
         "never_moved", FATAL, "", f"the robot never moves beyond the noise of its sensors: {why}",
         "drive with more; such a log bounds friction from below and says nothing else",
-        work.lines(np.ones(len(work), dtype=bool)), len(work), {},
+        work.lines(work.everywhere), len(work), {},
     )  # fmt: skip
 
 

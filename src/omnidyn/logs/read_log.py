@@ -21,6 +21,7 @@ from omnidyn.logs.log import Log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.table.table import ROWS, Table
 from omnidyn.logs.table.text_file import Progress
+from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
@@ -153,7 +154,7 @@ def log_from_table(
     if any(column.side == MOTOR_SIDE for column in columns.columns.values()) and robot is None:
         notes.append("speeds and angles are those of the motor shaft: no robot is given, so no gear is known")
     if "pose" in channels:
-        channels["pose"][:, 2] = _unwrapped(channels["pose"][:, 2])
+        channels["pose"][:, 2] = unwrapped(channels["pose"][:, 2])
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
     t = (clock or Clock()).times(table, columns.columns[TIME], notes)
@@ -168,14 +169,6 @@ def _bare(unit: str) -> str:
 
 def _gear(robot: Robot | None, wheel: int) -> float:
     return 1.0 if robot is None else float(per_wheel(robot.motor.gear_ratio, robot.wheels.count)[wheel])
-
-
-def _unwrapped(heading: FloatArray) -> FloatArray:
-    """Heading without jumps of a turn; missing values stay missing."""
-    known = np.isfinite(heading)
-    unwrapped = heading.copy()
-    unwrapped[known] = np.unwrap(heading[known])
-    return unwrapped
 
 
 def _signed(log: Log, robot: Robot | None) -> Log:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from omnidyn.findings.finding import NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import electric_speed, emf, ground, ohmic, volts, wheels_twist
-from omnidyn.findings.signal.robust import Slope, clusters, ratio, smooth, windowed
+from omnidyn.findings.signal.robust import Slope, central_rate, clusters, ratio, smooth, windowed
+from omnidyn.model.frames import unwrapped
 
 FloatArray = NDArray[np.float64]
 
@@ -75,11 +76,7 @@ def _pairs(work: LogUnderCheck) -> Iterator[Pair]:
         yield from _of_motors(work, speed)
     pose, twist = work.get("pose"), work.get("twist")
     if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
-        heading = pose[:, 2].copy()
-        good = np.isfinite(heading)
-        heading[good] = np.unwrap(heading[good])
-        rate = np.full(len(heading), np.nan)
-        rate[1:-1] = (heading[2:] - heading[:-2]) / (work.t[2:] - work.t[:-2])
+        rate = central_rate(unwrapped(pose[:, 2]), work.t, 1)
         yield Pair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
 
 

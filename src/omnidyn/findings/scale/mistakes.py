@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from omnidyn.findings.finding import FATAL, WARN, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import BEYOND, beyond_stall, emf, stall_current, volts
-from omnidyn.findings.signal.robust import slope, smooth, windowed
+from omnidyn.findings.signal.robust import central_rate, slope, smooth, windowed
 from omnidyn.logs.channels import components
+from omnidyn.model.frames import unwrapped
 from omnidyn.units import DEGREE, TURN
 
 FloatArray = NDArray[np.float64]
@@ -87,23 +88,12 @@ def _pairs(work: LogUnderCheck) -> Iterator[tuple[str, str, FloatArray, FloatArr
     half = max(1, round(0.05 / work.step)) if work.step > 0.0 else 1
     pose, twist = work.get("pose"), work.get("twist")
     if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
-        heading = np.where(np.isfinite(pose[:, 2]), pose[:, 2], np.nan)
-        yield "omega", "heading", _rate(heading, work.t, half, TURN), smooth(twist[:, 2], 2 * half + 1), TURN_UNITS
+        rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
+        yield "omega", "heading", rate, smooth(twist[:, 2], 2 * half + 1), TURN_UNITS
     angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
     if angle is not None and speed is not None and angle.shape == speed.shape:
         for name, a, w in zip(components("wheel_speed", speed.shape[1]), angle.T, speed.T, strict=True):
-            yield name, name.replace("w", "a"), _rate(a, work.t, half), smooth(w, 2 * half + 1), TURN_UNITS
-
-
-def _rate(values: FloatArray, t: FloatArray, half: int, period: float = 0.0) -> FloatArray:
-    out = np.full(len(values), np.nan)
-    if period:
-        good = np.isfinite(values)
-        values = values.copy()
-        values[good] = np.unwrap(values[good], period=period)
-    if len(values) > 2 * half:
-        out[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
-    return out
+            yield name, name.replace("w", "a"), central_rate(a, work.t, half), smooth(w, 2 * half + 1), TURN_UNITS
 
 
 def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:

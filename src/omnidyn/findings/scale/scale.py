@@ -67,14 +67,14 @@ def _without_stand_in(work: LogUnderCheck) -> LogUnderCheck:
     if dead is None or expected is None:
         return work
     speed = work.channels["wheel_speed"]
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     own, told = smooth(speed, width), smooth(expected[1], width)
     good = np.isfinite(own).all(axis=1) & np.isfinite(told).all(axis=1)
     cross = (own[good] * told[good]).sum(axis=0)
     alike = cross / np.sqrt((own[good] ** 2).sum(axis=0) * (told[good] ** 2).sum(axis=0))
     if (np.delete(alike, dead) > FOLLOWS).all():
         return work
-    return work.masked("wheel_speed", dead, np.ones(len(work), dtype=bool)).knowing(dead_wheel=None)
+    return work.masked("wheel_speed", dead, work.everywhere).knowing(dead_wheel=None)
 
 
 def scales(work: LogUnderCheck) -> Scales | None:
@@ -291,9 +291,9 @@ def _dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             found.append(Finding(
                 "dead", FATAL, name, f"{name} is noise about 0, while {source} says that the wheel turns",
                 "look at its encoder, its cable and its column; leave it out otherwise",
-                work.lines(np.ones(len(work), dtype=bool)), len(work), {"slope": a.value, "error": a.error},
+                work.lines(work.everywhere), len(work), {"slope": a.value, "error": a.error},
             ))  # fmt: skip
-            work = work.masked("wheel_speed", k, np.ones(len(work), dtype=bool))
+            work = work.masked("wheel_speed", k, work.everywhere)
     return found, work
 
 

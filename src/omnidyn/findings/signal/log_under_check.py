@@ -93,6 +93,15 @@ class LogUnderCheck:
         """(window of each row, number of windows)."""
         return clusters(len(self), self.step, seconds)
 
+    def width(self, seconds: float) -> int:
+        """Rows of a mean over so many seconds: odd, three at least."""
+        return max(3, round(seconds / self.step) | 1) if self.step > 0.0 else 3
+
+    @property
+    def everywhere(self) -> NDArray[np.bool_]:
+        """True in every row."""
+        return np.ones(len(self), dtype=bool)
+
     def noise(self, component: str, values: FloatArray) -> float:
         """Noise of one component: what its neighbours scatter by, at least what its quantisation makes."""
         cache: dict[str, float] = self.known.get("noise", {})

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
-from omnidyn.findings.signal.robust import smooth
-from omnidyn.model.frames import world_to_body
+from omnidyn.findings.signal.robust import central_rate, smooth
+from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.model.motor import back_emf, no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed, wheel_speed
@@ -49,35 +49,20 @@ def ground(work: LogUnderCheck) -> Ground | None:
 
 def pose_twist(work: LogUnderCheck, pose: FloatArray) -> tuple[FloatArray, int]:
     """(twist of the body from differences of the pose, shape (rows, 3); rows over which each is a mean)."""
-    heading = _unwrapped(pose[:, 2])
-    rate = _difference(heading, work.t, max(1, round(0.5 * POSE_WINDOW / work.step)))
+    heading = unwrapped(pose[:, 2])
+    rate = central_rate(heading, work.t, max(1, round(0.5 * POSE_WINDOW / work.step)))
     turning = np.nanquantile(np.abs(rate), 0.95) if np.isfinite(rate).any() else 0.0
     seconds = min(POSE_WINDOW, POSE_TURN / turning) if turning > 0.0 else POSE_WINDOW
     half = max(1, round(0.5 * seconds / work.step))
     twist = np.full((len(pose), 3), np.nan)
-    twist[:, 2] = _difference(heading, work.t, half)
+    twist[:, 2] = central_rate(heading, work.t, half)
     if np.isfinite(heading).any() and np.isfinite(pose[:, :2]).any():
-        speed = np.column_stack([_difference(pose[:, k], work.t, half) for k in range(2)])
+        speed = np.column_stack([central_rate(pose[:, k], work.t, half) for k in range(2)])
         turn = world_to_body(smooth(heading, 2 * half + 1))
         twist[:, :2] = np.einsum("kij,kj->ki", turn[:, :2, :2], speed)
     for segment in work.segments[1:]:
         twist[max(0, segment.start - half) : segment.start + half] = np.nan
     return twist, 2 * half + 1
-
-
-def _unwrapped(heading: FloatArray) -> FloatArray:
-    """Heading without its jumps by a turn; NaN stays."""
-    good = np.isfinite(heading)
-    out = heading.copy()
-    out[good] = np.unwrap(heading[good])
-    return out
-
-
-def _difference(values: FloatArray, t: FloatArray, half: int) -> FloatArray:
-    out = np.full(len(values), np.nan)
-    if len(values) > 2 * half:
-        out[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
-    return out
 
 
 def wheels_twist(work: LogUnderCheck, speed: FloatArray, width: int = 1) -> FloatArray | None:

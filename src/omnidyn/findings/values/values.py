@@ -46,7 +46,7 @@ def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck
     if len(dead) != 1 or expected is None or expected[0] not in MEASUREMENTS or expected[1].shape[1] != work.wheels:
         return work
     speed = work.channels["wheel_speed"].copy()
-    width = max(3, round(0.2 / work.step) | 1)  # noise of what tells the speed would make it look larger
+    width = work.width(0.2)  # noise of what tells the speed would make it look larger
     own, told = np.delete(smooth(speed, width), dead, axis=1), np.delete(smooth(expected[1], width), dead, axis=1)
     known = np.isfinite(own) & np.isfinite(told)
     size, turned = float((told[known] ** 2).sum()), float((own[known] ** 2).sum())
@@ -109,7 +109,7 @@ def _reads_zero(
     work: LogUnderCheck, component: str, values: FloatArray, step: float, source: str, reference: FloatArray
 ) -> list[Finding]:
     """A wheel slower than its encoder can say."""
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     # What lies between two measurements is no measurement, and a mean over such rows no better than they are.
     own = _told(work, source)
     turning = np.abs(smooth(reference, width))
@@ -155,9 +155,9 @@ def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
                     "dead", FATAL if channel not in ("pose", "twist_command", "wheel_speed_command") else WARN,
                     component, f"{component} is {np.nanmax(values):.4g} in every row, while {reason}",
                     "look at its sensor, its cable and its column; leave it out otherwise",
-                    work.lines(np.ones(len(work), dtype=bool)), len(work), {"value": float(np.nanmax(values))},
+                    work.lines(work.everywhere), len(work), {"value": float(np.nanmax(values))},
                 ))  # fmt: skip
-                work = work.masked(channel, k, np.ones(len(work), dtype=bool))
+                work = work.masked(channel, k, work.everywhere)
     return found, work
 
 
@@ -189,7 +189,7 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
             return "omega says it turns"
         if speed is None or robot is None:
             return ""
-        own = smooth(twist_from_wheel_speed(robot.wheels, speed), max(3, round(0.3 / work.step) | 1))
+        own = smooth(twist_from_wheel_speed(robot.wheels, speed), work.width(0.3))
         turning = spread_of_motion(own[:, 2]) * float(np.mean(robot.wheels.robot_radius))
         if turning > 0.3 * max(spread_of_motion(own[:, 0]), spread_of_motion(own[:, 1])):
             return "the wheels say that the robot turns: the heading was not recorded, or the wheels ran in the air"
