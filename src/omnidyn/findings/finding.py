@@ -15,7 +15,7 @@ from omnidyn.statistics import stretches
 
 FATAL, WARN, NOTE = "fatal", "warn", "note"
 LEVELS = (FATAL, WARN, NOTE)
-WORDS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
+LABELS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
 MAX_SPANS = 20  # spans of rows that a finding keeps; it counts all
 SHOWN_SPANS = 4
 SECTORS = 12  # of directions of travel
@@ -137,7 +137,7 @@ def merged(findings: Sequence[Finding], blocks: int) -> Finding:
 
 
 def _paragraph(finding: Finding, width: int) -> list[str]:
-    head = f"  {WORDS[finding.level]:5s}  {finding.code}{' ' + finding.where if finding.where else ''}: "
+    head = f"  {LABELS[finding.level]:5s}  {finding.code}{' ' + finding.where if finding.where else ''}: "
     body = finding.message + (f" [{_lines(finding)}]" if finding.rows else "")
     wrapped = textwrap.wrap(head + body, max(40, width), subsequent_indent=" " * 9) or [head]
     if finding.remedy:
