@@ -84,12 +84,13 @@ Part = str | Words | Points | Table  # plain text is a line as it stands
 class Document:
     """What a result says: its parts in the order in which text tells them, and its values as JSON can hold them.
 
-    warnings: what a reader of `data` alone must be told too.
+    warnings: what a reader of `data` alone must be told too. ascii: text has an escape for every other character.
     """
 
     parts: Sequence[Part]
     data: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[str] = ()
+    ascii: bool = False
 
     def __getitem__(self, name: str) -> Points | Table:
         """The points or the table of this name. Raises KeyError."""
@@ -103,12 +104,8 @@ class Document:
         lines: list[str] = []
         for part in self.parts:
             lines += [part] if isinstance(part, str) else part.lines(width, paint)
-        return "\n".join(lines)
-
-
-def ascii_only(text: str) -> str:
-    """The text with an escape for every character beyond ASCII."""
-    return text.encode("ascii", "backslashreplace").decode()
+        text = "\n".join(lines)
+        return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
 
 
 def cell(value: float | None, form: str) -> str:
