@@ -8,10 +8,10 @@ import numpy as np
 
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.group_fit import GroupFit, identify_groups
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import coloured, excitation, noisy
 
@@ -35,7 +35,7 @@ def floors() -> dict[str, Robot]:
     """The preset on its floor and on a rough one."""
     smooth = rough = load_robot("axebot")
     for key, value in ROUGH.items():
-        rough = with_parameter(rough, key, value)
+        rough = Key.parse(key).set(rough, value)
     return {"smooth": smooth, "rough": rough}
 
 

@@ -23,10 +23,10 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, RATE, excitation, noisy
 
@@ -63,7 +63,7 @@ def begun(seed: int) -> Robot:
     """The robot with all free numbers wrong by up to a factor of WRONG either way."""
     robot, rng = ellipse(), np.random.default_rng(9000 + seed)
     for key, factor in zip(KEYS, np.exp(rng.uniform(-np.log(WRONG), np.log(WRONG), len(KEYS))), strict=True):
-        robot = with_parameter(robot, key, float(parameter(robot, key)) * float(factor))
+        robot = Key.parse(key).set(robot, float(Key.parse(key).get(robot)) * float(factor))
     return robot
 
 
@@ -72,7 +72,7 @@ def fitted(run: Run, start: Robot) -> OutputErrorEstimate:
 
 
 def truth() -> dict[str, float]:
-    return {key: float(parameter(ellipse(), key)) for key in KEYS} | {LATENCY: LATE}
+    return {key: float(Key.parse(key).get(ellipse())) for key in KEYS} | {LATENCY: LATE}
 
 
 def bound() -> np.ndarray:

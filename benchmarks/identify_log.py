@@ -15,7 +15,7 @@ import numpy as np
 
 from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from tests.support.axebot_logs import NOISE, bare
@@ -30,7 +30,7 @@ def cramer_rao(robot: Robot, clean: Run) -> np.ndarray:
     """Least standard errors that any unbiased fit of this log has, from the log without noise. Shape (6,)."""
     fit = fit_output_error(bare(clean), robot, start="rest", covariance="white")
     noise = np.array(list(fit.noise.values()))
-    return np.array([fit.std[key] for key in FRICTION]) / np.tile(noise / NOISE, 2)
+    return np.array([fit.std[key] for key in BOX]) / np.tile(noise / NOISE, 2)
 
 
 class Draws:

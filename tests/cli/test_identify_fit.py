@@ -7,9 +7,9 @@ from omnidyn.cli import main
 from omnidyn.cli.identify_fit import _Watch
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.logs.run_file import write_run
+from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy
 from tests.support.outputs import strict
@@ -23,7 +23,7 @@ def logs(tmp_path_factory):
     """Two logs of 20 s on each of two floors, and one without inputs."""
     folder, axebot = tmp_path_factory.mktemp("logs"), load_robot("axebot")
     for k, name in enumerate(("smooth", "smooth", "rough", "rough")):
-        robot = axebot if name == "smooth" else with_parameter(axebot, COULOMB, ROUGH)
+        robot = axebot if name == "smooth" else Key.parse(COULOMB).set(axebot, ROUGH)
         write_run(noisy(simulate(robot, excitation(20.0, seed=k), 0.01), k), folder / f"{name}{k}.csv")
     speeds = simulate(axebot, excitation(5.0), 0.01)
     write_run(Run(t=speeds.t, wheel_speed=speeds.wheel_speed), folder / "inputless.csv")

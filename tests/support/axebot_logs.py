@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 
 NOISE = np.array([0.02, 0.02, 0.10])
 SECONDS, RATE = 60.0, 100.0
 MEMORY = 0.9  # correlation of neighbours of coloured noise
-TRUTH = dict(zip(FRICTION, (0.94, 0.96, 0.01, 2.2, 1.5, 0.099), strict=True))
+TRUTH = dict(zip(BOX, (0.94, 0.96, 0.01, 2.2, 1.5, 0.099), strict=True))
 # The voltages that drive one axis, and how large they may be [V].
 PATTERN, SIZE = np.array([[0.0, 1.0, -1.0], [-1.0, 0.5, 0.5], [1.0, 1.0, 1.0]]), np.array([4.5, 4.5, 2.5])
 
@@ -69,13 +68,13 @@ def coloured(run: Run, seed: int) -> Run:
 
 
 def truth(robot: Robot) -> dict[str, float]:
-    return {key: float(parameter(robot, key)) for key in FRICTION}
+    return {key: float(Key.parse(key).get(robot)) for key in BOX}
 
 
 def with_friction(robot: Robot, values: np.ndarray) -> Robot:
-    """The robot with these six numbers, in the order of FRICTION."""
-    for key, value in zip(FRICTION, values, strict=True):
-        robot = with_parameter(robot, key, float(value))
+    """The robot with these six numbers, in the order of BOX."""
+    for key, value in zip(BOX, values, strict=True):
+        robot = Key.parse(key).set(robot, float(value))
     return robot
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
+from omnidyn.model.keys import Key
 
 AGREES = 1e-5
 CHANNELS = ("twist", "pose", "current")
@@ -17,9 +17,9 @@ def differences(run: Callable, robot, key, width, watched=slice(None)):
 
     watched: axes whose dry friction makes a change of sign an event.
     """
-    value, kept = parameter(robot, key), {}
+    value, kept = Key.parse(key).get(robot), {}
     for steps in (-2, -1, 1, 2):
-        kept[steps] = run(with_parameter(robot, key, value + steps * width * value))
+        kept[steps] = run(Key.parse(key).set(robot, value + steps * width * value))
     pattern = [np.sign(one.twist[:, watched]).tolist() for one in kept.values()]
     assert all(p == pattern[0] for p in pattern), f"events do not pair up: {key}"
     assert len({getattr(one, "events", 0) for one in kept.values()}) == 1

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.output_error import fit as whole
+from omnidyn.model.keys import Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, noisy, voltages
 
@@ -23,7 +23,7 @@ def test_a_clean_log_gives_the_truth(axebot, clean):
     """Start 3x wrong; what is left is the precision at which the search ends."""
     start = axebot
     for key, value in TRUTH.items():
-        start = with_parameter(start, key, 3.0 * value)
+        start = Key.parse(key).set(start, 3.0 * value)
     fit = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=clean.twist), start, start="rest")
     assert fit.converged
     for key, value in TRUTH.items():

@@ -12,7 +12,8 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.simulation.sensitivity.directions import derivatives, parameter, with_parameter
+from omnidyn.model.keys import Key
+from omnidyn.simulation.sensitivity.directions import derivatives
 from omnidyn.simulation.simulate import simulate
 from tests.reference.modes import reference
 from tests.support.run_differences import AGREES, BODY, CHANNELS, MOTOR, differences, held, worst
@@ -96,7 +97,7 @@ def test_closed_form_of_the_paper(axebot):
         "emf_constant": "motor.emf_constant_Vs_rad", "radius": "wheels.wheel_radius_m", "gear": "motor.gear_ratio",
         "viscous": "friction.axes.viscous[0]", "coulomb": "friction.axes.coulomb[0]",
     }  # fmt: skip
-    values = {name: parameter(axebot, key) for name, key in names.items()}
+    values = {name: Key.parse(key).get(axebot) for name, key in names.items()}
     found = derivatives(axebot, held((60, [0, 3, -3])), 0.01, list(names.values()), tol=1e-9)
     np.testing.assert_allclose(found.run.twist[:, 0], closed_form(values, found.run.t), atol=1e-8)
     for j, name in enumerate(names):
@@ -327,8 +328,8 @@ def test_one_wheel_of_what_is_given_once(axebot):
     keys = ["motor.resistance_ohm", *(f"motor.resistance_ohm[{w}]" for w in range(3))]
     found = derivatives(axebot, held((20, [1, 5, -3])), 0.01, keys)
     np.testing.assert_allclose(found.twist[..., 1:].sum(axis=-1), found.twist[..., 0], rtol=1e-8, atol=1e-8)
-    assert with_parameter(axebot, keys[3], 2.0).motor.resistance == (1.69, 1.69, 2.0)
-    assert with_parameter(axebot, "friction.axes.coulomb[1]", 1.0).friction.axes.coulomb == (2.2, 1.0, 0.099)
+    assert Key.parse(keys[3]).set(axebot, 2.0).motor.resistance == (1.69, 1.69, 2.0)
+    assert Key.parse("friction.axes.coulomb[1]").set(axebot, 1.0).friction.axes.coulomb == (2.2, 1.0, 0.099)
 
 
 def test_the_clipped_voltage_follows_its_limit(axebot):
@@ -343,7 +344,8 @@ def test_the_clipped_voltage_follows_its_limit(axebot):
     "key, words",
     [
         ("body.mass", "mass_kg"),
-        ("mass_kg", "not a key"),
+        ("mass_kg", "unknown key; got mass_kg; did you mean body.mass_kg"),
+        ("body mass", "not a key"),
         ("body.rotating_frame", "not a number"),
         ("motor.current_limit_A", "not a number of this robot"),
         ("friction.axes.coulomb", "needs an index"),
@@ -361,4 +363,4 @@ def test_keys_that_cannot_be_used(axebot, key, words):
 
 def test_a_value_out_of_range_is_refused(axebot):
     with pytest.raises(InputError, match="mass_kg"):
-        with_parameter(axebot, "body.mass_kg", -1.0)
+        Key.parse("body.mass_kg").set(axebot, -1.0)

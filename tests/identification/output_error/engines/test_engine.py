@@ -7,8 +7,8 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine, Weigh
 from omnidyn.identification.output_error.fit import Options, make_problem, read_records
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import Point, per_column
+from omnidyn.model.keys import Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
 from tests.support.march_cases import ROBOT_KEYS, a_case
 
@@ -52,10 +52,10 @@ def test_slopes_are_central_differences_of_whole_runs(seed):
     ((_, slopes),) = ExactEngine(problem).outputs(point)
     good, total = 0, 0
     for j, key in enumerate(ROBOT_KEYS):
-        step = 1e-6 * parameter(robot, key)
+        step = 1e-6 * Key.parse(key).get(robot)
         sides = []
         for sign in (1.0, -1.0):
-            moved = with_parameter(robot, key, parameter(robot, key) + sign * step)
+            moved = Key.parse(key).set(robot, Key.parse(key).get(robot) + sign * step)
             sides.append(logged(simulate(moved, voltage, dt, twist=start)))
         differences = (sides[0] - sides[1]) / (2.0 * step)
         scale = np.abs(differences).max(axis=0) + 1e-300
