@@ -99,6 +99,11 @@ class Document:
                 return part
         raise KeyError(name)
 
+    def joined(self, *names: str) -> Points:
+        """The points of these names as one list."""
+        several = [part for part in map(self.__getitem__, names) if isinstance(part, Points)]
+        return Points([words for part in several for words in part.words])
+
     def to_text(self, width: int = WIDTH, paint: Paint = lambda word, tone: word) -> str:
         """The document for people, without a line break at its end. paint: how signs get their colours."""
         lines: list[str] = []
