@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import WARN, Finding
-from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, Work
-from omnidyn.findings.signal.robust import MAD, quantum, sample, spread
+from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.robust import quantum, sample, spread
 from omnidyn.logs.channels import place
 from omnidyn.logs.log import ON_CHANGE
+from omnidyn.statistics import robust_std
 
 FloatArray = NDArray[np.float64]
 
@@ -17,7 +18,7 @@ MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
 SPIKE = 10.0  # a single value so many times the noise away from both its neighbours
 
 
-def check_spikes(work: Work) -> tuple[list[Finding], Work]:
+def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Single values (or two) far away from both neighbours, which agree with each other."""
     found = []
     changed = _changed(work)
@@ -42,7 +43,7 @@ def check_spikes(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _changed(work: Work) -> NDArray[np.int64]:
+def _changed(work: LogUnderCheck) -> NDArray[np.int64]:
     """How often a command has changed up to each row."""
     changed = np.zeros(len(work), dtype=bool)
     for channel in INPUTS:
@@ -75,7 +76,7 @@ def _isolated(values: FloatArray) -> NDArray[np.bool_]:
     small = small[np.isfinite(small)]
     if not small.size:
         return bad
-    scale = max(MAD * float(np.median(small)), quantum(values), 1e-3 * spread(values), 1e-12)
+    scale = max(float(robust_std(small, 0.0)), quantum(values), 1e-3 * spread(values), 1e-12)
     # Heavy tails are no spikes: what is far must be far beyond the usual largest as well.
     scale = max(scale, float(np.quantile(small, 0.99)) / 3.0)
     with np.errstate(invalid="ignore"):
@@ -83,7 +84,7 @@ def _isolated(values: FloatArray) -> NDArray[np.bool_]:
     return bad
 
 
-def recorded(work: Work, channel: str, k: int) -> NDArray[np.int64]:
+def recorded(work: LogUnderCheck, channel: str, k: int) -> NDArray[np.int64]:
     """Rows in which a component was recorded; those between are no measurements where it is recorded on change."""
     logged = work.log.channels.get(channel)
     if logged is None:

@@ -16,13 +16,14 @@ from omnidyn.logs.table import dialect
 from omnidyn.logs.table.dialect import SAMPLE_ROWS, SEPARATOR_WORDS, SEPARATORS
 
 MAX_COLUMNS = 1000
+MAX_NAME = 1000  # characters
 TABS_NOTE = "columns are separated by " + SEPARATOR_WORDS["\t"]
 HEAD_ROWS = 3  # at most so many lines above the first row: titles, units, names
 
 _SEPARATOR_LINE = re.compile(r"sep=([,;\t])")  # Excel's own first line
 
 
-class Line(NamedTuple):
+class FileLine(NamedTuple):
     """A line of the file, counted from 1."""
 
     number: int
@@ -61,7 +62,7 @@ def find_layout(lines: Sequence[str], source: str, header: bool = True) -> Layou
     `header` False: there are no names, the columns are called c1, c2, ...
     Raises InputError when there is no header, or one that cannot be used.
     """
-    kept = [Line(k + 1, line) for k, line in enumerate(lines) if line.strip() and not dialect.is_comment(line)]
+    kept = [FileLine(k + 1, line) for k, line in enumerate(lines) if line.strip() and not dialect.is_comment(line)]
     told = _SEPARATOR_LINE.fullmatch(kept[0].text.strip()) if kept else None
     kept = kept[1:] if told else kept
     if not kept:
@@ -89,7 +90,7 @@ def _has_number(line: str) -> bool:
     return any(dialect.looks_like_number(cell.strip(' "')) for cell in re.split(r"[,;\t]", line))
 
 
-def _without_header(kept: list[Line], separator: str, source: str) -> Layout:
+def _without_header(kept: list[FileLine], separator: str, source: str) -> Layout:
     texts = [line.text for line in kept]
     separator = separator or dialect.find_separator(texts[0], texts, f"{source}:{kept[0].number}")
     ending = _other_ending(texts[:SAMPLE_ROWS], separator)
@@ -105,10 +106,12 @@ def _numbered(count: int) -> tuple[str, ...]:
     return tuple(f"c{k + 1}" for k in range(count))
 
 
-def _commented_header(lines: Sequence[str], row: Line) -> list[Line]:
+def _commented_header(lines: Sequence[str], row: FileLine) -> list[FileLine]:
     """Names, or names and units, that stand as comments right above the first row (`numpy.savetxt` puts them there)."""
-    above = [Line(k + 1, line) for k, line in enumerate(lines[: row.number - 1]) if line.strip()][-2:]
-    comments = [Line(line.number, line.text.lstrip()[1:].strip()) for line in above if dialect.is_comment(line.text)]
+    above = [FileLine(k + 1, line) for k, line in enumerate(lines[: row.number - 1]) if line.strip()][-2:]
+    comments = [
+        FileLine(line.number, line.text.lstrip()[1:].strip()) for line in above if dialect.is_comment(line.text)
+    ]
     if not comments or comments[-1].number != above[-1].number:
         return []
     for separator in SEPARATORS:
@@ -126,14 +129,14 @@ def _are_names(cells: Sequence[str]) -> bool:
     return all(cells) and len(set(cells)) == len(cells) and not any(map(dialect.looks_like_number, cells))
 
 
-def _layout(kept: list[Line], commented: int, separator: str, source: str) -> Layout:
+def _layout(kept: list[FileLine], commented: int, separator: str, source: str) -> Layout:
     """The layout of a file whose first line that counts is a header; the first `commented` of them were comments."""
     where = f"{source}:{kept[0].number}"
     rows = [line.text for line in kept[max(1, commented) :]]
     separator = separator or dialect.find_separator(kept[0].text, rows, where)
     ending = _other_ending(rows[HEAD_ROWS if len(rows) > 2 * HEAD_ROWS else 0 :][:SAMPLE_ROWS], separator)
     if ending:
-        kept = [Line(line.number, line.text.rstrip().removesuffix(ending)) for line in kept]
+        kept = [FileLine(line.number, line.text.rstrip().removesuffix(ending)) for line in kept]
     head = _head(kept[: commented or HEAD_ROWS + 1], separator, source)
     body = kept[len(head.lines) :]
     if not body:
@@ -149,7 +152,7 @@ def _layout(kept: list[Line], commented: int, separator: str, source: str) -> La
 class _Head(NamedTuple):
     """The lines above the first row, their cells, and which of them are the names, the units and the titles."""
 
-    lines: list[Line]
+    lines: list[FileLine]
     cells: list[list[str]]
     names: int = 0
     units: int | None = None
@@ -159,7 +162,7 @@ class _Head(NamedTuple):
         return [] if which is None else self.cells[which]
 
 
-def _head(first: list[Line], separator: str, source: str) -> _Head:
+def _head(first: list[FileLine], separator: str, source: str) -> _Head:
     """Which of the first lines are the head: a line of names, one of units, and with both, one of titles."""
     cells = [dialect.split_cells(first[0].text, separator, f"{source}:{first[0].number}")]
     cells += [_cells_or_row(line.text, separator) for line in first[1:]]
@@ -187,7 +190,7 @@ def _trimmed(cells: list[str]) -> list[str]:
     return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
 
-def _names(head: _Head, separator: str, body: list[Line], source: str) -> list[str]:
+def _names(head: _Head, separator: str, body: list[FileLine], source: str) -> list[str]:
     """The column names: one each, none blank, none a number, none twice. A blank last one has no column below it."""
     line, names = head.lines[head.names], head.cells[head.names]
     where = f"{source}:{line.number}"
@@ -197,14 +200,7 @@ def _names(head: _Head, separator: str, body: list[Line], source: str) -> list[s
         if all(len(names) - 1 in counts for counts in rows):
             names = names[:-1]
     for k, name in enumerate(names):
-        if not name:
-            raise InputError(
-                f"column {k + 1} has no name",
-                got=line.text,
-                expected="a name for every column",
-                remedy="name it or remove it",
-                where=where,
-            )
+        check_name(k, names, where, got=line.text)
         if dialect.looks_like_number(name):
             raise InputError(
                 "the table has no header: a number stands where a name should",
@@ -213,9 +209,30 @@ def _names(head: _Head, separator: str, body: list[Line], source: str) -> list[s
                 remedy="add a first line with the column names, or use --no-header",
                 where=where,
             )
-        if name in names[:k]:
-            raise InputError("two columns have the same name", got=name, expected="different names", where=where)
     return names
+
+
+def check_name(k: int, names: Sequence[str], where: str, got: str | None = None) -> None:
+    """Raises InputError where the name of column k is blank, too long, or that of an earlier one. got: the header."""
+    name = names[k]
+    if not name:
+        raise InputError(
+            f"column {k + 1} has no name",
+            got=got,
+            expected="a name for every column",
+            remedy="name it or remove it",
+            where=where,
+        )
+    if len(name) > MAX_NAME:
+        raise InputError(
+            f"the name of column {k + 1} is too long",
+            got=f"{len(name)} characters, {name[:40]}...",
+            expected=f"at most {MAX_NAME}",
+            remedy="give it a short name, or see whether this line is the header",
+            where=where,
+        )
+    if name in names[:k]:
+        raise InputError("two columns have the same name", got=name, expected="different names", where=where)
 
 
 def _refuse_width(columns: int, where: str) -> None:
@@ -246,7 +263,7 @@ def _units(names: list[str], head: _Head, where: str) -> tuple[list[str], dict[s
     return plain, units
 
 
-def _with_ending(layout: Layout, rows: list[Line], other: str) -> Layout:
+def _with_ending(layout: Layout, rows: list[FileLine], other: str) -> Layout:
     """The layout with what stands at the end of its rows and means nothing: its own separator, or another."""
     count = len(layout.names)
     own = [dialect.counts(row.text, layout.separator) for row in rows]
