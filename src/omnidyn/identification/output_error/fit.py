@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.estimate import unit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.motion import Motion, motion
 from omnidyn.identification.output_error.problem.nuisances import (
@@ -25,9 +24,9 @@ from omnidyn.identification.output_error.problem.nuisances import (
     pieces,
 )
 from omnidyn.identification.output_error.problem.parameters import (
-    FRICTION,
     Parameter,
     names_of,
+    refuse_repeated,
     refuse_unknown,
     robot_parameters,
 )
@@ -35,8 +34,6 @@ from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
 from omnidyn.identification.output_error.solve.loop import (
-    friction_keys,
-    friction_of_axis,
     left_out,
     loop_keys,
     loop_pieces,
@@ -51,11 +48,11 @@ from omnidyn.identification.output_error.trust.support import supported, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.keys import BOX, COULOMB, FRICTION, GAINS, VISCOUS, Key, expand, friction_keys, unit
 from omnidyn.model.motor import DYNAMIC
-from omnidyn.model.robot import Robot
+from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
-from omnidyn.simulation.sensitivity.directions import GAINS, parameter, with_parameter
 
 FloatArray = NDArray[np.float64]
 
@@ -66,7 +63,6 @@ CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
-IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
 
 
 @dataclass(frozen=True)
@@ -104,16 +100,17 @@ def fit_output_error(
     """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
 
     runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
-    free: keys of the robot file, such as "body.mass_kg"; by default the friction that the robot has. fixed: taken out.
-    The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, or stays as
-    the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval, without "[0]" for all.
+    free: keys of the robot file, such as "body.mass_kg"; "friction", the default, is what the robot has of it, a list
+    stands for its entries. fixed: taken out. The EMF constant follows the torque constant, wheel by wheel, unless both
+    are free. Breakaway follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" among the free keys
+    asks for its interval.
     nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade", "tilt"
     (or "tilt.x", "tilt.y", "tilt.yaw"). By default latency and dead band, and the gain where the supply is only
     nominal, as far as the logs determine them; a warning says what else would fit the logs better. () for none.
     start: "rest", "free", or "auto": at rest where that shows.
     use_priors: a std in the robot file counts as a Gaussian prior of what is free, and what has one is free too. Off by
-    default: a std that an earlier fit wrote from the same log would count the log twice; such ones ("identified: ...")
-    are never used.
+    default: a std that an earlier fit wrote from the same log would count the log twice; such ones (origin
+    "identified") are never used.
     outputs: of "twist", "wheel_speed", "current", "pose" (or of "heading", "position"), "wheel_angle"; by default all
     that the log has, but for what is computed from another one: that would count the same data twice.
     tick_rad: of the encoders behind wheel angles [rad]; by default found in the log. Their likelihood is that of
@@ -129,12 +126,14 @@ def fit_output_error(
     know. Of the nuisances, robots that need the implicit engine have latencies by default; they know the others, but
     no position and no wheel angle as outputs.
     """
+    refuse_repeated(names_of(free or ()))
     given = Options(
-        None if free is None else names_of(free), names_of(fixed), nuisance_names(nuisances), start, use_priors,
+        None if free is None else expand_keys(free, robot), expand_keys(fixed, robot), nuisance_names(nuisances),
+        start, use_priors,
         None if outputs is None else names_of(outputs), loss, covariance, tick_rad,
     )  # fmt: skip
     records = read_records([runs] if isinstance(runs, Run) else list(runs), robot, given)
-    return _fitted(records, robot, given, names_of(profile), bootstrap, onlooker(watch))
+    return _fitted(records, robot, given, expand_keys(profile, robot), bootstrap, onlooker(watch))
 
 
 def _fitted(
@@ -200,7 +199,7 @@ def _solve(
         watch.doing("looking for a start")
         solver = Solver(problem, ExactEngine(problem), nu)
         return solver, solver.minimise(first_point(solver, records), watch=watch)
-    fine = Solver(problem, TangentEngine(problem, FINE), nu, CLOSE)
+    fine = Solver(problem, ImplicitEngine(problem, FINE), nu, CLOSE)
     return fine, fine.minimise(coarse_point(problem, nu, watch), watch=watch)
 
 
@@ -214,11 +213,11 @@ def loss_words(loss: str) -> str:
     return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
 
 
-def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | TangentEngine | LoopEngine:
+def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
     """The engine of the robot and its logs; tol [m/s]: of the implicit one, None for a step a row."""
     if looped([piece.record for piece in problem.pieces]):
         return LoopEngine(problem, tol)
-    return ExactEngine(problem) if is_exact(problem.robot) else TangentEngine(problem, tol)
+    return ExactEngine(problem) if is_exact(problem.robot) else ImplicitEngine(problem, tol)
 
 
 def loop_options(given: Options, found: Motion, records: Sequence[Record], robot: Robot) -> Options:
@@ -279,7 +278,7 @@ def read_records(runs: Sequence[Run], robot: Robot, given: Options) -> list[Reco
             raise InputError(f"unknown {where}", got=value, expected=" or ".join(known), where=where)
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
-    gains = any(key.startswith(GAINS) for key in given.free or ())
+    gains = any(Key.parse(key).name in GAINS for key in given.free or ())
     found = [record(run, robot, given.outputs, gains, given.tick_rad) for run in runs]
     if len({each.set_point is None for each in found}) > 1:
         raise InputError(
@@ -300,7 +299,7 @@ def without_still_axes(
     still: list[tuple[str, float, str]] = []
     fixed, asked = set(given.fixed), given.free if given.free is not None else free_by_default(robot)
     for axis in np.flatnonzero(~found.moved):
-        own = {key for key in (*asked, *FRICTION) if friction_of_axis(key, int(axis))}
+        own = {key for key in (*asked, *BOX) if Key.parse(key).axis == axis}
         fixed |= own
         if not is_exact(robot) and not own & set(asked):
             continue  # friction along the direction of travel: no axis has its own
@@ -308,7 +307,7 @@ def without_still_axes(
         what = f"; it held {held:.4g} {unit(key)}" if held > NOTHING else "; nothing drove it"
         still.append((key, held, found.words(int(axis)) + (what if found.seen[axis] else "")))
         if is_exact(robot) and robot.friction.axes.levels[2][axis] < held:
-            robot = with_parameter(robot, f"friction.axes.coulomb[{axis}]", held)
+            robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)
     if not found.moved.any():
         raise InsufficientDataError(
             "the robot never visibly moved: its friction is only bounded from below",
@@ -331,10 +330,10 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     priors = known_priors(robot) if given.use_priors else {}
     usual = free_by_default(robot)
     keys = list(given.free) if given.free is not None else [*usual, *(key for key in priors if key not in usual)]
-    unknown = [key for key in given.fixed if key not in keys and (KEY not in keys or not key.startswith(KEY))]
+    unknown = [key for key in given.fixed if key not in keys]
     if unknown and given.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
-    keys = [key for key in keys if key not in given.fixed and not key.startswith(KEY)]
+    keys = [key for key in keys if key not in given.fixed and Key.parse(key).name != KEY]
     if not keys:
         got = ", ".join(given.free or ()) or "no key"
         raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
@@ -365,22 +364,29 @@ def _drive(records: Sequence[Record], robot: Robot) -> float:
 def _within_reach(p: Parameter, drive: float) -> Parameter:
     """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
     low = LEAST * p.value if p.low == 0.0 else p.low
-    if not p.name.startswith("friction.") or "coulomb" not in p.name or drive == 0.0:
+    if Key.parse(p.name).level != COULOMB or drive == 0.0:
         return replace(p, low=low)
     return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
 
 
-def free_by_default(robot: Robot) -> list[str]:
+def free_by_default(robot: Robot) -> tuple[str, ...]:
     """B and C of the axes; of a robot with friction elsewhere the levels that it has: one that is off has no slope."""
     if is_exact(robot):
-        return list(FRICTION)
-    return [key for key in friction_keys(robot) if "viscous" in key or parameter(robot, key) > 0.0]
+        return BOX
+    has = {key: Key.parse(key) for key in friction_keys(robot)}
+    return tuple(name for name, key in has.items() if key.level == VISCOUS or key.get(robot) > 0.0)
+
+
+def expand_keys(names: str | Sequence[str], robot: Robot) -> tuple[str, ...]:
+    """The keys that names stand for: "friction" for what is free by default, a list for its entries; others as is."""
+    each = (free_by_default(robot) if name == FRICTION else expand(name, robot) for name in names_of(names))
+    return tuple(dict.fromkeys(key for keys in each for key in keys))
 
 
 def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Priors of the robot file that are independent of any log: key -> (mean, std)."""
+    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry."""
     found = {}
-    for key, prior in robot.priors.items():
-        if prior.std is not None and not prior.source.startswith(IDENTIFIED):
-            found[key] = (float(parameter(robot, key)), prior.std)
+    for name, prior in robot.priors.items():
+        if prior.std is not None and prior.origin != IDENTIFIED:
+            found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
     return found

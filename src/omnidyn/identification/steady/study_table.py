@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from omnidyn.identification.estimate import unit
 from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
-from omnidyn.identification.steady.study_words import FORCES, label
+from omnidyn.identification.steady.study_words import FORCES
+from omnidyn.model.keys import Key
 
 WIDTH = 100
 
@@ -101,7 +101,8 @@ def level_rows(study: SteadyStudy) -> list[list[str]]:
             low, high = estimate.ci95[key]
             mark = " at bound" if key in estimate.at_bound else ""
             interval = f"[{low:.4g}, {high:.4g}]"
-            rows.append([group, label(key), f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, unit(key) + mark])
+            name = Key.parse(key)
+            rows.append([group, name.symbol, f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, name.unit + mark])
     return rows
 
 
