@@ -83,7 +83,8 @@ def test_the_robot_that_comes_back_has_the_friction_with_its_std_and_survives_it
     assert back.friction.axes.coulomb == (0.0, 0.0, 0.0)
     prior = back.priors["friction.direction.coulomb[0]"]
     assert prior.std == study.estimate.std["friction.direction.coulomb[0]"]
-    assert prior.source.startswith("identified: steady state, 24 runs, 24 steady points")
+    assert prior.origin == "identified"
+    assert prior.source.startswith("steady state, 24 runs, 24 steady points")
 
 
 def test_yaw_friction_that_was_not_measured_stays_and_is_named():
