@@ -205,19 +205,19 @@ def _document(done: list[Checked], robot: str) -> dict[str, Any]:
 
 def _brief(verdict: Verdict) -> str:
     """One log in a line: its findings by name."""
-    from omnidyn.findings.finding import FATAL, WARN, WORDS
+    from omnidyn.findings.finding import FATAL, LABELS, WARN
 
     parts = []
     for level in (FATAL, WARN):
         codes = [f"{each.code} {each.where}".rstrip() for each in verdict.findings if each.level == level]
         if codes:
-            parts.append(f"{painted(WORDS[level], level)} {', '.join(codes)}")
+            parts.append(f"{painted(LABELS[level], level)} {', '.join(codes)}")
     return f"{verdict.source}: {'; '.join(parts) or 'nothing to heed'}"
 
 
 def _summary(done: list[Checked], read: list[Checked]) -> str:
     """What was found over all logs: each kind once, in how many logs, with one example."""
-    from omnidyn.findings.finding import LEVELS, WORDS
+    from omnidyn.findings.finding import LABELS, LEVELS
 
     groups: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
     for each in read:
@@ -227,7 +227,7 @@ def _summary(done: list[Checked], read: list[Checked]) -> str:
     for (level, code), members in sorted(groups.items(), key=lambda kind: (LEVELS.index(kind[0][0]), -len(kind[1]))):
         logs = len({path for path, _ in members})
         path, example = members[0]
-        word = painted(f"{WORDS[level]:5s}", level)
+        word = painted(f"{LABELS[level]:5s}", level)
         lines.append(f"  {word}  {code}: in {logs} log{'s' * (logs > 1)}, such as {path}: {example.message}")
         if example.remedy:
             lines.append(f"         -> {example.remedy}")

@@ -15,7 +15,7 @@ from omnidyn.statistics import stretches
 
 FATAL, WARN, NOTE = "fatal", "warn", "note"
 LEVELS = (FATAL, WARN, NOTE)
-WORDS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
+LABELS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
 MAX_SPANS = 20  # spans of rows that a finding keeps; it counts all
 SHOWN_SPANS = 4
 LEAST_WIDTH, INDENT = 40, " " * 9  # of text
@@ -136,7 +136,7 @@ def merged(findings: Sequence[Finding], blocks: int) -> Finding:
 
 def _paragraphs(finding: Finding) -> Iterator[Words]:
     """What is the case, and what to do."""
-    head = f"  {WORDS[finding.level]:5s}  {finding.code}{' ' + finding.where if finding.where else ''}: "
+    head = f"  {LABELS[finding.level]:5s}  {finding.code}{' ' + finding.where if finding.where else ''}: "
     yield Words(head + finding.message + (f" [{_lines(finding)}]" if finding.rows else ""), rest=INDENT)
     if finding.remedy:
         yield Words("-> " + finding.remedy, INDENT, INDENT + "   ")

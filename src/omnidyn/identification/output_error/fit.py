@@ -100,9 +100,10 @@ def fit_output_error(
     """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
 
     runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
-    free: keys of the robot file, such as "body.mass_kg"; by default the friction that the robot has. fixed: taken out.
-    The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, or stays as
-    the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval, without "[0]" for all.
+    free: keys of the robot file, such as "body.mass_kg"; "friction", the default, is what the robot has of it, a list
+    stands for its entries. fixed: taken out. The EMF constant follows the torque constant, wheel by wheel, unless both
+    are free. Breakaway follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" among the free keys
+    asks for its interval.
     nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade", "tilt"
     (or "tilt.x", "tilt.y", "tilt.yaw"). By default latency and dead band, and the gain where the supply is only
     nominal, as far as the logs determine them; a warning says what else would fit the logs better. () for none.

@@ -10,8 +10,8 @@ from typing import Any
 from omnidyn.document import WIDTH, Document, Points, Table, interval_cell
 from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
-from omnidyn.identification.steady.study_words import FORCES, label
-from omnidyn.model.keys import unit
+from omnidyn.identification.steady.study_words import FORCES
+from omnidyn.model.keys import Key
 
 
 def table_text(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -88,7 +88,8 @@ def _level_table(study: SteadyStudy) -> Table:
     for group, estimate in study.estimates.items():
         for key, value in estimate.value.items():
             mark, interval = " at bound" if key in estimate.at_bound else "", interval_cell(estimate.ci95[key])
-            rows.append((group, label(key), f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, unit(key) + mark))
+            name = Key.parse(key)
+            rows.append((group, name.symbol, f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, name.unit + mark))
     return Table(("group", "level", "value", "std error", "95 % interval", "unit"), rows, name="levels")
 
 
