@@ -92,42 +92,34 @@ def _checked(
     from omnidyn.findings.check import check_blocks
     from omnidyn.logs.read_log import iter_logs
 
-    done, digest, kept = Checked(path), _Digest(), _Kept()
+    done, digest = Checked(path), _Digest()
     now(f"reading {path}")
 
     def said(count: int, total: int) -> None:
         now(f"reading {path}, {100 * count // max(total, 1)} %")
 
     try:
-        blocks = kept.first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=said)))
-        if kept.log is not None:
-            maps.show(path, kept.log.columns)
-            done.notes = kept.log.notes
-        done.verdict = check_log(kept.log, robot) if kept.only else check_blocks(blocks, robot)  # type: ignore[arg-type]
-        if picture and kept.log is not None:
+        log, only, blocks = _first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=said)))
+        if log is not None:
+            maps.show(path, log.columns)
+            done.notes = log.notes
+        done.verdict = check_log(log, robot) if log is not None and only else check_blocks(blocks, robot)
+        if picture and log is not None:
             from omnidyn.report.figures.raw_log import draw_raw_log
 
-            write_picture(draw_raw_log(kept.log, done.verdict), picture, force)
+            write_picture(draw_raw_log(log, done.verdict), picture, force)
     except OmnidynError as error:
         done.error = error
     done.digest, done.sha256 = digest.value, digest.sha256
     return done
 
 
-class _Kept:
-    """The first block of a log, kept for the picture, and whether it is the only one."""
+def _first(blocks: Iterator[Log]) -> tuple[Log | None, bool, Iterator[Log]]:
+    """The first block, which is kept for the picture, whether it is the only one, and all blocks."""
+    from itertools import chain, islice
 
-    def __init__(self) -> None:
-        self.log: Log | None = None
-        self.only = False
-
-    def first(self, blocks: Iterator[Log]) -> Iterator[Log]:
-        """The same blocks; two of them are read now."""
-        from itertools import chain
-
-        head = [block for _, block in zip(range(2), blocks, strict=False)]
-        self.log, self.only = (head[0] if head else None), len(head) == 1
-        return chain(head, blocks)
+    head = list(islice(blocks, 2))
+    return (head[0] if head else None), len(head) == 1, chain(head, blocks)
 
 
 class _Digest:
