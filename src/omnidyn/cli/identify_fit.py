@@ -14,7 +14,6 @@ from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
     from omnidyn.findings.finding import Verdict
-    from omnidyn.identification.motors.fit import MotorFit
     from omnidyn.identification.output_error.answer import OutputErrorEstimate
     from omnidyn.identification.output_error.problem.problem import Point
     from omnidyn.identification.output_error.solve.progress import Onlooker
@@ -62,7 +61,7 @@ class Out:
     json: bool
 
 
-class _Part:
+class Part:
     """Runs that are fitted and runs that are held out, with the group of each."""
 
     def __init__(self, loaded: Loaded, patterns: Sequence[str]):
@@ -98,7 +97,7 @@ def held_out(paths: Sequence[str], patterns: Sequence[str]) -> list[bool]:
 
 def fit_logs(loaded: Loaded, robot: Robot, ask: Ask, record: dict[str, Any], out: Out, now: Any) -> None:
     """Fit, validate, write, tell. An interrupt during the fit leaves the best so far, and ends with exit code 130."""
-    part = _Part(loaded, ask.hold_out)
+    part = Part(loaded, ask.hold_out)
     verdicts = _verdicts(loaded, robot, now)
     now("fitting: loading")
     fits, differences, cut = _fitted(part, robot, ask, now)
@@ -117,7 +116,7 @@ def fit_logs(loaded: Loaded, robot: Robot, ask: Ask, record: dict[str, Any], out
         raise typer.Exit(INTERRUPTED)
 
 
-def _validations(part: _Part, fits: Mapping[str, OutputErrorEstimate], now: Any) -> dict[str, Validation]:
+def _validations(part: Part, fits: Mapping[str, OutputErrorEstimate], now: Any) -> dict[str, Validation]:
     from omnidyn.identification.validation import validate
 
     found = {}
@@ -181,7 +180,7 @@ class _Watch:
 
 
 def _fitted(
-    part: _Part, robot: Robot, ask: Ask, now: Any
+    part: Part, robot: Robot, ask: Ask, now: Any
 ) -> tuple[dict[str, OutputErrorEstimate], Sequence[Difference], bool]:
     """(fits by group, differences, whether it was interrupted)."""
     from omnidyn.identification.output_error.group_fit import expand_keys
@@ -210,7 +209,7 @@ def _fitted(
 
 
 def _fitted_groups(
-    part: _Part, robot: Robot, per_free: Sequence[str], watch: _Watch, options: Mapping[str, Any],
+    part: Part, robot: Robot, per_free: Sequence[str], watch: _Watch, options: Mapping[str, Any],
     more: Mapping[str, Any],
 ) -> tuple[dict[str, OutputErrorEstimate], Sequence[Difference], bool]:  # fmt: skip
     """The same of groups: numbers and differences, or both at the best point so far."""
@@ -240,7 +239,7 @@ def _fitted_groups(
     return dict(study.estimates), study.differences, cut
 
 
-def _refuse_groups(part: _Part, ask: Ask) -> None:
+def _refuse_groups(part: Part, ask: Ask) -> None:
     """Options of groups where there are none."""
     from omnidyn.errors import InputError
 
@@ -323,56 +322,3 @@ def _text(
         lines.append("next:")
         lines += [text for words in next_ for text in textwrap.wrap(f"- {words}", 100, subsequent_indent="  ")]
     return "\n".join(line.encode("ascii", "backslashreplace").decode() for line in lines).rstrip("\n")
-
-
-def fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out: Out, now: Any) -> None:
-    """One output-error fit per motor, with and without a dead band, and free runs on what was held out."""
-    import numpy as np
-
-    from omnidyn.identification.motors.choice import is_late
-    from omnidyn.identification.motors.fit import fit_motor
-    from omnidyn.identification.motors.run import fit_rmse
-
-    part = _Part(loaded, ask.hold_out)
-    counts = [run.wheels or 1 for run in part.runs]
-    asked = nuisances(ask.nuisances)
-    other = [name for name in asked if name.partition(".")[0] != "latency"] if asked != "auto" else []
-    if other:
-        from omnidyn.errors import InputError
-
-        raise InputError("of the motors only latency can be fitted", got=other[0], where="--nuisance")
-    if out.out:
-        say("omnidyn: the numbers of the motors do not go into a robot file; -o is not used")
-    found: list[tuple[MotorFit, MotorFit, float, float]] = []
-    for motor in range(min(counts)):
-        now(f"fitting motor {motor + 1} of {min(counts)}")
-        how: dict[str, Any] = {"kind": kind, "between": ask.between or "auto", "loss": ask.loss or "gaussian"}
-        how["latency"] = is_late(part.runs, motor, **how) if asked == "auto" else bool(asked)
-        band, plain = (fit_motor(part.runs, motor, dead_band=with_band, **how) for with_band in (True, False))
-        held = [run for run, _ in part.held]
-        errors = [fit_rmse(fit, held) if held else np.nan for fit in (band, plain)]
-        found.append((band, plain, float(errors[0]), float(errors[1])))
-    _tell_motors(found, record, out)
-
-
-def _tell_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], record: dict[str, Any], out: Out) -> None:
-    if out.report:
-        from omnidyn.files import write_atomic
-        from omnidyn.report.fit_page import render_motors
-
-        write_atomic(out.report, render_motors(found, record), out.force)
-    if out.json:
-        motors = [
-            {**band.to_dict(), "held_out_rmse_rad_s": held, "without_dead_band":
-             {**plain.to_dict(), "held_out_rmse_rad_s": held_plain}}
-            for band, plain, held, held_plain in found
-        ]  # fmt: skip
-        show_json({"method": "output-error", "motors": motors, "report": out.report or None, "provenance": record})
-    else:
-        from omnidyn.identification.advice import MOTOR_HEAD, motor_rows, motor_words
-        from omnidyn.identification.steady.study_table import table_text
-
-        lines = [f"- {each}" for each in motor_words(found)]
-        show("\n".join([*table_text(MOTOR_HEAD, motor_rows(found)), "", *lines]))
-    if out.report:
-        say(f"omnidyn: wrote {out.report}")

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from omnidyn.cli.identify_fit import Out
     from omnidyn.cli.identify_logs import Loaded
     from omnidyn.identification.estimate import Estimate
-    from omnidyn.identification.motors.drive_line import DriveStudy
     from omnidyn.identification.steady.study import SteadyStudy
     from omnidyn.model.robot import Robot
 
@@ -59,12 +58,6 @@ def lines(loaded: Loaded, robot: Robot, how: How) -> dict[str, Estimate]:
     )
 
 
-def drives(loaded: Loaded, robot: Robot | None, kind: str, how: How) -> DriveStudy:
-    from omnidyn.identification.motors.drive_line import fit_drive_lines
-
-    return fit_drive_lines(loaded.runs, kind=kind, speed=how.speed, robot=robot, share=how.shares())
-
-
 def tell_study(study: SteadyStudy, record: dict[str, Any], to: Out) -> None:
     """Write and show friction and its shape: robot files, report, JSON or the summary."""
     from omnidyn.cli.identify_logs import outputs
@@ -87,7 +80,7 @@ def tell_study(study: SteadyStudy, record: dict[str, Any], to: Out) -> None:
         show_json({**study_to_dict(study), "output": files or None, "report": to.report or None, "provenance": record})
     else:
         show(study_summary(study).rstrip("\n"))
-    _say_written([*files.values(), to.report])
+    say_written([*files.values(), to.report])
 
 
 def tell_lines(lines: dict[str, Estimate], record: dict[str, Any], to: Out) -> None:
@@ -108,30 +101,10 @@ def tell_lines(lines: dict[str, Estimate], record: dict[str, Any], to: Out) -> N
         show_json({"shape": LINE, "groups": groups, "output": files or None, "provenance": record})
     else:
         show("\n".join(estimate.summary() for estimate in lines.values()).rstrip("\n"))
-    _say_written([*files.values()])
+    say_written([*files.values()])
 
 
-def tell_drives(drives: DriveStudy, record: dict[str, Any], to: Out) -> None:
-    """Write and show the lines of the motors: report, JSON or the summary."""
-    from omnidyn.files import write_atomic
-    from omnidyn.identification.motors.drive_table import drive_summary, drive_to_dict
-
-    if to.out:
-        say("omnidyn: the lines of the motors do not go into a robot file; -o is not used")
-    if to.report:
-        from omnidyn.report.steady_page import render_drives
-
-        write_atomic(to.report, render_drives(drives, record), to.force)
-    if to.json:
-        for warning in drives.warnings:
-            say(f"omnidyn: warning: {warning}")
-        show_json({**drive_to_dict(drives), "report": to.report or None, "provenance": record})
-    else:
-        show(drive_summary(drives).rstrip("\n"))
-    _say_written([to.report])
-
-
-def _say_written(paths: list[str]) -> None:
+def say_written(paths: list[str]) -> None:
     for path in paths:
         if path:
             say(f"omnidyn: wrote {path}")
@@ -153,7 +126,7 @@ def from_table(table: str, robot: str, rest: str, to: Out) -> None:
         show_json({**estimate.to_dict(), "output": to.out or None, "provenance": record})
     else:
         show(estimate.summary().rstrip("\n"))
-    _say_written([to.out])
+    say_written([to.out])
 
 
 def _estimated(table: str, robot: str, rest: str) -> tuple[Estimate, dict[str, Any]]:

@@ -104,7 +104,9 @@ def run(asked: Asked) -> None:
         now("identifying")
         record = _record(asked.robot, loaded)
         if asked.what == MOTORS:
-            _run_motors(method, loaded, robot, asked, record, now)
+            from omnidyn.cli.identify_motors import run_motors
+
+            run_motors(method, loaded, robot, asked, record, now)
             return
         assert robot is not None
         if (method or _default(loaded, robot)) == OUTPUT_ERROR:
@@ -187,22 +189,6 @@ def _default(loaded: Loaded, robot: Robot) -> str:
     if why:
         say(f"omnidyn: {STEADY_STATE}, not {OUTPUT_ERROR}: {why}")
     return STEADY_STATE if why else OUTPUT_ERROR
-
-
-def _run_motors(
-    method: str, loaded: Loaded, robot: Robot | None, asked: Asked, record: dict[str, Any], now: Any
-) -> None:
-    if method == OUTPUT_ERROR:
-        from omnidyn.cli.identify_fit import fit_motors
-        from omnidyn.errors import InputError
-
-        if asked.speed != "wheel":
-            raise InputError(f"{OUTPUT_ERROR} has no such option", got="--speed", expected=f"with {STEADY_STATE}")
-        fit_motors(loaded, asked.input_, asked.fit(), record, asked.places(), now)
-        return
-    drives = steady.drives(loaded, robot, asked.input_, steady.How(asked.speed, asked.force_from, asked.window))
-    now("writing")
-    steady.tell_drives(drives, record, asked.places())
 
 
 def _refuse_places(out: str, report: str, force: bool) -> None:
