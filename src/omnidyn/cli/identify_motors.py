@@ -11,14 +11,13 @@ from omnidyn.cli.identify_steady import How, say_written
 from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
-    from omnidyn.cli.identify_ways import Asked
     from omnidyn.identification.motors.drive_line import DriveStudy
     from omnidyn.identification.motors.fit import MotorFit
     from omnidyn.model.robot import Robot
 
 
 def run_motors(
-    method: str, loaded: Loaded, robot: Robot | None, asked: Asked, record: dict[str, Any], now: Any
+    method: str, loaded: Loaded, robot: Robot | None, asked: Any, record: dict[str, Any], now: Any
 ) -> None:
     if method == "output-error":
         from omnidyn.errors import InputError
