@@ -8,8 +8,7 @@ import numpy as np
 
 from benchmarks import real_logs as logs
 from benchmarks.table import Table
-from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.group_fit import identify_groups
+from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from omnidyn.cli.identify_fit import Ask, Out, Part, nuisances
 from omnidyn.cli.identify_logs import Loaded
-from omnidyn.cli.identify_steady import How, say_written
+from omnidyn.cli.identify_show import Out, say_warnings, say_written
 from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.identification.question import OUTPUT_ERROR, Question
 
 if TYPE_CHECKING:
     from omnidyn.identification.motors.drive_line import DriveStudy
@@ -17,48 +17,45 @@ if TYPE_CHECKING:
 
 
 def run_motors(
-    method: str, loaded: Loaded, robot: Robot | None, asked: Any, record: dict[str, Any], now: Any
+    question: Question, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, now: Any
 ) -> None:
-    if method == "output-error":
-        from omnidyn.errors import InputError
-
-        if asked.speed != "wheel":
-            raise InputError("output-error has no such option", got="--speed", expected="with steady-state")
-        _fit_motors(loaded, asked.input_, asked.fit(), record, asked.places(), now)
+    """Fit, write, tell."""
+    if question.method == OUTPUT_ERROR:
+        _fit_motors(loaded, question, record, to, now)
         return
-    drives = _drives(loaded, robot, asked.input_, How(asked.speed, asked.force_from, asked.window))
+    drives = _drives(loaded, robot, question)
     now("writing")
-    _tell_drives(drives, record, asked.places())
+    _tell_drives(drives, record, to)
 
 
-def _fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out: Out, now: Any) -> None:
+def _fit_motors(loaded: Loaded, question: Question, record: dict[str, Any], to: Out, now: Any) -> None:
     """One output-error fit per motor, with and without a dead band, and free runs on what was held out."""
     import numpy as np
 
+    from omnidyn.errors import InputError
+    from omnidyn.identification.grouping import held_out
     from omnidyn.identification.motors.choice import is_late
     from omnidyn.identification.motors.fit import fit_motor
     from omnidyn.identification.motors.run import fit_rmse
 
-    part = Part(loaded, ask.hold_out)
-    counts = [run.wheels or 1 for run in part.runs]
-    asked = nuisances(ask.nuisances)
-    other = [name for name in asked if name.partition(".")[0] != "latency"] if asked != "auto" else []
+    out = held_out([run.source for run in loaded.runs], question.hold_out)
+    runs = [run for run, away in zip(loaded.runs, out, strict=True) if not away]
+    held = [run for run, away in zip(loaded.runs, out, strict=True) if away]
+    counts = [run.wheels or 1 for run in runs]
+    other = [name for name in question.nuisances or () if name.partition(".")[0] != "latency"]
     if other:
-        from omnidyn.errors import InputError
-
-        raise InputError("of the motors only latency can be fitted", got=other[0], where="--nuisance")
-    if out.out:
+        raise InputError("of the motors only latency can be fitted", got=other[0], where="nuisances")
+    if to.out:
         say("omnidyn: the numbers of the motors do not go into a robot file; -o is not used")
     found: list[tuple[MotorFit, MotorFit, float, float]] = []
     for motor in range(min(counts)):
         now(f"fitting motor {motor + 1} of {min(counts)}")
-        how: dict[str, Any] = {"kind": kind, "between": ask.between or "auto", "loss": ask.loss or "gaussian"}
-        how["latency"] = is_late(part.runs, motor, **how) if asked == "auto" else bool(asked)
-        band, plain = (fit_motor(part.runs, motor, dead_band=with_band, **how) for with_band in (True, False))
-        held = [run for run, _ in part.held]
+        how: dict[str, Any] = {"kind": question.input, "between": question.between, "loss": question.loss}
+        how["latency"] = is_late(runs, motor, **how) if question.nuisances is None else bool(question.nuisances)
+        band, plain = (fit_motor(runs, motor, dead_band=with_band, **how) for with_band in (True, False))
         errors = [fit_rmse(fit, held) if held else np.nan for fit in (band, plain)]
         found.append((band, plain, float(errors[0]), float(errors[1])))
-    _tell_motors(found, record, out)
+    _tell_motors(found, record, to)
 
 
 def _tell_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], record: dict[str, Any], out: Out) -> None:
@@ -84,10 +81,10 @@ def _tell_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], recor
         say(f"omnidyn: wrote {out.report}")
 
 
-def _drives(loaded: Loaded, robot: Robot | None, kind: str, how: How) -> DriveStudy:
+def _drives(loaded: Loaded, robot: Robot | None, question: Question) -> DriveStudy:
     from omnidyn.identification.motors.drive_line import fit_drive_lines
 
-    return fit_drive_lines(loaded.runs, kind=kind, speed=how.speed, robot=robot, share=how.shares())
+    return fit_drive_lines(loaded.runs, kind=question.input, speed=question.speed, robot=robot, share=question.window)
 
 
 def _tell_drives(drives: DriveStudy, record: dict[str, Any], to: Out) -> None:
@@ -102,8 +99,7 @@ def _tell_drives(drives: DriveStudy, record: dict[str, Any], to: Out) -> None:
 
         write_atomic(to.report, render_drives(drives, record), to.force)
     if to.json:
-        for warning in drives.warnings:
-            say(f"omnidyn: warning: {warning}")
+        say_warnings(drives.warnings)
         show_json({**drive_to_dict(drives), "report": to.report or None, "provenance": record})
     else:
         show(drive_summary(drives).rstrip("\n"))

@@ -5,8 +5,8 @@ import pytest
 
 from benchmarks.identify import excitation
 from omnidyn.identification.advice import advice
-from omnidyn.identification.output_error.fit import fit_output_error, free_by_default
-from omnidyn.identification.output_error.group_fit import expand_keys
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.prepare import expand_keys, free_by_default
 from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.identification.validation import validate
 from omnidyn.model.first_guess import first_guess

@@ -5,8 +5,8 @@ import pytest
 
 from benchmarks.identify import excitation, noisy
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.group_fit import expand_keys, identify_groups
+from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
+from omnidyn.identification.output_error.prepare import expand_keys
 from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.sensitivity.directions import with_parameter

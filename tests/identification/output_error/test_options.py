@@ -8,7 +8,7 @@ import pytest
 from benchmarks.identify import excitation
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error import fit as whole
-from omnidyn.identification.output_error.group_fit import identify_groups
+from omnidyn.identification.output_error.fit import identify_groups
 from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.simulation.simulate import simulate
 from tests.identification.output_error.test_axebot import noisy

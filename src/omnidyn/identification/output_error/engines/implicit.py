@@ -7,6 +7,7 @@ run is looked at between its rows (sensitivity/sample.py).
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,25 @@ Found = tuple[FloatArray, FloatArray, IntArray]
 DRIVER = {GAIN: 1.0, DEAD: 0.0, FADE: 0.0}  # in the order of kernel/march.py, with what leaves the voltages as they are
 
 
+class LastPoints:
+    """What was found at the last KEPT points: a fit ends where it was, or at its last trial, and is then asked again
+    with other weights."""
+
+    KEPT = 2
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[bytes, ...], list[Found]] = {}
+
+    def at(self, point: Point, find: Callable[[Point], list[Found]]) -> list[Found]:
+        """What `find` says at a point, found anew unless it is one of the last."""
+        key = (point.values.tobytes(), *(state.tobytes() for state in point.states))
+        found = self._found.pop(key, None) or find(point)
+        while len(self._found) >= self.KEPT:
+            del self._found[next(iter(self._found))]
+        self._found[key] = found
+        return found
+
+
 class TangentEngine:
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
@@ -49,12 +69,12 @@ class TangentEngine:
                 remedy="leave it out of the nuisances",
             )  # fmt: skip
         refuse_exact_only(problem.columns, problem.robot.name)
-        self._known: dict[tuple[bytes, ...], list[Found]] = {}
+        self.last = LastPoints()
 
     def on(self, problem: Problem) -> TangentEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
-        engine.problem, engine._columns, engine._known = problem, problem.columns, {}
+        engine.problem, engine._columns, engine.last = problem, problem.columns, LastPoints()
         return engine
 
     def robot_at(self, values: FloatArray) -> Robot:
@@ -79,16 +99,8 @@ class TangentEngine:
         return found
 
     def residuals(self, point: Point) -> list[Found]:
-        """(residuals, slopes, at) of every piece, see `_piece`; those of the last two points are kept.
-
-        A fit ends where it was, or at its last trial, and is then asked again with other weights.
-        """
-        asked = (point.values.tobytes(), *(state.tobytes() for state in point.states))
-        found = self._known.pop(asked, None) or self._simulated(point)
-        while len(self._known) > 1:
-            del self._known[next(iter(self._known))]
-        self._known[asked] = found
-        return found
+        """(residuals, slopes, at) of every piece, see `_piece`; those of `last` are not simulated again."""
+        return self.last.at(point, self._simulated)
 
     def _simulated(self, point: Point) -> list[Found]:
         robot, values = self.robot_at(point.values), point.values

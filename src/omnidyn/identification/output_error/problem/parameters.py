@@ -18,6 +18,7 @@ FloatArray = NDArray[np.float64]
 FRICTION = tuple(f"friction.axes.{name}[{axis}]" for name in ("viscous", "coulomb") for axis in range(3))
 TORQUE, EMF = "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad"
 FRICTION_LIMIT = 1e6  # what a robot file takes
+AT = "@"  # KEY@GROUP is the number that a group has for itself
 SPAN = 1e4  # a number that must be positive stays within so many times its start, either way
 
 LARGEST = 700.0  # e^709 is the last float
