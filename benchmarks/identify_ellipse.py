@@ -13,11 +13,11 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, NOISE, RATE, SHARE, Draws, excitation, noisy
+from benchmarks.identify_log import COUNTING, SHARE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.problem import Point
@@ -25,11 +25,12 @@ from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.identification.question import Question
 from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, RATE, excitation, noisy
 
 LOGS = max(int(300 * SHARE), 10)
 LATE, FINE_ROWS = 0.013, 10  # [s]; rows of the truth in a row of the log
@@ -64,7 +65,7 @@ def begun(seed: int) -> Robot:
     """The robot with all free numbers wrong by up to a factor of WRONG either way."""
     robot, rng = ellipse(), np.random.default_rng(9000 + seed)
     for key, factor in zip(KEYS, np.exp(rng.uniform(-np.log(WRONG), np.log(WRONG), len(KEYS))), strict=True):
-        robot = with_parameter(robot, key, float(parameter(robot, key)) * float(factor))
+        robot = Key.parse(key).set(robot, float(Key.parse(key).get(robot)) * float(factor))
     return robot
 
 
@@ -73,7 +74,7 @@ def fitted(run: Run, start: Robot) -> OutputErrorEstimate:
 
 
 def truth() -> dict[str, float]:
-    return {key: float(parameter(ellipse(), key)) for key in KEYS} | {LATENCY: LATE}
+    return {key: float(Key.parse(key).get(ellipse())) for key in KEYS} | {LATENCY: LATE}
 
 
 def bound() -> np.ndarray:
@@ -90,7 +91,7 @@ def bound() -> np.ndarray:
 def _solver(run: Run, tol: float) -> Solver:
     given = Question(free=KEYS, nuisances=("latency",), start="rest")
     problem = make_problem([record(run, ellipse())], ellipse(), given)
-    return Solver(problem, TangentEngine(problem, tol))
+    return Solver(problem, ImplicitEngine(problem, tol))
 
 
 def measure() -> Table:

@@ -11,6 +11,7 @@ from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.outputs import strict
 
 
 @pytest.fixture(scope="module")
@@ -49,13 +50,6 @@ def call(logs, capsys):
     return run_it
 
 
-def strict(text):
-    def refuse(name):
-        raise AssertionError(f"{name} in JSON")
-
-    return json.loads(text, parse_constant=refuse)
-
-
 def test_a_clean_log_is_fit_for_use(call):
     code, out, err = call("clean.csv", "--robot", "axebot")
     assert code == 0
@@ -83,6 +77,15 @@ def test_a_log_that_cannot_be_read_does_not_stop_the_others(call):
     assert "gap.csv" in out
     assert "3 logs, 2 read" in out
     assert "missing.csv: no such file" in err
+
+
+def test_a_column_name_of_a_megabyte_is_refused_in_a_sentence(call, logs):
+    """It took minutes, and nothing was said."""
+    (logs / "long.csv").write_text(f"t,{'w' * 2**20}\n0,1\n1,2\n")
+    code, _, talk = call("check", "long.csv")
+    assert code == 3
+    assert "long.csv:1: the name of column 2 is too long; got 1048576 characters, wwww" in talk
+    assert len(talk) < 1000
 
 
 def test_a_folder_is_its_logs_in_brief_with_a_summary(call, run):

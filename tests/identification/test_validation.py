@@ -5,18 +5,19 @@ import pytest
 from scipy.integrate import quad
 
 import omnidyn
-from benchmarks.identify import NOISE, excitation, noisy
 from omnidyn.errors import InputError
-from omnidyn.identification.as_fitted import as_fitted, at_motors, mean_before
+from omnidyn.identification.as_fitted import as_fitted, mean_before
 from omnidyn.identification.identify import choose_method
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU, fit_output_error
 from omnidyn.identification.question import Question
 from omnidyn.identification.validation import Score, coloured, validate
+from omnidyn.model.actuation import Driver, at_motors
+from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, excitation, noisy
 
 AXEBOT = load_robot("axebot")
 LATE, GAIN, DEAD = 0.013, 0.95, 0.2
@@ -51,7 +52,7 @@ def test_a_held_out_log_is_compared_as_it_was_fitted(fit):
 
 def test_what_lasts_is_not_called_small(fit):
     """A motor twice as weak as the robot file says: the fit takes its errors for noise, the words do not."""
-    weak = with_parameter(AXEBOT, "motor.resistance_ohm", 2.0 * AXEBOT.motor.resistance)
+    weak = Key.parse("motor.resistance_ohm").set(AXEBOT, 2.0 * AXEBOT.motor.resistance)
     log = noisy(simulate(weak, excitation(20.0), 0.01), 1)
     wrong = fit_output_error(log, AXEBOT, nuisances=())
     (words,) = validate(wrong, [log], [log]).statements()
@@ -61,7 +62,7 @@ def test_what_lasts_is_not_called_small(fit):
 
 
 def test_another_floor_is_seen(fit):
-    rough = with_parameter(AXEBOT, "friction.axes.coulomb[0]", 3.0)
+    rough = Key.parse("friction.axes.coulomb[0]").set(AXEBOT, 3.0)
     plain = fit_output_error(noisy(simulate(AXEBOT, excitation(20.0), 0.01), 1), AXEBOT, nuisances=())
     other = noisy(simulate(rough, excitation(20.0, seed=5), 0.01), 2)
     found = validate(plain, [other], [other])
@@ -99,9 +100,8 @@ def test_mean_of_a_held_voltage():
 
 
 def test_voltage_at_the_motors():
-    left = at_motors(
-        np.array([[3.0], [-3.0], [0.1]]), np.array([0.0, 1.0, 2.0]), {"gain": 0.5, "dead_band": 1.0, "fade": 0.2}
-    )
+    driver = Driver(**{"gain": 0.5, "dead_band": 1.0, "fade": 0.2})
+    left, _ = at_motors(np.array([[3.0], [-3.0], [0.1]]), np.array([0.0, 1.0, 2.0]) / 2.0, driver)
     assert left[:, 0] == pytest.approx([1.0, -0.9, 0.0])
 
 

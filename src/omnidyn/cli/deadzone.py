@@ -89,7 +89,7 @@ def _line(robot: Robot, row: dict[str, Any]) -> str:
 
 def _limit_note(robot: Robot, voltage: list[float]) -> str:
     """A robot whose motors cannot reach that voltage does not move at all."""
-    from omnidyn.model.motor import clip_voltage
+    from omnidyn.model.actuation import clip_voltage
     from omnidyn.simulation.simulate import as_floats
 
     volts = as_floats("voltage", voltage)

@@ -351,8 +351,8 @@ def _head(robot: Robot) -> str:
 
     lines = [
         "Written by omnidyn init. SI units; azimuths count counter-clockwise from forward (x forward, y left).",
-        'Where a number comes from stands beside it: "given" by you, a "guess", "like" another robot. std is the',
-        'standard deviation. Put in what you know, such as { value = 1.7, std = 0.1, source = "datasheet" }.',
+        'The origin of a number stands beside it: "given" by you, a "guess", "imported" from another robot. std is the',
+        'standard deviation. Put in what you know, such as { value = 1.7, std = 0.1, origin = "datasheet" }.',
     ]
     guesses = reasons(robot)
     if guesses:

@@ -21,10 +21,11 @@ from omnidyn.comparison.start import start_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.logs.segments import segments
-from omnidyn.model.drive import COAST, DUTY, SPEED
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.simulate import TOLERANCE, simulate
+from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 
@@ -104,8 +105,7 @@ def choose_input(robot: Robot, run: Run, apply: str | None = None) -> str:
         )  # fmt: skip
     whole = [name for name in there if not _blank_components(run, name)]
     # A duty of 0 that coasts is an open circuit, which its voltage of 0 does not tell.
-    coasts = robot.drive.kind == DUTY and robot.drive.off == COAST and DUTY in whole
-    chosen = apply or (DUTY if coasts else [*whole, *there][0])
+    chosen = apply or (DUTY if robot.drive.coasts and DUTY in whole else [*whole, *there][0])
     blank = _blank_components(run, chosen)
     if blank:
         raise InputError(
@@ -184,8 +184,7 @@ def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatAr
 def _usable_pieces(rows: slice, usable: NDArray[np.bool_]) -> Iterator[slice]:
     """The longest runs of rows whose inputs are known; the row after the last one belongs to it as its end."""
     inside = usable[rows.start : max(rows.start, rows.stop - 1)]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
-    for first, end in edges.reshape(-1, 2) + rows.start:
+    for first, end in stretches(inside) + rows.start:
         yield slice(int(first), int(end) + 1)
 
 

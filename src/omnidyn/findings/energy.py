@@ -14,9 +14,9 @@ from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import white_noise
 from omnidyn.model.dynamics import mass_matrix
-from omnidyn.model.first_guess import GUESS
+from omnidyn.model.keys import EMF
 from omnidyn.model.motor import back_emf, settled_current, wheel_torque
-from omnidyn.model.robot import Robot
+from omnidyn.model.robot import GUESS, Robot
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 
 FloatArray = NDArray[np.float64]
@@ -25,7 +25,7 @@ MARGIN = 0.08  # of the power that turns with the back-EMF: K, R and the gear ar
 WINDOW = 0.4  # [s]
 MOVING = 0.2  # of the back-EMF that 95 % of the rows stay below: a robot at rest says nothing
 LEAST_SHARE = 0.02  # of the rows
-OF_BACK_EMF = ("motor.emf_constant_Vs_rad", "motor.gear_ratio", "wheels.wheel_radius_m")
+OF_BACK_EMF = (EMF, "motor.gear_ratio", "wheels.wheel_radius_m")
 
 
 def check_energy(work: Work) -> tuple[list[Finding], Work]:
@@ -39,7 +39,7 @@ def check_energy(work: Work) -> tuple[list[Finding], Work]:
     if not bad.any() or bad.mean() < (0.0 if points else LEAST_SHARE):
         return [], work
     excess = _excess(robot, voltage[bad], speed[bad])
-    guessed = [key for key in OF_BACK_EMF if (prior := robot.priors.get(key)) and prior.source == GUESS]
+    guessed = [key for key in OF_BACK_EMF if (prior := robot.priors.get(key)) and prior.origin == GUESS]
     return [Finding(
         "energy", WARN if guessed else FATAL, "",
         f"the motors would take up to {worst:.3g} W out of the robot while it does not slow down: the back-EMF is "

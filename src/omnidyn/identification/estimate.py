@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.model.robot import Prior, Robot
+from omnidyn.model.keys import unit
+from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
 
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
@@ -33,7 +34,7 @@ class Correlation:
 class Estimate:
     """What data say about a robot. Parameters are named by their key in the robot file: "friction.axes.viscous[0]".
 
-    robot: with the fitted numbers; its priors hold std and source, so that its file tells where they come from.
+    robot: with the fitted numbers; its priors hold std, source and origin, so that its file tells where they come from.
     value, std, ci95: name -> estimate, standard error, 95 % interval (low, high), in the unit of the key.
     correlation: between the estimates. degrees_of_freedom: name -> rows minus parameters behind that number.
     at_bound: names of what a bound holds (a friction that came out negative). std is then that of the free fit.
@@ -99,30 +100,11 @@ class Estimate:
         }
 
 
-def unit(name: str) -> str:
-    """The unit of a parameter by its key: friction depends on where it acts; other keys end in their unit, or it is 1.
-
-    A list as a whole, such as friction.axes.viscous, has the unit of its first item; a pure number has "".
-    """
-    yaw = (name.startswith("friction.axes.") and name.endswith("[2]")) or ".yaw_" in name
-    if name.startswith("friction."):
-        return ("N m s" if yaw else "N s/m") if "viscous" in name else "N m" if yaw else "N"
-    key = name.partition("[")[0].rpartition(".")[2]
-    endings = [ending for ending in _ENDINGS if key.endswith(ending)]
-    return _ENDINGS[max(endings, key=len)] if endings else ""
-
-
-_ENDINGS = {
-    "_kg": "kg", "_kg_m2": "kg m^2", "_m": "m", "_deg": "deg", "_ohm": "ohm", "_H": "H", "_Nm_A": "N m/A",
-    "_Vs_rad": "V s/rad", "_V": "V", "_A": "A", "_V_s_rad": "V s/rad", "_V_rad": "V/rad", "_Hz": "Hz",
-}  # fmt: skip
-
-
 def identified(std: float | None, source: str) -> Prior:
-    """The prior of an identified number: its standard error, where it is one, and "identified: SOURCE"."""
-    text = "".join(c if c.isprintable() else " " for c in f"identified: {source}")[:SOURCE_LENGTH]
+    """The prior of an identified number: its standard error, where it is one, and from what it was identified."""
+    text = "".join(c if c.isprintable() else " " for c in source)[:SOURCE_LENGTH]
     known = std is not None and 0.0 < std <= 1e9
-    return Prior(std=float(std) if known else None, source=text)  # type: ignore[arg-type]
+    return Prior(std=float(std) if known else None, source=text, origin=IDENTIFIED)  # type: ignore[arg-type]
 
 
 def finite_or_none(value: float) -> float | None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from omnidyn.findings.signal.log_under_check import Work
 from omnidyn.findings.signal.robust import smooth
+from omnidyn.model.actuation import asked_voltage
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.motor import back_emf, no_load_speed
 from omnidyn.model.robot import Robot
@@ -90,17 +91,8 @@ def wheels_twist(work: Work, speed: FloatArray, width: int = 1) -> FloatArray | 
 
 def volts(work: Work) -> FloatArray | None:
     """Voltage of the motors: as logged, else duty times the supply (logged, or of the robot file)."""
-    voltage, duty = work.get("voltage"), work.get("duty")
-    if voltage is not None:
-        return voltage
-    if duty is None:
-        return None
-    supply = work.get("supply")
-    if supply is not None:
-        return duty * supply[:, None]
-    if work.geometry is not None and work.geometry.drive.supply is not None:
-        return duty * work.geometry.drive.supply
-    return None
+    nominal = work.geometry.drive.supply if work.geometry is not None else None
+    return asked_voltage(work.get("voltage"), work.get("duty"), work.get("supply"), nominal)
 
 
 def ohmic(work: Work, current: FloatArray) -> FloatArray | None:

@@ -18,10 +18,16 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.drive_windows import WHEEL, DriveWindows, drive_windows
-from omnidyn.identification.steady.line import quantile
-from omnidyn.logs.average import autocorrelation_time
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.statistics import (
+    autocorrelation_time,
+    central_interval,
+    drawn_times,
+    errors_in_variables,
+    huber_weight,
+    t_quantile,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -117,12 +123,12 @@ def fit_drive_line(windows: DriveWindows, motor: int | None = None, *, draws: in
         value[name] = float(fit.parameters[own]) if own is not None else float("nan")
         spread = drawn[:, own] if own is not None else np.array([np.nan])
         std[name] = _robust_std(spread)
-        ci95[name], ci90[name] = _interval(spread, LEVEL), _interval(spread, 0.9)
+        ci95[name], ci90[name] = central_interval(spread, LEVEL), central_interval(spread, 0.9)
     gains = 1.0 / drawn[:, 0]
     residual = put_in - design[:, used] @ fit.parameters
     return DriveLine(
         motor="all" if motor is None else str(motor + 1), unit=windows.unit, value=value, std=std, ci95=ci95, ci90=ci90,
-        gain=1.0 / value["slope"], gain_std=_robust_std(gains), gain95=_interval(gains, LEVEL),
+        gain=1.0 / value["slope"], gain_std=_robust_std(gains), gain95=central_interval(gains, LEVEL),
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
         rmse=float(np.sqrt(np.mean(residual**2))), one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
         windows=len(blocks),
@@ -157,7 +163,7 @@ def _fit(design: FloatArray, put_in: FloatArray, speed_std: FloatArray) -> _Fit:
         error = (parameters[0] * speed_std) ** 2
         extra = _extra_variance(residual, error, weight, design.shape[1])
         size = np.abs(residual) / np.sqrt(extra + error + 1e-300)
-        weight = np.minimum(1.0, HUBER / np.maximum(size, 1e-300))
+        weight = huber_weight(size, HUBER)
         new = _york(design[None], put_in[None], speed_std[None], extra, weight[None])[0]
         if np.abs(new - parameters).max() <= SETTLED * np.abs(new).max():
             break
@@ -186,28 +192,18 @@ def _york(
 ) -> FloatArray:
     """Least sum of w r^2 / (s^2 + k^2 speed_std^2), for many draws at once. design: (draws, n, p). Returns (draws, p).
 
-    The gradient gives the normal equations with adjusted speeds x + k speed_std^2 W r, iterated, as in steady/line.py.
+    A ridge keeps draws apart that determine no line.
     """
     scale = np.sqrt(np.mean(design**2, axis=1)) + 1e-300
-    variance = speed_std**2
-    parameters = np.zeros(design.shape[::2])
-    adjusted = design
-    inner = weight / (extra + 1e-300) if extra > 0.0 else weight
-    for _ in range(ITERATIONS):
-        normal = np.einsum("bn,bnp,bnq->bpq", inner, adjusted, design) / (scale[:, :, None] * scale[:, None, :])
-        right = np.einsum("bn,bnp,bn->bp", inner, adjusted, put_in) / scale
-        normal += 1e-12 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(normal.shape[1])
-        new = np.linalg.solve(normal, right[:, :, None])[:, :, 0] / scale
-        settled = np.abs(new - parameters).max() <= SETTLED * np.abs(new).max()
-        parameters = new
-        if settled or not variance.any():
-            break
-        slope = parameters[:, :1]
-        inner = weight / (extra + slope**2 * variance + 1e-300)
-        residual = put_in - np.einsum("bnp,bp->bn", design, parameters)
-        adjusted = design.copy()
-        adjusted[:, :, 0] += slope * variance / (extra + slope**2 * variance + 1e-300) * residual
-    return parameters
+
+    def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+        matrix = matrix / (scale[:, :, None] * scale[:, None, :])
+        matrix += 1e-12 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(matrix.shape[1])
+        return np.linalg.solve(matrix, (right / scale)[:, :, None])[:, :, 0] / scale
+
+    return errors_in_variables(
+        design, put_in, extra, speed_std**2, solve, weight=weight, tolerance=SETTLED, most=ITERATIONS
+    ).parameters
 
 
 def _bootstrap(
@@ -223,11 +219,7 @@ def _bootstrap(
     residual = np.bincount(own, put_in - design @ fit.parameters) / np.bincount(own)
     memory = int(np.ceil(2.0 * autocorrelation_time(residual)))
     length = min(max(1 if settled else BLOCK, memory), max(1, len(blocks) // 2))
-    generator = np.random.default_rng(SEED)
-    starts = generator.integers(0, len(blocks), size=(draws, -(-len(blocks) // length)))
-    chosen = ((starts[:, :, None] + np.arange(length)) % len(blocks)).reshape(draws, -1)[:, : len(blocks)]
-    times = np.zeros((draws, len(blocks)))
-    np.add.at(times, (np.arange(draws)[:, None], chosen), 1.0)
+    times = drawn_times(len(blocks), length, draws, np.random.default_rng(SEED))
     found = []
     for part in np.array_split(times, max(1, draws * len(put_in) // 100_000)):
         weight = fit.weight * part[:, own]
@@ -240,18 +232,13 @@ def _bootstrap(
         )  # fmt: skip
     drawn = np.concatenate(found)
     freedom = max(len(blocks) / length - design.shape[1], 1.0)
-    wider = np.sqrt(1.0 + design.shape[1] / freedom) * quantile(int(max(freedom, 1))) / quantile(10**6)
+    wider = np.sqrt(1.0 + design.shape[1] / freedom) * t_quantile(int(max(freedom, 1))) / t_quantile(10**6)
     return fit.parameters + wider * (drawn - fit.parameters)
-
-
-def _interval(values: FloatArray, level: float) -> tuple[float, float]:
-    low, high = np.quantile(values, [0.5 - level / 2.0, 0.5 + level / 2.0])
-    return float(low), float(high)
 
 
 def _robust_std(values: FloatArray) -> float:
     """Half the width of the middle 68 %: a few wild draws of a line that is hardly determined do not count."""
-    low, high = _interval(values, 0.6827)
+    low, high = central_interval(values, 0.6827)
     return 0.5 * (high - low)
 
 

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.logs.average import TO_SIGMA, robust_mean, sensor_step
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus, live_angle
 from omnidyn.logs.resolved import unresolved_input
 from omnidyn.logs.segments import segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
+from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step
 
 FloatArray = NDArray[np.float64]
 
@@ -236,7 +236,7 @@ def _mean_speed(run: Run, motion: _Motion, window: slice) -> tuple[FloatArray, F
     angle = motion.angle[window]
     steps = np.diff(angle, axis=0) / np.diff(t)[:, None]
     # white noise of the angle, as it shows in the second differences, enters through the two ends
-    noise = np.median(np.abs(np.diff(angle, n=2, axis=0)), axis=0) * TO_SIGMA / np.sqrt(6.0)
+    noise = np.median(np.abs(np.diff(angle, n=2, axis=0)), axis=0) * MAD_TO_STD / np.sqrt(6.0)
     mean = (angle[-1] - angle[0]) / (t[-1] - t[0])
     return np.where(np.isfinite(steps).all(axis=0), mean, np.nan), np.sqrt(2.0) * noise / (t[-1] - t[0])
 
@@ -248,7 +248,7 @@ def _mean_of_noisy(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
         return np.nan, np.nan
     x, y = 2.0 * (t[known] - t[0]) / (t[-1] - t[0]) - 1.0, speed[known]
     middle = np.median(y)
-    reach = WILD * TO_SIGMA * np.median(np.abs(y - middle)) + sensor_step(y)
+    reach = WILD * MAD_TO_STD * np.median(np.abs(y - middle)) + sensor_step(y)
     table = np.polynomial.legendre.legvander(x, min(3, len(x) // 6))
     smooth = table @ np.linalg.lstsq(table, np.clip(y, middle - reach, middle + reach), rcond=None)[0]
     rest, error = robust_mean(y - smooth)
@@ -305,7 +305,7 @@ def _sides(motion: _Motion, window: slice, motor: int, usual: float, error: floa
     speed = motion.speed[window, motor]
     speed = np.where(np.isfinite(speed), speed, np.nanmedian(speed))
     rows = len(speed)
-    noise = max(float(np.median(np.abs(np.diff(speed)))) * TO_SIGMA / np.sqrt(2.0), error * np.sqrt(rows))
+    noise = max(float(np.median(np.abs(np.diff(speed)))) * MAD_TO_STD / np.sqrt(2.0), error * np.sqrt(rows))
     count = int(np.ceil((noise / (SIGN_NOISE * usual)) ** 2)) if usual > 0.0 else rows
     if count >= rows:
         return np.full(rows, np.sign(put_in))

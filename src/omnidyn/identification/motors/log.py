@@ -19,6 +19,7 @@ from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.logs.segments import segments
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def _record(run: Run, motor: int, put_in: FloatArray, between: str, angle: bool)
         u = np.append(0.5 * (u[1:] + u[:-1]), u[-1])
         known = np.isfinite(u)
     pieces = [
-        (s.start + int(a), s.start + int(b) - 1) for s in segments(t) for a, b in _stretches(known[s])
+        (s.start + int(a), s.start + int(b) - 1) for s in segments(t) for a, b in stretches(known[s]).tolist()
         if b - a >= SHORTEST
     ]  # fmt: skip
     if not pieces:
@@ -77,11 +78,6 @@ def _record(run: Run, motor: int, put_in: FloatArray, between: str, angle: bool)
         t, np.ascontiguousarray(np.nan_to_num(u)[:, None]), measured,
         tuple((name, 0) for name in outputs), (0.0,) * len(outputs), tuple(pieces), run.source, False, (),
     )  # fmt: skip
-
-
-def _stretches(known: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def motor_problem(records: Sequence[Record], dead_band: bool, latency: bool) -> Problem:

@@ -33,7 +33,7 @@ from omnidyn.identification.output_error.prepare import (
     stays_exact,
 )
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES, automatic
-from omnidyn.identification.output_error.problem.parameters import AT, refuse_unknown
+from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated, refuse_unknown
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
 from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
@@ -80,7 +80,8 @@ class Fit:
         every = [runs] if isinstance(runs, Run) else list(runs)
         names = _group_names(every, question, groups)
         exact = is_exact(robot)
-        usual = tuple(free_by_default(robot, exact))
+        usual = free_by_default(robot, exact)
+        refuse_repeated(question.free or ())
         question = _written_out(question, robot, usual)
         if groups is not None:
             _refuse_joint(every, robot, question)
@@ -321,7 +322,7 @@ def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Ques
     """The question with every key written out."""
 
     def every(keys: Iterable[str]) -> tuple[str, ...]:
-        return tuple(expand_keys(tuple(keys), robot, usual))
+        return expand_keys(tuple(keys), robot, usual)
 
     free = question.free
     return replace(

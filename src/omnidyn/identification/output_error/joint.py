@@ -19,12 +19,11 @@ from omnidyn.identification.output_error.solve.loop import loop_start
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Engine, Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import SHARE, Trust
+from omnidyn.model.keys import find_key
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 T = TypeVar("T")
-
-ANY_FRICTION = "friction."
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +117,7 @@ def _widened(sums: PieceSums, at: IntArray, columns: IntArray, count: int) -> Pi
 def own_names(asked: Sequence[str], problems: Sequence[Problem]) -> tuple[str, ...]:
     """The numbers that each group has for itself. Raises InputError where one is not free, or where there is none."""
     names = list(dict.fromkeys(name for problem in problems for name in problem.names))
-    own = tuple(asked) or tuple(name for name in names if name.startswith(ANY_FRICTION))
+    own = tuple(asked) or tuple(name for name in names if (key := find_key(name)) and key.level)
     unknown = [name for name in own if name not in names]
     if unknown:
         raise InputError(

@@ -9,42 +9,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.estimate import unit
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.motion import Motion, motion
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, nuisance_parameters, pieces
-from omnidyn.identification.output_error.problem.parameters import FRICTION, Parameter, names_of, robot_parameters
+from omnidyn.identification.output_error.problem.parameters import Parameter, names_of, robot_parameters
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
-from omnidyn.identification.output_error.solve.loop import (
-    friction_keys,
-    friction_of_axis,
-    loop_keys,
-    loop_pieces,
-    looped,
-)
+from omnidyn.identification.output_error.solve.loop import loop_keys, loop_pieces, looped
 from omnidyn.identification.output_error.trust.breakaway import KEY
 from omnidyn.identification.question import Question
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.keys import BOX, COULOMB, FRICTION, GAINS, VISCOUS, Key, expand, friction_keys, unit
 from omnidyn.model.motor import DYNAMIC
-from omnidyn.model.robot import Robot
+from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
-from omnidyn.simulation.sensitivity.directions import GAINS, changed_parameter, parameter, with_parameter
 
 FloatArray = NDArray[np.float64]
 
 EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
-ALL_FRICTION = "friction"  # stands for all that the robot has
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
-IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +77,7 @@ def make_group(
     engine, bounds, warnings = EXACT if exact else IMPLICIT, {}, []
     asked, fixed = question.free if question.free is not None else usual, set(question.fixed)
     for axis in np.flatnonzero(~found.moved).tolist():
-        own = {key for key in (*asked, *usual) if friction_of_axis(key, axis)}
+        own = {key for key in (*asked, *usual) if Key.parse(key).axis == axis}
         fixed |= own
         if not own or (alone and not exact and not own & set(asked)):
             continue  # friction along the direction of travel: no axis has its own
@@ -98,7 +89,7 @@ def make_group(
         warnings.append(found.words(axis) + (what if found.seen[axis] else ""))
         bounds |= {key: held} if held > NOTHING else {}
         if exact and robot.friction.axes.levels[2][axis] < held:
-            robot = with_parameter(robot, f"friction.axes.coulomb[{axis}]", held)
+            robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)
     if alone and not found.moved.any():
         raise _never_moved(found, records[0].source)
     if warnings and question.free is None and question.use_priors:
@@ -131,7 +122,7 @@ def read_records(runs: Sequence[Run], robot: Robot, question: Question) -> list[
     """The runs as a fit sees them. Raises InputError where there is none, and for logs that do not go together."""
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
-    gains = any(key.startswith(GAINS) for key in question.free or ())
+    gains = any(Key.parse(key).name in GAINS for key in question.free or ())
     found = [record(run, robot, question.outputs, gains, question.tick_rad) for run in runs]
     if len({each.set_point is None for each in found}) > 1:
         raise InputError(
@@ -152,10 +143,10 @@ def make_problem(
     keys = [*question.free] if question.free is not None else [
         *dict.fromkeys((*(usual or free_by_default(robot)), *priors))
     ]  # fmt: skip
-    unknown = [key for key in question.fixed if key not in keys and (KEY not in keys or not key.startswith(KEY))]
+    unknown = [key for key in question.fixed if key not in keys]
     if unknown and question.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
-    keys = [key for key in keys if key not in question.fixed and not key.startswith(KEY)]
+    keys = [key for key in keys if key not in question.fixed and Key.parse(key).name != KEY]
     if not keys:
         got = ", ".join(question.free or ()) or "no key"
         raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
@@ -176,11 +167,11 @@ def make_problem(
     return Problem(robot, (*own, *more), len(own), tuple(parts))
 
 
-def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactEngine | TangentEngine | LoopEngine:
+def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
     """The engine of a problem. tol [m/s]: of an implicit one, None for a step a row."""
     if kind == EXACT:
         return ExactEngine(problem)
-    return LoopEngine(problem, tol) if kind == LOOP else TangentEngine(problem, tol)
+    return LoopEngine(problem, tol) if kind == LOOP else ImplicitEngine(problem, tol)
 
 
 def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> str:
@@ -198,10 +189,11 @@ def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:
 
     A number of one wheel makes equal motors unequal, and the axes couple; friction that was off may come up.
     """
-    other = [key for key in keys if key not in FRICTION and not key.startswith(KEY)]
+    other = [Key.parse(key) for key in keys if key not in BOX]
+    other = [key for key in other if key.name != KEY]
     for k, key in enumerate(other):
-        value, share = float(parameter(robot, key)), ASIDE * (k + 1)
-        robot = changed_parameter(robot, key, value * (1.0 + share) or share, checked=False)
+        value, share = key.get(robot), ASIDE * (k + 1)
+        robot = key.set(robot, value * (1.0 + share) or share, checked=False)
     return not other or is_exact(robot)
 
 
@@ -215,36 +207,35 @@ def _drive(records: Sequence[Record], robot: Robot) -> float:
 def _within_reach(p: Parameter, drive: float) -> Parameter:
     """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
     low = LEAST * p.value if p.low == 0.0 else p.low
-    if not p.name.startswith("friction.") or "coulomb" not in p.name or drive == 0.0:
+    if Key.parse(p.name).level != COULOMB or drive == 0.0:
         return replace(p, low=low)
     return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
 
 
-def free_by_default(robot: Robot, exact: bool | None = None) -> list[str]:
-    """B and C of the axes; of a robot with friction elsewhere the levels that it has: one that is off has no slope."""
+def free_by_default(robot: Robot, exact: bool | None = None) -> tuple[str, ...]:
+    """B and C of the axes; of a robot with friction elsewhere the levels that it has: one that is off has no slope.
+
+    exact: whether the exact engine knows the robot, where that is known.
+    """
     if is_exact(robot) if exact is None else exact:
-        return list(FRICTION)
-    return [key for key in friction_keys(robot) if "viscous" in key or parameter(robot, key) > 0.0]
+        return BOX
+    has = {key: Key.parse(key) for key in friction_keys(robot)}
+    return tuple(name for name, key in has.items() if key.level == VISCOUS or key.get(robot) > 0.0)
 
 
 def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Priors of the robot file that are independent of any log: key -> (mean, std)."""
+    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry."""
     found = {}
-    for key, prior in robot.priors.items():
-        if prior.std is not None and not prior.source.startswith(IDENTIFIED):
-            found[key] = (float(parameter(robot, key)), prior.std)
+    for name, prior in robot.priors.items():
+        if prior.std is not None and prior.origin != IDENTIFIED:
+            found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
     return found
 
 
-def expand_keys(keys: str | Sequence[str], robot: Robot | None = None, usual: Sequence[str] = ()) -> list[str]:
-    """Keys with those that stand for several written out: "friction" is what the robot has, a list its items.
+def expand_keys(names: str | Sequence[str], robot: Robot, usual: Sequence[str] = ()) -> tuple[str, ...]:
+    """The keys that names stand for: "friction" for what is free by default, a list for its entries; others as is.
 
-    usual: what is free by default, where that is known. Without a robot, or with one of the exact engine, "friction" is
-    all six of the axes.
+    usual: what is free by default, where that is known.
     """
-    known = usual or (FRICTION if robot is None else free_by_default(robot))
-    found: list[str] = []
-    for key in names_of(keys):
-        many = [each for each in (*known, *FRICTION) if each.startswith(f"{key}[")]
-        found += known if key == ALL_FRICTION else many or [key]
-    return list(dict.fromkeys(found))
+    each = ((usual or free_by_default(robot)) if name == FRICTION else expand(name, robot) for name in names_of(names))
+    return tuple(dict.fromkeys(key for keys in each for key in keys))

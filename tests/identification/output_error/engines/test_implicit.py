@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.parameters import Parameter
@@ -15,10 +15,10 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.question import Question
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
+from omnidyn.model.keys import Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, voltages
+from tests.support.axebot_logs import NOISE, voltages
 
 TRUTH = {
     "friction.direction.coulomb[0]": 2.2,
@@ -51,7 +51,7 @@ def log(ellipse):
 def test_an_ellipse_in_a_turning_frame_seen_late(ellipse, log):
     start = ellipse
     for key, true in TRUTH.items():
-        start = with_parameter(start, key, 1.4 * true)
+        start = Key.parse(key).set(start, 1.4 * true)
     fit = fit_output_error(log, start, free=list(TRUTH), start="rest")
     for key, true in TRUTH.items():
         assert abs(fit.value[key] - true) < 4.5 * fit.std[key]
@@ -68,7 +68,7 @@ def test_what_the_second_engine_does_not_know(ellipse, log):
     problem = make_problem([record(log, ellipse)], ellipse, Question(free=tuple(TRUTH), start="rest", nuisances=()))
     unknown = replace(problem, parameters=(*problem.parameters, Parameter("slip", 0.0, 0.0, 1.0)))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got slip.*leave it out"):
-        TangentEngine(unknown)
+        ImplicitEngine(unknown)
     placed = log.replace(pose=np.zeros((len(log), 3)))
     with pytest.raises(UnsupportedError, match=r"by the exact engine only; got position.*leave it out of the outputs"):
         fit_output_error(placed, ellipse, outputs=["twist", "position"], start="rest", nuisances=())
@@ -83,7 +83,7 @@ def test_the_fast_fit_ends_where_an_independent_optimiser_does(ellipse, log):
     def residual(scaled):
         robot, late = ellipse, float(scaled[-1]) * 0.007
         for key, value in zip(TRUTH, scaled, strict=False):
-            robot = with_parameter(robot, key, float(value) * TRUTH[key])
+            robot = Key.parse(key).set(robot, float(value) * TRUTH[key])
         share = 1.0 - late / 0.01
         dt = np.tile([share * 0.01, (1.0 - share) * 0.01], len(t) - 1)
         twist = simulate(robot, np.repeat(log.voltage[:-1], 2, axis=0), dt, tol=1e-7).twist
@@ -113,7 +113,7 @@ def applied(voltage, values):
 def shown(robot, voltage, values, start=START, tol=1e-9):
     """Twist, wheel speeds, currents and heading as a log has them, each late, by runs with rows there."""
     for key, value in values.items():
-        robot = with_parameter(robot, key, value) if key.startswith(("friction", "body", "motor")) else robot
+        robot = Key.parse(key).set(robot, value) if key.startswith(("friction", "body", "motor")) else robot
     found = []
     for channel, width in (("twist", 3), ("wheel_speed", 3), ("current", 3), ("heading", 1)):
         late = values.get(f"latency.{channel}", 0.0)
@@ -142,7 +142,7 @@ def test_every_slope_against_differences_of_simulated_logs(ellipse):
     given = Question(free=tuple(keys), nuisances=("gain", "dead_band", "fade", "latency"), start="free")
     problem = make_problem([record(run, ellipse)], ellipse, given)
     piece = replace(problem.pieces[0], margin=np.zeros(10))
-    engine = TangentEngine(replace(problem, pieces=(piece,)), 1e-8)
+    engine = ImplicitEngine(replace(problem, pieces=(piece,)), 1e-8)
     point = Point(np.array([values[name] for name in problem.names]), (np.concatenate([START, np.zeros(10)]),))
     residual, slopes, at = engine.residuals(point)[0]
     share = np.arange(40) / 40

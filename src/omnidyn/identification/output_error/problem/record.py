@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.problem.outputs import outputs_of
 from omnidyn.logs.segments import segments
+from omnidyn.model.actuation import asked_voltage, clip_voltage
 from omnidyn.model.drive import SPEED
-from omnidyn.model.motor import clip_voltage
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
+from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 
@@ -50,6 +51,11 @@ class Record:
     @property
     def span(self) -> float:
         return float(self.t[-1] - self.t[0]) or 1.0
+
+    @property
+    def share(self) -> FloatArray:
+        """How much of the run has gone by, 0 to 1. Shape (rows,)."""
+        return (self.t - self.t[0]) / self.span
 
 
 def record(
@@ -107,19 +113,16 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
             "the log has another number of wheels", got=run.wheels,
             expected=f"{robot.wheels.count}, as {robot.name} has", where=run.source,
         )  # fmt: skip
-    if run.voltage is not None:
-        return run.voltage, False, []
+    nominal = robot.drive.supply
+    voltage = asked_voltage(run.voltage, run.duty, run.supply, nominal)
+    if voltage is not None:
+        supplied = run.voltage is None and run.supply is None
+        return voltage, supplied, [f"the supply is not logged: its nominal {nominal:g} V is taken"] if supplied else []
     if run.duty is not None:
-        if run.supply is not None:
-            return run.duty * run.supply[:, None], False, []
-        nominal = robot.drive.supply
-        if nominal is None:
-            raise InputError(
-                "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
-                remedy="add supply_V to the robot file",
-            )  # fmt: skip
-        note = f"the supply is not logged: its nominal {nominal:g} V is taken"
-        return run.duty * nominal, True, [note]
+        raise InputError(
+            "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
+            remedy="add supply_V to the robot file",
+        )  # fmt: skip
     if run.wheel_speed_command is not None or run.twist_command is not None:
         raise UnsupportedError(
             "only set speeds are logged, and the robot has no speed loop to follow them", got=", ".join(run.channels),
@@ -141,6 +144,5 @@ def _whole(known: NDArray[np.bool_], start: int, stop: int) -> list[tuple[int, i
     """Stretches of rows with all inputs, (first, last). The last row needs none: nothing follows it."""
     if known[start : stop - 1].all():
         return [(start, stop - 1)] if stop - start >= SHORTEST else []
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], known[start:stop].astype(int), [0]])))
-    runs = zip(start + edges[::2], start + edges[1::2] - 1, strict=True)
-    return [(int(a), int(b)) for a, b in runs if b - a + 1 >= SHORTEST]
+    found = start + stretches(known[start:stop])
+    return [(int(a), int(b) - 1) for a, b in found if b - a >= SHORTEST]
