@@ -159,10 +159,12 @@ def _outputs(out: str, groups: Iterable[str], force: bool) -> dict[str, str]:
     """
     from omnidyn.files import check_output
 
+    if not out:
+        return {}
     names, path = list(groups), Path(out)
     plain = ["".join(c if c.isalnum() or c in "-_." else "-" for c in group) for group in names]
     several = [str(path.with_name(f"{path.stem}-{word}{path.suffix}")) for word in plain]
-    files = dict(zip(names, [out] if len(names) == 1 else several, strict=True)) if out else {}
+    files = dict(zip(names, [out] if len(names) == 1 else several, strict=True))
     for each in files.values():
         check_output(each, force)
     return files
