@@ -13,6 +13,7 @@ import typer
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.identification.question import OUTPUT_ERROR, Question
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def _fit_text(found: Identification) -> str:
 
 def _tell_study(found: Identification, record: dict[str, Any], to: Out) -> None:
     """Friction and its shape."""
-    from omnidyn.identification.steady.study_table import study_summary, study_to_dict
+    from omnidyn.identification.steady.study_table import study_document
 
     study = found.study
     assert study is not None
@@ -102,11 +103,7 @@ def _tell_study(found: Identification, record: dict[str, Any], to: Out) -> None:
 
         to.write_report(render_study(study, record))
     _save(found.estimates, files, to.force)
-    if to.json:
-        say_warnings(study.warnings)
-        show_json({**study_to_dict(study), "output": files or None, "report": to.report or None, "provenance": record})
-    else:
-        show(study_summary(study).rstrip("\n"))
+    tell_document(study_document(study), to.json, record, output=files or None, report=to.report or None)
     say_written([*files.values(), to.report])
 
 
@@ -144,11 +141,7 @@ def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
         record = provenance([robot_input(robot), {"role": "data", "name": table, "sha256": data.sha256}])
     if to.out:
         _save({"": estimate}, {"": to.out}, to.force)
-    if to.json:
-        say_warnings(estimate.warnings)
-        show_json({**estimate.to_dict(), "output": to.out or None, "provenance": record})
-    else:
-        show(estimate.summary().rstrip("\n"))
+    tell_document(estimate.document(), to.json, record, output=to.out or None)
     say_written([to.out])
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, WARN, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import white_noise
 from omnidyn.model.dynamics import mass_matrix
@@ -28,7 +28,7 @@ LEAST_SHARE = 0.02  # of the rows
 OF_BACK_EMF = (EMF, "motor.gear_ratio", "wheels.wheel_radius_m")
 
 
-def check_energy(work: Work) -> tuple[list[Finding], Work]:
+def check_energy(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """The finding on rows whose energy is impossible."""
     voltage, robot = volts(work), work.geometry
     speed = _speed(work)
@@ -61,7 +61,7 @@ def _remedy(guessed: list[str]) -> str:
     )
 
 
-def _speed(work: Work) -> FloatArray | None:
+def _speed(work: LogUnderCheck) -> FloatArray | None:
     speed, robot = work.full("wheel_speed"), work.geometry
     if speed is not None or robot is None:
         return speed
@@ -90,12 +90,16 @@ def _points(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[NDArr
     return bad, float(-power[bad].min()) if bad.any() else 0.0
 
 
-def _windows(work: Work, robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[NDArray[np.bool_], float]:
+def _windows(
+    work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: FloatArray
+) -> tuple[NDArray[np.bool_], float]:
     """Balance over windows: work of the motors, change of kinetic energy."""
     none = np.zeros(len(work), dtype=bool), 0.0
     width = max(4, round(WINDOW / work.step))
-    edges = [(a, min(a + width, piece.stop - 1)) for piece in work.pieces for a in range(piece.start, piece.stop, width)
-             if min(a + width, piece.stop - 1) - a >= width // 2]  # fmt: skip
+    edges = []
+    for segment in work.segments:
+        ends = ((a, min(a + width, segment.stop - 1)) for a in range(segment.start, segment.stop, width))
+        edges += [(a, b) for a, b in ends if b - a >= width // 2]
     if not edges:
         return none
     low, high = np.array(edges).T

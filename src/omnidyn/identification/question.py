@@ -58,8 +58,9 @@ class Question:
     free: tuple[str, ...] | None = _option(
         None, "Fit this; friction is all of it.",
         'Keys of the robot file, such as "body.mass_kg"; that of a list stands for its items. None: the friction that '
-        "the robot has. The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, "
-        'or stays as the robot has it; "friction.axes.breakaway[0]" asks for its interval, without "[0]" for all.',
+        "the robot has. The EMF constant follows the torque constant, wheel by wheel, unless both are free. Breakaway "
+        'follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" asks for its interval, without '
+        '"[0]" for all.',
         of=(FIT,), metavar="KEY",
     )  # fmt: skip
     fixed: tuple[str, ...] = _option(
