@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.table import Table, machine
-from omnidyn.identification.output_error.group_fit import GroupFit, identify_groups
+from omnidyn.identification.output_error.answer import Answer
+from omnidyn.identification.output_error.fit import identify_groups
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -39,7 +40,7 @@ def floors() -> dict[str, Robot]:
     return {"smooth": smooth, "rough": rough}
 
 
-def pair(seed: int, noise: Callable[[Run, int], Run]) -> GroupFit:
+def pair(seed: int, noise: Callable[[Run, int], Run]) -> Answer:
     """A log on each floor, fitted together; the magnet is fitted too, and shared."""
     runs = [
         noise(simulate(robot, excitation(SECONDS, seed=2 * seed + k), 0.01), 2 * seed + k)

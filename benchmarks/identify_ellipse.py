@@ -18,10 +18,12 @@ from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import Solver
+from omnidyn.identification.question import Question
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
@@ -87,7 +89,7 @@ def bound() -> np.ndarray:
 
 
 def _solver(run: Run, tol: float) -> Solver:
-    given = Options(KEYS, nuisances=("latency",), start="rest")
+    given = Question(free=KEYS, nuisances=("latency",), start="rest")
     problem = make_problem([record(run, ellipse())], ellipse(), given)
     return Solver(problem, ImplicitEngine(problem, tol))
 

@@ -13,8 +13,10 @@ import numpy as np
 from benchmarks.identify_log import SHARE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem, read_records
+from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.kernel.counts import information
+from omnidyn.identification.output_error.prepare import make_problem, read_records
+from omnidyn.identification.question import Question
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -66,7 +68,7 @@ def counted(angle: np.ndarray, tick: float, jitter: float, rng: np.random.Genera
 
 def least_std(log: Run, robot: Robot, tick: float, deviation: float) -> np.ndarray:
     """Cramer-Rao bound of the six friction numbers: slopes at the truth, Fisher's information of a row of counts."""
-    given = Options(nuisances=(), start="rest", tick_rad=tick)
+    given = Question(nuisances=(), start="rest", tick_rad=tick)
     problem = make_problem(read_records([log], robot, given), robot, given)
     ((_, slopes),) = ExactEngine(problem).outputs(problem.start())
     of_row = information(np.full(3, deviation**2), np.full(3, tick))[0] / deviation**2

@@ -7,8 +7,7 @@ import time
 import numpy as np
 
 from benchmarks.table import Table
-from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.group_fit import identify_groups
+from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot

@@ -31,7 +31,7 @@ _HOME = {
     "fit_output_error": "omnidyn.identification.output_error.fit",
     "fit_steady_state": "omnidyn.identification.steady.steady_state",
     "identify": "omnidyn.identification.identify",
-    "identify_groups": "omnidyn.identification.output_error.group_fit",
+    "identify_groups": "omnidyn.identification.output_error.fit",
     "identify_steady": "omnidyn.identification.steady.study",
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
@@ -58,8 +58,7 @@ if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identify import identify
     from omnidyn.identification.motors.drive_line import fit_drive_lines
-    from omnidyn.identification.output_error.fit import fit_output_error
-    from omnidyn.identification.output_error.group_fit import identify_groups
+    from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
     from omnidyn.identification.steady.steady_state import fit_steady_state
     from omnidyn.identification.steady.study import identify_steady
     from omnidyn.identification.validation import validate

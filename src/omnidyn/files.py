@@ -188,7 +188,7 @@ def check_output(path: str | os.PathLike, force: bool = False) -> Path:
     if path.is_dir():
         raise InputError("cannot write the result there", got="a folder", expected="a file name", where=str(path))
     if path.exists() and not force:
-        raise InputError("the file exists already", remedy="use --force to replace it", where=str(path))
+        raise InputError("the file exists already", remedy="use `force` to replace it", where=str(path))
     folder = path.parent
     if not folder.is_dir():
         raise InputError("the folder does not exist", got=str(folder), remedy=f"mkdir -p {folder}", where=str(path))
@@ -221,7 +221,7 @@ def write_atomic(path: str | os.PathLike, content: str | bytes, force: bool = Fa
         raise InputError(
             "the file exists already",
             got="another process made it meanwhile",
-            remedy="use --force to replace it",
+            remedy="use `force` to replace it",
             where=str(path),
         ) from None
     except OSError as error:

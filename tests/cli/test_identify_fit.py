@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.cli import main
-from omnidyn.cli.identify_fit import _Watch
+from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.keys import Key
@@ -16,6 +16,7 @@ from tests.support.outputs import strict
 
 ROUGH = 2.6  # N along x; the preset has 2.2
 COULOMB = "friction.axes.coulomb[0]"
+TOLD = Progress.__call__
 
 
 @pytest.fixture(scope="session")
@@ -147,15 +148,21 @@ def test_what_does_not_belong_is_refused_by_name(call, arguments, words):
     assert words in err
 
 
-def test_an_interrupt_leaves_the_best_so_far(call, tmp_path, monkeypatch):
-    told = _Watch.__call__
+def cut_at_the_second_state():
+    """What follows a fit, and interrupts it at the second better state."""
+    count = []
 
     def interrupted(self, state):
-        told(self, state)
-        if len(self.states) == 2:
+        TOLD(self, state)
+        count.append(state)
+        if len(count) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(_Watch, "__call__", interrupted)
+    return interrupted
+
+
+def test_an_interrupt_leaves_the_best_so_far(call, tmp_path, monkeypatch):
+    monkeypatch.setattr(Progress, "__call__", cut_at_the_second_state())
     code, out, err = call("smooth0.csv", "--robot", "axebot", "-o", str(tmp_path / "fit.toml"))
     assert code == 130
     assert "the fit was interrupted: the numbers are the best so far" in out.replace("\n  ", " ")
@@ -164,18 +171,15 @@ def test_an_interrupt_leaves_the_best_so_far(call, tmp_path, monkeypatch):
 
 
 def test_an_interrupt_while_groups_are_fitted_alone_leaves_the_best_so_far(call, tmp_path, monkeypatch):
-    begin, heard = _Watch.__init__, []
+    told, heard = Progress.doing, []
 
-    def listening(self, now):
-        def told(words):
-            now(words)
-            heard.extend([words] if words.startswith("fitting rough alone") else [])
-            if len(heard) == 2:
-                raise KeyboardInterrupt
+    def listening(self, words):
+        told(self, words)
+        heard.extend([words] if words.startswith("rough alone") else [])
+        if len(heard) == 2:
+            raise KeyboardInterrupt
 
-        begin(self, told)
-
-    monkeypatch.setattr(_Watch, "__init__", listening)
+    monkeypatch.setattr(Progress, "doing", listening)
     code, out, err = call(".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--json",
                           "-o", str(tmp_path / "{group}.toml"))  # fmt: skip
     assert code == 130
@@ -186,18 +190,11 @@ def test_an_interrupt_while_groups_are_fitted_alone_leaves_the_best_so_far(call,
 
 
 def test_an_interrupt_of_groups_leaves_the_best_so_far_and_the_same_again(call, tmp_path, monkeypatch):
-    told = _Watch.__call__
-
-    def interrupted(self, state):
-        told(self, state)
-        if len(self.states) == 2:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(_Watch, "__call__", interrupted)
     arguments = (".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--free", "friction",
                  "--free", "motor.torque_constant_Nm_A", "--json")  # fmt: skip
     found = []
     for name in ("a.toml", "b.toml"):
+        monkeypatch.setattr(Progress, "__call__", cut_at_the_second_state())
         code, out, err = call(*arguments, "-o", str(tmp_path / name))
         assert code == 130
         assert "interrupted" in err

@@ -59,7 +59,7 @@ def test_what_is_refused(text, words):
 
 def test_a_component_that_is_not_in_the_logs_is_refused_with_the_nearest():
     rules = [parse_threshold("vx.rmse>1"), parse_threshold("w4.rmse>1")]
-    with pytest.raises(InputError, match=r"--fail-if: the logs cannot judge this component; got w4; .*did you mean w"):
+    with pytest.raises(InputError, match=r"`fail_if`: the logs cannot judge this component; got w4; .*did you mean w"):
         refuse_absent(rules, ("vx", "w1", "w2"))
     refuse_absent(rules[:1], ("vx",))
 
@@ -69,7 +69,7 @@ def test_what_fails_is_named_with_its_numbers(found):
     words = exceeded(found, rules)
     assert len(words) == 2
     assert words[0] == f"vx.rmse = {found.rmse['vx']:.6g} (> 0.005)"
-    with pytest.raises(ThresholdError, match=r"2 of 3 rules of --fail-if hold for axebot: vx.rmse = 0\.0\d+") as caught:
+    with pytest.raises(ThresholdError, match=r"2 of 3 rules of `fail_if` hold for axebot: vx.rmse = 0\.0\d+") as caught:
         refuse_exceeded(found, rules)
     assert caught.value.exit_code == 5
     refuse_exceeded(found, rules[1:2])
@@ -96,6 +96,6 @@ def test_any_text_is_read_or_refused_in_words(text):
     except InputError as refused:
         where = refused.where
     else:
-        where = "--fail-if"
+        where = "`fail_if`"
         assert parse_threshold(str(rule)) == rule._replace(number=float(f"{rule.number:g}"))
-    assert where == "--fail-if"
+    assert where == "`fail_if`"

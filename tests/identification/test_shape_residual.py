@@ -11,7 +11,7 @@ from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
-SHAPE = "as with friction of another shape than that of the robot file: --method steady-state says which shape"
+SHAPE = "as with friction of another shape than that of the robot file: `method` steady-state says which shape"
 
 
 def drives(robot, directions, seconds=1.0, dt=0.02):

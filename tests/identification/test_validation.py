@@ -7,9 +7,10 @@ from scipy.integrate import quad
 import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.identification.as_fitted import as_fitted, mean_before
-from omnidyn.identification.identify import choose_method, options_of
+from omnidyn.identification.identify import choose_method
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU, fit_output_error
+from omnidyn.identification.question import Question
 from omnidyn.identification.validation import Score, coloured, validate
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import Key
@@ -130,13 +131,13 @@ def test_what_decides_the_method():
 
 def test_options_of_another_method_are_refused():
     run = noisy(simulate(AXEBOT, excitation(2.0), 0.01), 1)
-    with pytest.raises(InputError, match=r"output-error has no such option; got shape; .*; it belongs to steady-state"):
+    with pytest.raises(InputError, match=r"output-error has no such option; got `shape`; expected with steady-state"):
         omnidyn.identify(run, AXEBOT, method="output-error", shape="disc")
-    with pytest.raises(InputError, match="steady-state has no such option; got loss"):
+    with pytest.raises(InputError, match="steady-state has no such option; got `loss`"):
         omnidyn.identify(run, AXEBOT, method="steady-state", loss="student-t")
     with pytest.raises(InputError, match="method: no such method; got magic; expected output-error or steady-state"):
         omnidyn.identify(run, AXEBOT, method="magic")
-    assert "nuisances" in options_of("output-error")
+    assert "nuisances (output-error, motors output-error)" in Question.__doc__
 
 
 def test_one_component_of_many_is_coloured_by_chance_more_often():

@@ -71,7 +71,7 @@ def test_17_time_that_goes_back_is_refused(run, tmp_path):
     lines = text_of(run, tmp_path)
     lines[50], lines[51] = lines[51], lines[50]
     (tmp_path / "back.csv").write_text("\n".join(lines))
-    with pytest.raises(InputError, match=r"back.csv:52: time goes back; .* use --sort"):
+    with pytest.raises(InputError, match=r"back.csv:52: time goes back; .* use `sort`"):
         read_log(tmp_path / "back.csv")
     assert check(load_log(tmp_path / "back.csv"), ROBOT).fatal
 

@@ -80,7 +80,7 @@ def test_the_steps_add_up_to_the_times(steps, start):
     "content, words",
     [
         (HEADER, r"no rows; got 0 samples"),  # 3
-        (HEADER + "0,1,2,3\n", r"u\.csv: one row: how long it holds is not said; .*; add --duration SECONDS"),  # 4
+        (HEADER + "0,1,2,3\n", r"u\.csv: one row: how long it holds is not said; .*; add `duration` SECONDS"),  # 4
         (
             HEADER + "0,1,2,3\n0,1,2,3\n",
             r"u\.csv:3, column t_s: the same time stands twice; got 0 after 0; expected increasing",
@@ -116,7 +116,7 @@ def test_it_refuses_a_duration_that_is_none(write, duration):
 
 
 def test_it_refuses_more_rows_than_the_limit(write):  # 33
-    with pytest.raises(InputError, match=r"too many rows; got 2; expected at most 1; .*--max-steps"):
+    with pytest.raises(InputError, match=r"too many rows; got 2; expected at most 1; .*`max_steps`"):
         read_voltages(write(HEADER + "0,1,2,3\n1,1,2,3\n"), 3, max_steps=1)
 
 

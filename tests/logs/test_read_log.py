@@ -184,7 +184,7 @@ def test_overrides_and_maps(tmp_path):
 
 def test_a_log_without_a_clock_is_refused_with_a_remedy(tmp_path):
     path = write(tmp_path, "step,w1_rad_s\n0,1\n1,2\n2,3\n")
-    with pytest.raises(InputError, match=r'cannot tell the time of the rows; .*--column "t=step:UNIT"'):
+    with pytest.raises(InputError, match=r'cannot tell the time of the rows; .*`column` "t=step:UNIT"'):
         read_log(path)
 
 

@@ -91,7 +91,7 @@ def test_an_infinite_value_is_refused_with_its_place(tmp_path):
 def test_an_existing_file_stays_unless_forced(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("mine")
-    with pytest.raises(InputError, match=r"run\.csv: the file exists already; use --force"):
+    with pytest.raises(InputError, match=r"run\.csv: the file exists already; use `force`"):
         write_run(full_run(), path)
     assert path.read_text() == "mine"
     write_run(full_run(), path, force=True)

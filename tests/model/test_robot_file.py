@@ -267,7 +267,7 @@ def test_a_pipe_does_not_block(tmp_path):
 
 def test_saving_never_overwrites_unless_told(tmp_path, axebot, four_wheel):
     path = save_robot(axebot, tmp_path / "a.toml")
-    with pytest.raises(InputError, match=r"a\.toml: the file exists already; use --force"):
+    with pytest.raises(InputError, match=r"a\.toml: the file exists already; use `force`"):
         save_robot(four_wheel, path)
     assert load_robot(path) == axebot
     save_robot(four_wheel, path, force=True)

@@ -2,44 +2,48 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
 import typer
 
 from omnidyn.cli import log_options as options
-from omnidyn.cli.identify_ways import FRICTION, Asked, run
+from omnidyn.cli.terminal.flags import flags
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import say
+from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.identification.question import options as fields_of_question
+
+INTERRUPTED = 130
 
 
+def _asks(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with an option for every field of a Question that has a flag, before its other options."""
+    asked = []
+    for each in fields_of_question():
+        if each.metadata["flag"] is None:
+            continue
+        many = isinstance(each.default, tuple) or each.name in ("free", "nuisances")
+        words = f"{each.metadata['words']}{' Repeatable.' if many else ''}"
+        default: Any = [] if many else "" if each.default is None else each.default
+        kind: Any = list[str] if many else type(default)
+        least, metavar = 0 if kind is int else None, each.metadata["metavar"] or None
+        option = typer.Option(default, flags()[each.name], metavar=metavar, help=words, min=least)
+        asked.append(inspect.Parameter(each.name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind))
+    own = [p for p in inspect.signature(command).parameters.values() if p.kind is not p.VAR_KEYWORD]
+    command.__signature__ = inspect.Signature([*own[:2], *asked, *own[2:]])  # type: ignore[attr-defined]
+    return command
+
+
+@_asks
 def identify(
     logs: list[str] = typer.Argument(
         metavar="LOG...", help="Logs (CSV, Parquet) or folders of them; or one table axis,speed,force."
     ),
     robot: str = typer.Option("", metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
-    method: str = typer.Option("", help="output-error (whole logs; the default) or steady-state (the paper's)."),
-    free: list[str] = typer.Option([], metavar="KEY", help="Fit this; friction is all of it. Repeatable."),
-    fix: list[str] = typer.Option([], metavar="KEY", help="Leave this as the robot file has it. Repeatable."),
-    nuisance: list[str] = typer.Option(
-        [],
-        metavar="NAME",
-        help="Fit what the log does: latency, gain, dead_band, fade, tilt, none; default: auto. Repeatable.",
-    ),
-    loss: str = typer.Option("", help="gaussian, or student-t for logs with outliers."),
-    use_priors: bool = typer.Option(False, "--use-priors", help="A std in the robot file counts as a prior."),
-    hold_out: list[str] = typer.Option([], metavar="GLOB", help="Do not fit these logs: predict them. Repeatable."),
-    per: list[str] = typer.Option([], metavar="NAME=GLOB", help="A group with friction of its own. Repeatable."),
-    per_free: list[str] = typer.Option([], metavar="KEY", help="What each group has for itself instead. Repeatable."),
-    profile: list[str] = typer.Option([], metavar="KEY", help="Interval by profile of the likelihood. Repeatable."),
-    bootstrap: int = typer.Option(0, min=0, metavar="N", help="Intervals from N draws of whole runs instead."),
-    start: str = typer.Option("", help="How logs begin: rest, free, or auto: at rest where that shows."),
-    between: str = typer.Option("", help="Of the motors: input holds, mean of two rows, or a curve; default: auto."),
-    what: str = typer.Option(FRICTION, help="friction, or motors: the line of each motor, wheels off the ground."),
-    shape: str = typer.Option(
-        "auto", help="box, disc, ellipse, wheel, wheels, disc+wheel, ...; auto: the best; line: per axis, the paper."
-    ),
-    speed: str = typer.Option("wheel", help="Which speed friction is a function of: wheel, set or ground."),
-    force_from: str = typer.Option("", help="current or voltage; default: current where all logs have it."),
-    input_: str = typer.Option("", "--input", help="Of the motors: voltage, duty or current; default: the first."),
-    window: str = typer.Option("", metavar="A,B", help="Use these shares of each command's rows, such as 0.4,0.95."),
-    group: list[str] = typer.Option([], metavar="NAME=GLOB", help="Logs of one floor or load. Repeatable."),
-    rest: str = typer.Option("bound", help="Of a table: what a row at rest says: bound, line (the paper) or ignore."),
+    *,
     report: str = typer.Option("", metavar="FILE.html", help="A page with pictures, numbers and what they say."),
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Robot file to write (TOML), one per group."),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
@@ -53,6 +57,7 @@ def identify(
     no_header: bool = options.NO_HEADER,
     skip_bad_rows: bool = options.SKIP_BAD_ROWS,
     current_unsigned: bool = options.CURRENT_UNSIGNED,
+    **asked: Any,
 ) -> None:
     """Identify a robot from its logs: friction, and what --free names.
 
@@ -61,4 +66,67 @@ def identify(
     speed, or from a table of steady points. The answer carries standard errors, 95 % intervals and warnings in words,
     and says what the data cannot tell.
     """
-    run(Asked(**locals()))
+    from omnidyn.cli.identify_logs import Reading, is_steady_table
+    from omnidyn.cli.identify_show import Out, tell_table
+    from omnidyn.files import check_output
+
+    question, to = _question(asked), Out(report, out, force, json)
+    question = replace(question, method=question.method_asked())
+    if not robot and question.what != MOTORS:
+        raise typer.BadParameter("Missing option '--robot'.")
+    for path in (out, report):  # before any work
+        if path:
+            check_output(path, force)
+    options.keep_logs(logs, out, report, save_map)
+    if question.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
+        tell_table(logs[0], robot, question, to)
+        return
+    how = options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
+    _identify(logs, robot, question, Reading(how, sort, options.Maps(save_map, force)), to)
+
+
+def _question(asked: dict[str, Any]) -> Question:
+    """The options as they stand on the command line; an empty one was not given."""
+    from omnidyn.cli.terminal.numbers import number_list
+
+    given: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
+    given["window"] = tuple(number_list("--window", given["window"])) if given["window"] else None
+    given["free"], given["nuisances"] = given["free"] or None, given["nuisances"] or None
+    return Question(**given)
+
+
+def _identify(arguments: list[str], robot: str, question: Question, reading: Any, to: Any) -> None:
+    """Read, choose the method, identify, tell."""
+    from omnidyn.cli.identify_logs import load_runs
+    from omnidyn.cli.identify_show import tell
+    from omnidyn.cli.terminal.session import provenance, robot_input
+    from omnidyn.identification.identify import Identification, settle_method
+    from omnidyn.model.robot_file import load_robot
+
+    def told(words: str) -> None:
+        say(f"omnidyn: {words}")
+
+    with progress("reading") as now:
+        start = load_robot(robot) if robot else None
+        loaded = load_runs(arguments, question, start, reading, now)
+        now("identifying")
+        record = provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
+        if question.what == MOTORS:
+            from omnidyn.cli.identify_motors import run_motors
+
+            run_motors(question, loaded, start, record, to, now)
+            return
+        assert start is not None
+        question, logs = settle_method(loaded.runs, start, question, told), loaded.logs
+        if loaded.folders and question.method == STEADY_STATE:
+            question = replace(question, group=loaded.folders)
+        elif loaded.folders:
+            told("all folders are fitted together; `per` NAME=GLOB makes groups of them")
+        if question.method != OUTPUT_ERROR:
+            logs = logs.clear() or []
+        found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
+        now("writing")
+        tell(found, record, to)
+    if found.interrupted:
+        told(f"interrupted: {found.interrupted}")
+        raise typer.Exit(INTERRUPTED)

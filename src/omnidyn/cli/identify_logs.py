@@ -1,4 +1,4 @@
-"""The part of `omnidyn identify` that reads logs: runs, groups, and what is made of them."""
+"""The part of `omnidyn identify` that reads logs."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from omnidyn.cli.log_options import Maps, load_logs, log_files, matches
+from omnidyn.cli.log_options import Maps, load_logs, log_files
 from omnidyn.cli.terminal.streams import say
+from omnidyn.identification.question import FRICTION, Question
 
 if TYPE_CHECKING:
     from omnidyn.logs.log import Log
@@ -19,13 +20,21 @@ if TYPE_CHECKING:
 SNIFF_BYTES, SHOWN_NOTES = 64 * 2**10, 12
 
 
+class Reading(NamedTuple):
+    """How logs are read."""
+
+    options: LogOptions
+    sort: bool
+    maps: Maps
+
+
 class Loaded(NamedTuple):
-    """Runs, the group of each (None: there are no groups), and the record of the files."""
+    """Runs, logs, the record of the files, and NAME=FOLDER of each folder where LOG... is several."""
 
     runs: list[Run]
-    groups: list[str] | None
-    inputs: list[dict[str, str]]
     logs: list[Log]
+    inputs: list[dict[str, str]]
+    folders: tuple[str, ...]
 
 
 def is_steady_table(path: str) -> bool:
@@ -48,67 +57,46 @@ def is_steady_table(path: str) -> bool:
     return "axis" in names and bool(names & {"speed", "force"})
 
 
-def load_runs(
-    arguments: Sequence[str], patterns: Sequence[str], robot: Robot | None, options: LogOptions, *, sort: bool,
-    maps: Maps, now: Any, option: str = "--group", keep: bool = False,
-) -> Loaded:  # fmt: skip
-    """The runs of LOG..., with their groups; what the readers had to decide is said once on stderr.
+def load_runs(arguments: Sequence[str], question: Question, robot: Robot | None, reading: Reading, now: Any) -> Loaded:
+    """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once.
 
-    option: where `patterns` come from; folders are groups of --group alone. keep: keep the logs too.
+    The logs are kept for friction alone.
     """
     files = log_files(arguments)
-    names = _groups(files, arguments, patterns, option)
-    used = files if names is None else [path for path in files if path in names]
-    runs, inputs, logs, said = [], [], [], {}
-    for path, log in load_logs(used, robot, options, now):
-        maps.show(path, log.columns)
-        run = log.to_run(sort=sort)
+    folders = () if question.per or question.group else _folders(arguments)
+    used = _of_groups(files, question.per or question.group or folders, "per" if question.per else "group")
+    found, said = Loaded([], [], [], folders), {}
+    for path, log in load_logs(used, robot, reading.options, now):
+        reading.maps.show(path, log.columns)
+        run = log.to_run(sort=reading.sort)
         for words in run.warnings:
             said.setdefault(words, []).append(path)
-        runs.append(run)
-        logs += [log] if keep else []
-        inputs.append({"role": "log", "name": path, "sha256": log.sha256})
+        found.runs.append(run)
+        if question.what == FRICTION:
+            found.logs.append(log)
+        found.inputs.append({"role": "log", "name": path, "sha256": log.sha256})
     _say_notes(said, len(used))
-    return Loaded(runs, None if names is None else [names[path] for path in used], inputs, logs)
-
-
-def _groups(
-    files: Sequence[str], arguments: Sequence[str], patterns: Sequence[str], option: str
-) -> dict[str, str] | None:
-    """File -> group, by --group, else by folder where several folders are given; None where there are no groups."""
-    from omnidyn.errors import InputError
-
-    folders = [each for each in arguments if os.path.isdir(each)]
-    if not patterns:
-        if option != "--group" or len(folders) < 2 or len(folders) < len(arguments):
-            return None
-        patterns = [f"{Path(os.path.abspath(folder)).name}={folder}" for folder in folders]
-    pairs = [_pair(text, option) for text in patterns]
-    found: dict[str, str] = {}
-    for path in files:
-        mine = [name for name, pattern in pairs if matches(path, pattern)]
-        if len(set(mine)) > 1:
-            raise InputError("a log belongs to two groups", got=" and ".join(mine), where=path,
-                             remedy=f"make the patterns of {option} narrower")  # fmt: skip
-        if mine:
-            found[path] = mine[0]
-    for name, pattern in pairs:
-        if name not in found.values():
-            raise InputError("no log belongs to this group", got=pattern, expected="a glob or a folder of LOG...",
-                             where=f"{option} {name}")  # fmt: skip
-    if len(found) < len(files):
-        say(f"omnidyn: {len(files) - len(found)} of {len(files)} logs belong to no group and are not used")
     return found
 
 
-def _pair(text: str, option: str) -> tuple[str, str]:
-    from omnidyn.errors import InputError
+def _folders(arguments: Sequence[str]) -> tuple[str, ...]:
+    """NAME=FOLDER of each folder, where several are given and nothing else."""
+    folders = [each for each in arguments if os.path.isdir(each)]
+    if len(folders) < 2 or len(folders) < len(arguments):
+        return ()
+    return tuple(f"{Path(os.path.abspath(folder)).name}={folder}" for folder in folders)
 
-    name, equals, pattern = text.partition("=")
-    if not equals or not name.strip() or not pattern.strip():
-        raise InputError("cannot read the group", got=text, expected="NAME=GLOB, such as gray=gray_surface",
-                         where=option)  # fmt: skip
-    return name.strip(), pattern.strip()
+
+def _of_groups(files: Sequence[str], patterns: Sequence[str], option: str) -> list[str]:
+    """The files that belong to a group; all where there are none."""
+    from omnidyn.identification.grouping import group_names
+
+    if not patterns:
+        return list(files)
+    used = [path for path, name in zip(files, group_names(files, patterns, option), strict=True) if name]
+    if len(used) < len(files):
+        say(f"omnidyn: {len(files) - len(used)} of {len(files)} logs belong to no group and are not used")
+    return used
 
 
 def _say_notes(said: Mapping[str, Sequence[str]], files: int) -> None:
@@ -117,14 +105,3 @@ def _say_notes(said: Mapping[str, Sequence[str]], files: int) -> None:
         say(f"omnidyn: {where}: {words}")
     if len(said) > SHOWN_NOTES:
         say(f"omnidyn: and {len(said) - SHOWN_NOTES} more notes of the readers (omnidyn check shows all)")
-
-
-def outputs(out: str, groups: Sequence[str]) -> dict[str, str]:
-    """Group -> file to write: the name given where there is one group, NAME-GROUP.toml where there are several."""
-    if not out:
-        return {}
-    if len(groups) == 1:
-        return {groups[0]: out}
-    path = Path(out)
-    plain = ["".join(c if c.isalnum() or c in "-_." else "-" for c in group) for group in groups]
-    return {g: str(path.with_name(f"{path.stem}-{word}{path.suffix}")) for g, word in zip(groups, plain, strict=True)}

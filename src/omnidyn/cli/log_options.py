@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -115,16 +114,6 @@ def _natural(path: str) -> list[Any]:
     import re
 
     return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", path)]
-
-
-def matches(path: str, pattern: str) -> bool:
-    """Whether a file belongs to a group: its path matches the glob, or lies in the folder of that name."""
-    plain = os.path.normpath(path)
-    folder = os.path.normpath(pattern)
-    if fnmatch.fnmatch(plain, folder) or fnmatch.fnmatch(os.path.basename(plain), pattern):
-        return True
-    parents = [str(parent) for parent in Path(plain).parents]
-    return any(fnmatch.fnmatch(parent, folder) or os.path.basename(parent) == folder for parent in parents)
 
 
 def load_logs(

@@ -13,6 +13,7 @@ from types import FrameType
 import typer
 
 from omnidyn.cli.terminal import session
+from omnidyn.cli.terminal.flags import of_place
 from omnidyn.cli.terminal.streams import prepare, say
 from omnidyn.errors import OmnidynError
 
@@ -51,7 +52,7 @@ def _run(arguments: list[str]) -> int:
 
 def _code_of(error: BaseException, debug: bool) -> int:
     if isinstance(error, OmnidynError):
-        say(f"omnidyn: error: {error}")
+        say(f"omnidyn: error: {_with_flag(error)}")
         return error.exit_code
     if isinstance(error, typer.TyperException):
         return _usage(error)
@@ -67,6 +68,11 @@ def _code_of(error: BaseException, debug: bool) -> int:
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else BUG
     return _unforeseen(error, debug)
+
+
+def _with_flag(error: OmnidynError) -> str:
+    """The message, with the place as the command line names it."""
+    return of_place(error.where) + str(error)[len(error.where) :]
 
 
 def _unforeseen(error: BaseException, debug: bool) -> int:

@@ -173,7 +173,7 @@ def _sign_doubts(
     names = components("current", logged[0].shape[1])
     models = [trace.model for by in traces.values() for name in names for trace in by.get(name, [])]
     if any((each < 0.0).any() for each in models):
-        yield "no measured current is negative: has the sensor no sign? then say current_unsigned (--current-unsigned)"
+        yield "no measured current is negative: has the sensor no sign? then say current_unsigned (`current_unsigned`)"
 
 
 def _warnings(runs: Sequence[Run], replays: Mapping[str, Sequence[Replay]]) -> Iterator[str]:

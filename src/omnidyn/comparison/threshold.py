@@ -36,7 +36,7 @@ def parse_threshold(text: str) -> Threshold:
     if match is None:
         raise InputError(
             "cannot read this threshold", got=text, expected='such as "vx.rmse>0.05", with > >= < or <=',
-            where="--fail-if",
+            where="`fail_if`",
         )  # fmt: skip
     component, metric, sign, number = match.groups()
     if metric not in METRICS:
@@ -44,11 +44,11 @@ def parse_threshold(text: str) -> Threshold:
     if place(component) is None:
         raise _unknown("no such component", component, ["vx", "vy", "omega", "w1", "i1", "u1", "x", "y", "heading"])
     if not abs(float(number)) < 1e300:
-        raise InputError("not a finite number", got=number, where="--fail-if")
+        raise InputError("not a finite number", got=number, where="`fail_if`")
     return Threshold(component, metric, sign, float(number))
 
 
-def refuse_absent(wanted: Sequence[Threshold | str], compared: Sequence[str], where: str = "--fail-if") -> None:
+def refuse_absent(wanted: Sequence[Threshold | str], compared: Sequence[str], where: str = "`fail_if`") -> None:
     """Raises InputError when a threshold, or a component asked for, is about what will not be compared."""
     for each in wanted:
         name = each if isinstance(each, str) else each.component
@@ -67,7 +67,7 @@ def exceeded(comparison: Comparison, thresholds: Sequence[Threshold], robot: str
         if value is None:
             raise InsufficientDataError(
                 f"the data do not tell {each.component}.{each.metric}", got=str(each),
-                expected="a signal that changes, and enough samples", where="--fail-if",
+                expected="a signal that changes, and enough samples", where="`fail_if`",
             )  # fmt: skip
         if _OPERATORS[each.sign](value, each.number):
             words.append(f"{each.component}.{each.metric} = {value:.6g} ({each.sign} {each.number:g})")
@@ -78,11 +78,11 @@ def refuse_exceeded(comparison: Comparison, thresholds: Sequence[Threshold]) -> 
     """Raises ThresholdError when any threshold fails for the first robot, naming all that do."""
     words = exceeded(comparison, thresholds)
     if words:
-        count = f"{len(words)} of {len(thresholds)} rules of --fail-if hold"
+        count = f"{len(words)} of {len(thresholds)} rules of `fail_if` hold"
         raise ThresholdError(f"{count} for {comparison.robots[0]}: {', '.join(words)}")
 
 
-def _unknown(what: str, name: str, known: Sequence[str], where: str = "--fail-if") -> InputError:
+def _unknown(what: str, name: str, known: Sequence[str], where: str = "`fail_if`") -> InputError:
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
     remedy = f"did you mean {close[0]}?" if close else ""
     return InputError(what, got=name, expected=", ".join(known), remedy=remedy, where=where)

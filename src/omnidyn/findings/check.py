@@ -72,7 +72,7 @@ def _no_channel(log: Log) -> list[Finding]:
     names = f" of {', '.join(unused[:6])}{', ...' * (len(unused) > 6)}" if unused else ""
     return [Finding(
         "no_channel", FATAL, "", f"no column but the time is known: nothing was checked{names}",
-        "say which column is what: --column w1=NAME:rad/s, or --map FILE", (), 0, {},
+        "say which column is what: `column` w1=NAME:rad/s, or `map` FILE", (), 0, {},
     )]  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def _remedy(guessed: list[str]) -> str:
     if guessed:
         return (
             f"{', '.join(guessed)} of the robot file {'is' if len(guessed) == 1 else 'are'} only guessed: put in what "
-            "is known of the motors, or let omnidyn identify --free friction --free motor.torque_constant_Nm_A find it"
+            "is known of the motors, or let omnidyn identify `free` friction `free` motor.torque_constant_Nm_A find it"
         )
     return (
         "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of "

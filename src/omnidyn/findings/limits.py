@@ -188,5 +188,5 @@ def _unsigned(work: LogUnderCheck) -> list[Finding]:
         "unsigned", FATAL, names,
         f"the currents are never negative, though the motors are driven backward in {100 * share:.0f} % of the values: "
         "the sensor gives their size only",
-        "say so: --current-unsigned takes the sign from the commanded speed", (), 0, {"share": share},
+        "say so: `current_unsigned` takes the sign from the commanded speed", (), 0, {"share": share},
     )]  # fmt: skip

@@ -96,7 +96,7 @@ def _backward(log: Log, rows: NDArray[np.int64]) -> list[Finding]:
     return [
         Finding(
             "time_back", FATAL, "t", f"time goes back {count} times, by up to {farthest:.4g} s",
-            "sort the rows (--sort) where they were written out of order; split the file where two logs were joined",
+            "sort the rows (`sort`) where they were written out of order; split the file where two logs were joined",
             spans_of(bad, log.lines[rows]), count, {"farthest_s": farthest},
         )
     ]  # fmt: skip
@@ -169,7 +169,7 @@ def _unit(work: LogUnderCheck) -> list[Finding]:
         Finding(
             "time_unit", FATAL, "t",
             f"one row every {work.step:.4g} s: the time is hardly in the unit given ({likely})",
-            "give the unit of the time column, such as --column t=NAME:ms", (), 0, {"step_s": work.step},
+            "give the unit of the time column, such as `column` t=NAME:ms", (), 0, {"step_s": work.step},
         )
     ]  # fmt: skip
 

@@ -123,13 +123,13 @@ def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
     for name in fit.unidentifiable:
         yield f"{name} cannot be told from these logs: {_remedy(name)}"
     for words in fit.blind:
-        yield f"{words}: fix one of them to what was measured otherwise (--fix), or give it a std (--use-priors)"
+        yield f"{words}: fix one of them to what was measured otherwise (`fixed`), or give it a std (`use_priors`)"
 
 
 def _remedy(name: str) -> str:
     if name in BOX:
         return f"drive {_axis(name)} both ways, at several speeds"
-    return "fix it (--fix), or record what depends on it: currents, or another load"
+    return "fix it (`fixed`), or record what depends on it: currents, or another load"
 
 
 def _axis(name: str) -> str:
@@ -148,11 +148,11 @@ def _guesses(fit: OutputErrorEstimate, validation: Validation | None) -> Iterato
         guessed = [key for key in guessed if key not in GOES_WITH_TORQUE]
     missed = validation is not None and bool(coloured(validation.scores.get(HELD_OUT) or validation.scores[FITTED]))
     if guessed and missed:
-        free = " ".join(f"--free {key}" for key in FREEABLE if key in guessed)
+        free = " ".join(f"`free` {key}" for key in FREEABLE if key in guessed)
         are = "is a guess" if len(guessed) == 1 else "are guesses"
         yield (
             f"{', '.join(guessed)} {are} of the robot file, and the errors are not white: put in what you can "
-            f"measure{f', or fit what shows in the logs (--free friction {free})' if free else ''}"
+            f"measure{f', or fit what shows in the logs (`free` friction {free})' if free else ''}"
         )
 
 
@@ -191,15 +191,15 @@ def _from_validation(fit: OutputErrorEstimate, validation: Validation | None) ->
     late = {name: s.lag for name, s in scores.items() if s.lag}
     if late and not any(name.startswith("latency") for name in fit.nuisances):
         name, lag = next(iter(late.items()))
-        yield f"{name} is {lag:+.3f} s behind the model: fit it with --nuisance latency"
+        yield f"{name} is {lag:+.3f} s behind the model: fit it with `nuisances` latency"
     if coloured(scores) and not fit.nuisances:
         yield (
-            "errors are not white, so the model misses something: try --nuisance latency, gain or dead_band, or free "
+            "errors are not white, so the model misses something: try `nuisances` latency, gain or dead_band, or free "
             "motor.torque_constant_Nm_A"
         )
     yield from _shape(fit, validation)
     if validation.held_out is None:
-        yield "record one more log, of other drives, and hold it out (--hold-out): only that shows what it is worth"
+        yield "record one more log, of other drives, and hold it out (`hold_out`): only that shows what it is worth"
 
 
 def _shape(fit: OutputErrorEstimate, validation: Validation) -> Iterator[str]:
@@ -209,6 +209,6 @@ def _shape(fit: OutputErrorEstimate, validation: Validation) -> Iterator[str]:
         way = "faster" if found.change > 0.0 else "slower"
         yield (
             f"between its axes the robot is {abs(found.change):.2g} +- {found.std:.1g} m/s {way} against the model "
-            "than along them, as with friction of another shape than that of the robot file: --method steady-state "
+            "than along them, as with friction of another shape than that of the robot file: `method` steady-state "
             "says which shape the logs have"
         )

@@ -61,7 +61,7 @@ def wheel_geometry(runs: Sequence[Run]) -> Geometry:
     raise InputError(
         "cannot tell where the wheels stand", got=", ".join(runs[0].channels) if runs else "no log",
         expected="twist_command and wheel_speed_command, or twist and wheel_speed, all components of them",
-        remedy="say which columns they are (--column w1=NAME), or give --azimuth",
+        remedy="say which columns they are (`column` w1=NAME), or give `azimuth`",
     )  # fmt: skip
 
 
@@ -78,7 +78,7 @@ def as_mecanum(seen: Geometry) -> Geometry:
         raise InputError(
             "the wheels do not push as mecanum wheels in an X do", got=f"directions {angle} degree",
             expected=f"{list(AS_OMNI)}: front left, front right, rear left, rear right, counter-clockwise positive",
-            remedy="name the columns in this order, a left wheel that counts forward with a minus: --column w1=-LEFT",
+            remedy="name the columns in this order, a left wheel that counts forward with a minus: `column` w1=-LEFT",
         )  # fmt: skip
     radius = None if seen.robot_radius is None else float(np.sqrt(2.0)) * seen.robot_radius
     return replace(seen, azimuth_deg=AS_OMNI, per_metre=seen.per_metre / float(np.sqrt(2.0)), robot_radius=radius)
@@ -99,7 +99,7 @@ def _fit(twist: FloatArray, speed: FloatArray, source: str) -> Geometry:
     if (size == 0.0).any() or np.linalg.cond(design / size) > MAX_CONDITION:
         raise InsufficientDataError(
             "the logs do not show where the wheels stand", got=f"{len(twist)} rows in motion, all alike",
-            expected="motion along x and along y", remedy="add logs in other directions, or give --azimuth",
+            expected="motion along x and along y", remedy="add logs in other directions, or give `azimuth`",
         )  # fmt: skip
     rows, *_ = np.linalg.lstsq(design, speed, rcond=None)
     rest = speed - design @ rows
@@ -108,8 +108,8 @@ def _fit(twist: FloatArray, speed: FloatArray, source: str) -> Geometry:
         raise InputError(
             "the wheels do not follow the body as omni wheels do",
             got=f"{residual:.0%} of the wheel speeds unexplained", expected=f"at most {MAX_RESIDUAL:.0%}",
-            remedy="check the columns with omnidyn check, or give --azimuth" if turned else "a turn rate is not in the "
-            "logs, or 0: where the robot turned say which column it is (--column omega=NAME:UNIT)",
+            remedy="check the columns with omnidyn check, or give `azimuth`" if turned else "a turn rate is not in the "
+            "logs, or 0: where the robot turned say which column it is (`column` omega=NAME:UNIT)",
         )  # fmt: skip
     scale = np.hypot(rows[0], rows[1])
     if (scale == 0.0).any():

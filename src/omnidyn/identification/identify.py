@@ -1,58 +1,70 @@
-"""identify: logs and a robot in, an Estimate out, by the method that they allow."""
+"""identify: logs and a robot in, an Estimate out, by the method that they allow; Identification: all of it, checked,
+fitted, validated, with advice."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.findings.check import check
+from omnidyn.findings.finding import FATAL, Verdict
+from omnidyn.identification.advice import advice, verdict_advice
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.grouping import group_names, held_out
+from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
+from omnidyn.identification.output_error.fit import WHOLE, Fit, fit_output_error
 from omnidyn.identification.output_error.inputs import why_no_inputs
+from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.solver import State
+from omnidyn.identification.question import AUTO, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.identification.steady.axis_lines import identify_lines
 from omnidyn.identification.steady.settling import why_no_transient
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.steady.study import SteadyStudy, identify_steady
+from omnidyn.identification.steady.study_parts import Difference
+from omnidyn.identification.validation import Validation, validate
+from omnidyn.logs.log import Log
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
-AUTO, OUTPUT_ERROR, STEADY_STATE = "auto", "output-error", "steady-state"
-METHODS = (OUTPUT_ERROR, STEADY_STATE)
-_FUNCTIONS: dict[str, Callable[..., Any]] = {OUTPUT_ERROR: fit_output_error, STEADY_STATE: identify_steady}
+Tell = Callable[[str], object]
+
+LINE = "line"  # a shape: the paper's line on each axis
+CHECKED = 1_000_000  # rows that are checked on the way
+CUT_SHORT = "the numbers are the best so far, not the best there are"
+NOT_COMPARED = "the numbers are those of the whole fit, but nothing was compared with them"
 
 
-def identify(runs: Run | Sequence[Run], robot: Robot, *, method: str = AUTO, **options: Any) -> Estimate:
+def identify(runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None, **options: Any) -> Estimate:
     """Fit the robot to logs. Returns an Estimate: robot, value, std, ci95, correlation, warnings.
 
-    method: "output-error" (whole logs by maximum likelihood, see `fit_output_error`), "steady-state" (friction from
-    stretches of constant speed, see `identify_steady`), or "auto": the first where robot and logs support it, else the
-    second, with a warning that says why. options: those of the method, such as free=, nuisances=, loss= or shape=;
-    with "auto" they choose it.
+    question, options: see `Question`, such as method=, free=, nuisances=, loss= or shape=. With the method "auto" the
+    options choose it, else robot and logs: output error where they support it, else steady state, with a warning that
+    says why.
     Raises InputError for options of another method and for what cannot be used, InsufficientDataError where the logs
     cannot answer.
     """
     every = [runs] if isinstance(runs, Run) else list(runs)
-    chosen, why = (method, "") if method != AUTO else choose_method(every, robot, [*options])
-    refuse_options(chosen, [*options])
-    if chosen == OUTPUT_ERROR:
-        return fit_output_error(every, robot, **options)
-    estimate = identify_steady(every, robot, **options).estimate
-    if why:
-        from dataclasses import replace
-
-        return replace(estimate, warnings=(why, *estimate.warnings))
-    return estimate
+    asked = Question.for_method("", question, options)
+    method, why = (
+        choose_method(every, robot, [*options, *asked.given()]) if asked.method == AUTO else (asked.method, "")
+    )
+    asked = replace(asked, method=method)
+    if method == OUTPUT_ERROR:
+        return fit_output_error(every, robot, question=asked)
+    estimate = identify_steady(every, robot, question=asked).estimate
+    return replace(estimate, warnings=(why, *estimate.warnings)) if why else estimate
 
 
 def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()) -> tuple[str, str]:
     """(method, why it is not output error; "" where it is, or where an option decides). options: names of those."""
-    own = options_of(STEADY_STATE)
-    if any(name in own and name not in options_of(OUTPUT_ERROR) for name in options):
-        return STEADY_STATE, ""
+    method = Question().method_asked(options)
+    if method != AUTO:
+        return method, ""
     why = why_not_output_error(runs, robot)
-    if not why or any(name in options_of(OUTPUT_ERROR) for name in options):
-        return OUTPUT_ERROR, ""
-    return STEADY_STATE, f"steady-state, not output error: {why}"
+    return (STEADY_STATE, f"steady-state, not output error: {why}") if why else (OUTPUT_ERROR, "")
 
 
 def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
@@ -63,19 +75,162 @@ def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     return why_no_transient(runs, robot)
 
 
-def options_of(method: str) -> tuple[str, ...]:
-    """Names of the options of a method."""
-    parameters = inspect.signature(_FUNCTIONS[method]).parameters.values()
-    return tuple(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
+def settle_method(runs: Sequence[Run], robot: Robot, question: Question, tell: Tell) -> Question:
+    """The question with its method, by name, by options, or by what robot and logs support; `tell` hears why."""
+    method = question.method_asked()
+    if method == AUTO:
+        why = why_not_output_error(runs, robot)
+        method = STEADY_STATE if why else OUTPUT_ERROR
+        if why:
+            tell(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}")
+    return replace(question, method=method)
 
 
-def refuse_options(method: str, options: Sequence[str]) -> None:
-    """Raises InputError for an unknown method, and for options that it does not have."""
-    if method not in METHODS:
-        raise InputError("no such method", got=method, expected=" or ".join(METHODS), where="method")
-    own = options_of(method)
-    for name in options:
-        if name not in own:
-            other = [each for each in METHODS if name in options_of(each)]
-            remedy = f"it belongs to {other[0]}" if other else ""
-            raise InputError(f"{method} has no such option", got=name, expected=", ".join(own), remedy=remedy)
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """All that logs say about a robot: estimates of each group, differences between groups, and what to do next.
+
+    method: that was taken. estimates: group -> Estimate; one, "all", where there are no groups. validations: group ->
+    Validation, by output error. study: by steady state, but for the shape "line". verdicts: of `check` on each log.
+    advice: what to mend, to measure or to ask for next, gravest first. interrupted: what an interrupt cut off, in
+    words; "" without one.
+    """
+
+    question: Question
+    method: str
+    estimates: Mapping[str, Estimate]
+    differences: tuple[Difference, ...] = ()
+    validations: Mapping[str, Validation] | None = None
+    study: SteadyStudy | None = None
+    verdicts: tuple[Verdict, ...] = ()
+    advice: tuple[str, ...] = ()
+    interrupted: str = ""
+
+    @classmethod
+    def of(
+        cls, runs: Run | Sequence[Run], robot: Robot, question: Question | None = None, *, logs: Sequence[Log] = (),
+        progress: Tell | None = None, tell: Tell | None = None, keep_best: bool = False, **options: Any,
+    ) -> Identification:  # fmt: skip
+        """Choose the method; check, fit, validate and advise.
+
+        question, options: see `Question`; the sources of the runs tell their groups, and which are held out. logs:
+        where the runs come from, to be checked as well. progress: is called with what is being done. tell: with what a
+        user must know at once. keep_best: an interrupt leaves the best so far, instead of being raised.
+        Errors: as `identify` raises.
+        """
+        every = [runs] if isinstance(runs, Run) else list(runs)
+        asked = (question or Question()).but(options)
+        heard = _Heard(progress or _silent, tell or _silent, keep_best)
+        if asked.what == MOTORS:
+            raise UnsupportedError("motors have functions of their own", got=MOTORS, where="what")
+        asked = settle_method(every, robot, asked, heard.tell)
+        if asked.method == STEADY_STATE:
+            return _steady(every, robot, asked)
+        why = why_not_output_error(every, robot) if robot.drive.kind == SPEED else ""
+        if why:
+            heard.tell(f"{why}; `method` {STEADY_STATE} (`group` instead of `per`) answers in seconds")
+        return _fitted(every, robot, asked, logs, heard)
+
+    @property
+    def estimate(self) -> Estimate:
+        """The estimate of the first group; the only one where there are no groups."""
+        return next(iter(self.estimates.values()))
+
+    @property
+    def fits(self) -> dict[str, OutputErrorEstimate]:
+        """The estimates by output error: group -> Estimate."""
+        return {name: each for name, each in self.estimates.items() if isinstance(each, OutputErrorEstimate)}
+
+
+@dataclass(frozen=True)
+class _Heard:
+    """Who hears of an identification: of what is done, and of what must be known at once."""
+
+    now: Tell
+    tell: Tell
+    keep_best: bool
+
+
+def _silent(words: str) -> None:
+    """Nobody hears."""
+
+
+def _steady(runs: Sequence[Run], robot: Robot, asked: Question) -> Identification:
+    names = group_names([run.source for run in runs], asked.group, "group") if asked.group else None
+    used = runs if names is None else [run for run, name in zip(runs, names, strict=True) if name]
+    groups = None if names is None else [name for name in names if name]
+    plain = replace(asked, group=())
+    if asked.shape == LINE:
+        return Identification(asked, STEADY_STATE, identify_lines(used, robot, groups=groups, question=plain))
+    study = identify_steady(used, robot, groups=groups, question=plain)
+    return Identification(asked, STEADY_STATE, study.estimates, study.differences, study=study, advice=study.advice)
+
+
+def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[Log], heard: _Heard) -> Identification:
+    sources = [run.source for run in runs]
+    groups = group_names(sources, asked.per, "per") if asked.per else [WHOLE] * len(runs)
+    held = held_out(sources, asked.hold_out)
+    fitted = [(run, group) for run, group, out in zip(runs, groups, held, strict=True) if group and not out]
+    names = list(dict.fromkeys(group for _, group in fitted))
+    if asked.per and len(names) == 1:
+        raise InputError("the logs have only one group", got=names[0], expected="two or more", where="per")
+    verdicts = _verdicts(logs, robot, heard)
+    heard.now("fitting: loading")
+    plain = replace(asked, per=(), hold_out=())
+    answer, cut = _answered(
+        [run for run, _ in fitted], robot, plain, [g for _, g in fitted] if asked.per else None, heard
+    )
+    validations: dict[str, Validation] = {}
+    try:
+        for group, fit in answer.estimates.items() if not cut else ():
+            beside = [run for run, own, out in zip(runs, groups, held, strict=True) if out and own == group]
+            validations[group] = validate(fit, [run for run, own in fitted if own == group], beside, heard.now)
+    except KeyboardInterrupt:  # what is fitted stays
+        if not heard.keep_best:
+            raise
+        validations, cut = {}, NOT_COMPARED
+    words = verdict_advice(verdicts)
+    for group, fit in answer.estimates.items():
+        own = advice(fit, validations.get(group))
+        words += own if len(answer.estimates) == 1 else [f"{group}: {each}" for each in own]
+    return Identification(
+        asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, tuple(verdicts), tuple(words), cut
+    )
+
+
+def _verdicts(logs: Sequence[Log], robot: Robot, heard: _Heard) -> list[Verdict]:
+    """What check says of the logs, where they are not too long; fatal findings are told at once."""
+    if sum(len(log) for log in logs) > CHECKED:
+        heard.tell("the logs are long: not checked on the way (omnidyn check does)")
+        return []
+    found = []
+    for k, log in enumerate(logs):
+        heard.now(f"checking {k + 1} of {len(logs)}")
+        found.append(check(log, robot))
+        for finding in found[-1].findings:
+            if finding.level == FATAL:
+                heard.tell(f"warning: {log.source}: {finding.message}: {finding.remedy}")
+    return found
+
+
+def _answered(
+    runs: Sequence[Run], robot: Robot, asked: Question, groups: Sequence[str] | None, heard: _Heard
+) -> tuple[Answer, str]:
+    """(answer, what an interrupt cut off)."""
+    steps = 0
+
+    def better(state: State) -> None:
+        nonlocal steps
+        steps += 1
+        heard.now(f"fitting, step {steps}, -log likelihood {state.objective:.6g}")
+
+    progress = Progress(better, lambda words: heard.now(f"fitting: {words}"))
+    fit = Fit.of(runs, robot, asked, groups, progress)
+    try:
+        return fit.answer(fit.solve(progress), progress), ""
+    except KeyboardInterrupt:
+        if not heard.keep_best or progress.best is None:
+            raise
+        heard.now("finishing with the best so far")
+        heard.tell("interrupted: finishing with the best so far (again: give up)")
+        return fit.answer(progress.best), CUT_SHORT

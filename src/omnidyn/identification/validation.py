@@ -71,7 +71,7 @@ class Validation:
         """What they say, in words."""
         found = self.scores.get(HELD_OUT)
         if found is None:
-            yield "nothing was held out: how well the model predicts logs that it never saw is not known (--hold-out)"
+            yield "nothing was held out: how well the model predicts logs that it never saw is not known (`hold_out`)"
             return
         far = [name for name, s in found.items() if s.chi2 is not None and s.chi2 > FAR]
         if far:

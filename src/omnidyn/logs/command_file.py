@@ -87,7 +87,7 @@ def _read(
             "too many rows",
             got=len(table),
             expected=f"at most {max_steps}",
-            remedy="shorten the file or raise --max-steps",
+            remedy="shorten the file or raise `max_steps`",
             where=table.source,
         )
     t = table.numbers("t_s")
@@ -149,7 +149,7 @@ def _intervals(table: Table, t: FloatArray, duration: float | None) -> tuple[Flo
             "one row: how long it holds is not said",
             got="1 row",
             expected="two rows, or a duration",
-            remedy="add --duration SECONDS",
+            remedy="add `duration` SECONDS",
             where=table.source,
         )
     steps = _regular(t) if len(t) > 1 else np.empty(0)

@@ -182,7 +182,7 @@ class Log:
             row = int(back[0]) + 1
             raise InputError(
                 "time goes back", got=f"{self.t[row]:.9g} s after {self.t[row - 1]:.9g} s ({back.size} times)",
-                expected="times that increase", remedy="sort the rows, or use --sort",
+                expected="times that increase", remedy="sort the rows, or use `sort`",
                 where=f"{self.source}:{self.lines[row]}",
             )  # fmt: skip
 

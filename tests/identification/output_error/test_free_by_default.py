@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.advice import advice
-from omnidyn.identification.output_error.fit import expand_keys, fit_output_error, free_by_default
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.prepare import expand_keys, free_by_default
 from omnidyn.identification.validation import validate
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import BOX, Key
@@ -52,4 +53,4 @@ def test_the_robot_of_init_is_fitted_as_it_is_and_its_guesses_are_named(robot):
     assert abs(wrong.value[key] - 2.0) > 4.0 * right.std[key]
     assert any("motor.resistance_ohm" in words and "are guesses of the robot file" in words for words in told)
     told = " ".join(told)
-    assert "(--free friction --free motor.torque_constant_Nm_A --free motor.resistance_ohm --free body.inertia" in told
+    assert "(`free` friction `free` motor.torque_constant_Nm_A `free` motor.resistance_ohm `free` body.inertia" in told

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.output_error.best_so_far import WORDS, best_groups_so_far
 from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.group_fit import identify_groups, join_groups
+from omnidyn.identification.output_error.fit import INTERRUPTED, Fit, identify_groups
+from omnidyn.identification.output_error.joint import join
+from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.question import Question
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
@@ -99,19 +101,20 @@ def test_the_best_so_far_is_what_the_state_says_and_the_same_again():
     runs, names = floors(2)
     found = []
     for _ in range(2):
-        joint, states = join_groups(runs, AXEBOT, names, free=["friction", TORQUE], **QUIET), []
+        joint, states = Fit.of(runs, AXEBOT, Question(free=["friction", TORQUE], **QUIET), names), []
 
         def watch(state, kept=states):
             kept.append(state)
             if len(kept) == 2:
                 raise KeyboardInterrupt
 
+        progress = Progress(watch)
         with pytest.raises(KeyboardInterrupt):
-            joint.solve(watch)
-        found.append(best_groups_so_far(joint, states))
-        values = dict(zip(joint.engine.problem.names, states[-1].point.values, strict=True))
+            joint.solve(progress)
+        found.append(joint.answer(progress.best))
+        values = dict(zip(states[-1].problem.names, states[-1].point.values, strict=True))
         for group, estimate in found[-1].estimates.items():
-            assert WORDS in estimate.warnings
+            assert INTERRUPTED in estimate.warnings
             assert estimate.value[TORQUE] == values[TORQUE]
             assert estimate.value[COULOMB] == values[f"{COULOMB}@{group}"]
     assert found[0].differences == found[1].differences
@@ -124,8 +127,10 @@ def test_logs_with_other_channels_in_another_order():
     robot = Key.parse(COULOMB).set(AXEBOT, 2.6)
     wheels = simulate(robot, excitation(6.0, 50.0, seed=5), 0.02)
     runs[3] = wheels.replace(twist=None, pose=None, current=None)
-    joint = join_groups(runs, AXEBOT, names, free=["friction"], **QUIET)
-    problem, engine = joint.engine.problem, joint.engine
+    joint = Fit.of(runs, AXEBOT, Question(free=["friction"], **QUIET), names)
+    groups = joint.groups
+    engine = join(groups, [group.problem() for group in groups], BOX)
+    problem = engine.problem
     order = [3, 0, 2, 1]
     other = engine.on(type(problem)(problem.robot, problem.parameters, problem.robot_count,
                                     tuple(problem.pieces[k] for k in order)))  # fmt: skip

@@ -95,7 +95,7 @@ def test_wheels_named_by_their_place_are_no_log_of_one_motor(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "fl_vel": 1, "fr_vel": 2, "rear_vel": 3}))
     assert list(columns.columns) == ["t"]
     assert columns.doubts == (
-        "fl_vel, fr_vel, rear_vel look like w1, but no number says which wheel each is (say --column w1=fl_vel and so "
+        "fl_vel, fr_vel, rear_vel look like w1, but no number says which wheel each is (say `column` w1=fl_vel and so "
         "on): not taken",
     )
 
@@ -146,7 +146,7 @@ def test_the_columns_of_the_robotino(tmp_path):
     assert columns.columns["w1"].side == columns.columns["w1_cmd"].side == "motor"
     doubts = " ".join(columns.doubts)
     assert "m1pos looks like a1, but counts per turn are not known" in doubts
-    assert 'the unit pix is unknown: not taken; say --column "x=xpos:UNIT"' in doubts
+    assert 'the unit pix is unknown: not taken; say `column` "x=xpos:UNIT"' in doubts
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_whole_numbers_of_an_encoder_are_counts_and_no_radians(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "enc1": clock(7.0), "enc2": clock(-7.0)}))
     assert list(columns.columns) == ["t"]
     assert columns.doubts == (
-        "enc1, enc2 look like a1, a2, but counts per turn are not known: not taken; say --assume "
+        "enc1, enc2 look like a1, a2, but counts per turn are not known: not taken; say `assume` "
         "a=ticks/COUNTS_PER_TURN",
     )
     assert "a1" in guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "angle1": clock(0.25)})).columns
@@ -181,7 +181,7 @@ def test_whole_numbers_of_an_encoder_are_counts_and_no_radians(tmp_path):
 def test_a_turn_rate_beyond_any_robot_is_not_taken_as_rad_s(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "gyro_z": clock(20.0)}))
     assert "omega" not in columns.columns
-    assert 'say --column "omega=gyro_z:deg/s"' in columns.doubts[0]
+    assert 'say `column` "omega=gyro_z:deg/s"' in columns.doubts[0]
     assert "omega" in guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "gyro_z": clock(0.2)})).columns
 
 
@@ -200,7 +200,7 @@ def test_german_degrees_are_degrees(tmp_path):
 def test_v_with_a_number_may_be_volts_or_a_speed(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "V_1": 1, "V_2": 2, "omega_1": 3}))
     assert columns.doubts == (
-        "V_1, V_2 look like u1, u2, which may be voltages or speeds (say --column u1=V_1:V and so on): not taken",
+        "V_1, V_2 look like u1, u2, which may be voltages or speeds (say `column` u1=V_1:V and so on): not taken",
     )
 
 
@@ -236,7 +236,7 @@ def test_time_without_a_unit_is_taken_where_it_is_unmistakable(tmp_path, step, u
 def test_time_that_may_be_two_units_is_not_taken(tmp_path, step, units):
     columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
     assert "t" not in columns.columns
-    assert all(f'--column "t=t:{unit}"' in columns.doubts[0] for unit in units)
+    assert all(f'`column` "t=t:{unit}"' in columns.doubts[0] for unit in units)
 
 
 def test_a_counter_is_no_clock(tmp_path):
@@ -250,7 +250,7 @@ def test_volts_or_duty_is_not_guessed(tmp_path):
     table = table_of(tmp_path, {"t_s": clock(0.01), "u1": 45.0})
     columns = guess_columns(table)
     assert "u1" not in columns.columns
-    assert "--assume u=V" in columns.doubts[0]
+    assert "`assume` u=V" in columns.doubts[0]
     assert guess_columns(table, assume={"u": "%"}).columns["d1"] == Column("u1", "%")
     assert guess_columns(table, assume={"u1": "V"}).columns["u1"] == Column("u1", "V")
 
@@ -302,7 +302,7 @@ def test_a_units_row_that_contradicts_a_name_is_still_refused(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "w1_rad_s": 1}, ["s", "rad"]))
     assert list(columns.columns) == ["t"]
     assert columns.doubts == (
-        "w1_rad_s looks like w1, but rad is no unit of a turn rate: not taken; say --assume w=UNIT",
+        "w1_rad_s looks like w1, but rad is no unit of a turn rate: not taken; say `assume` w=UNIT",
     )
 
 
@@ -323,7 +323,7 @@ def test_a_heading_that_jumps_by_360_is_not_taken_as_radians(tmp_path, yaw, take
     assert (columns.columns["heading"].unit if "heading" in columns.columns else "") == taken
     if not taken:
         assert columns.doubts == (
-            "yaw looks like heading, but no unit is given, and it jumps by 360 as degrees do: not taken; say --column "
+            "yaw looks like heading, but no unit is given, and it jumps by 360 as degrees do: not taken; say `column` "
             '"heading=yaw:deg"',
         )
 

@@ -73,7 +73,7 @@ def test_what_numpy_writes_comes_back_bitwise(write):
 def test_no_header(write):
     table = read_table(write(" 0 1 2\n 1 2 3\n"), header=False)
     assert numbers(table) == {"c1": [0.0, 1.0], "c2": [1.0, 2.0], "c3": [2.0, 3.0]}
-    with pytest.raises(InputError, match=r"the table has no header: its first row is numbers.*--no-header"):
+    with pytest.raises(InputError, match=r"the table has no header: its first row is numbers.*`no_header`"):
         read_table(write(" 0 1 2\n 1 2 3\n"))
 
 

@@ -12,6 +12,8 @@ from typing import Any
 
 import typer
 
+from omnidyn.cli.terminal.flags import with_flags
+
 MIN_WIDTH, WIDTH_WITHOUT_TERMINAL = 20, 110
 COLOURS = {
     "fatal": "red", "warn": "yellow", "note": "white", "yes": "green", "mended": "yellow", "no": "red",
@@ -57,12 +59,12 @@ def say(words: str) -> None:
         return
     # Not typer.echo: it overrides the encoding of an ASCII stream.
     with contextlib.suppress(BrokenPipeError):
-        print(words, file=sys.stderr, flush=True)
+        print(with_flags(words), file=sys.stderr, flush=True)
 
 
 def show(text: str) -> None:
     """The result, to stdout."""
-    print(text, flush=True)
+    print(with_flags(text), flush=True)
 
 
 def show_json(document: dict[str, Any]) -> None:

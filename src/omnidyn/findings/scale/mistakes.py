@@ -38,7 +38,7 @@ def unit_of(factor: float, units: dict[str, float]) -> str:
 
 def unit_finding(where: str, words: str, factor: float) -> Finding:
     return Finding(
-        "unit", FATAL, where, words, "give the unit of the column (--column NAME:UNIT) or its side of the gear",
+        "unit", FATAL, where, words, "give the unit of the column (`column` NAME:UNIT) or its side of the gear",
         (), 0, {"factor": factor},
     )  # fmt: skip
 
@@ -65,7 +65,7 @@ def own_derivatives(work: LogUnderCheck) -> list[Finding]:
             found.append(Finding(
                 "time_unit", FATAL, "t",
                 f"{words}: the time is not in the unit given" + (f" ({clock}?)" if clock else ""),
-                "give the unit of the time column, such as --column t=NAME:ms", (), 0, {"ratio": line.value},
+                "give the unit of the time column, such as `column` t=NAME:ms", (), 0, {"ratio": line.value},
             ))  # fmt: skip
         else:
             found.append(Finding(

@@ -344,7 +344,7 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         if off < 0.0:
             found.append(Finding(
                 "inverted", FATAL, name, f"{name} has the opposite sign of what {source} says, while the other wheels "
-                "agree with it", "put the column right in the mapping (--column)", (), 0,
+                "agree with it", "put the column right in the mapping (`column`)", (), 0,
                 {"ratio": off, "error": slopes[k].error},
             ))  # fmt: skip
             continue

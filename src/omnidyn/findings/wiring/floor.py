@@ -173,7 +173,7 @@ def wheels_finding(work: LogUnderCheck, answer: Answer, blamed: str) -> Finding:
         code_of(answer.best), FATAL, " ".join(wrong),
         f"wheel_speed against {what}: {answer.best.words(names)}{also}{rivals_of(answer, names)}; as logged it "
         f"leaves {100 * answer.logged:.0f} % of the motion unexplained, put right {100 * answer.left:.1f} %",
-        "put the columns right in the mapping (--column), or the order and signs of the wheels in the robot file",
+        "put the columns right in the mapping (`column`), or the order and signs of the wheels in the robot file",
         (), 0, {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,
                 "as_good": float(answer.others)},
     )  # fmt: skip

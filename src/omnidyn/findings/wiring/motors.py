@@ -110,6 +110,6 @@ def motor_finding(work: LogUnderCheck, channel: str, answer: Answer) -> Finding:
         code_of(answer.best), FATAL, " ".join(wrong),
         f"{channel} against {against} of the same motor: {answer.best.words(names)}{rivals_of(answer, names)}; as "
         f"logged it leaves {100 * answer.logged:.0f} % unexplained, put right {100 * answer.left:.1f} %",
-        "put the columns right in the mapping (--column)", (), 0,
+        "put the columns right in the mapping (`column`)", (), 0,
         {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left, "as_good": float(answer.others)},
     )  # fmt: skip

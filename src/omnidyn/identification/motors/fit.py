@@ -33,11 +33,12 @@ from omnidyn.identification.motors.log import (
 from omnidyn.identification.output_error.answer import Nuisance
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.fit import GAUSS, STUDENT, degrees
+from omnidyn.identification.output_error.fit import degrees
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
+from omnidyn.identification.question import GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
 

@@ -1,4 +1,4 @@
-"""OutputErrorEstimate: the answer of a fit to whole logs, in values, intervals and words."""
+"""Answer: what a fit to whole logs says, in values, intervals and words; one OutputErrorEstimate a group."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 from omnidyn.document import Part, Points, interval_cell
 from omnidyn.identification.estimate import Estimate, finite_or_none
+from omnidyn.identification.steady.study_parts import Difference
 
 
 @dataclass(frozen=True)
@@ -66,3 +67,22 @@ class OutputErrorEstimate(Estimate):
             "covariance": self.covariance,
             "converged": self.converged,
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a fit says. estimates: group -> Estimate; one where there are no groups. Shared numbers are the same in all.
+
+    own: names that each group has for itself; shared: the others. differences: every pair of groups (second minus
+    first) and every own number that both determine.
+    """
+
+    estimates: Mapping[str, OutputErrorEstimate]
+    own: tuple[str, ...]
+    shared: tuple[str, ...]
+    differences: tuple[Difference, ...]
+
+    @property
+    def estimate(self) -> OutputErrorEstimate:
+        """The estimate of the first group; the only one where there are no groups."""
+        return next(iter(self.estimates.values()))

@@ -1,206 +1,299 @@
-"""fit_output_error: whole logs in, a robot with honest intervals out."""
+"""Fit: whole logs in, a robot with honest intervals out; one log or many, one group of logs or several.
+
+Several groups (floors, loads, days) share some numbers and have some each for itself. One likelihood over all logs is
+maximised: nothing is combined afterwards, so that the result is exact, and differences between groups carry the
+correlation that the shared numbers bring about.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
-from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
-from omnidyn.identification.output_error.problem.motion import Motion, motion
-from omnidyn.identification.output_error.problem.nuisances import (
-    AUTO,
-    LATENCY,
-    NUISANCES,
-    automatic,
-    nuisance_parameters,
-    pieces,
+from omnidyn.identification.output_error.inputs import why_no_inputs
+from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
+from omnidyn.identification.output_error.prepare import (
+    EXACT,
+    FINE,
+    IMPLICIT,
+    LOOP,
+    Group,
+    expand_keys,
+    free_by_default,
+    is_exact,
+    known_priors,
+    make_engine,
+    make_group,
+    read_records,
+    stays_exact,
 )
-from omnidyn.identification.output_error.problem.parameters import (
-    Parameter,
-    names_of,
-    refuse_repeated,
-    refuse_unknown,
-    robot_parameters,
-)
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES, automatic
+from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated, refuse_unknown
 from omnidyn.identification.output_error.problem.problem import Problem
-from omnidyn.identification.output_error.problem.record import Record, record
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
-from omnidyn.identification.output_error.solve.loop import (
-    left_out,
-    loop_keys,
-    loop_pieces,
-    looped,
-    solve_loop,
-)
-from omnidyn.identification.output_error.solve.progress import Onlooker, onlooker
-from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
+from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
+from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
+from omnidyn.identification.output_error.solve.progress import Best, Progress
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
+from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
-from omnidyn.logs.steady_table import AXES
-from omnidyn.model.dynamics import drive_wrench
-from omnidyn.model.keys import BOX, COULOMB, FRICTION, GAINS, VISCOUS, Key, expand, friction_keys, unit
-from omnidyn.model.motor import DYNAMIC
-from omnidyn.model.robot import IDENTIFIED, Robot
+from omnidyn.identification.question import GAUSS, OUTPUT_ERROR, STUDENT, Question
+from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.exact.march import why_not_exact
 
-FloatArray = NDArray[np.float64]
-
-GAUSS, STUDENT = "gaussian", "student-t"
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
-NOTHING = 1e-9  # [N, N m] a drive that is only rounding
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
-FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
-BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
-LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
+WHOLE = "all"  # the name of the group where there are none
+INTERRUPTED = "the fit was interrupted: the numbers are the best so far, their intervals are those of that point"
 
 
-@dataclass(frozen=True)
-class Options:
-    """How to fit; see fit_output_error."""
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fit of whole logs, ready to be solved.
 
-    free: tuple[str, ...] | None = None
-    fixed: tuple[str, ...] = ()
-    nuisances: tuple[str, ...] | None = ()  # None: those that the logs support
-    start: str = AUTO
-    use_priors: bool = False
-    outputs: tuple[str, ...] | None = None
-    loss: str = GAUSS
-    covariance: str = AUTO
-    tick_rad: float | None = None  # None: found in the logs
+    `solve` finds the best point, `answer` says what it means. After an interrupt, `answer` takes the `best` of the
+    Progress that `solve` was given.
+    """
+
+    question: Question
+    groups: tuple[Group, ...]
+
+    @classmethod
+    def of(
+        cls, runs: Run | Sequence[Run], robot: Robot, question: Question, groups: Sequence[str] | None = None,
+        progress: Progress | None = None,
+    ) -> Fit:  # fmt: skip
+        """Make runs of any length and rate, split at gaps, a problem. groups: name of each run's group.
+
+        Raises InputError for options and logs that cannot be used, InsufficientDataError where nothing can be learnt,
+        UnsupportedError for what an engine does not know. Of the nuisances, robots that need the implicit engine have
+        latencies by default; they know the others, but no position and no wheel angle as outputs.
+        """
+        every = [runs] if isinstance(runs, Run) else list(runs)
+        names = _group_names(every, question, groups)
+        exact = is_exact(robot)
+        usual = free_by_default(robot, exact)
+        refuse_repeated(question.free or ())
+        question = _written_out(question, robot, usual)
+        if groups is not None:
+            _refuse_joint(every, robot, question)
+        found = {
+            name: read_records([run for run, own in zip(every, names, strict=True) if own == name], robot, question)
+            for name in (dict.fromkeys(names) or [WHOLE])
+        }
+        if question.bootstrap:
+            refuse_bootstrap(question.bootstrap, Counter(names if groups is not None else [""] * len(names)))
+        refuse_unknown(question.fixed, robot)
+        asked_axes(question.free or (), question.fixed)
+        (progress or Progress()).doing("looking for what moved")
+        keys = question.free if question.free is not None else known_priors(robot) if question.use_priors else ()
+        exact = exact and stays_exact(robot, [key for key in keys if key not in question.fixed])
+        made = [
+            make_group(name, records, robot, question, exact, usual, alone=groups is None)
+            for name, records in found.items()
+        ]
+        if groups is not None:
+            own_names(question.per_free, [group.problem() for group in made])
+        return cls(question, tuple(made))
+
+    @property
+    def nu(self) -> float:
+        """Degrees of freedom of the loss; 0 for Gaussian noise."""
+        return degrees(self.question.loss)
+
+    def solve(self, progress: Progress | None = None) -> Solution:
+        """The best point; `progress` sees every better state on the way, and hears in words what is done."""
+        progress = progress or Progress()
+        if len(self.groups) == 1:
+            return self._settled(self.groups[0], progress)
+        return self._solve_joint(self._settled_alone(progress), progress)
+
+    def answer(self, found: Solution | Best, progress: Progress | None = None) -> Answer:
+        """What the best point says; of the best so far without profile, bootstrap, breakaway and what else would fit.
+
+        Raises InputError for a name to profile that is not free, InsufficientDataError where the logs say nothing about
+        any of the robot's numbers.
+        """
+        progress, done = progress or Progress(), isinstance(found, Solution)
+        solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
+        hints = self._hints(solution, done)
+        solution, levels = self._levels(solution) if done else (solution, [])
+        solver = solution.solver
+        progress.doing("finding how sure the numbers are")
+        known = trust(solver, solution, self.question.covariance)
+        strata = {id(record): group.name for group in self.groups for record in group.records}
+        profile, draws = (self.question.profile, self.question.bootstrap) if done else ((), 0)
+        again = resampled(solver, solution, known, _in_each_group(profile, solver.problem), draws, strata, progress)
+        loss = loss_words(self.question.loss)
+        if len(self.groups) == 1:
+            group = self.groups[0]
+            words = [*warnings, *group.warnings, *hints]
+            estimate = conclude(
+                solver, solution, known, group.records, loss, words, group.bounds, levels, again.intervals
+            )
+            return Answer({group.name: estimate}, (), solver.problem.names, ())
+        engine, estimates = solver.engine, {}
+        assert isinstance(engine, JointEngine)
+        for member in engine.members:
+            words = [*warnings, *member.group.warnings]
+            better = engine.named_alone(member, again.intervals)
+            seen, alone = engine.seen_alone(member, solution, known)
+            estimate = conclude(seen.solver, seen, alone, member.group.records, loss, words, {}, (), better)
+            others = ", ".join(each.name for each in engine.members if each is not member)
+            estimates[member.name] = replace(estimate, method=f"{estimate.method}; fitted together with {others}")
+        own = own_names(self.question.per_free, [member.problem for member in engine.members])
+        shared = tuple(name for name in solver.problem.names if AT not in name)
+        return Answer(estimates, own, shared, differences(solution, known, again, own, [*estimates], profile, strata))
+
+    def _settled(self, group: Group, progress: Progress) -> Solution:
+        """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
+        found = self._solve(group, group.problem(), progress)
+        if self.question.nuisances is not None or group.engine == IMPLICIT:
+            return found
+        progress.doing("which nuisances the logs support")
+        kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
+        lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
+        if not lost:
+            return found
+        if group.engine == LOOP:  # from its start on: until it is done, the fit with all of them is the best so far
+            progress = progress.aside(f"once more without {', '.join(lost)}")
+        return self._solve(group, group.problem(kept), progress)
+
+    def _solve(self, group: Group, problem: Problem, progress: Progress) -> Solution:
+        """The best point of one group alone."""
+        if group.engine == LOOP:
+            return solve_loop(problem, self.nu, progress)
+        engine = make_engine(group.engine, problem)
+        if group.engine == EXACT:
+            progress.doing("looking for a start")
+            solver = Solver(problem, engine, self.nu)
+            return solver.minimise(first_point(solver, group.records), watch=progress)
+        solver = Solver(problem, engine, self.nu, CLOSE)
+        return solver.minimise(coarse_point(problem, self.nu, progress), watch=progress)
+
+    def _settled_alone(self, progress: Progress) -> tuple[str, ...] | None:
+        """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""
+        if not self._settles:
+            return None
+        progress.doing("each group alone")
+        names = automatic([record for group in self.groups for record in group.records])
+        kept: tuple[str, ...] | None = None
+        for group in self.groups:
+            found = self._solve(group, group.problem(names), progress.alone(group.name))
+            mine = supported(found.solver, found, names)
+            kept = mine if kept is None else tuple(name for name in kept if name in mine)
+        return kept
+
+    @property
+    def _settles(self) -> bool:
+        """Whether nuisances are taken out again that the logs do not support."""
+        exact = all(group.engine == EXACT for group in self.groups)
+        return self.question.nuisances is None and (exact or len(self.groups) == 1)
+
+    def _solve_joint(self, nuisances: Sequence[str] | None, progress: Progress) -> Solution:
+        """The best point of all groups together."""
+        solver = self._solver(nuisances)
+        engine = solver.engine
+        assert isinstance(engine, JointEngine)
+        start, loop = joint_start(engine, self.nu, progress), self.groups[0].engine == LOOP
+        if any(group.engine != EXACT for group in self.groups):  # first a step a row
+            coarse = self._solver(nuisances, coarse=True)
+            aside = progress.aside("all groups, first a step a row")
+            start = coarse.minimise(start, watch=aside).state.point
+            if loop:
+                start = coarse.minimise(retimed(coarse, start, progress), watch=aside).state.point
+        found = solver.minimise(start, watch=progress)
+        return beyond_jumps(found, progress) if loop else found
+
+    def _solver(self, nuisances: Sequence[str] | None, coarse: bool = False) -> Solver:
+        """The solver of all that is fitted, as exact as at the end of a fit, or `coarse`: by a step a row."""
+        problems, tol = [group.problem(nuisances) for group in self.groups], None if coarse else FINE
+        if len(problems) == 1:
+            kind = self.groups[0].engine
+            return Solver(problems[0], make_engine(kind, problems[0], LOOP_FINE if kind == LOOP else tol), self.nu)
+        engine = join(self.groups, problems, own_names(self.question.per_free, problems), tol)
+        return Solver(engine.problem, engine, self.nu)
+
+    def _so_far(self, best: Best) -> tuple[Solution, list[str]]:
+        """The best so far as if it were the best, and what is to be said of it."""
+        warnings, state = [INTERRUPTED], best.state
+        if state is not None:  # it may be of a part of the logs, or of longer steps
+            assert state.problem is not None
+            solver = self._solver(_nuisances(state.problem) if self._settles else None)
+            state = solver.state(state.point, state.variance if solver.scaled.any() else None)
+        else:
+            solver = self._solver(None)
+            assert isinstance(solver.engine, JointEngine)
+            state = solver.minimise(joint_start(solver.engine, self.nu, Progress(), best.alone), limit=0).state
+            late = [group.name for group in self.groups if group.name not in best.alone]
+            warnings += [f"{name} was not fitted yet: its own numbers are where its fit begins" for name in late]
+        return Solution(state, Normal(solver, state).held, 0, True, solver), warnings
+
+    def _hints(self, solution: Solution, done: bool) -> list[str]:
+        """Which logs are not used; and, of the best point, which nuisances the logs ask for beside automatic ones."""
+        group, problem = self.groups[0], solution.solver.problem
+        if len(self.groups) > 1:
+            return []
+        if group.engine == LOOP:
+            return left_out(group.records, problem.pieces)
+        if group.engine == IMPLICIT or self.question.nuisances is not None or not done:
+            return []
+        wider = group.problem(tuple(dict.fromkeys((*_nuisances(problem), *NUISANCES))))
+        return wanted(solution.solver, solution, Solver(wider, make_engine(EXACT, wider), self.nu))
+
+    def _levels(self, solution: Solution) -> tuple[Solution, list[Breakaway]]:
+        """Breakaway of the axes that were asked for, and the fit with it."""
+        group = self.groups[0]
+        axes = [axis for axis in asked_axes(self.question.free or (), self.question.fixed) if group.moved[axis]]
+        if not axes:
+            return solution, []
+        if group.engine != EXACT:
+            raise UnsupportedError(
+                "breakaway is profiled with the exact engine only", got=group.robot.name,
+                expected="friction on the body axes", where="free",
+            )  # fmt: skip
+        return find_breakaway(solution, axes, trust(solution.solver, solution, self.question.covariance))
 
 
 def fit_output_error(
-    runs: Run | Sequence[Run],
-    robot: Robot,
-    *,
-    free: Sequence[str] | None = None,
-    fixed: Sequence[str] = (),
-    nuisances: str | Sequence[str] = AUTO,
-    start: str = AUTO,
-    use_priors: bool = False,
-    outputs: Sequence[str] | None = None,
-    loss: str = GAUSS,
-    covariance: str = AUTO,
-    tick_rad: float | None = None,
-    profile: Sequence[str] = (),
-    bootstrap: int = 0,
-    watch: Callable[[State], None] | None = None,
-) -> OutputErrorEstimate:
+    runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None,
+    watch: Callable[[State], object] | None = None, **options: Any,
+) -> OutputErrorEstimate:  # fmt: skip
     """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
 
     runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
-    free: keys of the robot file, such as "body.mass_kg"; "friction", the default, is what the robot has of it, a list
-    stands for its entries. fixed: taken out. The EMF constant follows the torque constant, wheel by wheel, unless both
-    are free. Breakaway follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" among the free keys
-    asks for its interval.
-    nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade", "tilt"
-    (or "tilt.x", "tilt.y", "tilt.yaw"). By default latency and dead band, and the gain where the supply is only
-    nominal, as far as the logs determine them; a warning says what else would fit the logs better. () for none.
-    start: "rest", "free", or "auto": at rest where that shows.
-    use_priors: a std in the robot file counts as a Gaussian prior of what is free, and what has one is free too. Off by
-    default: a std that an earlier fit wrote from the same log would count the log twice; such ones (origin
-    "identified") are never used.
-    outputs: of "twist", "wheel_speed", "current", "pose" (or of "heading", "position"), "wheel_angle"; by default all
-    that the log has, but for what is computed from another one: that would count the same data twice.
-    tick_rad: of the encoders behind wheel angles [rad]; by default found in the log. Their likelihood is that of
-    counts; 0 takes them like any other output.
-    loss: "gaussian", or "student-t" for logs with outliers. covariance: "white", "sandwich", or "auto".
-    profile: names whose interval comes from the profile of the likelihood instead, scaled by the sandwich where that is
-    used. bootstrap: draws of whole runs from
-    which the std and intervals of all come instead; deterministic.
-    watch: is called with every better state on the way; an Onlooker is told in words what is done, too.
+    question, options: those of `Question` that belong to output error, such as free=, nuisances=, loss=.
+    watch: is called with every better state on the way; a Progress is told in words what is done, too.
 
-    Returns an Estimate with nuisances, noise and what is not identifiable. Raises InputError for options and logs that
-    cannot be used, InsufficientDataError where nothing can be learnt, UnsupportedError for what an engine does not
-    know. Of the nuisances, robots that need the implicit engine have latencies by default; they know the others, but
-    no position and no wheel angle as outputs.
+    Returns an Estimate with nuisances, noise and what is not identifiable. Errors: see `Fit.of` and `Fit.answer`.
     """
-    refuse_repeated(names_of(free or ()))
-    given = Options(
-        None if free is None else expand_keys(free, robot), expand_keys(fixed, robot), nuisance_names(nuisances),
-        start, use_priors,
-        None if outputs is None else names_of(outputs), loss, covariance, tick_rad,
-    )  # fmt: skip
-    records = read_records([runs] if isinstance(runs, Run) else list(runs), robot, given)
-    return _fitted(records, robot, given, expand_keys(profile, robot), bootstrap, onlooker(watch))
+    progress = Progress.of(watch)
+    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=progress)
+    return fit.answer(fit.solve(progress), progress).estimate
 
 
-def _fitted(
-    records: Sequence[Record], robot: Robot, given: Options, profile: Sequence[str], bootstrap: int, watch: Onlooker
-) -> OutputErrorEstimate:  # fmt: skip
-    """The fit of records."""
-    if bootstrap:
-        refuse_bootstrap(bootstrap, {"": len(records)})
-    refuse_unknown(given.fixed, robot)
-    asked = asked_axes(given.free or (), given.fixed)
-    watch.doing("looking for what moved")
-    motion_of = motion(records, robot)
-    robot, given, still = of_what_moved(motion_of, records, robot, given)
-    solver, solution = _solve(records, robot, given, watch)
-    solver, solution, given, hints = _settled(records, robot, given, watch, solver, solution)
-    axes = [axis for axis in asked if motion_of.moved[axis]]
-    solver, solution, levels = _levels_of(solver, solution, axes, given.covariance)
-    watch.doing("finding how sure the numbers are")
-    known = trust(solver, solution, given.covariance)
-    more = [*(words for _, _, words in still), *hints]
-    bounds = {key: bound for key, bound, _ in still if bound > NOTHING}
-    better = resampled(solver, solution, known, profile, bootstrap, watch=watch).intervals
-    return conclude(solver, solution, known, records, loss_words(given.loss), more, bounds, levels, better)
+def identify_groups(
+    runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, question: Question | None = None,
+    watch: Callable[[State], object] | None = None, **options: Any,
+) -> Answer:  # fmt: skip
+    """Fit logs of several groups at once by output error.
 
-
-def _levels_of(
-    solver: Solver, solution: Solution, axes: list[int], covariance: str
-) -> tuple[Solver, Solution, list[Breakaway]]:
-    """Breakaway of the axes that were asked for, and the fit with it."""
-    if not axes:
-        return solver, solution, []
-    if not isinstance(solver.engine, ExactEngine):
-        raise UnsupportedError(
-            "breakaway is profiled with the exact engine only", got=solver.problem.robot.name,
-            expected="friction on the body axes", where="free",
-        )  # fmt: skip
-    return find_breakaway(solver, solution, axes, trust(solver, solution, covariance))
-
-
-def nuisance_names(nuisances: str | Sequence[str]) -> tuple[str, ...] | None:
-    """The nuisances asked for; None where those are meant that the logs support."""
-    if nuisances == AUTO:
-        return None
-    return (nuisances,) if isinstance(nuisances, str) else tuple(nuisances)
-
-
-def of_what_moved(
-    found: Motion, records: Sequence[Record], robot: Robot, given: Options
-) -> tuple[Robot, Options, list[tuple[str, float, str]]]:
-    """The robot and the options that a fit of these records has; see `without_still_axes`."""
-    if looped(records):
-        return robot, loop_options(given, found, records, robot), []
-    return without_still_axes(found, records[0].source, robot, given)
-
-
-def _solve(
-    records: Sequence[Record], robot: Robot, given: Options, watch: Onlooker
-) -> tuple[Solver, Solution]:  # fmt: skip
-    problem, nu = make_problem(records, robot, given), degrees(given.loss)
-    if looped(records):
-        return solve_loop(problem, nu, watch)
-    if is_exact(robot):
-        watch.doing("looking for a start")
-        solver = Solver(problem, ExactEngine(problem), nu)
-        return solver, solver.minimise(first_point(solver, records), watch=watch)
-    fine = Solver(problem, ImplicitEngine(problem, FINE), nu, CLOSE)
-    return fine, fine.minimise(coarse_point(problem, nu, watch), watch=watch)
+    groups: name of each run's group. question, options, watch: as in `fit_output_error`; per_free= names the numbers
+    that each group has for itself.
+    Raises InputError for what cannot be used, InsufficientDataError where a group says nothing about its numbers, or
+    has too few runs for a bootstrap, UnsupportedError for robots and logs that output error does not take.
+    """
+    progress = Progress.of(watch)
+    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
+    return fit.answer(fit.solve(progress), progress)
 
 
 def degrees(loss: str) -> float:
@@ -213,180 +306,50 @@ def loss_words(loss: str) -> str:
     return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
 
 
-def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
-    """The engine of the robot and its logs; tol [m/s]: of the implicit one, None for a step a row."""
-    if looped([piece.record for piece in problem.pieces]):
-        return LoopEngine(problem, tol)
-    return ExactEngine(problem) if is_exact(problem.robot) else ImplicitEngine(problem, tol)
+def _group_names(runs: Sequence[Run], question: Question, groups: Sequence[str] | None) -> list[str]:
+    """The group of each run."""
+    if groups is None:
+        if question.per_free:
+            raise InputError("there are no groups", got=question.per_free[0], expected="with `per`", where="per_free")
+        return [WHOLE] * len(runs)
+    if len(groups) != len(runs) or len(set(groups)) < 2:
+        got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
+        raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
+    return list(groups)
 
 
-def loop_options(given: Options, found: Motion, records: Sequence[Record], robot: Robot) -> Options:
-    """By default friction of what moved, and the gains. Raises InsufficientDataError where nothing moved."""
-    more = known_priors(robot) if given.use_priors else ()
-    keys = dict.fromkeys((*loop_keys(robot, found.moved, records[0].source), *more))
-    free = tuple(key for key in keys if key not in given.fixed)
-    return given if given.free is not None else replace(given, free=free, fixed=())
+def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Question:
+    """The question with every key written out."""
+
+    def every(keys: Iterable[str]) -> tuple[str, ...]:
+        return expand_keys(tuple(keys), robot, usual)
+
+    free = question.free
+    return replace(
+        question, free=None if free is None else every(free), fixed=every(question.fixed),
+        per_free=every(question.per_free), profile=every(question.profile),
+    )  # fmt: skip
 
 
-def fits_exactly(problem: Problem) -> bool:
-    """Whether the exact engine fits this problem."""
-    return is_exact(problem.robot) and not looped([piece.record for piece in problem.pieces])
-
-
-def is_exact(robot: Robot) -> bool:
-    """Whether the exact engine fits this robot."""
-    return not why_not_exact(robot) and robot.motor.electrical != DYNAMIC
-
-
-def _settled(
-    records: Sequence[Record], robot: Robot, given: Options, watch: Onlooker, solver: Solver, solution: Solution,
-) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
-    """Where the nuisances are automatic: without those that the logs do not support; and what they ask for beside."""
-    if looped(records):
-        return _settled_loop(records, robot, given, watch, solver, solution)
-    if given.nuisances is not None or not isinstance(solver.engine, ExactEngine):
-        return solver, solution, given, []
-    watch.doing("which nuisances the logs support")
-    kept = supported(solver, solution, automatic(records))
-    given = replace(given, nuisances=kept)
-    if set(kept) != set(automatic(records)):
-        solver, solution = _solve(records, robot, given, watch)
-    wider = make_problem(records, robot, replace(given, nuisances=tuple(dict.fromkeys((*kept, *NUISANCES)))))
-    return solver, solution, given, wanted(solver, solution, Solver(wider, ExactEngine(wider), solver.nu))
-
-
-def _settled_loop(
-    records: Sequence[Record], robot: Robot, given: Options, watch: Onlooker, solver: Solver, solution: Solution,
-) -> tuple[Solver, Solution, Options, list[str]]:  # fmt: skip
-    """Without the latencies that the logs do not determine, where they are automatic; and what is not used."""
-    if given.nuisances is None:
-        kept = supported(solver, solution, (LATENCY,))
-        given = replace(given, nuisances=kept)
-        lost = [name for name in solver.problem.names[solver.problem.robot_count :] if name not in kept]
-        if lost:  # from its start on: until it is done, the fit with all of them is the best so far
-            solver, solution = _solve(records, robot, given, watch.aside(f"once more without {', '.join(lost)}"))
-    return solver, solution, given, left_out(records, solver.problem.pieces)
-
-
-def read_records(runs: Sequence[Run], robot: Robot, given: Options) -> list[Record]:
-    """The runs as a fit sees them. Raises InputError for unknown words among the options, and where there is no run."""
-    for value, known, where in (
-        (given.loss, (GAUSS, STUDENT), "loss"),
-        (given.covariance, (AUTO, "white", "sandwich"), "covariance"),
-    ):
-        if value not in known:
-            raise InputError(f"unknown {where}", got=value, expected=" or ".join(known), where=where)
-    if not runs:
-        raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
-    gains = any(Key.parse(key).name in GAINS for key in given.free or ())
-    found = [record(run, robot, given.outputs, gains, given.tick_rad) for run in runs]
-    if len({each.set_point is None for each in found}) > 1:
-        raise InputError(
-            "some logs have voltages, others set speeds only", got=", ".join(each.source for each in found[:2]),
-            expected="logs of one kind", remedy="free a gain of the loop, or fit them apart", where="runs",
+def _refuse_joint(runs: Sequence[Run], robot: Robot, question: Question) -> None:
+    if asked_axes(question.free or ()):
+        raise UnsupportedError(
+            "breakaway is not profiled in groups", got=KEY, expected="other keys", remedy="fit each group alone",
+            where="free",
         )  # fmt: skip
-    return found
+    why = why_no_inputs(runs, robot)
+    if why:
+        raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
 
 
-def without_still_axes(
-    found: Motion, source: str, robot: Robot, given: Options
-) -> tuple[Robot, Options, list[tuple[str, float, str]]]:
-    """Take the friction of axes that never visibly moved out of the fit: (robot, options, (key, bound, words) each).
-
-    Such an axis has held what drove it: the robot gets at least that level there. Raises InsufficientDataError where
-    no axis moved.
-    """
-    still: list[tuple[str, float, str]] = []
-    fixed, asked = set(given.fixed), given.free if given.free is not None else free_by_default(robot)
-    for axis in np.flatnonzero(~found.moved):
-        own = {key for key in (*asked, *BOX) if Key.parse(key).axis == axis}
-        fixed |= own
-        if not is_exact(robot) and not own & set(asked):
-            continue  # friction along the direction of travel: no axis has its own
-        held, key = float(found.held[axis]), f"friction.axes.breakaway[{axis}]"
-        what = f"; it held {held:.4g} {unit(key)}" if held > NOTHING else "; nothing drove it"
-        still.append((key, held, found.words(int(axis)) + (what if found.seen[axis] else "")))
-        if is_exact(robot) and robot.friction.axes.levels[2][axis] < held:
-            robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)
-    if not found.moved.any():
-        raise InsufficientDataError(
-            "the robot never visibly moved: its friction is only bounded from below",
-            got="; ".join(
-                f"{AXES[axis]} held {held:.3g}" if seen else f"{AXES[axis]} was not measured"
-                for axis, (held, seen) in enumerate(zip(found.held, found.seen, strict=True))
-            ),
-            expected="motion", remedy="drive it beyond its dead zone", where=source,
-        )  # fmt: skip
-    if not still:
-        return robot, given, still
-    free = [key for key in asked if key not in fixed]
-    if given.free is None and given.use_priors:
-        return robot, replace(given, fixed=tuple(fixed)), still
-    return robot, replace(given, free=tuple(free), fixed=()), still
+def _in_each_group(names: Iterable[str], problem: Problem) -> list[str]:
+    """Names with those of each group written out: KEY stands for KEY@GROUP of all groups."""
+    found: list[str] = []
+    for name in names:
+        found += [each for each in problem.names if each.startswith(f"{name}{AT}")] or [name]
+    return list(dict.fromkeys(found))
 
 
-def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Problem:
-    """What is free, and how the pieces start. Raises InputError for unknown keys, or where nothing is left free."""
-    priors = known_priors(robot) if given.use_priors else {}
-    usual = free_by_default(robot)
-    keys = list(given.free) if given.free is not None else [*usual, *(key for key in priors if key not in usual)]
-    unknown = [key for key in given.fixed if key not in keys]
-    if unknown and given.free is not None:
-        raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
-    keys = [key for key in keys if key not in given.fixed and Key.parse(key).name != KEY]
-    if not keys:
-        got = ", ".join(given.free or ()) or "no key"
-        raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
-    own = robot_parameters(robot, keys, priors)
-    exact = is_exact(robot) and not looped(records)
-    if not exact:
-        own = [_within_reach(p, _drive(records, robot)) for p in own]
-    auto = automatic(records) if exact else (LATENCY,)
-    more = nuisance_parameters(auto if given.nuisances is None else given.nuisances, records, robot)
-    late = any(p.name.startswith(LATENCY) for p in more)
-    start = given.start
-    parts = loop_pieces(records, robot, start) if looped(records) else pieces(records, robot, start, late)
-    rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
-    if rows <= len(own) + len(more):
-        raise InsufficientDataError(
-            "too few measurements", got=f"{rows}", expected=f"more than {len(own) + len(more)}, one for each number"
-        )
-    return Problem(robot, (*own, *more), len(own), tuple(parts))
-
-
-def _drive(records: Sequence[Record], robot: Robot) -> float:
-    """The greatest wrench that the voltages of the logs give at rest [N, N, N m]; a loop may give its limit."""
-    limit = robot.motor.voltage_limit or robot.drive.supply or 0.0
-    levels = [r.voltage if r.set_point is None else np.eye(robot.wheels.count) * limit for r in records]
-    return max(float(np.nanmax(np.abs(drive_wrench(robot, np.zeros(3), volts)), initial=0.0)) for volts in levels)
-
-
-def _within_reach(p: Parameter, drive: float) -> Parameter:
-    """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
-    low = LEAST * p.value if p.low == 0.0 else p.low
-    if Key.parse(p.name).level != COULOMB or drive == 0.0:
-        return replace(p, low=low)
-    return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
-
-
-def free_by_default(robot: Robot) -> tuple[str, ...]:
-    """B and C of the axes; of a robot with friction elsewhere the levels that it has: one that is off has no slope."""
-    if is_exact(robot):
-        return BOX
-    has = {key: Key.parse(key) for key in friction_keys(robot)}
-    return tuple(name for name, key in has.items() if key.level == VISCOUS or key.get(robot) > 0.0)
-
-
-def expand_keys(names: str | Sequence[str], robot: Robot) -> tuple[str, ...]:
-    """The keys that names stand for: "friction" for what is free by default, a list for its entries; others as is."""
-    each = (free_by_default(robot) if name == FRICTION else expand(name, robot) for name in names_of(names))
-    return tuple(dict.fromkeys(key for keys in each for key in keys))
-
-
-def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry."""
-    found = {}
-    for name, prior in robot.priors.items():
-        if prior.std is not None and prior.origin != IDENTIFIED:
-            found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
-    return found
+def _nuisances(problem: Problem) -> tuple[str, ...]:
+    """The nuisances of a problem, each once whether groups have their own or not."""
+    return tuple(dict.fromkeys(name.partition(AT)[0] for name in problem.names[problem.robot_count :]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from omnidyn.identification.output_error.fit import is_exact
+from omnidyn.identification.output_error.prepare import is_exact
 from omnidyn.identification.output_error.problem.record import LOOP_REMEDY
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.steady.operating_points import WHEEL, ForcePoints, force_points
+from omnidyn.identification.question import STEADY_STATE, Question
+from omnidyn.identification.steady.operating_points import ForcePoints, force_points
 from omnidyn.identification.steady.points import driven_axes
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.steady_table import AXES, SteadyTable
@@ -18,20 +20,18 @@ from omnidyn.run import Run
 
 
 def identify_lines(
-    runs: Sequence[Run],
-    robot: Robot,
-    *,
-    groups: Sequence[str] | None = None,
-    speed: str = WHEEL,
-    force_from: str = "",
-    window: tuple[float, float] | None = None,
-) -> dict[str, Estimate]:
+    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question | None = None,
+    **options: Any,
+) -> dict[str, Estimate]:  # fmt: skip
     """B and C of each axis and group: group -> Estimate. Options: see `identify_steady`.
 
     Every point counts for the axes that it drives. Friction elsewhere than on the axes is taken off the robot.
     Raises InsufficientDataError when no axis of a group has three points at two speeds or more.
     """
-    points = force_points(runs, robot, groups=groups, speed=speed, force_from=force_from, window=window)
+    asked = Question.for_method(STEADY_STATE, question, options)
+    points = force_points(
+        runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
+    )
     plain = robot.replace(friction=Friction(axes=robot.friction.axes), priors=_without_other_friction(robot))
     found = {}
     for group in points.groups:

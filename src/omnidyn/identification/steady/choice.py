@@ -128,7 +128,7 @@ def _refuse_lost_signs(points: ForcePoints) -> None:
         raise InsufficientDataError(
             "the force points against the motion, as if friction drove the robot", got=f"in {wrong} of {len(along)} "
             "points", expected="forces along the motion",
-            remedy="check the sign of the currents (--current-unsigned) and which wheel is which",
+            remedy="check the sign of the currents (`current_unsigned`) and which wheel is which",
         )  # fmt: skip
 
 

@@ -219,7 +219,7 @@ def _twist(run: Run, robot: Robot, each: Plateau, speed: str) -> tuple[FloatArra
         if commanded is None:
             raise InputError(
                 "the run lacks a set speed", got=", ".join(run.channels), expected="twist_command or "
-                "wheel_speed_command", remedy="use --speed wheel", where=run.source,
+                "wheel_speed_command", remedy="use `speed` wheel", where=run.source,
             )  # fmt: skip
         return commanded, _still(rim_speed(robot.wheels, commanded), 0.0)
     _need(run, each, "wheel_speed")
@@ -255,7 +255,7 @@ def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
     if lowest >= 0.0 and back > UNSIGNED_SHARE * len(windows):
         raise InputError(
             "the currents have no sign: none is below 0", got=f"wheels that turn backward in {back} of {len(windows)} "
-            "windows", expected="currents signed as the torque", remedy="use --current-unsigned",
+            "windows", expected="currents signed as the torque", remedy="use `current_unsigned`",
             where=runs[0].source,
         )  # fmt: skip
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,10 @@ from scipy.linalg import null_space
 
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
+from omnidyn.identification.question import STEADY_STATE, Question
 from omnidyn.identification.steady import study_words as words
-from omnidyn.identification.steady.choice import AUTO, ShapeChoice, base_name, choose_shape, speeds_differ
-from omnidyn.identification.steady.operating_points import WHEEL, ForcePoints, force_points
+from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
+from omnidyn.identification.steady.operating_points import ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
@@ -63,28 +65,23 @@ class SteadyStudy:
 
 
 def identify_steady(
-    runs: Sequence[Run],
-    robot: Robot,
-    *,
-    groups: Sequence[str] | None = None,
-    shape: str = AUTO,
-    speed: str = WHEEL,
-    force_from: str = "",
-    robust: bool = True,
-    window: tuple[float, float] | None = None,
-) -> SteadyStudy:
+    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question | None = None,
+    **options: Any,
+) -> SteadyStudy:  # fmt: skip
     """Identify friction from the steady windows of runs.
 
-    groups: name of each run's group (a floor, a load); every group has its own levels of one shape. shape: "auto" or a
-    name of `shapes.SHAPES`. speed: "wheel", "set" or "ground": which speed the friction is a function of. force_from:
-    "current" (signed as the torque) or "voltage"; "" takes what all runs have. robust: points far from the shape pull
-    less. window: shares of each command's rows, instead of steady rows found.
+    groups: name of each run's group (a floor, a load); every group has its own levels of one shape. question, options:
+    those of `Question` that belong to steady state, such as shape=, speed=, window=.
     The friction of `robot` is replaced; its motor and wheels are taken as they are.
     Raises InsufficientDataError when nothing is steady, nothing moves, or no shape is determined; InputError for a run
     without the channels needed, or for a wrong option.
     """
-    points = force_points(runs, robot, groups=groups, speed=speed, force_from=force_from, window=window)
-    choice = choose_shape(robot, points, shape=shape, robust=robust)
+    asked = Question.for_method(STEADY_STATE, question, options)
+    robust = asked.robust
+    points = force_points(
+        runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
+    )
+    choice = choose_shape(robot, points, shape=asked.shape, robust=robust)
     if not SHAPES[choice.chosen].in_model:
         raise InsufficientDataError(
             "a robot file cannot hold this shape: it is for comparison only", got=choice.chosen,

@@ -120,7 +120,7 @@ def doubts(points: ForcePoints, choice: ShapeChoice, turning: bool) -> tuple[str
     if wrong > WRONG_WAY * max(len(along), 1):
         found.append(
             f"in {wrong} of {len(along)} points the force points against the motion, as if friction drove the robot: "
-            "the sign of the currents is lost (--current-unsigned), or a wheel is swapped"
+            "the sign of the currents is lost (`current_unsigned`), or a wheel is swapped"
         )
     if points.force_from == "voltage":
         found.append("forces are from eq (11): as right as the R, K_t and K_v of the robot file")

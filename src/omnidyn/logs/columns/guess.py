@@ -156,7 +156,7 @@ def _doubt_letters(names: list[str], found: Guess) -> None:
     parts = {name: read_name(name) for name in names}
     mine = [name for name in names if _is_letter_v(parts[name])]
     if mine and "u1" not in found.columns:
-        why = f"which may be voltages or speeds (say --column u1={mine[0]}:V and so on)"
+        why = f"which may be voltages or speeds (say `column` u1={mine[0]}:V and so on)"
         found.doubts += [Doubt(name, f"u{parts[name].number}", why, ()) for name in mine]
 
 
@@ -255,7 +255,7 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
     for component, mine in alike.items():
         if len(mine) > 1:
             _forget(mine, found)
-            why = f"but no number says which wheel each is (say --column {component}={mine[0]} and so on)"
+            why = f"but no number says which wheel each is (say `column` {component}={mine[0]} and so on)"
             found.doubts += [Doubt(name, component, why, ()) for name in mine]
         elif not body:
             _forget(mine, found)
@@ -327,6 +327,6 @@ def refuse_doubtful(columns: ColumnMap, where: str) -> None:
         doubt = next((doubt for doubt in columns.doubts if f" {TIME}, " in doubt), "")
         settled = doubt.rpartition("; ")[2] if "; " in doubt else ""
         written = "write seconds, or dates such as 2026-11-20T10:00:00.125" if doubt else ""
-        remedy = settled or written or "say which column it is: --column t=COLUMN:s"
+        remedy = settled or written or "say which column it is: `column` t=COLUMN:s"
         got = doubt.partition(": not taken")[0] or "no column that looks like a time"
         raise InputError("cannot tell the time of the rows", got=got, remedy=remedy, where=where)

@@ -59,9 +59,9 @@ def _doubt_sentence(letter: str, why: str, units: tuple[str, ...], doubts: list[
     if not units:
         return f"{names} {looks} like {like}, {why}: not taken"
     if len(doubts) == 1 and letter == doubts[0].component:
-        remedy = " or ".join(f'--column "{like}={names}:{unit}"' for unit in units)
+        remedy = " or ".join(f'`column` "{like}={names}:{unit}"' for unit in units)
     else:
-        remedy = " or ".join(f"--assume {letter}={unit}" for unit in units)
+        remedy = " or ".join(f"`assume` {letter}={unit}" for unit in units)
     return f"{names} {looks} like {like}, but {why}: not taken; say {remedy}"
 
 

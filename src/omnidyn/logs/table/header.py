@@ -80,7 +80,7 @@ def find_layout(lines: Sequence[str], source: str, header: bool = True) -> Layou
             "the table has no header: its first row is numbers",
             got=kept[0].text,
             expected="column names such as t_s,u1_V",
-            remedy="add a first line with the column names, or use --no-header",
+            remedy="add a first line with the column names, or use `no_header`",
             where=f"{source}:{kept[0].number}",
         )
     return _layout(kept, 0, separator, source)
@@ -206,7 +206,7 @@ def _names(head: _Head, separator: str, body: list[FileLine], source: str) -> li
                 "the table has no header: a number stands where a name should",
                 got=name,
                 expected="column names such as t_s,u1_V",
-                remedy="add a first line with the column names, or use --no-header",
+                remedy="add a first line with the column names, or use `no_header`",
                 where=where,
             )
     return names

@@ -17,7 +17,7 @@ from omnidyn.files import file_format, open_regular, text_format, too_large
 BLOCK_BYTES = 2**20
 START_BYTES = 256  # enough to tell a format and an encoding
 MAX_LINE_BYTES = 4 * 2**20
-TOO_LARGE_REMEDY = "cut it, allow more with --max-bytes, or read it in pieces with iter_tables"
+TOO_LARGE_REMEDY = "cut it, allow more with `max_bytes`, or read it in pieces with iter_tables"
 
 Progress = Callable[[int, int], None]
 

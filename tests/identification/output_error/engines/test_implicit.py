@@ -8,10 +8,12 @@ from scipy.optimize import least_squares
 
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
+from omnidyn.identification.question import Question
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
@@ -63,7 +65,7 @@ def test_an_ellipse_in_a_turning_frame_seen_late(ellipse, log):
 def test_what_the_second_engine_does_not_know(ellipse, log):
     with pytest.raises(UnsupportedError, match="breakaway is profiled with the exact engine only"):
         fit_output_error(log, ellipse, free=[*TRUTH, "friction.axes.breakaway[0]"], start="rest", nuisances=())
-    problem = make_problem([record(log, ellipse)], ellipse, Options(free=tuple(TRUTH), start="rest"))
+    problem = make_problem([record(log, ellipse)], ellipse, Question(free=tuple(TRUTH), start="rest", nuisances=()))
     unknown = replace(problem, parameters=(*problem.parameters, Parameter("slip", 0.0, 0.0, 1.0)))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got slip.*leave it out"):
         ImplicitEngine(unknown)
@@ -137,7 +139,7 @@ def test_every_slope_against_differences_of_simulated_logs(ellipse):
         current=clean[:, 6:9], pose=np.column_stack([t, t, clean[:, 9]]),
     )  # fmt: skip
     keys = [*TRUTH, "body.mass_kg", "motor.resistance_ohm"]
-    given = Options(tuple(keys), nuisances=("gain", "dead_band", "fade", "latency"), start="free")
+    given = Question(free=tuple(keys), nuisances=("gain", "dead_band", "fade", "latency"), start="free")
     problem = make_problem([record(run, ellipse)], ellipse, given)
     piece = replace(problem.pieces[0], margin=np.zeros(10))
     engine = ImplicitEngine(replace(problem, pieces=(piece,)), 1e-8)

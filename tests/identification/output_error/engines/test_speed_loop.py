@@ -8,11 +8,13 @@ from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.identify import identify
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
-from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem, read_records
-from omnidyn.identification.output_error.group_fit import identify_groups
+from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
+from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.loop import retimed
+from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solver
+from omnidyn.identification.question import Question
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key, friction_keys, gain_keys
 from omnidyn.run import Run
@@ -116,8 +118,8 @@ def test_outputs_and_slopes(ellipse, late):
     run = log(ellipse, 4, 200)
     run = run.replace(wheel_speed=np.zeros((200, 3)), pose=np.zeros((200, 3)))
     free = (*friction_keys(ellipse), KP, "body.mass_kg")
-    records = read_records([run], ellipse, Options(free=free))
-    problem = make_problem(records, ellipse, Options(free=free, nuisances=("latency",)))
+    records = read_records([run], ellipse, Question(free=free, nuisances=()))
+    problem = make_problem(records, ellipse, Question(free=free, nuisances=("latency",)))
     engine, piece, start = LoopEngine(problem, 1e-8), problem.pieces[0], problem.start()
     values = start.values.copy()
     values[problem.robot_count :] = late
@@ -224,11 +226,11 @@ def test_friction_keys_name_what_is_there(looped, ellipse):
 def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(looped):
     """A loop of 500 Hz in rows at 100 Hz: after a few steps with wrong gains a latency may stand anywhere."""
     fast = looped.replace(drive=looped.drive.replace(rate=500.0))
-    given = Options(nuisances=("latency",), free=(KP,))
+    given = Question(nuisances=("latency",), free=(KP,))
     problem = make_problem(read_records([log(fast, 3, 300)], fast, given), fast, given)
     point = problem.start()
     values = point.values.copy()
     astray = problem.where("latency.current")
     values[astray] = 0.15
-    found = retimed(Solver(problem, LoopEngine(problem)), Point(values, point.states))
+    found = retimed(Solver(problem, LoopEngine(problem)), Point(values, point.states), Progress())
     assert abs(found.values[astray]) <= 0.01

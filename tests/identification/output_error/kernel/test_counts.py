@@ -7,8 +7,7 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr
 from scipy.stats import truncnorm
 
-from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.group_fit import identify_groups
+from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
 from omnidyn.identification.output_error.kernel.counts import count_terms, find_tick, information, rounding, tail
 from omnidyn.model.keys import Key
 from omnidyn.run import Run

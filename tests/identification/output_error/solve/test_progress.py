@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.best_so_far import WORDS, best_so_far
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.fit import INTERRUPTED, Fit, fit_output_error
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.progress import Onlooker, onlooker
+from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import State
+from omnidyn.identification.question import Question
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
@@ -28,7 +28,7 @@ def log(looped):
     return Run(t=np.arange(250) * 0.01, twist_command=command, twist=twist, current=current, source="log")
 
 
-class Cut(Onlooker):
+class Cut(Progress):
     """Interrupts at so many better states, or at the first of these words."""
 
     def __init__(self, count=0, words=None):
@@ -51,10 +51,11 @@ class Cut(Onlooker):
 )
 def test_an_interrupted_fit_of_set_speeds_leaves_the_best_so_far(looped, log, cut):
     """In the first search for a start, between two descents, and after the last one."""
+    asked = Fit.of(log, looped, Question())
     with pytest.raises(KeyboardInterrupt):
-        fit_output_error(log, looped, watch=cut)
-    fit = best_so_far(cut.states, [log], looped, {})
-    assert WORDS in fit.warnings
+        asked.answer(asked.solve(cut), cut)
+    fit = asked.answer(cut.best).estimate
+    assert INTERRUPTED in fit.warnings
     values = {**fit.value, **{name: own.value for name, own in fit.nuisances.items()}}
     assert list(values.values()) == pytest.approx(list(cut.states[-1].point.values))
     assert "drive.kp_V_s_rad" in fit.value
@@ -79,7 +80,7 @@ def test_a_robot_of_the_exact_engine_tells_its_phases_too(axebot):
 
 def test_a_search_that_goes_several_ways_shows_only_what_is_better_than_all_before():
     seen = []
-    watch = Onlooker(seen.append).below(10.0)
+    watch = Progress(seen.append).below(10.0)
     states = [State(Point(np.zeros(0), ()), [], objective, np.zeros(0)) for objective in (11.0, 9.0, 9.5, 8.0, 8.0)]
     for state in states:
         watch(state)
@@ -88,7 +89,7 @@ def test_a_search_that_goes_several_ways_shows_only_what_is_better_than_all_befo
 
 def test_the_states_of_a_fit_beside_become_words():
     seen, heard = [], []
-    watch = Onlooker(seen.append, heard.append).aside("once more")
+    watch = Progress(seen.append, heard.append).aside("once more")
     watch(State(Point(np.zeros(0), ()), [], -12.5, np.zeros(0)))
     watch.doing("trying")
     assert (seen, heard) == ([], ["once more, -log likelihood -12.5", "trying"])
@@ -96,6 +97,6 @@ def test_the_states_of_a_fit_beside_become_words():
 
 def test_any_function_may_look_on():
     seen = []
-    onlooker(seen.append)("a state")
-    onlooker(None)("a state")
+    Progress.of(seen.append)("a state")
+    Progress.of(None)("a state")
     assert seen == ["a state"]

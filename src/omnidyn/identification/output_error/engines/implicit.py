@@ -7,6 +7,7 @@ run is sampled between its rows (sensitivity/sample.py).
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,25 @@ IntArray = NDArray[np.int64]
 Found = tuple[FloatArray, FloatArray, IntArray]
 
 
+class LastPoints:
+    """What was found at the last KEPT points: a fit ends where it was, or at its last trial, and is then asked again
+    with other weights."""
+
+    KEPT = 2
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[bytes, ...], list[Found]] = {}
+
+    def at(self, point: Point, find: Callable[[Point], list[Found]]) -> list[Found]:
+        """What `find` says at a point, found anew unless it is one of the last."""
+        key = (point.values.tobytes(), *(state.tobytes() for state in point.states))
+        found = self._found.pop(key, None) or find(point)
+        while len(self._found) >= self.KEPT:
+            del self._found[next(iter(self._found))]
+        self._found[key] = found
+        return found
+
+
 class ImplicitEngine:
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
@@ -45,12 +65,12 @@ class ImplicitEngine:
                 remedy="leave it out of the nuisances", where=problem.robot.name,
             )  # fmt: skip
         refuse_exact_only(problem.columns, problem.robot.name)
-        self._known: dict[tuple[bytes, ...], list[Found]] = {}
+        self.last = LastPoints()
 
     def on(self, problem: Problem) -> ImplicitEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
-        engine.problem, engine._columns, engine._known = problem, problem.columns, {}
+        engine.problem, engine._columns, engine.last = problem, problem.columns, LastPoints()
         return engine
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
@@ -63,16 +83,8 @@ class ImplicitEngine:
         return found
 
     def residuals(self, point: Point) -> list[Found]:
-        """(residuals, slopes, at) of every piece, see `_piece`; those of the last two points are kept.
-
-        A fit ends where it was, or at its last trial, and is then asked again with other weights.
-        """
-        asked = (point.values.tobytes(), *(state.tobytes() for state in point.states))
-        found = self._known.pop(asked, None) or self._simulated(point)
-        while len(self._known) > 1:
-            del self._known[next(iter(self._known))]
-        self._known[asked] = found
-        return found
+        """(residuals, slopes, at) of every piece, see `_piece`; those of `last` are not simulated again."""
+        return self.last.at(point, self._simulated)
 
     def _simulated(self, point: Point) -> list[Found]:
         robot, values = self.problem.robot_at(point.values), point.values

@@ -20,6 +20,7 @@ from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twist
+from omnidyn.identification.question import AUTO, REST
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.first_guess import GRAVITY
@@ -33,7 +34,6 @@ TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an u
 EARLIEST, LATEST = -0.1, 0.3  # [s]
 SUPPLY_STD = 0.1  # of a nominal supply: a battery is full or it is not
 MOST_FADE = 0.9
-AUTO, REST, FREE = "auto", "rest", "free"
 SILENT = 5  # rows without voltage that show a robot at rest
 CLEAR = 4.0  # standard errors from 0 that count as motion
 LEAD = 5  # rows whose mean is where a free start begins
@@ -97,8 +97,6 @@ def pieces(records: Sequence[Record], robot: Robot, start: str, late: bool) -> l
 
     "auto": at rest where the log begins without voltage and without visible motion; else free.
     """
-    if start not in (AUTO, REST, FREE):
-        raise InputError("unknown start", got=start, expected=f"{AUTO}, {REST} or {FREE}", where="start")
     found = []
     for record in records:
         twist = measured_twist(record, robot)

@@ -16,6 +16,7 @@ from omnidyn.model.robot import Robot
 FloatArray = NDArray[np.float64]
 
 FRICTION_LIMIT = 1e6  # what a robot file takes
+AT = "@"  # KEY@GROUP is the number that a group has for itself
 SPAN = 1e4  # a number that must be positive stays within so many times its start, either way
 
 LARGEST = 700.0  # e^709 is the last float

@@ -12,7 +12,7 @@ from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
-from omnidyn.identification.output_error.solve.progress import Onlooker
+from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.model.keys import FRICTION
 
@@ -66,7 +66,7 @@ def _with_latencies(solver: Solver, point: Point) -> Point:
     return Point(values, point.states)
 
 
-def coarse_point(problem: Problem, nu: float, watch: Onlooker) -> Point:
+def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
     """Near the best point, by one step a row; a long log is first fitted in part, of which `watch` hears only."""
     watch.doing("looking for a start")
     solver, short, own = (

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
-from omnidyn.identification.output_error.problem.nuisances import EARLIEST, FREE, LATEST, REST
+from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twist
-from omnidyn.identification.output_error.solve.progress import NOBODY, Onlooker
+from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
+from omnidyn.identification.question import FREE, REST
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
 from omnidyn.model.robot import Robot
 
@@ -118,24 +119,24 @@ def _piece(record: Record, first: int, last: int) -> Piece:
     )  # fmt: skip
 
 
-def solve_loop(problem: Problem, nu: float, watch: Onlooker = NOBODY) -> tuple[Solver, Solution]:
+def solve_loop(problem: Problem, nu: float, watch: Progress) -> Solution:
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
     first = Solver(problem, LoopEngine(problem), nu)
     coarse = first.minimise(loop_start(problem, nu, watch), FEW, watch)
     coarse = first.minimise(retimed(first, coarse.state.point, watch), watch=watch)
     watch.doing("the same as exactly as it must be")
     fine = Solver(problem, LoopEngine(problem, FINE), nu)
-    return fine, beyond_jumps(fine, fine.minimise(coarse.state.point, watch=watch), watch)
+    return beyond_jumps(fine.minimise(coarse.state.point, watch=watch), watch)
 
 
-def loop_start(problem: Problem, nu: float, watch: Onlooker = NOBODY) -> Point:
+def loop_start(problem: Problem, nu: float, watch: Progress) -> Point:
     """Where a fit begins: the best of several starts, tried on what sets off."""
     short = shortened(problem, SETTING_OFF)
     found = best_start(Solver(short, LoopEngine(short), nu), watch)
     return Point(found.values, problem.start().states)
 
 
-def retimed(solver: Solver, point: Point, watch: Onlooker = NOBODY) -> Point:
+def retimed(solver: Solver, point: Point, watch: Progress) -> Point:
     """The point with the best latency of the currents, of one in the middle of each period of the loop.
 
     A current jumps at every tick: no descent gets a latency across one, and one that has gone astray comes back only if
@@ -171,7 +172,7 @@ def shortened(problem: Problem, rows: int) -> Problem:
     return replace(problem, pieces=tuple(replace(p, last=min(p.last, p.first + rows)) for p in problem.pieces))
 
 
-def best_start(solver: Solver, watch: Onlooker = NOBODY) -> Point:
+def best_start(solver: Solver, watch: Progress) -> Point:
     """The best of several starts: all gains, all friction and all latencies by factors, then a few steps of each."""
     problem, seen = solver.problem, watch.below()
     delays = _if_any(problem, LATENCY, LATE, 0.0)
@@ -185,7 +186,7 @@ def best_start(solver: Solver, watch: Onlooker = NOBODY) -> Point:
 
 
 def _tried(
-    solver: Solver, which: Sequence[tuple[float, float, float]], what: str, watch: Onlooker
+    solver: Solver, which: Sequence[tuple[float, float, float]], what: str, watch: Progress
 ) -> list[State]:  # fmt: skip
     """The states at each (latency [s], factor of friction, factor of gains)."""
     found = []
@@ -209,7 +210,7 @@ def _moved(solver: Solver, late: float, level: float, gain: float) -> State:
     return solver.state(Point(values, own.states), np.ones(len(problem.columns)) if solver.nu else None)
 
 
-def beyond_jumps(solver: Solver, solution: Solution, watch: Onlooker = NOBODY) -> Solution:
+def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
     """The solution, or a better one behind a jump of the likelihood, which no descent crosses.
 
     An integral that stands still at the voltage limit jumps by a whole tick where a number of the robot decides on
@@ -217,10 +218,10 @@ def beyond_jumps(solver: Solver, solution: Solution, watch: Onlooker = NOBODY) -
     rises by less than the parabola says, there is another branch to descend into. A run away from the limit has
     no such branch.
     """
-    engine, seen = solver.engine, watch.below(solution.state.objective)
+    solver, seen = solution.solver, watch.below(solution.state.objective)
     watch.doing("looking for a better branch, beyond jumps of the likelihood")
     if not np.any(solver.problem.robot.drive.ki) or (
-        isinstance(engine, LoopEngine) and not engine.meets_limit(solution.state.point)
+        isinstance(solver.engine, LoopEngine) and not solver.engine.meets_limit(solution.state.point)
     ):
         return solution
     gains = [j for j, p in enumerate(solver.problem.parameters) if p.part == DRIVE]

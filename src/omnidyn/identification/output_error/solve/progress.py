@@ -1,22 +1,44 @@
-"""What looks on while a fit goes on: it sees every better state, and hears in words what is being done."""
+"""How far a fit is: every better state, in words what is being done, and the best so far, which an interrupt leaves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from omnidyn.identification.output_error.solve.solver import State
 
 
-class Onlooker:
-    """Looks on. better: is called with every better state; words: with what is being done, before it is begun."""
+@dataclass(frozen=True)
+class Best:
+    """The best of a fit so far: a state of all that is fitted, or, before there is one, of each group alone."""
+
+    state: State | None
+    alone: Mapping[str, State]
+
+
+class Progress:
+    """Follows a fit. better: is called with every better state; words: with what is being done, before it is begun."""
 
     def __init__(self, better: Callable[[State], object] | None = None, words: Callable[[str], object] | None = None):
         self._better, self._words = better, words
+        self._state: State | None = None
+        self._alone: dict[str, State] = {}
+
+    @classmethod
+    def of(cls, watch: Callable[[State], object] | None) -> Progress:
+        """Whatever follows a fit, as a Progress."""
+        return watch if isinstance(watch, Progress) else cls(watch)
+
+    @property
+    def best(self) -> Best | None:
+        """The best so far; None where there is none yet."""
+        return Best(self._state, dict(self._alone)) if self._state is not None or self._alone else None
 
     def __call__(self, state: State) -> None:
         """A better state than those before."""
+        self._state = state
         if self._better is not None:
             self._better(state)
 
@@ -25,7 +47,7 @@ class Onlooker:
         if self._words is not None:
             self._words(words)
 
-    def below(self, objective: float = np.inf) -> Onlooker:
+    def below(self, objective: float = np.inf) -> Progress:
         """The same, of a search that goes several ways: sees only states below all before, and below `objective`."""
         least = objective
 
@@ -35,16 +57,17 @@ class Onlooker:
                 least = state.objective
                 self(state)
 
-        return Onlooker(better, self.doing)
+        return Progress(better, self.doing)
 
-    def aside(self, words: str) -> Onlooker:
-        """The same, of a fit beside the one that is looked at: its states become words, headed by `words`."""
-        return Onlooker(lambda state: self.doing(f"{words}, -log likelihood {state.objective:.6g}"), self.doing)
+    def aside(self, words: str) -> Progress:
+        """The same, of a fit beside the one that is followed: its states become words, headed by `words`."""
+        return Progress(lambda state: self.doing(f"{words}, -log likelihood {state.objective:.6g}"), self.doing)
 
+    def alone(self, group: str) -> Progress:
+        """The same, of the fit of one group alone: its states become words, and its last one is kept."""
 
-NOBODY = Onlooker()
+        def better(state: State) -> None:
+            self._alone[group] = state
+            self.doing(f"{group} alone, -log likelihood {state.objective:.6g}")
 
-
-def onlooker(watch: Callable[[State], object] | None) -> Onlooker:
-    """Whatever looks on, as an Onlooker."""
-    return watch if isinstance(watch, Onlooker) else Onlooker(watch)
+        return Progress(better)

@@ -50,22 +50,27 @@ FASTEST = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off f
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A point, its sums, F there and the variance of each column."""
+    """A point, its sums, F there and the variance of each column. problem: whose point it is, where that is known."""
 
     point: Point
     sums: list[PieceSums]
     objective: float
     variance: FloatArray
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short."""
+    """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short.
+
+    solver: which found it.
+    """
 
     state: State
     held: NDArray[np.bool_]
     iterations: int
     converged: bool
+    solver: Solver
 
 
 class Solver:
@@ -97,7 +102,7 @@ class Solver:
         objective = float(0.5 * count @ np.log(now))
         if scaled.any():
             objective += float(per_column(sums, len(given), "loss")[scaled].sum())
-        return State(point, sums, objective + self._prior(point), now)
+        return State(point, sums, objective + self._prior(point), now, self.problem)
 
     @property
     def scaled(self) -> NDArray[np.bool_]:
@@ -140,8 +145,8 @@ class Solver:
             if not better and blocked.any() and not released:  # a shorter step may stay this side of the jump
                 blocked, released, damping = np.zeros_like(blocked), True, SHORT
             elif not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
-                return Solution(now, held, iteration + 1, True)
-        return Solution(now, held, limit, False)
+                return Solution(now, held, iteration + 1, True, self)
+        return Solution(now, held, limit, False, self)
 
     def _rescaled(self, now: State) -> tuple[State, float]:
         """The same point at better scales of Student's t and counts, and the largest relative change.

@@ -73,13 +73,12 @@ def with_breakaway(solver: Solver, levels: FloatArray) -> Solver:
     return Solver(solver.problem, solver.engine.with_breakaway(levels), solver.nu)
 
 
-def find_breakaway(
-    solver: Solver, solution: Solution, axes: list[int], known: Trust
-) -> tuple[Solver, Solution, list[Breakaway]]:
-    """Profile S of the axes, one after the other, twice where there are several: (solver, solution, levels) there.
+def find_breakaway(solution: Solution, axes: list[int], known: Trust) -> tuple[Solution, list[Breakaway]]:
+    """Profile S of the axes, one after the other, twice where there are several: (solution, levels) there.
 
     known: how far the solution can be trusted.
     """
+    solver = solution.solver
     assert isinstance(solver.engine, ExactEngine)
     levels, found = solver.engine.mapping.breakaway.copy(), []
     for _ in range(1 if len(axes) == 1 else 2):
@@ -89,7 +88,7 @@ def find_breakaway(
             levels[axis] = np.nan if one.tied and one.value <= one.low else one.value
             solution = with_breakaway(solver, levels).minimise(solution.state.point)
             found.append(one)
-    return with_breakaway(solver, levels), solution, found
+    return solution, found
 
 
 def _steeper(solver: Solver, known: Trust, axis: int) -> float:

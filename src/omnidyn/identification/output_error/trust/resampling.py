@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.difference import TiedEngine
-from omnidyn.identification.output_error.solve.progress import NOBODY, Onlooker
+from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.statistics import central_interval, t_quantile
@@ -39,7 +39,7 @@ class Resampled:
 
 def resampled(
     solver: Solver, solution: Solution, known: Trust, profile: Sequence[str] = (), draws: int = 0,
-    strata: Strata | None = None, watch: Onlooker = NOBODY,
+    strata: Strata | None = None, watch: Progress | None = None,
 ) -> Resampled:  # fmt: skip
     """Intervals by bootstrap of all numbers, and by profile of those named.
 
@@ -65,7 +65,7 @@ def resampled(
             found[p.name] = (spread, (p.outer(low), p.outer(high)))
     for name in profile:
         if not known.blind[j := names.index(name)]:
-            watch.doing(f"the profile of {name}")
+            (watch or Progress()).doing(f"the profile of {name}")
             found[name] = (None, profile_interval(solver, solution, known, j))
     return Resampled(found, drawn, widening)
 
@@ -171,7 +171,7 @@ def _rise(solver: Solver, solution: Solution, index: int, inner: float, point: P
 
 def bootstrap(
     solver: Solver, solution: Solution, draws: int, seed: int = SEED, strata: Strata | None = None,
-    watch: Onlooker = NOBODY,
+    watch: Progress | None = None,
 ) -> FloatArray:  # fmt: skip
     """Fits to runs drawn with replacement, those of each group among themselves. Shape (draws, P).
 
@@ -183,7 +183,7 @@ def bootstrap(
     refuse_few_runs({group: len(runs) for group, runs in of_group.items()})
     rng, found = np.random.default_rng(seed), []
     for draw in range(draws):
-        watch.doing(f"drawing the runs anew, {draw + 1} of {draws}")
+        (watch or Progress()).doing(f"drawing the runs anew, {draw + 1} of {draws}")
         drawn = [runs[k] for runs in of_group.values() for k in rng.integers(len(runs), size=len(runs))]
         chosen = [k for run in drawn for k, piece in enumerate(pieces) if id(piece.record) == run]
         problem = replace(solver.problem, pieces=tuple(pieces[k] for k in chosen))

@@ -1,0 +1,32 @@
+"""Options as the command line writes them: the library names them in backticks, `hold_out`; here that is --hold-out."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+# Options beside those of a Question, and those whose flag is not their name.
+OTHERS = (
+    "assume", "azimuth", "column", "current_unsigned", "duration", "fail_if", "force", "map", "max_bytes", "max_steps",
+    "no_header", "skip_bad_rows", "sort",
+)  # fmt: skip
+_NAMED = re.compile(r"`([a-z_]+)`")
+
+
+@cache
+def flags() -> dict[str, str]:
+    """Option -> flag."""
+    from omnidyn.identification.question import options
+
+    asked = {each.name: each.metadata["flag"] or each.name for each in options() if each.metadata["flag"] is not None}
+    return {name: f"--{word.replace('_', '-')}" for name, word in {**{name: name for name in OTHERS}, **asked}.items()}
+
+
+def with_flags(text: str) -> str:
+    """The text with every option in backticks as its flag."""
+    return _NAMED.sub(lambda found: flags().get(found[1], found[0]), text) if "`" in text else text
+
+
+def of_place(where: str) -> str:
+    """Where an error stands: the flag, where that is an option."""
+    return flags().get(where, where)

@@ -1,0 +1,62 @@
+"""Which runs belong to which group, and which are held out: by globs and folders of their sources."""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from omnidyn.errors import InputError
+
+
+def matches(path: str, pattern: str) -> bool:
+    """Whether a file belongs to a group: its path matches the glob, or lies in the folder of that name."""
+    plain = os.path.normpath(path)
+    folder = os.path.normpath(pattern)
+    if fnmatch.fnmatch(plain, folder) or fnmatch.fnmatch(os.path.basename(plain), pattern):
+        return True
+    parents = [str(parent) for parent in Path(plain).parents]
+    return any(fnmatch.fnmatch(parent, folder) or os.path.basename(parent) == folder for parent in parents)
+
+
+def held_out(sources: Sequence[str], patterns: Sequence[str]) -> list[bool]:
+    """Which runs are held out. Raises InputError for a pattern that none matches, and where nothing is left."""
+    for pattern in patterns:
+        if not any(matches(source, pattern) for source in sources):
+            raise InputError(
+                "no log to hold out", got=pattern, expected="a glob or a folder of LOG...", where="hold_out"
+            )
+    held = [any(matches(source, pattern) for pattern in patterns) for source in sources]
+    if patterns and all(held):
+        raise InputError("every log is held out", got=", ".join(patterns), expected="one or more to fit",
+                         where="hold_out")  # fmt: skip
+    return held
+
+
+def group_names(sources: Sequence[str], patterns: Sequence[str], option: str) -> list[str]:
+    """The group of each run, "" for one of none. patterns: NAME=GLOB each; option: where they come from.
+
+    Raises InputError for a pattern that cannot be read or that no run matches, and for a run of two groups.
+    """
+    pairs = [_pair(text, option) for text in patterns]
+    found = []
+    for source in sources:
+        mine = list(dict.fromkeys(name for name, pattern in pairs if matches(source, pattern)))
+        if len(mine) > 1:
+            raise InputError("a log belongs to two groups", got=" and ".join(mine), where=source,
+                             remedy=f"make the patterns of `{option}` narrower")  # fmt: skip
+        found.append(mine[0] if mine else "")
+    for name, pattern in pairs:
+        if name not in found:
+            raise InputError("no log belongs to this group", got=pattern, expected="a glob or a folder of LOG...",
+                             where=f"`{option}` {name}")  # fmt: skip
+    return found
+
+
+def _pair(text: str, option: str) -> tuple[str, str]:
+    name, equals, pattern = text.partition("=")
+    if not equals or not name.strip() or not pattern.strip():
+        raise InputError("cannot read the group", got=text, expected="NAME=GLOB, such as gray=gray_surface",
+                         where=option)  # fmt: skip
+    return name.strip(), pattern.strip()

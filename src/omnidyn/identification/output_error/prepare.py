@@ -1,0 +1,241 @@
+"""From runs and a question to problems: what is free, which engine follows from that, and what never moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.output_error.engines.exact import ExactEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
+from omnidyn.identification.output_error.problem.motion import Motion, motion
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, nuisance_parameters, pieces
+from omnidyn.identification.output_error.problem.parameters import Parameter, names_of, robot_parameters
+from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.output_error.problem.record import Record, record
+from omnidyn.identification.output_error.solve.loop import loop_keys, loop_pieces, looped
+from omnidyn.identification.output_error.trust.breakaway import KEY
+from omnidyn.identification.question import Question
+from omnidyn.logs.steady_table import AXES
+from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.keys import BOX, COULOMB, FRICTION, GAINS, VISCOUS, Key, expand, friction_keys, unit
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.robot import IDENTIFIED, Robot
+from omnidyn.run import Run
+from omnidyn.simulation.exact.march import why_not_exact
+
+FloatArray = NDArray[np.float64]
+
+EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
+NOTHING = 1e-9  # [N, N m] a drive that is only rounding
+FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
+ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
+BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
+LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """The logs of one group, alone: the robot they begin from, what is free of it there, and the engine for that.
+
+    usual: what is free by default. moved (3,): which axes did. bounds: key -> what an axis that never moved has held.
+    warnings: what is to be said of such axes.
+    """
+
+    name: str
+    records: list[Record]
+    robot: Robot
+    question: Question
+    engine: str
+    usual: tuple[str, ...]
+    moved: NDArray[np.bool_]
+    bounds: dict[str, float]
+    warnings: tuple[str, ...]
+
+    def problem(self, nuisances: Sequence[str] | None = None) -> Problem:
+        """What is to be fitted. nuisances: those that were settled; None: those that are asked for."""
+        asked = self.question if nuisances is None else replace(self.question, nuisances=tuple(nuisances))
+        return make_problem(self.records, self.robot, asked, self.engine, self.usual)
+
+
+def make_group(
+    name: str, records: list[Record], robot: Robot, question: Question, exact: bool, usual: tuple[str, ...],
+    alone: bool,
+) -> Group:  # fmt: skip
+    """The group of these records. exact: whether the exact engine fits them; usual: what is free by default.
+
+    alone: there are no other groups, which may tell what is shared: raises InsufficientDataError where no axis moved.
+    """
+    found = motion(records, robot)
+    if looped(records):
+        question = _loop_question(question, found, records, robot)
+        return Group(name, records, robot, question, LOOP, usual, found.moved, {}, ())
+    engine, bounds, warnings = EXACT if exact else IMPLICIT, {}, []
+    asked, fixed = question.free if question.free is not None else usual, set(question.fixed)
+    for axis in np.flatnonzero(~found.moved).tolist():
+        own = {key for key in (*asked, *usual) if Key.parse(key).axis == axis}
+        fixed |= own
+        if not own or (alone and not exact and not own & set(asked)):
+            continue  # friction along the direction of travel: no axis has its own
+        held, key = float(found.held[axis]), f"friction.axes.breakaway[{axis}]"
+        if not alone:
+            warnings.append(f"{found.words(axis, name)} there")
+            continue
+        what = f"; it held {held:.4g} {unit(key)}" if held > NOTHING else "; nothing drove it"
+        warnings.append(found.words(axis) + (what if found.seen[axis] else ""))
+        bounds |= {key: held} if held > NOTHING else {}
+        if exact and robot.friction.axes.levels[2][axis] < held:
+            robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)
+    if alone and not found.moved.any():
+        raise _never_moved(found, records[0].source)
+    if warnings and question.free is None and question.use_priors:
+        question = replace(question, fixed=tuple(fixed))
+    elif warnings:
+        question = replace(question, free=tuple(key for key in asked if key not in fixed), fixed=())
+    return Group(name, records, robot, question, engine, usual, found.moved, bounds, tuple(warnings))
+
+
+def _never_moved(found: Motion, source: str) -> InsufficientDataError:
+    return InsufficientDataError(
+        "the robot never visibly moved: its friction is only bounded from below",
+        got="; ".join(
+            f"{AXES[axis]} held {held:.3g}" if seen else f"{AXES[axis]} was not measured"
+            for axis, (held, seen) in enumerate(zip(found.held, found.seen, strict=True))
+        ),
+        expected="motion", remedy="drive it beyond its dead zone", where=source,
+    )  # fmt: skip
+
+
+def _loop_question(question: Question, found: Motion, records: Sequence[Record], robot: Robot) -> Question:
+    """By default friction of what moved, and the gains. Raises InsufficientDataError where nothing moved."""
+    more = known_priors(robot) if question.use_priors else ()
+    keys = dict.fromkeys((*loop_keys(robot, found.moved, records[0].source), *more))
+    free = tuple(key for key in keys if key not in question.fixed)
+    return question if question.free is not None else replace(question, free=free, fixed=())
+
+
+def read_records(runs: Sequence[Run], robot: Robot, question: Question) -> list[Record]:
+    """The runs as a fit sees them. Raises InputError where there is none, and for logs that do not go together."""
+    if not runs:
+        raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
+    gains = any(Key.parse(key).name in GAINS for key in question.free or ())
+    found = [record(run, robot, question.outputs, gains, question.tick_rad) for run in runs]
+    if len({each.set_point is None for each in found}) > 1:
+        raise InputError(
+            "some logs have voltages, others set speeds only", got=", ".join(each.source for each in found[:2]),
+            expected="logs of one kind", remedy="free a gain of the loop, or fit them apart", where="runs",
+        )  # fmt: skip
+    return found
+
+
+def make_problem(
+    records: Sequence[Record], robot: Robot, question: Question, engine: str = "", usual: Sequence[str] = ()
+) -> Problem:
+    """What is free, and how the pieces start. engine, usual: of `engine_for` and `free_by_default`, where known.
+
+    Raises InputError for unknown keys, or where nothing is left free.
+    """
+    priors = known_priors(robot) if question.use_priors else {}
+    keys = [*question.free] if question.free is not None else [
+        *dict.fromkeys((*(usual or free_by_default(robot)), *priors))
+    ]  # fmt: skip
+    unknown = [key for key in question.fixed if key not in keys]
+    if unknown and question.free is not None:
+        raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
+    keys = [key for key in keys if key not in question.fixed and Key.parse(key).name != KEY]
+    if not keys:
+        got = ", ".join(question.free or ()) or "no key"
+        raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
+    own = robot_parameters(robot, keys, priors)
+    engine = engine or engine_for(records, robot, keys)
+    if engine != EXACT:
+        own = [_within_reach(p, _drive(records, robot)) for p in own]
+    auto = automatic(records) if engine == EXACT else (LATENCY,)
+    more = nuisance_parameters(auto if question.nuisances is None else question.nuisances, records, robot)
+    late = any(p.name.startswith(LATENCY) for p in more)
+    start = question.start
+    parts = loop_pieces(records, robot, start) if engine == LOOP else pieces(records, robot, start, late)
+    rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
+    if rows <= len(own) + len(more):
+        raise InsufficientDataError(
+            "too few measurements", got=f"{rows}", expected=f"more than {len(own) + len(more)}, one for each number"
+        )
+    return Problem(robot, (*own, *more), len(own), tuple(parts))
+
+
+def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
+    """The engine of a problem. tol [m/s]: of an implicit one, None for a step a row."""
+    if kind == EXACT:
+        return ExactEngine(problem)
+    return LoopEngine(problem, tol) if kind == LOOP else ImplicitEngine(problem, tol)
+
+
+def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> str:
+    """Which engine fits these keys of the robot to the records."""
+    return LOOP if looped(records) else EXACT if is_exact(robot) and stays_exact(robot, keys) else IMPLICIT
+
+
+def is_exact(robot: Robot) -> bool:
+    """Whether the exact engine knows this robot."""
+    return not why_not_exact(robot) and robot.motor.electrical != DYNAMIC
+
+
+def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:
+    """Whether the exact engine, which knows the robot as it is, knows it wherever a fit of these keys may bring it.
+
+    A number of one wheel makes equal motors unequal, and the axes couple; friction that was off may come up.
+    """
+    other = [Key.parse(key) for key in keys if key not in BOX]
+    other = [key for key in other if key.name != KEY]
+    for k, key in enumerate(other):
+        value, share = key.get(robot), ASIDE * (k + 1)
+        robot = key.set(robot, value * (1.0 + share) or share, checked=False)
+    return not other or is_exact(robot)
+
+
+def _drive(records: Sequence[Record], robot: Robot) -> float:
+    """The greatest wrench that the voltages of the logs give at rest [N, N, N m]; a loop may give its limit."""
+    limit = robot.motor.voltage_limit or robot.drive.supply or 0.0
+    levels = [r.voltage if r.set_point is None else np.eye(robot.wheels.count) * limit for r in records]
+    return max(float(np.nanmax(np.abs(drive_wrench(robot, np.zeros(3), volts)), initial=0.0)) for volts in levels)
+
+
+def _within_reach(p: Parameter, drive: float) -> Parameter:
+    """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
+    low = LEAST * p.value if p.low == 0.0 else p.low
+    if Key.parse(p.name).level != COULOMB or drive == 0.0:
+        return replace(p, low=low)
+    return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
+
+
+def free_by_default(robot: Robot, exact: bool | None = None) -> tuple[str, ...]:
+    """B and C of the axes; of a robot with friction elsewhere the levels that it has: one that is off has no slope.
+
+    exact: whether the exact engine knows the robot, where that is known.
+    """
+    if is_exact(robot) if exact is None else exact:
+        return BOX
+    has = {key: Key.parse(key) for key in friction_keys(robot)}
+    return tuple(name for name, key in has.items() if key.level == VISCOUS or key.get(robot) > 0.0)
+
+
+def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
+    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry."""
+    found = {}
+    for name, prior in robot.priors.items():
+        if prior.std is not None and prior.origin != IDENTIFIED:
+            found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
+    return found
+
+
+def expand_keys(names: str | Sequence[str], robot: Robot, usual: Sequence[str] = ()) -> tuple[str, ...]:
+    """The keys that names stand for: "friction" for what is free by default, a list for its entries; others as is.
+
+    usual: what is free by default, where that is known.
+    """
+    each = ((usual or free_by_default(robot)) if name == FRICTION else expand(name, robot) for name in names_of(names))
+    return tuple(dict.fromkeys(key for keys in each for key in keys))
