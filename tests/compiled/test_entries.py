@@ -1,6 +1,7 @@
 """Entries on disk: taken where they fit, replaced where they do not, whatever has become of them."""
 
 import os
+from dataclasses import replace
 
 import numba
 import pytest
@@ -166,3 +167,20 @@ def test_two_kernels_of_one_name_are_told_apart(folder):
     first, second = [kernel(lambda x: 2.0 * x),
                      kernel(lambda x: 5.0 * x)]  # fmt: skip
     assert (first(1.0), second(1.0), first(2.0)) == (2.0, 5.0, 4.0)
+
+
+def test_what_no_kernel_would_take_is_dropped(folder, entry):
+    """Entries of kernels that have been renamed, or are no more, as far as they lie beside others."""
+    kernels = [kernel(thrice), kernel(half)]
+    assert kernels[1](2.0) == 1.0
+    assert kernels[0](1j) == 3j
+    for name in ("gone.f-1.kernel", "test_entries.half-2.kernel"):
+        (entry.parent / name).write_bytes(b"1" * 64 + entry.read_bytes()[64:])
+    (entry.parent / "gone.f-3.kernel").write_bytes(b"\xff")
+    (entry.parent / "other.pyc").touch()
+    caches = [each._cache for each in kernels]
+    stock = entries.take_stock(caches)
+    assert (stock.folders, stock.entries, stock.dropped) == ((str(entry.parent),), 3, 3)
+    assert stock.size == sum(file.stat().st_size for file in files(folder))
+    assert len(files(folder)) == 4
+    assert entries.take_stock(caches) == replace(stock, dropped=0)

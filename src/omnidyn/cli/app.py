@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import check, compare, deadzone, demo, identify, init, robots, simulate
+from omnidyn.cli import check, compare, deadzone, demo, identify, init, robots, simulate, warm
 from omnidyn.cli.terminal.streams import show
 
 app = typer.Typer(
@@ -38,6 +38,6 @@ def _omnidyn(
 
 for _command in (
     demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, deadzone.deadzone,
-    robots.robots,
+    robots.robots, warm.warm,
 ):  # fmt: skip
     app.command()(_command)

@@ -13,7 +13,8 @@ import os
 import pickle
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from numba.core.serialize import dumps
 from omnidyn.compiled.stamp import stamp
 
 SUFFIX = ".kernel"
+STAMP_SIZE = 64
 
 
 class Entries(_Cache):
@@ -95,3 +97,36 @@ class Entries(_Cache):
             return None
         size = len(self._head(b""))
         return whole[size:] if whole[:size] == self._head(whole[size:]) else None
+
+
+@dataclass(frozen=True)
+class Stock:
+    """What lies on disk: folders, entries of today's sources and their size [bytes], and old ones that were dropped."""
+
+    folders: tuple[str, ...]
+    entries: int
+    size: int
+    dropped: int
+
+
+def take_stock(caches: Sequence[Entries]) -> Stock:
+    """Count the entries of all kernels, and drop those beside them that none would take.
+
+    A kernel replaces its own entries. Those of one that has been renamed, or is no more, would stay for ever.
+    """
+    stamps, folders = {cache.stamp for cache in caches}, sorted({cache.cache_path for cache in caches})
+    sizes, dropped = [], 0
+    for file in (file for folder in folders for file in Path(folder).glob(f"*{SUFFIX}")):
+        with contextlib.suppress(OSError):
+            if _stamp_of(file) in stamps:
+                sizes.append(file.stat().st_size)
+            else:
+                file.unlink()
+                dropped += 1
+    return Stock(tuple(folders), len(sizes), sum(sizes), dropped)
+
+
+def _stamp_of(file: Path) -> str:
+    """The stamp that an entry begins with. Raises OSError where it cannot be read."""
+    with file.open("rb") as opened:
+        return opened.read(STAMP_SIZE).decode("ascii", "replace")

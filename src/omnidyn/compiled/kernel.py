@@ -9,11 +9,13 @@ thread pools break under fork and under user threads; use threads over blocks in
 from __future__ import annotations
 
 import contextlib
+import sys
 from collections.abc import Callable
 from typing import Any
 
 import numba
 from numba.core.compiler import Compiler
+from numba.extending import is_jitted
 
 from omnidyn.compiled.hearing import told
 
@@ -42,6 +44,13 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
             compiled._cache = Entries(function)
     return compiled
+
+
+def kept() -> list[Any]:
+    """What keeps the kernels of the package that have been imported, see entries.py; nothing keeps those in memory."""
+    modules = [module for name, module in tuple(sys.modules.items()) if name.startswith("omnidyn.")]
+    every: dict[int, Any] = {id(value): value for each in modules for value in vars(each).values() if is_jitted(value)}
+    return [each._cache for each in every.values() if hasattr(each._cache, "stamp")]
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:

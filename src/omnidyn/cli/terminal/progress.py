@@ -13,17 +13,19 @@ from omnidyn.compiled.hearing import Compiling, heard
 
 SILENT_S, NEW_S, BEAT_S = 2.0, 3.0, 5.0
 COMPILING = " (a kernel is being compiled: once, the first time)"
+WARM = "omnidyn: a first run waits for the compiler, up to a minute; `omnidyn warm` compiles for all commands, once"
 
 
 @contextlib.contextmanager
-def progress(step: str) -> Iterator[Callable[[str], None]]:
+def progress(step: str, hint: str = WARM) -> Iterator[Callable[[str], None]]:
     """Says after 2 s, and then every 5 s, what is being done: every 3 s where that is something new.
 
+    hint: said once, where the compiler is waited for; "": nothing.
     Yields the function that names the next step.
     """
     steps, done = [step], threading.Event()
     with heard() as compiling:
-        teller = threading.Thread(target=_tell, args=(steps, done, compiling, time.monotonic()), daemon=True)
+        teller = threading.Thread(target=_tell, args=(steps, done, compiling, hint), daemon=True)
         teller.start()
         try:
             yield steps.append
@@ -32,13 +34,16 @@ def progress(step: str) -> Iterator[Callable[[str], None]]:
             teller.join()
 
 
-def _tell(steps: list[str], done: threading.Event, compiling: Compiling, started: float) -> None:
-    said, wait = "", SILENT_S
+def _tell(steps: list[str], done: threading.Event, compiling: Compiling, hint: str) -> None:
+    said, wait, started = "", SILENT_S, time.monotonic()
     while not done.wait(wait):
         if _now(steps, compiling) == said and done.wait(BEAT_S - NEW_S):
             return
         said, wait = _now(steps, compiling), NEW_S
         with contextlib.suppress(OSError, ValueError):
+            if hint and compiling.under_way:
+                say(hint)
+                hint = ""
             say(f"omnidyn: {said} ... {time.monotonic() - started:.0f} s")
             sys.stderr.flush()
 

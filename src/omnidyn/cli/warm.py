@@ -1,0 +1,65 @@
+"""omnidyn warm: the compiler is waited for once, and not by the first run of each command."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import typer
+
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.compiled.hearing import Compiling, heard
+
+
+def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
+    """Compile all that first runs need, once.
+
+    Small runs and fits of every kind are made; what is compiled for them stays on disk. Takes about a minute, and
+    a second or two where all is there. After an update only what has changed is compiled.
+    """
+    started = time.monotonic()
+    with progress("loading", hint="") as now, heard() as compiling:
+        _make(now, compiling)
+    seconds = time.monotonic() - started
+    from omnidyn.compiled.kernel import kept
+
+    caches = kept()
+    if not caches:
+        say("omnidyn: warning: no folder is writable, so each process compiles for itself; name one in NUMBA_CACHE_DIR")
+        result: dict[str, Any] = {"folders": [], "entries": 0, "bytes": 0}
+    else:
+        from omnidyn.compiled.entries import take_stock
+
+        stock = take_stock(caches)
+        result = {"folders": list(stock.folders), "entries": stock.entries, "bytes": stock.size}
+    _tell({"compiled": [{"kernel": name, "seconds": s} for name, s in compiling.done], **result}, seconds, json)
+
+
+def _make(now: Callable[[str], None], compiling: Compiling) -> None:
+    """Every run and fit, in turn; says which of them had to wait, for what and how long."""
+    from omnidyn.identification.first_runs import first_runs
+
+    every = first_runs()
+    for k, (what, make) in enumerate(every):
+        done, step = len(compiling.done), f"{k + 1} of {len(every)}, {what}"
+        now(step)
+        make()
+        new = compiling.done[done:]
+        if new:
+            say(f"omnidyn: {step}: {', '.join(f'{name} {seconds:.1f} s' for name, seconds in new)}")
+
+
+def _tell(result: dict[str, Any], seconds: float, json: bool) -> None:
+    from omnidyn.cli.terminal.session import provenance
+
+    if json:
+        show_json({**result, "provenance": provenance([])})
+        return
+    count, folders = len(result["compiled"]), result["folders"]
+    show(f"{count} compiled in {seconds:.0f} s" if count else f"all is there ({seconds:.1f} s)")
+    if folders:
+        place = folders[0] if len(folders) == 1 else f"{len(folders)} folders below {os.path.commonpath(folders)}"
+        show(f"{result['entries']} entries, {result['bytes'] / 1e6:.1f} MB, in {place}")

@@ -1,0 +1,61 @@
+"""Small runs and fits that need every kernel: where these were made once, nobody waits for a compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.identify import OUTPUT_ERROR, identify
+from omnidyn.model.drive import SPEED
+from omnidyn.model.dynamics import acceleration
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.robot import Robot
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+
+ROWS, HOLD, DT = 400, 40, 0.01  # rows of a run; rows and [s] that a command holds
+NOISE = {"twist": 0.005, "current": 0.05, "pose": 0.002}  # [m/s, rad/s], [A], [m, rad]
+TWIST, VOLTAGE = (0.4, 0.4, 2.0), 10.0  # the largest commands [m/s, m/s, rad/s], [V]
+TICK = 2.0 * np.pi / 200.0  # of a counted angle [rad]
+
+
+def first_runs() -> list[tuple[str, Callable[[], object]]]:
+    """(what it stands for, how to make it), in the order in which they are wanted. Compiled, each takes below 1 s."""
+    paper, four, other, looped = (load_robot(name) for name in ("axebot", "four-wheel", "mecanum", "robotino"))
+    winding = four.replace(motor=four.motor.replace(electrical=DYNAMIC, inductance=1e-3))
+    return [
+        ("simulation, friction of the axes", partial(_run, paper)),
+        ("fit of speeds", partial(_fit, paper, "twist")),
+        ("fit of speeds alone", partial(_fit, paper, "twist", nuisances=(), start="rest")),
+        ("fit of speeds, currents and poses", partial(_fit, paper, "twist", "current", "pose")),
+        ("fit of counted angles", partial(_fit, paper, "wheel_angle")),
+        ("simulation, any friction", partial(_run, other)),
+        ("acceleration, any friction", partial(acceleration, looped, np.zeros(3), np.ones(3))),
+        ("fit, any friction", partial(_fit, other, "twist")),
+        ("fit in a speed loop", partial(_fit, looped, "twist")),
+        ("simulation, inductance", partial(_run, winding)),
+    ]
+
+
+def _run(robot: Robot) -> Run:
+    """From rest, with reversals: under voltages, or under set points where the drive takes those."""
+    looped = robot.drive.kind == SPEED
+    steps = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS // HOLD, 3 if looped else robot.wheels.count))
+    steps[0] = 0.0
+    given = np.repeat(steps, HOLD, axis=0)
+    return simulate(robot, dt=DT, twist_command=given * TWIST) if looped else simulate(robot, given * VOLTAGE, DT)
+
+
+def _fit(robot: Robot, *sensors: str, **options: object) -> Estimate:
+    """A fit to what these sensors show of that run."""
+    random, run = np.random.default_rng(1), _run(robot)
+    seen = {name: value + NOISE[name] * random.standard_normal(value.shape) for name, value in run.channels.items()
+            if name in NOISE}  # fmt: skip
+    seen["wheel_angle"] = np.round(np.cumsum(run.channels["wheel_speed"], axis=0) * DT / TICK) * TICK
+    given = Run(t=run.t, voltage=None if robot.drive.kind == SPEED else run.voltage, twist_command=run.twist_command)
+    log = given.replace(**{name: seen[name] for name in sensors})
+    return identify(log, robot, method=OUTPUT_ERROR, **options)
