@@ -6,10 +6,10 @@ import textwrap
 from collections.abc import Sequence
 
 from omnidyn.cli.terminal.streams import coloured, width
-from omnidyn.paper.claim import Claim, Verdict
+from omnidyn.paper.claim import Claim, ClaimVerdict
 
-SHORT = {Verdict.REPRODUCED: "yes", Verdict.CORRECTED: "mended", Verdict.NOT_REPRODUCED: "no"}
-COLOURS = {Verdict.REPRODUCED: "green", Verdict.CORRECTED: "yellow", Verdict.NOT_REPRODUCED: "red"}
+SHORT = {ClaimVerdict.REPRODUCED: "yes", ClaimVerdict.CORRECTED: "mended", ClaimVerdict.NOT_REPRODUCED: "no"}
+COLOURS = {ClaimVerdict.REPRODUCED: "green", ClaimVerdict.CORRECTED: "yellow", ClaimVerdict.NOT_REPRODUCED: "red"}
 INDENT = 8
 
 
@@ -18,7 +18,7 @@ def claims_table(claims: Sequence[Claim]) -> str:
     columns = width()
     lines = [line for claim in claims for line in _claim(claim, columns)]
     lines.append("")
-    for verdict in Verdict:
+    for verdict in ClaimVerdict:
         number = sum(claim.verdict == verdict for claim in claims)
         lines += _entry(verdict, _wrapped(f"{number} {verdict.value}", columns))
     return "\n".join(lines)
@@ -29,7 +29,7 @@ def _claim(claim: Claim, columns: int) -> list[str]:
     return _entry(claim.verdict, first + _wrapped(f"printed {claim.printed}; ours {claim.ours}", columns))
 
 
-def _entry(verdict: Verdict, lines: list[str]) -> list[str]:
+def _entry(verdict: ClaimVerdict, lines: list[str]) -> list[str]:
     """Lines with the verdict in front of the first, the others below it."""
     label = coloured(f"{SHORT[verdict]:{INDENT}}", COLOURS[verdict])
     return [label + lines[0], *(" " * INDENT + line for line in lines[1:])]

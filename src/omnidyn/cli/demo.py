@@ -67,10 +67,10 @@ def _made(now: Any) -> tuple[tuple[Claim, ...], list[Picture], dict[str, Any]]:
 def _result(claims: tuple[Claim, ...], pictures: list[Picture], record: dict[str, Any]) -> dict[str, Any]:
     from dataclasses import asdict
 
-    from omnidyn.paper.claim import Verdict
+    from omnidyn.paper.claim import ClaimVerdict
 
     return {
-        "verdicts": {verdict.value: sum(claim.verdict == verdict for claim in claims) for verdict in Verdict},
+        "verdicts": {verdict.value: sum(claim.verdict == verdict for claim in claims) for verdict in ClaimVerdict},
         "claims": [asdict(claim) for claim in claims],
         "figures": [{"name": each.name, "title": each.title, "caption": each.caption} for each in pictures],
         "provenance": record,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from omnidyn.model.robot_file import load_robot
-from omnidyn.paper.claim import Claim, Verdict
+from omnidyn.paper.claim import Claim, ClaimVerdict
 from omnidyn.paper.friction import friction_claims
 from omnidyn.paper.geometry import geometry_claims
 from omnidyn.paper.mismatch import mismatch_claims
@@ -12,7 +12,7 @@ from omnidyn.paper.motors import motor_claims
 from omnidyn.paper.speeds import speed_claims
 from omnidyn.paper.validation import validation_claims
 
-__all__ = ["PRESET", "Claim", "Verdict", "all_claims"]
+__all__ = ["PRESET", "Claim", "ClaimVerdict", "all_claims"]
 
 PRESET = "axebot"
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from omnidyn.paper.claim import Claim, Verdict
+from omnidyn.paper.claim import Claim, ClaimVerdict
 from omnidyn.report.html import STYLE, Section, figure, page
 from omnidyn.report.style import Picture
 
@@ -15,9 +15,9 @@ __all__ = ["MARKS", "STYLE", "render_page"]
 
 # Colour, word and sign: a reader who cannot see one has the others.
 MARKS = {
-    Verdict.REPRODUCED: ("yes", "\N{CHECK MARK}"),
-    Verdict.CORRECTED: ("mended", "\N{ALMOST EQUAL TO}"),
-    Verdict.NOT_REPRODUCED: ("no", "\N{MULTIPLICATION X}"),
+    ClaimVerdict.REPRODUCED: ("yes", "\N{CHECK MARK}"),
+    ClaimVerdict.CORRECTED: ("mended", "\N{ALMOST EQUAL TO}"),
+    ClaimVerdict.NOT_REPRODUCED: ("no", "\N{MULTIPLICATION X}"),
 }
 
 
@@ -33,13 +33,13 @@ def render_page(
 
 def _counts(claims: Sequence[Claim]) -> str:
     parts = []
-    for verdict in Verdict:
+    for verdict in ClaimVerdict:
         number = sum(claim.verdict == verdict for claim in claims)
         parts.append(f"<li>{_badge(verdict)} <b>{number}</b></li>")
     return f'<ul class="counts">{"".join(parts)}</ul>'
 
 
-def _badge(verdict: Verdict) -> str:
+def _badge(verdict: ClaimVerdict) -> str:
     colour, sign = MARKS[verdict]
     return f'<span class="badge {colour}"><span aria-hidden="true">{sign}</span> {escape(verdict.value)}</span>'
 
