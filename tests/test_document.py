@@ -10,7 +10,6 @@ from omnidyn.document import (
     Points,
     Table,
     Words,
-    ascii_only,
     cell,
     chance_cell,
     interval_cell,
@@ -107,8 +106,9 @@ def test_points_and_tables_are_found_by_their_name():
         document["doubts"]
 
 
-def test_ascii_only_says_what_the_characters_are():
-    assert ascii_only("µ 車") == "\\xb5 \\u8eca"
+def test_characters_beyond_ascii_stay_or_are_escaped():
+    assert Document(["µ 車"]).to_text() == "µ 車"
+    assert Document(["µ 車"], ascii=True).to_text() == "\\xb5 \\u8eca"
 
 
 @pytest.mark.parametrize(

@@ -84,12 +84,13 @@ Part = str | Words | Points | Table  # plain text is a line as it stands
 class Document:
     """What a result says: its parts in the order in which text tells them, and its values as JSON can hold them.
 
-    warnings: what a reader of `data` alone must be told too.
+    warnings: what a reader of `data` alone must be told too. ascii: text has an escape for every other character.
     """
 
     parts: Sequence[Part]
     data: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[str] = ()
+    ascii: bool = False
 
     def __getitem__(self, name: str) -> Points | Table:
         """The points or the table of this name. Raises KeyError."""
@@ -98,17 +99,18 @@ class Document:
                 return part
         raise KeyError(name)
 
+    def joined(self, *names: str) -> Points:
+        """The points of these names as one list."""
+        several = [part for part in map(self.__getitem__, names) if isinstance(part, Points)]
+        return Points([words for part in several for words in part.words])
+
     def to_text(self, width: int = WIDTH, paint: Paint = lambda word, tone: word) -> str:
         """The document for people, without a line break at its end. paint: how signs get their colours."""
         lines: list[str] = []
         for part in self.parts:
             lines += [part] if isinstance(part, str) else part.lines(width, paint)
-        return "\n".join(lines)
-
-
-def ascii_only(text: str) -> str:
-    """The text with an escape for every character beyond ASCII."""
-    return text.encode("ascii", "backslashreplace").decode()
+        text = "\n".join(lines)
+        return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
 
 
 def cell(value: float | None, form: str) -> str:

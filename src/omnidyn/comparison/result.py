@@ -10,7 +10,7 @@ from omnidyn.comparison import text
 from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
-from omnidyn.document import Document, Part, Points, Words, ascii_only
+from omnidyn.document import Document, Part, Points, Words
 from omnidyn.run import Run
 
 
@@ -81,7 +81,7 @@ class Comparison:
 
     def summary(self, segments: bool = False) -> str:
         """The comparison as plain tables, for reading; with `segments`, each segment too. ASCII only."""
-        return ascii_only(self.document(segments).to_text()) + "\n"
+        return self.document(segments).to_text() + "\n"
 
     def document(self, segments: bool = False) -> Document:
         """What the comparison says; with `segments`, of each segment too."""
@@ -99,7 +99,8 @@ class Comparison:
             ]  # fmt: skip
         parts += text.legend([each for found in self.overall.values() for each in found.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
-        return Document([*parts, Points(self.warnings, "warning:")], self.to_dict(), self.warnings)
+        parts.append(Points(self.warnings, "warning:"))
+        return Document(parts, self.to_dict(), self.warnings, ascii=True)
 
     def _title(self, robot: str) -> tuple[Words, Words]:
         """Which robot met which logs, and what drove it."""

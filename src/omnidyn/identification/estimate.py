@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.document import Document, Part, Points, Table, interval_cell
 from omnidyn.model.keys import unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
@@ -56,22 +56,26 @@ class Estimate:
 
     def summary(self) -> str:
         """The estimate as a plain table, for reading. ASCII only."""
-        lines = [f"{self.robot.name}: {self.method}", f"data: {self.data}", "", *self._table()]
-        lines += [f"{name} is at least {bound:.4g} {unit(name)}" for name, bound in self.lower_bound.items()]
-        for warning in self.warnings:
-            lines += textwrap.wrap(f"warning: {warning}", 100, subsequent_indent="  ")
-        return "\n".join(line.encode("ascii", "backslashreplace").decode() for line in lines) + "\n"
+        return self.document().to_text() + "\n"
 
-    def _table(self) -> list[str]:
-        width = max([len(name) for name in self.value] + [len("parameter")])
-        rows = [f"{'parameter':{width}}  {'value':>10}  {'std error':>10}  {'95 % interval':>24}  unit"]
+    def document(self) -> Document:
+        """What the estimate says."""
+        return Document(self._parts(), self.to_dict(), self.warnings, ascii=True)
+
+    def _parts(self) -> list[Part]:
+        """Its words and its table, in the order of reading."""
+        bounds = [f"{name} is at least {bound:.4g} {unit(name)}" for name, bound in self.lower_bound.items()]
+        head = [f"{self.robot.name}: {self.method}", f"data: {self.data}", ""]
+        return [*head, self._table(), *bounds, Points(self.warnings, "warning:")]
+
+    def _table(self) -> Table:
+        rows = []
         for name, value in self.value.items():
-            low, high = self.ci95[name]
-            interval = f"{f'[{low:.4g}, {high:.4g}]':>24}"
             mark = "  at bound" if name in self.at_bound else ""
-            row = f"{name:{width}}  {value:10.4g}  {self.std[name]:10.3g}  {interval}  {unit(name)}{mark}"
-            rows.append(row.rstrip())
-        return rows
+            interval = interval_cell(self.ci95[name])
+            rows.append((name, f"{value:.4g}", f"{self.std[name]:.3g}", interval, unit(name) + mark))
+        head = ("parameter", "value", "std error", "95 % interval", "unit")
+        return Table(head, rows, "<>>><", least=(0, 10, 10, 24))
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it: no NaN, no infinity (null instead); the robot as the text of its file."""

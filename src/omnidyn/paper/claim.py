@@ -30,6 +30,12 @@ class ClaimVerdict(StrEnum):
     CORRECTED = "reproduced after a correction"
     NOT_REPRODUCED = "cannot be reproduced"
 
+    @property
+    def short(self) -> str:
+        """The verdict in a word: yes, mended or no."""
+        short = {ClaimVerdict.REPRODUCED: "yes", ClaimVerdict.CORRECTED: "mended", ClaimVerdict.NOT_REPRODUCED: "no"}
+        return short[self]
+
 
 @dataclass(frozen=True)
 class Claim:
