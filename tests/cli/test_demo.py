@@ -9,7 +9,7 @@ from omnidyn.cli import main
 from omnidyn.cli.terminal.folder import MARKER, check_folder, write_folder
 from omnidyn.cli.terminal.streams import width
 from omnidyn.errors import InputError
-from omnidyn.paper.claim import Verdict
+from omnidyn.paper.claim import ClaimVerdict
 from omnidyn.paper.claims import all_claims, claims_document
 from tests.support.outputs import strict
 
@@ -155,5 +155,5 @@ def test_the_table_has_every_claim_and_the_counts():
     table = claims_document(claims).to_text(4000)
     for claim in claims:
         assert f"{claim.place}: {claim.statement}" in table
-    for verdict in Verdict:
+    for verdict in ClaimVerdict:
         assert f"{sum(claim.verdict == verdict for claim in claims)} {verdict.value}" in table

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from omnidyn.paper.claim import Claim, Verdict, judge, listed, plain, tiny
+from omnidyn.paper.claim import Claim, ClaimVerdict, judge, listed, plain, tiny
 from omnidyn.paper.claims import all_claims
 
 NOT = [
@@ -69,9 +69,9 @@ def test_every_equation_table_and_figure_has_a_claim(places):
 
 def test_verdicts(claims):
     verdicts = {key: claim.verdict for key, claim in claims.items()}
-    assert {key for key, verdict in verdicts.items() if verdict is Verdict.NOT_REPRODUCED} == set(NOT)
-    assert {key for key, verdict in verdicts.items() if verdict is Verdict.CORRECTED} == set(CORRECTED)
-    assert [str(verdict) for verdict in Verdict] == [
+    assert {key for key, verdict in verdicts.items() if verdict is ClaimVerdict.NOT_REPRODUCED} == set(NOT)
+    assert {key for key, verdict in verdicts.items() if verdict is ClaimVerdict.CORRECTED} == set(CORRECTED)
+    assert [str(verdict) for verdict in ClaimVerdict] == [
         "reproduced",
         "reproduced after a correction",
         "cannot be reproduced",
@@ -105,13 +105,13 @@ def test_mpc(claims):
 
 
 def test_judge():
-    assert judge(True, False) is Verdict.REPRODUCED
-    assert judge(False, True) is Verdict.CORRECTED
-    assert judge(False) is Verdict.NOT_REPRODUCED
+    assert judge(True, False) is ClaimVerdict.REPRODUCED
+    assert judge(False, True) is ClaimVerdict.CORRECTED
+    assert judge(False) is ClaimVerdict.NOT_REPRODUCED
 
 
 def test_text():
     assert listed([0.37, 1.0, 10.02]) == "0.37, 1, 10"
     assert (tiny(1e-16, "W"), tiny(0.002)) == ("1e-12 W", "2.0e-03")
     assert plain(a=1, b=(1, 2)) == {"a": 1.0, "b": [1.0, 2.0]}
-    assert Claim("k", "p", "s", "a", "b", Verdict.REPRODUCED, "w.").numbers == {}
+    assert Claim("k", "p", "s", "a", "b", ClaimVerdict.REPRODUCED, "w.").numbers == {}

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from omnidyn.paper.claim import Claim, Verdict
+from omnidyn.paper.claim import Claim, ClaimVerdict
 from omnidyn.report.page import SIGNS, STYLE, render_page
 from omnidyn.report.style import Picture
 from tests.support.outputs import Reader
@@ -17,7 +17,7 @@ RECORD = {"omnidyn": "0.1.0", "command": "omnidyn demo", "inputs": [ROBOT]}
 FIGURE = Picture("fig", "Title", "Caption", b"", b"<svg xmlns='http://www.w3.org/2000/svg'/>")
 
 
-def claim(verdict=Verdict.REPRODUCED, key="key", text="a plain word", numbers=None):
+def claim(verdict=ClaimVerdict.REPRODUCED, key="key", text="a plain word", numbers=None):
     return Claim(key, text, text, text, text, verdict, text, numbers or {"speed": [1.0, 2.5]})
 
 
@@ -74,7 +74,7 @@ def test_all_text_is_escaped():
     assert read.text.count("<script>alert(1)</script>") >= 12
 
 
-@pytest.mark.parametrize("verdict", list(Verdict))
+@pytest.mark.parametrize("verdict", list(ClaimVerdict))
 def test_a_verdict_has_a_colour_a_sign_and_words(verdict):
     colour, sign = verdict.short, SIGNS[verdict.short]
     text = page([claim(verdict)])
@@ -88,7 +88,7 @@ def test_the_counts_add_up(demo_page):
     from omnidyn.paper.claims import all_claims
 
     counted = [int(number) for number in re.findall(r"</span> <b>(\d+)</b>", demo_page)]
-    assert len(counted) == len(Verdict)
+    assert len(counted) == len(ClaimVerdict)
     assert sum(counted) == len(all_claims())
 
 
@@ -98,7 +98,7 @@ def test_the_numbers_behind_a_claim_are_there_to_the_last_digit():
 
 
 def test_a_claim_without_numbers_has_no_empty_box():
-    bare = Claim("key", "a", "b", "c", "d", Verdict.REPRODUCED, "e")
+    bare = Claim("key", "a", "b", "c", "d", ClaimVerdict.REPRODUCED, "e")
     assert "<details>" not in page([bare])
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from omnidyn.comparison.aligned import errors_for_whiteness
-from omnidyn.comparison.difference import Difference, difference
+from omnidyn.comparison.difference import ModelDifference, difference
 from omnidyn.comparison.metrics import Metrics, metrics
 from omnidyn.comparison.replay import HOLD, Replay, choose_input, refuse_other_robot, replay
 from omnidyn.comparison.result import Comparison, Segment
@@ -152,7 +152,7 @@ def _by_segment(traces: Mapping[str, list[Trace]], channels: Sequence[str]) -> d
 
 def _differences(
     traces: Sequence[Mapping[str, list[Trace]]], channels: Sequence[str], seed: int
-) -> dict[str, Difference]:
+) -> dict[str, ModelDifference]:
     first, second = traces
     found = ((key, difference(first[key], second[key], len(channels), seed, whole=key in POSE)) for key in channels)
     return {key: each for key, each in found if each is not None}

@@ -23,7 +23,7 @@ FEWEST = 8  # blocks below which nothing can be told
 
 
 @dataclass(frozen=True)
-class Difference:
+class ModelDifference:
     """rmse_difference: rmse of the first model minus that of the second, in the unit of the component; std_error: of
     that, None where there are too few independent stretches. better: 0 or 1 for the model that is surely better, None
     where chance could have done it. blocks: how many independent stretches the samples are worth.
@@ -37,7 +37,7 @@ class Difference:
 
 def difference(
     first: Sequence[Trace], second: Sequence[Trace], tests: int = 1, seed: int = 0, whole: bool = False
-) -> Difference | None:
+) -> ModelDifference | None:
     """Compare two models a, b on the same measured traces y.
 
     With the midpoint m = (a + b)/2 and the gap g = a - b, the difference of the squared errors is 2 g (m - y): what
@@ -54,19 +54,19 @@ def difference(
     one, two = (float(np.sqrt(np.mean((error + half * apart) ** 2))) for half in (0.5, -0.5))
     power = float(apart @ apart)
     if power == 0.0 or one + two == 0.0:
-        return Difference(0.0, 0.0, None, len(error))
+        return ModelDifference(0.0, 0.0, None, len(error))
     share = float(error @ apart) / power
     left = [2.0 * each[:, 1] * (each[:, 0] - share * each[:, 1]) for each in parts]
     length = max(map(len, left)) if whole else block_length(left)
     blocks = sum(max(1, len(each) // length) for each in left)
     gap = one - two
     if blocks < FEWEST:
-        return Difference(gap, None, None, blocks)
+        return ModelDifference(gap, None, None, blocks)
     # the mean and the share were fitted to the blocks: two degrees of freedom
     loss = np.sqrt(blocks / (blocks - 2.0))
     spread = loss * bootstrap_error(left, length, blocks, DRAWS, np.random.default_rng(seed)) / (one + two)
     sure = t_quantile(blocks - 2, 1.0 - 0.5 * ALPHA / tests) * spread
-    return Difference(gap, spread, (0 if gap < 0.0 else 1) if abs(gap) > sure else None, blocks)
+    return ModelDifference(gap, spread, (0 if gap < 0.0 else 1) if abs(gap) > sure else None, blocks)
 
 
 def _midpoint_and_gap(first: Trace, second: Trace) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from omnidyn.comparison import text
-from omnidyn.comparison.difference import Difference
+from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
 from omnidyn.document import Document, Part, Points, Words
@@ -50,7 +50,7 @@ class Comparison:
     segments: tuple[Segment, ...]
     overall: Mapping[str, Mapping[str, Metrics]]
     by_segment: Mapping[str, Mapping[str, tuple[Metrics | None, ...]]]
-    difference: Mapping[str, Difference] = field(default_factory=dict)
+    difference: Mapping[str, ModelDifference] = field(default_factory=dict)
     current_unsigned: bool = False
     warnings: tuple[str, ...] = ()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from omnidyn.comparison.difference import Difference
+from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import unit
 from omnidyn.document import Table, cell, chance_cell
@@ -27,7 +27,7 @@ def _row(name: str, each: Metrics | None) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def difference_table(robots: Sequence[str], found: Mapping[str, Difference]) -> Table:
+def difference_table(robots: Sequence[str], found: Mapping[str, ModelDifference]) -> Table:
     """Which of two robots is better, a row per component."""
     rows = []
     for name, each in found.items():

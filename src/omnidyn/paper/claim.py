@@ -23,7 +23,7 @@ ABOUT = 0.15
 Numbers = dict[str, float | list]
 
 
-class Verdict(StrEnum):
+class ClaimVerdict(StrEnum):
     """What became of a claim."""
 
     REPRODUCED = "reproduced"
@@ -33,7 +33,8 @@ class Verdict(StrEnum):
     @property
     def short(self) -> str:
         """The verdict in a word: yes, mended or no."""
-        return {Verdict.REPRODUCED: "yes", Verdict.CORRECTED: "mended", Verdict.NOT_REPRODUCED: "no"}[self]
+        short = {ClaimVerdict.REPRODUCED: "yes", ClaimVerdict.CORRECTED: "mended", ClaimVerdict.NOT_REPRODUCED: "no"}
+        return short[self]
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,16 @@ class Claim:
     statement: str
     printed: str
     ours: str
-    verdict: Verdict
+    verdict: ClaimVerdict
     why: str
     numbers: Numbers = field(default_factory=dict)
 
 
-def judge(as_printed: bool, as_corrected: bool = False) -> Verdict:
+def judge(as_printed: bool, as_corrected: bool = False) -> ClaimVerdict:
     """The verdict on a claim that holds as printed, or only after a correction, or in neither form."""
     if as_printed:
-        return Verdict.REPRODUCED
-    return Verdict.CORRECTED if as_corrected else Verdict.NOT_REPRODUCED
+        return ClaimVerdict.REPRODUCED
+    return ClaimVerdict.CORRECTED if as_corrected else ClaimVerdict.NOT_REPRODUCED
 
 
 def listed(values: Iterable[float], form: str = ".3g") -> str:

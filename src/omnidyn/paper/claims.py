@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from omnidyn.document import Document, Words
 from omnidyn.model.robot_file import load_robot
-from omnidyn.paper.claim import Claim, Verdict
+from omnidyn.paper.claim import Claim, ClaimVerdict
 from omnidyn.paper.friction import friction_claims
 from omnidyn.paper.geometry import geometry_claims
 from omnidyn.paper.mismatch import mismatch_claims
@@ -16,7 +16,7 @@ from omnidyn.paper.motors import motor_claims
 from omnidyn.paper.speeds import speed_claims
 from omnidyn.paper.validation import validation_claims
 
-__all__ = ["PRESET", "Claim", "Verdict", "all_claims", "claims_document", "verdict_counts"]
+__all__ = ["PRESET", "Claim", "ClaimVerdict", "all_claims", "claims_document", "verdict_counts"]
 
 PRESET = "axebot"
 INDENT = " " * 8
@@ -29,9 +29,9 @@ def all_claims() -> tuple[Claim, ...]:
     return tuple(claim for part in (*parts, mismatch_claims) for claim in part(robot))
 
 
-def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
+def verdict_counts(claims: Sequence[Claim]) -> dict[ClaimVerdict, int]:
     """How many claims have each verdict."""
-    return {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in Verdict}
+    return {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in ClaimVerdict}
 
 
 def claims_document(claims: Sequence[Claim]) -> Document:
@@ -45,5 +45,5 @@ def claims_document(claims: Sequence[Claim]) -> Document:
     return Document([*parts, "", *total], data)
 
 
-def _judged(verdict: Verdict, words: str) -> Words:
+def _judged(verdict: ClaimVerdict, words: str) -> Words:
     return Words(words, f"{verdict.short:{len(INDENT)}}", INDENT, tone=verdict.short)

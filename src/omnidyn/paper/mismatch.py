@@ -9,7 +9,7 @@ import numpy as np
 from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
-from omnidyn.paper.claim import SPEED_TOLERANCE, Claim, Verdict, judge, listed, plain
+from omnidyn.paper.claim import SPEED_TOLERANCE, Claim, ClaimVerdict, judge, listed, plain
 from omnidyn.paper.reconcile import FRICTION, Reconciliation, reconciliations
 from omnidyn.paper.steady import printed_force
 from omnidyn.paper.tables import AXES, MPC_SENTENCE, PAPER_AXES, SPEED_UNIT
@@ -108,7 +108,7 @@ def _mpc(robot: Robot) -> Claim:
         statement=f"The predictive controller of Araujo et al. 2011 {MPC_SENTENCE}.",
         printed=MPC_SENTENCE,
         ours="saturation only",
-        verdict=Verdict.NOT_REPRODUCED,
+        verdict=ClaimVerdict.NOT_REPRODUCED,
         why="That paper, as read by the project, predicts without the non-linear part: friction is in its simulated "
         f"plant only. Its B divides the torque row by M instead of I_n, {theirs:.4f} instead of {ours:.4f} rad/s^2/V, "
         f"{ours / theirs:.0f} times less, and it puts continuous matrices into a discrete equation, where A would "

@@ -8,7 +8,7 @@ from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.motor import back_emf, no_load_speed, traction, wheel_torque
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
-from omnidyn.paper.claim import ROUNDING, Claim, Verdict, judge, listed, plain, tiny
+from omnidyn.paper.claim import ROUNDING, Claim, ClaimVerdict, judge, listed, plain, tiny
 from omnidyn.paper.steady import settled_twist
 from omnidyn.paper.tables import AXES, EQ_11_POWER_OF_GEAR, EQ_12, EQ_13_POWER_OF_GEAR, TABLE_4
 
@@ -123,7 +123,7 @@ def _current_limit(robot: Robot) -> Claim:
         statement="The current is limited to i_max.",
         printed="i_max, no value",
         ours=f"stall current {stall:.2f} A",
-        verdict=Verdict.NOT_REPRODUCED,
+        verdict=ClaimVerdict.NOT_REPRODUCED,
         why=f"i_max has no printed value. At {np.max(limit):g} V a blocked motor draws {stall:.2f} A, and the steps "
         f"of Table 4 start with up to {starting:.2f} A: a limit below that would be felt, one above {stall:.2f} A "
         "only when the voltage is reversed at speed. The preset has none.",

@@ -6,7 +6,7 @@ import numpy as np
 
 from omnidyn.model.deadzone import breakaway_voltage, moves
 from omnidyn.model.robot import Robot
-from omnidyn.paper.claim import ABOUT, SPEED_TOLERANCE, Claim, Verdict, judge, listed, plain
+from omnidyn.paper.claim import ABOUT, SPEED_TOLERANCE, Claim, ClaimVerdict, judge, listed, plain
 from omnidyn.paper.steady import measured_speed, pattern_of, printed_voltage, settled_speed
 from omnidyn.paper.tables import AXES, DEAD_ZONE_TEXT, FIG_2_SPEED, FIG_2_VOLTAGE, PAPER_AXES, TABLE_4
 
@@ -99,6 +99,6 @@ def _other_figures() -> Claim:
         statement="Figures without a number in the text we have.",
         printed="not in the text we have",
         ours="none",
-        verdict=Verdict.NOT_REPRODUCED,
+        verdict=ClaimVerdict.NOT_REPRODUCED,
         why="We work from the text of the paper: of these figures it holds neither data nor numbers.",
     )

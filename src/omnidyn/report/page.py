@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from omnidyn.paper.claims import Claim, Verdict, verdict_counts
+from omnidyn.paper.claims import Claim, ClaimVerdict, verdict_counts
 from omnidyn.report.html import STYLE, Section, figure, page
 from omnidyn.report.style import Picture
 
@@ -33,7 +33,7 @@ def _counts(claims: Sequence[Claim]) -> str:
     return f'<ul class="counts">{parts}</ul>'
 
 
-def _badge(verdict: Verdict) -> str:
+def _badge(verdict: ClaimVerdict) -> str:
     sign = SIGNS[verdict.short]
     return f'<span class="badge {verdict.short}"><span aria-hidden="true">{sign}</span> {escape(verdict.value)}</span>'
 
