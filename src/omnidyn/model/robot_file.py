@@ -118,8 +118,10 @@ def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Pr
 def _origin_in(source: Any) -> Origin:
     """What the words of a source say in a file that gives no origin, as none did before there were origins."""
     words = source if isinstance(source, str) else ""
-    found: tuple[Origin, ...] = (GUESS, IDENTIFIED)
-    return next((origin for origin in found if words == origin or words.startswith(f"{origin}:")), GIVEN)
+    for origin in (GUESS, IDENTIFIED):
+        if words == origin or words.startswith(f"{origin}:"):
+            return origin
+    return GIVEN
 
 
 def _dotted(path: tuple[str | int, ...]) -> str:

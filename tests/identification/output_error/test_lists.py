@@ -25,6 +25,7 @@ def driven(robot, seconds=8.0, seed=3):
     rng = np.random.default_rng(seed)
     steps = rng.uniform(-6.0, 6.0, (int(4 * seconds), robot.wheels.count))
     run = simulate(robot, np.repeat(steps, 25, axis=0), 0.01)
+    assert run.twist is not None
     return Run(t=run.t, voltage=run.voltage, twist=run.twist + rng.normal(0.0, NOISE, run.twist.shape))
 
 

@@ -61,7 +61,7 @@ def _tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Ta
     kind, suffix = format_of(path), Path(path).suffix
     reader = next((each for each in READERS if kind is not None and each.kind == kind.name), TEXT)
     promised = next((each for each in READERS if suffix.lower() in each.suffixes), TEXT)
-    tables = completed(reader.tables(path, rows, options))
+    tables = completed(reader.tables(path, rows, options), reader.least)
     if promised is reader or not suffix:
         return tables
     note = f"the file holds {reader.word}, though its name ends in {suffix}"

@@ -28,16 +28,17 @@ class Options(NamedTuple):
 
 class Reader(NamedTuple):
     """kind: of `files.Format` that it reads, "" for text. word: of such files, in messages. suffixes: of their names,
-    lower case. tables(path, rows, options): see the contract.
+    lower case. tables(path, rows, options): see the contract. least: what a file must hold, in messages.
     """
 
     kind: str
     word: str
     suffixes: tuple[str, ...]
     tables: Callable[[str | os.PathLike, int, Options], Iterator[Table]]
+    least: str = "at least one row"
 
 
-def completed(tables: Iterable[Table]) -> Iterator[Table]:
+def completed(tables: Iterable[Table], least: str) -> Iterator[Table]:
     """The tables that have rows, each once the next one is there: so the last of them has the hash and all notes."""
     waiting: Table | None = None
     table = None
@@ -47,7 +48,5 @@ def completed(tables: Iterable[Table]) -> Iterator[Table]:
                 yield waiting
             waiting = table
     if waiting is None:
-        raise InputError(
-            "no rows", got="0 samples", expected="at least one row", where=table.source if table is not None else ""
-        )
+        raise InputError("no rows", got="0 samples", expected=least, where=table.source if table is not None else "")
     yield replace(waiting, sha256=table.sha256, notes=table.notes)  # type: ignore[union-attr]

@@ -58,7 +58,7 @@ def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterato
     yield table({}, np.zeros(0, dtype=np.int64), file.sha256)
 
 
-TEXT = Reader("", "text", (), text_tables)
+TEXT = Reader("", "text", (), text_tables, "at least one row under the header")
 
 
 def _head(blocks: Iterator[TextBlock]) -> tuple[list[str], Iterator[TextBlock]]:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -23,7 +22,14 @@ from omnidyn.model.stick_slip.workspace import workspace
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands
 from omnidyn.simulation.implicit.march import Outcome, begun, room
-from omnidyn.simulation.sensitivity.directions import EPS, Directions, Prepared, difference, directions_of, prepared
+from omnidyn.simulation.sensitivity.directions import (
+    Directions,
+    Prepared,
+    current_derivatives,
+    difference,
+    directions_of,
+    prepared,
+)
 from omnidyn.simulation.sensitivity.loop import run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.march import march_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
@@ -140,8 +146,7 @@ def run_with_derivatives(
     ds[:1] = first
     march_with_derivatives(
         *numbers.copy(), *bare, workspace(), room(state), directions, given.voltage, bound, given.dt, tol, out.pose,
-        out.state, out.iterations, out.steps, first, ds, dposes,
-        seen or NO_SAMPLES,
+        out.state, out.iterations, out.steps, first, ds, dposes, seen or NO_SAMPLES,
     )  # fmt: skip
     return out, ds, dposes
 
@@ -150,9 +155,9 @@ def _settled(robots: list[Robot], run: Run, dtwist: FloatArray, dvolts: FloatArr
     """Derivatives of settled currents. Shape (samples, K, wheels)."""
     assert run.twist is not None
     assert run.voltage is not None
-    values = []
-    for j, robot in enumerate(robots):
-        eps, more = EPS * (1 - 2 * (j % 2)), dvolts[j // 2]
-        volts = run.voltage + eps * np.concatenate([more, more[-1:]])
-        values.append(settled_currents(robot, run.twist + eps * dtwist[:, j // 2], volts))
-    return np.moveaxis(difference(np.array(values)), 0, 1)
+    held = np.concatenate([dvolts, dvolts[:, -1:]], axis=1)
+    each = [
+        current_derivatives(robots[2 * k : 2 * k + 2], run.twist, run.voltage, dtwist[:, k], held[k])
+        for k in range(len(held))
+    ]
+    return np.stack(each, axis=1)

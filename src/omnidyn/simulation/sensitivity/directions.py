@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
+from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.keys import Key
 from omnidyn.model.layout import ACTIVE, EFFICIENCY, ELLIPSE, GX, GZ, HOLD, N_AXES, SLIDE, SLIDE_X, SLIDE_Y
 from omnidyn.model.robot import Robot
@@ -85,6 +86,15 @@ def directions_of(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Dir
 def difference(values: FloatArray) -> FloatArray:
     """Derivatives from values up (even) and down (odd) each key. Shape (2 K, ...) -> (K, ...)."""
     return np.ascontiguousarray((values[0::2] - values[1::2]) / (2.0 * EPS))
+
+
+def current_derivatives(
+    ends: Sequence[Robot], twist: FloatArray, voltage: FloatArray, dtwist: FloatArray, dvoltage: FloatArray | float
+) -> FloatArray:
+    """Derivatives of settled currents [A] along one direction; `ends`: the robot up and down it. Shape (rows, n)."""
+    sides = zip(ends, (EPS, -EPS), strict=True)
+    values = [settled_currents(robot, twist + eps * dtwist, voltage + eps * dvoltage) for robot, eps in sides]
+    return difference(np.array(values))[0]
 
 
 def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:

@@ -21,7 +21,12 @@ from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands
 from omnidyn.simulation.implicit.march import capped
 from omnidyn.simulation.sensitivity.derivatives import run_with_derivatives
-from omnidyn.simulation.sensitivity.directions import EPS, difference, directions_of, refuse_switched_off
+from omnidyn.simulation.sensitivity.directions import (
+    current_derivatives,
+    difference,
+    directions_of,
+    refuse_switched_off,
+)
 from omnidyn.simulation.sensitivity.sample import MEET, Samples, empty_samples
 from omnidyn.simulation.simulate import as_tolerance, current_bounds
 
@@ -88,12 +93,8 @@ class LateSample:
         return settled_currents(self.robot, self.twist, self.voltage), pace, by
 
     def _change(self, up: Robot | None, down: Robot | None, twist: FloatArray, voltage: FloatArray) -> FloatArray:
-        """Derivative of settled currents by central difference."""
-        ends = [
-            settled_currents(robot or self.robot, self.twist + eps * twist, self.voltage + eps * voltage)
-            for robot, eps in ((up, EPS), (down, -EPS))
-        ]
-        return difference(np.array(ends))[0]
+        """Derivatives of settled currents."""
+        return current_derivatives((up or self.robot, down or self.robot), self.twist, self.voltage, twist, voltage)
 
 
 def late_samples(

@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled.kernel import kernel, part
-from omnidyn.model.layout import BOUND, LENGTH, LIMIT, N_AXES, VOLTAGE
+from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.stick_slip.release import SIGNS, start_state, with_given_currents
 from omnidyn.model.stick_slip.workspace import copy_row, copy_table, workspace
 from omnidyn.simulation.commands import Commands, loop_gains, on_ticks
-from omnidyn.simulation.implicit.march import SIMPSON, STAGES, Outcome, advance_pose, begun, room
+from omnidyn.simulation.implicit.march import SIMPSON, Outcome, advance_pose, begun, room
 from omnidyn.simulation.sensitivity.directions import EPS, Directions, Prepared
-from omnidyn.simulation.sensitivity.march import pose_derivatives, row_with_derivatives
+from omnidyn.simulation.sensitivity.march import apply_row, pose_derivatives, row_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
-from omnidyn.simulation.sensitivity.stage import step_with_derivatives
 from omnidyn.simulation.simulate import current_bounds
 from omnidyn.simulation.speed_loop import close_loop, loop_of, seen_speed, tick_answer, tick_branch
 
@@ -137,19 +136,6 @@ def _as_before(loop, extra, state, d, settled):
     return change < settled
 
 
-@part
-def _apply(element, along, extra, voltage, bound):
-    """Voltages, their derivatives and the current limits into the plants."""
-    for w in range(len(bound)):
-        e = N_AXES + w
-        element[e, VOLTAGE], element[e, BOUND] = voltage[0, w], bound[w]
-        for j in range(2 * len(extra.sum)):
-            along.element[j, e, BOUND] = along.element[j, e, LIMIT]
-        for k in range(len(extra.sum)):
-            along.element[2 * k, e, VOLTAGE] = voltage[0, w] + EPS * extra.voltage[k, w]
-            along.element[2 * k + 1, e, VOLTAGE] = voltage[0, w] - EPS * extra.voltage[k, w]
-
-
 @kernel
 def march_loop(
     body, element, bare_body, bare_element, s, spare, along, loop, extra, bound, dt, keep, tol, settled, travels, found
@@ -174,20 +160,11 @@ def march_loop(
             for k in range(len(d)):
                 copy_row(found.dvoltage[k, row], extra.voltage[k])
         if not still:
-            _apply(element, along, extra, voltage, bound)
-            counts[0] = counts[1] = 0
-            if tol > 0.0:
-                h = row_with_derivatives(
-                    body, element, bare_body, bare_element, s, spare, along, state, dt[j], tol, h, pose, d, dnext,
-                    dpose, counts, True, found.seen, 0.0,
-                )  # fmt: skip
-            else:
-                counts[0] = step_with_derivatives(body, element, s, along, state, spare[2], spare[3], dt[j], d, dnext)
-                counts[1] = 1
-                pose_derivatives(along, pose, dpose, state, spare[3], spare[2], d, along.middle, dnext, dt[j], STAGES)
-                advance_pose(pose, state, spare[3], spare[2], body[LENGTH], dt[j], STAGES)
-                copy_row(state, spare[2])
-                copy_table(d, dnext)
+            apply_row(element, along, voltage[0], bound, extra.voltage)
+            h = row_with_derivatives(
+                body, element, bare_body, bare_element, s, spare, along, state, dt[j], tol, h, pose, d, dnext, dpose,
+                counts, True, found.seen, 0.0,
+            )  # fmt: skip
             out.iterations[row] = max(out.iterations[row], counts[0])
             out.steps[row] += counts[1]
         elif travels:

@@ -63,13 +63,30 @@ def _is_smooth(element, start, one, middle, two, settled, m):
 @part
 def row_with_derivatives(
     body, element, bare_body, bare_element, s, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
-    seen, end,
+    seen, begin,
 ):  # fmt: skip
-    """`implicit._row` with derivatives: the half steps that count are done again with theirs.
+    """One row with derivatives, in place: adaptive steps, or for a tol of 0 one fixed step. Returns the next h.
 
     kept: whether the derivatives are kept by row, position included. Where they are only sampled, those of the step
-    as a whole do where it is smooth: they are within the tolerance too. end: of the row [s].
+    as a whole do where it is smooth: they are within the tolerance too. begin: of the row [s].
     """
+    counts[0] = counts[1] = 0
+    if tol > 0.0:
+        return _adaptive(
+            body, element, bare_body, bare_element, s, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts,
+            kept, seen, begin + dt,
+        )  # fmt: skip
+    counts[0] = _fixed(body, element, s, spare, along, state, dt, pose, d, dnext, dpose, kept, seen, begin)
+    counts[1] = 1
+    return h
+
+
+@part
+def _adaptive(
+    body, element, bare_body, bare_element, s, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
+    seen, end,
+):  # fmt: skip
+    """`implicit._row` with derivatives: the half steps that count are done again with theirs. end: of the row [s]."""
     one, middle, two, inner, settled, m, left = spare[0], spare[1], spare[2], spare[3], spare[4], len(element), dt
     counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
     while left > 0.0:
@@ -114,16 +131,16 @@ def _fixed(body, element, s, spare, along, state, dt, pose, d, dnext, dpose, kep
 
 
 @part
-def apply_row(element, along, voltage, bound, r):
-    """Apply the voltages and current limits of row r, and to the plants of each parameter what they change to."""
-    for w in range(voltage.shape[1]):
+def apply_row(element, along, voltage, bound, dvoltage):
+    """Apply voltages and current limits (n,) of a row, and to the plants of each parameter what they change to."""
+    for w in range(len(bound)):
         e = N_AXES + w
-        element[e, VOLTAGE], element[e, BOUND] = voltage[r, w], bound[r, w]
+        element[e, VOLTAGE], element[e, BOUND] = voltage[w], bound[w]
         for j in range(len(along.element) - 1):
-            along.element[j, e, BOUND] = along.element[j, e, LIMIT] if bound[r, w] > 0.0 else 0.0
-        for k in range(len(along.voltage)):
-            along.element[2 * k, e, VOLTAGE] = voltage[r, w] + EPS * along.voltage[k, r, w]
-            along.element[2 * k + 1, e, VOLTAGE] = voltage[r, w] - EPS * along.voltage[k, r, w]
+            along.element[j, e, BOUND] = along.element[j, e, LIMIT] if bound[w] > 0.0 else 0.0
+        for k in range(len(dvoltage)):
+            along.element[2 * k, e, VOLTAGE] = voltage[w] + EPS * dvoltage[k, w]
+            along.element[2 * k + 1, e, VOLTAGE] = voltage[w] - EPS * dvoltage[k, w]
 
 
 @kernel
@@ -136,16 +153,11 @@ def march_with_derivatives(
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
     kept, begin = len(ds) > 0, 0.0
     for r in range(len(dt)):
-        counts[0] = counts[1] = 0
-        apply_row(element, along, voltage, bound, r)
-        if tol > 0.0:
-            h = row_with_derivatives(
-                body, element, bare_body, bare_element, s, spare, along, state, dt[r], tol, h, pose, d, dnext, dpose,
-                counts, kept, seen, begin + dt[r],
-            )  # fmt: skip
-        else:
-            counts[0] = _fixed(body, element, s, spare, along, state, dt[r], pose, d, dnext, dpose, kept, seen, begin)
-            counts[1] = 1
+        apply_row(element, along, voltage[r], bound[r], along.voltage[:, r])
+        h = row_with_derivatives(
+            body, element, bare_body, bare_element, s, spare, along, state, dt[r], tol, h, pose, d, dnext, dpose,
+            counts, kept, seen, begin,
+        )  # fmt: skip
         begin += dt[r]
         iterations[r], steps[r] = counts[0], counts[1]
         copy_row(states[r + 1], state)

@@ -71,7 +71,7 @@ class ExactEngine:
 
     def __init__(self, problem: Problem, fast: bool = True):
         self.problem = problem
-        self.mapping = Mapping(problem.robot, problem.parameters[: problem.robot_count])
+        self.mapping = Mapping(problem.robot, problem.robot_parameters)
         self._columns = problem.columns
         twists = all(name == "twist" for name, _ in self._columns)
         margins = any(piece.margin.any() for piece in problem.pieces)
@@ -93,7 +93,7 @@ class ExactEngine:
 
     def drives(self, point: Point) -> list[FloatArray]:
         """Drive of the axes [N, N, N m] in every row of every piece but the last, shape (rows, 3)."""
-        robot = self.mapping.robot_at(point.values[: self.problem.robot_count])
+        robot = self.problem.robot_at(point.values)
         matrix = self.mapping.at(point.values[: self.problem.robot_count])[0].drive * mass_matrix(robot)[:, None]
         driver, _ = driver_of(self.problem, point.values)
         found = []

@@ -16,7 +16,6 @@ from omnidyn.identification.output_error.engines.actuation import driver_of
 from omnidyn.identification.output_error.engines.exact import LATE, Weighting
 from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.problem.outputs import refuse_exact_only
-from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
 from omnidyn.model.layout import N_AXES
@@ -54,18 +53,6 @@ class ImplicitEngine:
         engine.problem, engine._columns, engine._known = problem, problem.columns, {}
         return engine
 
-    def robot_at(self, values: FloatArray) -> Robot:
-        """The robot with these values, not checked."""
-        robot = self.problem.robot
-        for p, value in zip(self._own, values, strict=False):
-            robot = p.on(robot, float(value))
-        return robot
-
-    @property
-    def _own(self) -> tuple[Parameter, ...]:
-        """The parameters of the robot file."""
-        return self.problem.parameters[: self.problem.robot_count]
-
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the residuals of every piece add up to; see kernel/march.py."""
         found = []
@@ -88,11 +75,11 @@ class ImplicitEngine:
         return found
 
     def _simulated(self, point: Point) -> list[Found]:
-        robot, values = self.robot_at(point.values), point.values
+        robot, values = self.problem.robot_at(point.values), point.values
         scales = [abs(float(value)) or 1.0 for value in values]
         moved = [
             tuple(p.on(robot, float(value) + side * EPS * scale) for side in (1.0, -1.0))
-            for p, value, scale in zip(self._own, values, scales, strict=False)
+            for p, value, scale in zip(self.problem.robot_parameters, values, scales, strict=False)
         ]
         return [
             self._piece(robot, moved, scales, piece, state, values)
@@ -141,7 +128,7 @@ class ImplicitEngine:
         logged = clip_voltage(robot.motor, record.voltage[rows])
         share = record.share[rows]
         voltage, by = at_motors(logged, share, driver)
-        for p, (up, down) in zip(self._own, moved, strict=True):
+        for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True):
             rate = None
             if up.motor.voltage_limit != down.motor.voltage_limit:
                 ends = [at_motors(clip_voltage(r.motor, logged), share, driver)[0] for r in (up, down)]

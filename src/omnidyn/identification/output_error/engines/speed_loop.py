@@ -17,14 +17,14 @@ from omnidyn.identification.output_error.engines.exact import LATE, Weighting
 from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.problem.outputs import refuse_exact_only
 from omnidyn.identification.output_error.problem.problem import Piece, PieceSums, Point, Problem
-from omnidyn.model.dynamics import acceleration, settled_currents
+from omnidyn.model.dynamics import acceleration
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.simulation.commands import Commands
 from omnidyn.simulation.sensitivity.derivatives import Derivatives, differentiate
-from omnidyn.simulation.sensitivity.directions import EPS, Prepared, difference, prepared
+from omnidyn.simulation.sensitivity.directions import Prepared, current_derivatives, prepared
 
 FloatArray = NDArray[np.float64]
 
@@ -57,17 +57,10 @@ class LoopEngine:
         engine.problem = problem
         return engine
 
-    def robot_at(self, values: FloatArray) -> Robot:
-        """The robot with these values, not checked."""
-        robot = self.problem.robot
-        for p, value in zip(self.problem.parameters[: self.problem.robot_count], values, strict=False):
-            robot = p.on(robot, float(value))
-        return robot
-
     def ready_at(self, values: FloatArray) -> Prepared:
         """The robot with these values and its neighbours, for all pieces."""
-        keys = [key for p in self.problem.parameters[: self.problem.robot_count] for key in _keys(p.name, p.also)]
-        return prepared(self.robot_at(values), keys)
+        keys = [key for p in self.problem.robot_parameters for key in _keys(p.name, p.also)]
+        return prepared(self.problem.robot_at(values), keys)
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the residuals of every piece add up to; see kernel/march.py."""
@@ -146,7 +139,7 @@ class LoopEngine:
     def _chained(self, by_key: FloatArray) -> FloatArray:
         """Derivatives by the parameters from those by all their keys. Shape (rows, robot_count)."""
         out, k = np.zeros((len(by_key), self.problem.robot_count)), 0
-        for j, p in enumerate(self.problem.parameters[: self.problem.robot_count]):
+        for j, p in enumerate(self.problem.robot_parameters):
             for factor in (1.0, *(factor for _, factor in p.also)):
                 out[:, j] += factor * by_key[:, k]
                 k += 1
@@ -201,8 +194,7 @@ def _rate(
     assert run.current is not None
     if name == "current" and not period:
         assert run.voltage is not None
-        ends = (settled_currents(robot, run.twist[at] + eps * pace, run.voltage[at])[:, i] for eps in (EPS, -EPS))
-        return difference(np.array([*ends]))[0]
+        return current_derivatives((robot, robot), run.twist[at], run.voltage[at], pace, 0.0)[:, i]
     if name == "current":
         later = np.minimum(np.searchsorted(grid, grid[at] + period - MEET), len(grid) - 1)
         return (run.current[later, i] - run.current[at, i]) / period

@@ -62,6 +62,13 @@ class Parameter:
         return robot
 
 
+def robot_at(robot: Robot, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray) -> Robot:
+    """The robot with these values of its numbers, not checked; values beyond the parameters are of nuisances."""
+    for p, value in zip(parameters, values, strict=False):
+        robot = p.on(robot, float(value))
+    return robot
+
+
 def robot_parameter(
     robot: Robot, key: str, prior: tuple[float, float] | None, others: Sequence[str] = ()
 ) -> Parameter:  # fmt: skip

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.problem.parameters import Parameter, robot_at
 from omnidyn.model.dynamics import mass_matrix, settled_currents
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Robot
@@ -80,10 +80,7 @@ class Mapping:
 
     def robot_at(self, values: FloatArray) -> Robot:
         """The robot with these values, not checked."""
-        robot = self.robot
-        for p, value in zip(self.parameters, values, strict=True):
-            robot = p.on(robot, float(value))
-        return robot
+        return robot_at(self.robot, self.parameters, values)
 
     def at(self, values: FloatArray) -> tuple[Primitives, Primitives]:
         """(primitives, their derivatives by the values). `values`, shape (P,)."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.problem.parameters import Parameter, robot_at
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.robot import Robot
 
@@ -61,6 +61,15 @@ class Problem:
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
+
+    @property
+    def robot_parameters(self) -> tuple[Parameter, ...]:
+        """Those of the robot file."""
+        return self.parameters[: self.robot_count]
+
+    def robot_at(self, values: FloatArray) -> Robot:
+        """The robot with these values of the parameters, not checked."""
+        return robot_at(self.robot, self.robot_parameters, values)
 
     def where(self, name: str) -> int:
         """Index of a parameter by its name, -1 where it is not free."""
