@@ -11,6 +11,7 @@ import numpy as np
 from omnidyn.comparison.compare import compare
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import unit
+from omnidyn.document import Document, Table, cell, chance_cell
 from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
@@ -18,13 +19,11 @@ from omnidyn.run import Run
 from omnidyn.statistics import robust_std
 
 STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
-HEAD = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
 FITTED, HELD_OUT = "fitted", "held out"
 POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
 LASTING = 2.0  # errors over their scatter from row to row, beyond which most of them is no noise
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
-TINY = 0.001
 
 
 @dataclass(frozen=True)
@@ -59,13 +58,15 @@ class Validation:
     held_out: Comparison | None
     scores: dict[str, dict[str, Score]]
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Cells under HEAD."""
-        return [
-            (which, name, unit(name), str(s.samples), f"{s.rmse:.4g}", _cell(s.fit_percent, ".1f"),
-             _cell(s.chi2, ".3g"), _chance(s.whiteness), _cell(s.lag, "+.3f"))
+    def table(self) -> Table:
+        """The scores, a row per component."""
+        rows = [
+            (which, name, unit(name), str(s.samples), f"{s.rmse:.4g}", cell(s.fit_percent, ".1f"),
+             cell(s.chi2, ".3g"), chance_cell(s.whiteness), cell(s.lag, "+.3f"))
             for which, found in self.scores.items() for name, s in found.items()
         ]  # fmt: skip
+        head = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
+        return Table(head, rows, "<<<>")
 
     def statements(self) -> Iterator[str]:
         """What they say, in words."""
@@ -109,13 +110,7 @@ class Validation:
 
     def summary(self) -> str:
         """A plain table, for reading."""
-        table = [HEAD, *self.rows()]
-        widths = [max(len(row[k]) for row in table) for k in range(len(HEAD))]
-        lines = []
-        for row in table:
-            cells = (c.ljust(w) if k < 3 else c.rjust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))
-            lines.append("  ".join(cells).rstrip())
-        return "\n".join([*lines, *(f"- {words}" for words in self.statements())])
+        return Document([self.table(), *(f"- {words}" for words in self.statements())]).to_text()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -171,12 +166,3 @@ def output_name(component: str) -> str:
         return POSE[component]
     found = place(component)
     return f"{found[0]}[{found[1]}]" if found else component
-
-
-def _chance(value: float | None) -> str:
-    """A p-value; none is 0."""
-    return "<0.001" if value is not None and value < TINY else _cell(value, ".3f")
-
-
-def _cell(value: float | None, form: str) -> str:
-    return "-" if value is None else f"{value:{form}}"

@@ -22,11 +22,11 @@ from omnidyn.identification.advice import (
 from omnidyn.identification.motors.fit import MotorFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.steady.study_parts import Difference
-from omnidyn.identification.validation import HEAD, Validation, output_name
+from omnidyn.identification.validation import Validation, output_name
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.residuals import draw_residuals
-from omnidyn.report.html import Section, bullets, figure, page, paragraph, table
+from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, table
 from omnidyn.report.style import Picture
 
 Fits = Mapping[str, OutputErrorEstimate]
@@ -116,7 +116,7 @@ def _runs(group: str, validation: Validation) -> str:
     pictures = [_renamed(draw_overlay(validation.fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
     if validation.held_out is not None:
         pictures.append(_renamed(draw_overlay(validation.held_out), f"overlay-held-out{group}", "on a log held out"))
-    return table(HEAD, validation.rows()) + "".join(map(figure, pictures))
+    return content(validation.table(), *pictures)
 
 
 def _renamed(drawn: Picture, name: str, words: str) -> Picture:

@@ -27,14 +27,17 @@ class Section:
 
 def section(key: str, title: str, *parts: Table | Points | Picture, none: str = "") -> Section:
     """A part of the page with tables, lists and pictures; `none` stands there where they hold nothing."""
-    content = "".join(map(_content, parts))
-    return Section(key, title, content or (paragraph(none) if none else ""))
+    return Section(key, title, content(*parts) or (paragraph(none) if none else ""))
 
 
-def _content(part: Table | Points | Picture) -> str:
-    if isinstance(part, Picture):
-        return figure(part)
-    return table(part.head, part.rows) if isinstance(part, Table) else bullets(part.words)
+def content(*parts: Table | Points | Picture) -> str:
+    """Tables, lists and pictures, one after the other."""
+    return "".join(
+        figure(part) if isinstance(part, Picture)
+        else table(part.head, part.rows) if isinstance(part, Table)
+        else bullets(part.words)
+        for part in parts
+    )  # fmt: skip
 
 
 def page(

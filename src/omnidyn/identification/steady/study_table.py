@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from omnidyn.document import WIDTH, Document, Points, Table, interval_cell
+from omnidyn.document import Document, Points, Table, interval_cell
 from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_words import FORCES
@@ -16,15 +15,7 @@ from omnidyn.model.keys import Key
 
 def table_text(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Aligned columns, the first to the left, the others to the right."""
-    widths = [max(len(str(row[k])) for row in (head, *rows)) for k in range(len(head))]
-    lines = []
-    for row in (head, *rows):
-        cells = [
-            str(cell).ljust(w) if k == 0 else str(cell).rjust(w)
-            for k, (cell, w) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    return lines
+    return Document([Table(head, rows)]).to_text().split("\n")
 
 
 def study_document(study: SteadyStudy) -> Document:
@@ -48,7 +39,7 @@ def study_document(study: SteadyStudy) -> Document:
 
 def bullet(head: str, words: str) -> list[str]:
     """One point of a list, wrapped."""
-    return textwrap.wrap(f"{head} {words}", WIDTH, subsequent_indent="  ")
+    return Document([Points([words], head)]).to_text().split("\n")
 
 
 def _travel_table(study: SteadyStudy) -> Table:
