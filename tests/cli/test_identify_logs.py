@@ -182,8 +182,8 @@ def test_motors_need_no_robot(call, bench, tmp_path):
     code, out, _ = call(str(bench), "--what", "motors", "--json", "--report", str(report))
     assert code == 0
     first = json.loads(out)["motors"][0]
-    assert first["value"]["slope"] == pytest.approx(0.5, rel=0.02)
-    assert first["value"]["dead_band"] == pytest.approx(0.4, rel=0.05)
+    assert first["parameters"]["slope"]["value"] == pytest.approx(0.5, rel=0.02)
+    assert first["parameters"]["dead_band"]["value"] == pytest.approx(0.4, rel=0.05)
     assert first["dead_band_seen"] is True
     assert "What each motor needs to turn" in report.read_text("utf-8")
 
@@ -191,7 +191,8 @@ def test_motors_need_no_robot(call, bench, tmp_path):
 def test_motors_in_words(call, bench):
     code, out, err = call(str(bench), "--what", "motors", "-o", "x.toml")
     assert code == 0
-    assert "motor 1: slope 2 +-" in out
+    assert "motor 1: slope 0.50" in out
+    assert "V s/rad; dead band 0.4" in out
     assert "-o is not used" in err
 
 

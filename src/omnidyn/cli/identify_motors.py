@@ -2,110 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from omnidyn.cli.identify_fit import Ask, Out, Part, nuisances
+from omnidyn.cli.identify_fit import Out, Part, nuisances
 from omnidyn.cli.identify_logs import Loaded
 from omnidyn.cli.identify_steady import How, say_written
 from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
-    from omnidyn.cli.identify_ways import Asked
-    from omnidyn.identification.motors.drive_line import DriveStudy
-    from omnidyn.identification.motors.fit import MotorFit
+    from omnidyn.identification.motors.study import MotorStudy
     from omnidyn.model.robot import Robot
 
 
-def run_motors(
-    method: str, loaded: Loaded, robot: Robot | None, asked: Asked, record: dict[str, Any], now: Any
-) -> None:
-    if method == "output-error":
-        from omnidyn.errors import InputError
+def run_motors(method: str, loaded: Loaded, robot: Robot | None, asked: Any, record: dict[str, Any], now: Any) -> None:
+    """Fit, write, tell."""
+    from omnidyn.identification.motors.study import STEADY_STATE, identify_motors
 
-        if asked.speed != "wheel":
-            raise InputError("output-error has no such option", got="--speed", expected="with steady-state")
-        _fit_motors(loaded, asked.input_, asked.fit(), record, asked.places(), now)
-        return
-    drives = _drives(loaded, robot, asked.input_, How(asked.speed, asked.force_from, asked.window))
+    ask, part = asked.fit(), Part(loaded, asked.hold_out)
+    study = identify_motors(
+        part.runs, method=method or STEADY_STATE, kind=asked.input_, speed=asked.speed, robot=robot,
+        share=How(asked.speed, asked.force_from, asked.window).shares(), between=ask.between or "auto",
+        latency=_latency(nuisances(ask.nuisances)), loss=ask.loss or "gaussian", held_out=[run for run, _ in part.held],
+        now=now,
+    )  # fmt: skip
     now("writing")
-    _tell_drives(drives, record, asked.places())
+    _tell(study, record, asked.places())
 
 
-def _fit_motors(loaded: Loaded, kind: str, ask: Ask, record: dict[str, Any], out: Out, now: Any) -> None:
-    """One output-error fit per motor, with and without a dead band, and free runs on what was held out."""
-    import numpy as np
+def _latency(asked: str | list[str]) -> bool | None:
+    """Whether to fit a latency; None is where the logs show one."""
+    from omnidyn.errors import InputError
 
-    from omnidyn.identification.motors.choice import is_late
-    from omnidyn.identification.motors.fit import fit_motor
-    from omnidyn.identification.motors.run import fit_rmse
-
-    part = Part(loaded, ask.hold_out)
-    counts = [run.wheels or 1 for run in part.runs]
-    asked = nuisances(ask.nuisances)
-    other = [name for name in asked if name.partition(".")[0] != "latency"] if asked != "auto" else []
-    if other:
-        from omnidyn.errors import InputError
-
-        raise InputError("of the motors only latency can be fitted", got=other[0], where="--nuisance")
-    if out.out:
-        say("omnidyn: the numbers of the motors do not go into a robot file; -o is not used")
-    found: list[tuple[MotorFit, MotorFit, float, float]] = []
-    for motor in range(min(counts)):
-        now(f"fitting motor {motor + 1} of {min(counts)}")
-        how: dict[str, Any] = {"kind": kind, "between": ask.between or "auto", "loss": ask.loss or "gaussian"}
-        how["latency"] = is_late(part.runs, motor, **how) if asked == "auto" else bool(asked)
-        band, plain = (fit_motor(part.runs, motor, dead_band=with_band, **how) for with_band in (True, False))
-        held = [run for run, _ in part.held]
-        errors = [fit_rmse(fit, held) if held else np.nan for fit in (band, plain)]
-        found.append((band, plain, float(errors[0]), float(errors[1])))
-    _tell_motors(found, record, out)
+    if asked == "auto":
+        return None
+    for name in asked:
+        if name.partition(".")[0] != "latency":
+            raise InputError("of the motors only latency can be fitted", got=name, where="nuisances")
+    return bool(asked)
 
 
-def _tell_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], record: dict[str, Any], out: Out) -> None:
-    if out.report:
-        from omnidyn.files import write_atomic
-        from omnidyn.report.fit_page import render_motors
-
-        write_atomic(out.report, render_motors(found, record), out.force)
-    if out.json:
-        motors = [
-            {**band.to_dict(), "held_out_rmse_rad_s": held, "without_dead_band":
-             {**plain.to_dict(), "held_out_rmse_rad_s": held_plain}}
-            for band, plain, held, held_plain in found
-        ]  # fmt: skip
-        show_json({"method": "output-error", "motors": motors, "report": out.report or None, "provenance": record})
-    else:
-        from omnidyn.identification.advice import MOTOR_HEAD, motor_rows, motor_words
-        from omnidyn.identification.steady.study_table import table_text
-
-        lines = [f"- {each}" for each in motor_words(found)]
-        show("\n".join([*table_text(MOTOR_HEAD, motor_rows(found)), "", *lines]))
-    if out.report:
-        say(f"omnidyn: wrote {out.report}")
-
-
-def _drives(loaded: Loaded, robot: Robot | None, kind: str, how: How) -> DriveStudy:
-    from omnidyn.identification.motors.drive_line import fit_drive_lines
-
-    return fit_drive_lines(loaded.runs, kind=kind, speed=how.speed, robot=robot, share=how.shares())
-
-
-def _tell_drives(drives: DriveStudy, record: dict[str, Any], to: Out) -> None:
-    """Write and show the lines of the motors: report, JSON or the summary."""
+def _tell(study: MotorStudy, record: dict[str, Any], to: Out) -> None:
+    """Write and show: report, JSON or the summary."""
     from omnidyn.files import write_atomic
-    from omnidyn.identification.motors.drive_table import drive_summary, drive_to_dict
 
     if to.out:
-        say("omnidyn: the lines of the motors do not go into a robot file; -o is not used")
+        say("omnidyn: the numbers of the motors do not go into a robot file; -o is not used")
     if to.report:
-        from omnidyn.report.steady_page import render_drives
+        from omnidyn.report.motors_page import render_motors
 
-        write_atomic(to.report, render_drives(drives, record), to.force)
+        write_atomic(to.report, render_motors(study, record), to.force)
     if to.json:
-        for warning in drives.warnings:
+        for warning in study.doubts:
             say(f"omnidyn: warning: {warning}")
-        show_json({**drive_to_dict(drives), "report": to.report or None, "provenance": record})
+        show_json({**study.to_dict(), "report": to.report or None, "provenance": record})
     else:
-        show(drive_summary(drives).rstrip("\n"))
+        show(study.summary().rstrip("\n"))
     say_written([to.report])
