@@ -2,7 +2,7 @@
 """One door to the project. Needs Python 3.11 or newer, and nothing installed.
 
     python3 dev.py demo [ARGS]        the paper, end to end; ARGS go to `omnidyn demo`
-    python3 dev.py test [ARGS]        the tests; ARGS go to pytest
+    python3 dev.py test [ARGS]        the tests, a process per core; ARGS go to pytest: -k WORD, -n0, --long
     python3 dev.py check              ruff, pyright and the tests of the house rules
     python3 dev.py bench [NAME ARGS]  the benchmarks
     python3 dev.py docs               the documentation, into docs/_build/html
@@ -46,13 +46,17 @@ BEAT = 5.0  # seconds between signs of life while an installer is silent
 
 SPHINX = ["-m", "sphinx", "-q", "-W", "--keep-going", "docs", "docs/_build/html"]  # -W: a warning is an error
 
+# A process for each core; each takes tests that follow one another, so that few fixtures are made twice. -n0 is one
+# process; --pdb is one too.
+TESTS = ["-m", "pytest", "-n", "auto", "--dist", "worksteal"]
+
 # level: what must be installed; there: the working directory, None = where the user stands;
 # steps: what Python is called with; open: whether arguments are passed on.
 Command = namedtuple("Command", "level there steps open")
 COMMANDS = {
     # -P: a file of the user's called numpy.py must not be imported by the demo.
     "demo": Command("core", None, [["-P", "-m", "omnidyn", "demo"]], True),
-    "test": Command("everything", ROOT, [["-m", "pytest"]], True),
+    "test": Command("everything", ROOT, [TESTS], True),
     "check": Command(
         "everything",
         ROOT,

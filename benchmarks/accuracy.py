@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.table import Table, machine
 from omnidyn.simulation.simulate import simulate
 from tests.reference.reference import Physical, reference
-from tests.reference.robots import (
+from tests.support.robots import (
     TABLE_3,
     random_program,
     random_robot,

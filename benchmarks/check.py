@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.check_faults import FAULTS, draw
-from benchmarks.check_logs import clean
 from benchmarks.table import Table, machine, one_core
 from omnidyn.findings.check import check
 from omnidyn.findings.finding import NOTE
 from omnidyn.logs.log import Log
 from omnidyn.report.figures.raw_log import draw_raw_log
 from omnidyn.report.style import BLUE, GREY, VERMILLION, WIDTH, look, new_figure, picture
+from tests.support.random_logs import clean
 
 LOGS, CLEAN = 200, 1000
 RECALL, FALSE = 0.95, 0.02  # the goals

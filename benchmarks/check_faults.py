@@ -1,4 +1,4 @@
-"""Twelve faults to put into clean logs (check_logs.py), with sizes from a published range.
+"""Twelve faults to put into clean logs (tests/support/random_logs.py), with sizes from a published range.
 
 A fault goes into a log either before the simulation (saturation, sag) or into what was recorded.
 """
@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.check_logs import FloatArray, Rng, Scene, plain, play, program, random_scene, record
 from omnidyn.findings.finding import Verdict
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
+from tests.support.random_logs import FloatArray, Rng, Scene, plain, play, program, random_scene, record
 
 
 class Fault(NamedTuple):

@@ -6,17 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.identify import NOISE, excitation, noisy
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.group_fit import GroupFit, identify_groups
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import coloured, excitation, noisy
 
 PAIRS, SECONDS = 200, 20.0
-MEMORY = 0.9  # correlation of neighbours of coloured noise
 COULOMB, VISCOUS, TORQUE = "friction.axes.coulomb[0]", "friction.axes.viscous[1]", "motor.torque_constant_Nm_A"
 ROUGH = {COULOMB: 2.6, VISCOUS: 1.2}  # of the second floor; the preset has 2.2 N and 0.96 N s/m
 RUNS, DRAWS = 10, 200  # a floor, and of them
@@ -32,22 +31,11 @@ def measure() -> Table:
     return table
 
 
-def coloured(run: Run, seed: int) -> Run:
-    """The run with noise of the same size that remembers: each row takes MEMORY of the last one."""
-    assert run.twist is not None
-    fresh = np.random.default_rng(5000 + seed).normal(size=run.twist.shape) * NOISE
-    errors = np.empty_like(fresh)
-    errors[0] = fresh[0]
-    for k in range(1, len(fresh)):
-        errors[k] = MEMORY * errors[k - 1] + np.sqrt(1.0 - MEMORY**2) * fresh[k]
-    return Run(t=run.t, voltage=run.voltage, twist=run.twist + errors, source="simulated")
-
-
 def floors() -> dict[str, Robot]:
     """The preset on its floor and on a rough one."""
     smooth = rough = load_robot("axebot")
     for key, value in ROUGH.items():
-        rough = with_parameter(rough, key, value)
+        rough = Key.parse(key).set(rough, value)
     return {"smooth": smooth, "rough": rough}
 
 

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from benchmarks.identify_cost import command, long, speed
 from benchmarks.identify_draws import breakaway, coverage, impaired, starts
-from benchmarks.identify_log import NOISE, RATE, Draws, excitation, fit_output_error, noisy, truth
 from benchmarks.identify_peers import compare
 from benchmarks.table import Table, machine
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
-
-__all__ = ["NOISE", "RATE", "Draws", "excitation", "fit_output_error", "measure", "noisy", "truth"]
+from tests.support.axebot_logs import RATE, excitation
 
 
 def measure() -> Table:

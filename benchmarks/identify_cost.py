@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 import omnidyn
-from benchmarks.identify_log import cpu, excitation, fit_output_error, noisy
+from benchmarks.identify_log import cpu, fit_output_error
 from benchmarks.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation, noisy
 
 FIRST = 10.0  # [s] of the command's first run
 

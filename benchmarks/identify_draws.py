@@ -6,24 +6,13 @@ import time
 
 import numpy as np
 
-from benchmarks.identify_log import (
-    COUNTING,
-    NOISE,
-    RATE,
-    SHARE,
-    Draws,
-    cramer_rao,
-    excitation,
-    fit_output_error,
-    noisy,
-    truth,
-    with_friction,
-)
+from benchmarks.identify_log import COUNTING, SHARE, Draws, cramer_rao, fit_output_error
 from benchmarks.table import Table
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, RATE, excitation, noisy, truth, with_friction
 
 LOGS, IMPAIRED, STARTS, BREAKAWAYS = (max(int(n * SHARE), 10) for n in (10_000, 1000, 1000, 200))
 LATE, GAIN, DEAD = 0.013, 0.97, 0.15
@@ -61,7 +50,7 @@ def starts(table: Table, robot: Robot, clean: Run) -> None:
     for _ in range(STARTS):
         factor = np.exp(rng.uniform(-np.log(100.0), np.log(100.0), 6))
         fit = fit_output_error(log, with_friction(robot, true * factor), start="rest")
-        good += all(abs(fit.value[key] - best.value[key]) < 0.1 * best.std[key] for key in FRICTION)
+        good += all(abs(fit.value[key] - best.value[key]) < 0.1 * best.std[key] for key in BOX)
     share = good / STARTS
     table.add(
         ">= 0.999", share >= 0.999, what="starts up to 100x wrong that end at the best", draws=STARTS, value=share
@@ -99,7 +88,7 @@ def breakaway(table: Table, robot: Robot, clean: Run) -> None:
         axes = robot.friction.axes.replace(breakaway=(float(level), *coulomb[1:].tolist()))
         true = robot.replace(friction=robot.friction.replace(axes=axes))
         log = noisy(simulate(true, excitation(seed=100 + seed), 1.0 / RATE), seed)
-        low, high = fit_output_error(log, robot, free=[*FRICTION, key], start="rest").ci95[key]
+        low, high = fit_output_error(log, robot, free=[*BOX, key], start="rest").ci95[key]
         held += low <= level <= high
         widths.append((high - low) / coulomb[0])
     share = held / BREAKAWAYS

@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, NOISE, RATE, SHARE, Draws, excitation, noisy
+from benchmarks.identify_log import COUNTING, SHARE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.engines.exact import Weighting
@@ -23,11 +23,12 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, RATE, excitation, noisy
 
 LOGS = max(int(300 * SHARE), 10)
 LATE, FINE_ROWS = 0.013, 10  # [s]; rows of the truth in a row of the log
@@ -62,7 +63,7 @@ def begun(seed: int) -> Robot:
     """The robot with all free numbers wrong by up to a factor of WRONG either way."""
     robot, rng = ellipse(), np.random.default_rng(9000 + seed)
     for key, factor in zip(KEYS, np.exp(rng.uniform(-np.log(WRONG), np.log(WRONG), len(KEYS))), strict=True):
-        robot = with_parameter(robot, key, float(parameter(robot, key)) * float(factor))
+        robot = Key.parse(key).set(robot, float(Key.parse(key).get(robot)) * float(factor))
     return robot
 
 
@@ -71,7 +72,7 @@ def fitted(run: Run, start: Robot) -> OutputErrorEstimate:
 
 
 def truth() -> dict[str, float]:
-    return {key: float(parameter(ellipse(), key)) for key in KEYS} | {LATENCY: LATE}
+    return {key: float(Key.parse(key).get(ellipse())) for key in KEYS} | {LATENCY: LATE}
 
 
 def bound() -> np.ndarray:

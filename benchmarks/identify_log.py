@@ -15,66 +15,22 @@ import numpy as np
 
 from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
+from tests.support.axebot_logs import NOISE, bare
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a row asks for
 
-NOISE = np.array([0.02, 0.02, 0.10])
-SECONDS, RATE = 60.0, 100.0
 SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
 COUNTING = 3.0  # standard errors of a counted share, granted where fewer than the full number of draws are done
-
-
-def excitation(seconds: float = SECONDS, rate: float = RATE, seed: int = 1) -> np.ndarray:
-    """Voltages [V], shape (n, 3): levels held 0.3 to 1.2 s on one axis after the other and mixed, each third a ramp."""
-    rng = np.random.default_rng(seed)
-    pattern, size = np.array([[0.0, 1.0, -1.0], [-1.0, 0.5, 0.5], [1.0, 1.0, 1.0]]), np.array([4.5, 4.5, 2.5])
-    n = round(seconds * rate)
-    voltage, row, count = np.zeros((n, 3)), 0, 0
-    while row < n:
-        end = min(n, row + int(rng.uniform(0.3, 1.2) * rate))
-        level = np.zeros(3)
-        if count % 4 == 3:
-            level = rng.uniform(-0.5, 0.5, 3) * size
-        else:
-            level[count % 3] = rng.uniform(-1.0, 1.0) * size[count % 3]
-        shape = np.linspace(-1.0, 1.0, end - row) if count % 3 == 2 else np.ones(end - row)
-        voltage[row:end] = shape[:, None] * (level @ pattern)
-        row, count = end, count + 1
-    return np.clip(voltage, -6.0, 6.0)
-
-
-def noisy(run: Run, seed: int) -> Run:
-    """Its voltage and twist as instruments with noise record them."""
-    assert run.twist is not None
-    twist = run.twist + np.random.default_rng(1000 + seed).normal(size=run.twist.shape) * NOISE
-    return Run(t=run.t, voltage=run.voltage, twist=twist, source="simulated")
-
-
-def truth(robot: Robot) -> dict[str, float]:
-    return {key: float(parameter(robot, key)) for key in FRICTION}
-
-
-def with_friction(robot: Robot, values: np.ndarray) -> Robot:
-    """The robot with these six numbers, in the order of FRICTION."""
-    for key, value in zip(FRICTION, values, strict=True):
-        robot = with_parameter(robot, key, float(value))
-    return robot
-
-
-def bare(run: Run) -> Run:
-    """Its voltage and twist alone, without noise."""
-    return Run(t=run.t, voltage=run.voltage, twist=run.twist, source="simulated")
 
 
 def cramer_rao(robot: Robot, clean: Run) -> np.ndarray:
     """Least standard errors that any unbiased fit of this log has, from the log without noise. Shape (6,)."""
     fit = fit_output_error(bare(clean), robot, start="rest", covariance="white")
     noise = np.array(list(fit.noise.values()))
-    return np.array([fit.std[key] for key in FRICTION]) / np.tile(noise / NOISE, 2)
+    return np.array([fit.std[key] for key in BOX]) / np.tile(noise / NOISE, 2)
 
 
 class Draws:

@@ -12,16 +12,16 @@ import time
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, NOISE, Draws
+from benchmarks.identify_log import COUNTING, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.solve.loop import friction_keys, gain_keys
 from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.keys import Key, friction_keys, gain_keys
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE
 
 SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
 LOGS = max(int(100 * SHARE), 5)
@@ -72,12 +72,12 @@ def log(robot: Robot, seed: int) -> Run:
 
 def _coverage(table: Table, robot: Robot) -> None:
     keys = [*friction_keys(robot), *gain_keys(robot)]
-    true = {key: float(parameter(robot, key)) for key in keys} | {"latency.twist": LATE, "latency.current": LATE}
+    true = {key: float(Key.parse(key).get(robot)) for key in keys} | {"latency.twist": LATE, "latency.current": LATE}
     draws, spent = Draws(true), 0.0
     for seed in range(LOGS):
         start = robot
         for k, key in enumerate(gain_keys(robot)):
-            start = with_parameter(start, key, (3.0 if (seed >> k) & 1 else 1.0 / 3.0) * true[key])
+            start = Key.parse(key).set(start, (3.0 if (seed >> k) & 1 else 1.0 / 3.0) * true[key])
         run, began = log(robot, seed), time.process_time()
         draws.add(fit_output_error(run, start, nuisances=("latency",)))
         spent += time.process_time() - began

@@ -21,24 +21,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from benchmarks.identify_log import (
-    NOISE,
-    RATE,
-    bare,
-    cpu,
-    cramer_rao,
-    fit_output_error,
-    noisy,
-    truth,
-    with_friction,
-)
+from benchmarks.identify_log import cpu, cramer_rao, fit_output_error
 from benchmarks.table import Table
 from benchmarks.tanh import run_tanh
-from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.run import Run
+from tests.support.axebot_logs import NOISE, RATE, bare, noisy, truth, with_friction
 
 WRONG = 2.0  # times the truth: where all begin
 FASTER_SYSID, FASTER_LMFIT, SYSTEMATIC = 500.0, 5000.0, 0.1  # the goals
@@ -123,7 +114,7 @@ def compare(table: Table, robot: Robot, clean: Run) -> None:
 def our_fit(robot: Robot, log: Run) -> np.ndarray:
     """The six numbers of our fit."""
     fit = fit_output_error(log, robot, start="rest")
-    return np.array([fit.value[key] for key in FRICTION])
+    return np.array([fit.value[key] for key in BOX])
 
 
 def run_events(robot: Robot, voltage: np.ndarray, dt: float) -> np.ndarray:
@@ -210,12 +201,12 @@ def by_sysid(robot: Robot, log: Run, fair: bool) -> np.ndarray:
         sensors="".join(f'<jointvel name="s{k}" joint="j{k}"/>' for k in range(3)),
     ))  # fmt: skip
     parameters = sysid.ParameterDict()
-    for k, key in enumerate(FRICTION):
+    for k, key in enumerate(BOX):
         parameters.add(sysid.Parameter(
             key, nominal=start[k], min_value=0.0, max_value=5.0 * start[k], modifier=put_friction(k, braking),
         ))  # fmt: skip
     for k in range(6):
-        parameters[FRICTION[k]].modifier(spec, parameters[FRICTION[k]])
+        parameters[BOX[k]].modifier(spec, parameters[BOX[k]])
     model = spec.compile()
     data = mujoco.MjData(model)
     force = np.repeat(log.voltage[:-1] @ system.B.T * mass, rows, axis=0)
@@ -233,7 +224,7 @@ def by_sysid(robot: Robot, log: Run, fair: bool) -> np.ndarray:
 
 
 def put_friction(k: int, braking: np.ndarray) -> Callable[[Any, Any], None]:
-    """What writes number k of FRICTION into a model: damping of joint k, or frictionloss of joint k - 3."""
+    """What writes number k of BOX into a model: damping of joint k, or frictionloss of joint k - 3."""
 
     def put(spec: Any, number: Any) -> None:
         joint, value = spec.joint(f"j{k % 3}"), float(number.value[0])

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.table import Table, Times, machine, one_core
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import simulate_exact
-from tests.reference.robots import TABLE_3, robot_of, table_3_voltages, with_breakaway
+from tests.support.robots import TABLE_3, robot_of, table_3_voltages, with_breakaway
 
 DT, ROUNDS, REPEATS = 1e-3, 10, 5
 GOAL_RATIO = 4.0

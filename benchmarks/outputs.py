@@ -10,18 +10,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.identify_log import NOISE, SHARE, Draws, excitation, truth
+from benchmarks.identify_log import SHARE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem, read_records
 from omnidyn.identification.output_error.kernel.counts import information
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, excitation, truth
 
 TICKED, TILTED, CAPTURED = (max(int(n * SHARE), 10) for n in (300, 200, 200))
 COUNTS, JITTERS = (64, 512, 2048), (0.3, 0.0)  # counts a turn; noise before the encoder rounds, in ticks
@@ -128,7 +129,7 @@ def _tilt(table: Table, robot: Robot) -> None:
         ignored.add(fit_output_error(log, robot, nuisances=(), start="rest"))
     _cover(table, "floor tilted by 1 degree, six numbers and the force", known, TILTED)
     table.add(what="... force along x, std", draws=TILTED, value=known.spread[6], unit="N")
-    shift = _shares(ignored, FRICTION[:1] + FRICTION[3:4])
+    shift = _shares(ignored, BOX[:1] + BOX[3:4])
     table.add(what="... tilt ignored: viscous x off by", draws=TILTED, value=shift[0], unit="%")
     table.add(what="... tilt ignored: coulomb x off by", draws=TILTED, value=shift[1], unit="%")
     table.add(what="... tilt ignored: coverage, least", draws=TILTED, value=ignored.coverage.min())

@@ -25,7 +25,7 @@ from omnidyn.simulation.implicit.march import run_implicit
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.speed_loop import no_loop
 from tests.reference.make import FILE
-from tests.reference.robots import TABLE_3, robot_of, table_3_voltages
+from tests.support.robots import TABLE_3, robot_of, table_3_voltages
 
 DT = 1e-3
 GOAL_PAPER, GOAL_FULL = 2.0, 5.0  # us a step

@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import real_logs as logs
 from benchmarks import real_loop, udea
-from benchmarks.identify import excitation, noisy
 from benchmarks.table import Table, machine
 from omnidyn.identification.motors.between import MEAN
 from omnidyn.identification.motors.choice import choose_motor
@@ -25,6 +23,8 @@ from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support import real_logs as logs
+from tests.support.axebot_logs import excitation, noisy
 
 TURN = 2.0 * np.pi
 CHIRP_END = 4.0  # [s] after it the chirp outruns the rows

@@ -6,16 +6,16 @@ import time
 
 import numpy as np
 
-from benchmarks import real_logs as logs
 from benchmarks.table import Table
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.group_fit import identify_groups
 from omnidyn.identification.steady.study import identify_steady
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support import real_logs as logs
 
 SETS_OFF = 0.5  # [s] of each run that the fit does not see: the robot sets off within it, between two rows
 SECONDS = 6.0  # [s] of each run that are used: the shortest have as many, and nothing changes after the start
@@ -58,7 +58,7 @@ def robotino(table: Table) -> None:
     """Friction of each floor, motor and gain shared; then runs in other directions, never seen, as free runs."""
     robot = load_robot("robotino")
     (runs, names), (held, their) = floors(FITTED), floors(HELD)
-    start = with_parameter(robot, GAIN, WRONG * robot.drive.kp)  # type: ignore[operator]
+    start = Key.parse(GAIN).set(robot, WRONG * robot.drive.kp)  # type: ignore[operator]
     began = time.process_time()
     fit = identify_groups(
         runs, start, names, free=[*LEVELS, GAIN], per_free=LEVELS, nuisances=(), outputs=OUTPUTS, start="rest",

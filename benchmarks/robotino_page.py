@@ -8,11 +8,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks import real_logs as logs
 from omnidyn.cli import main as omnidyn
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.shapes import draw_polar
+from tests.support import real_logs as logs
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 BEGIN, END = "<!-- begin: made by python -m benchmarks.robotino_page -->", "<!-- end -->"

@@ -11,7 +11,7 @@ from benchmarks.table import Table, Times, machine, one_core
 from benchmarks.tanh import run_tanh
 from omnidyn.simulation.simulate import simulate
 from tests.reference.reference import reference
-from tests.reference.robots import TABLE_3, robot_of, table_3_voltages
+from tests.support.robots import TABLE_3, robot_of, table_3_voltages
 
 DT = 1e-3
 GOAL_MS, GOAL_RATIO = 20.0, 100.0

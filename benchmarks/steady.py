@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import real_logs as logs
-from benchmarks.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled
 from benchmarks.table import Table, machine
 from omnidyn.identification.motors.estimate import MotorEstimate
 from omnidyn.identification.motors.study import identify_motors
@@ -22,6 +20,8 @@ from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from tests.support import real_logs as logs
+from tests.support.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled
 
 DRAWS, DIRECTIONS = 200, range(0, 360, 15)
 SHARE = (0.4, 0.95)

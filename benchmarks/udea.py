@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
-from benchmarks import real_logs as logs
 from benchmarks.table import Table
 from omnidyn.identification.motors.between import HOLD, MEAN
 from omnidyn.identification.motors.choice import choose_motor
@@ -18,6 +17,7 @@ from omnidyn.identification.motors.fit import fit_motor
 from omnidyn.identification.motors.free_run import run_motor
 from omnidyn.logs.read_log import read_log
 from omnidyn.run import Run
+from tests.support import real_logs as logs
 
 FloatArray = NDArray[np.float64]
 

@@ -10,6 +10,9 @@ from hypothesis import HealthCheck, settings
 
 from omnidyn.model.robot_file import load_robot
 
+# Output is wrapped as it is without a terminal; the processes of pytest-xdist are told 80 columns.
+os.environ.pop("COLUMNS", None)
+
 settings.register_profile(
     "ci",
     max_examples=60,
@@ -21,6 +24,30 @@ settings.register_profile(
 )
 settings.register_profile("thorough", settings.get_profile("ci"), max_examples=3000, derandomize=False)
 settings.load_profile(os.environ.get("OMNIDYN_HYPOTHESIS", "ci"))
+
+
+def pytest_addoption(parser):
+    parser.addoption("--long", action="store_true", help="run the long studies as well: those marked long")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Without --long the long studies are left out, and counted as deselected."""
+    if not config.getoption("--long"):
+        long = [item for item in items if item.get_closest_marker("long")]
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if item not in long]
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write text or bytes to a file in an own folder: its path."""
+
+    def to_file(content, name="table.csv"):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return to_file
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.outputs import strict
 
 
 @pytest.fixture(scope="module")
@@ -47,13 +48,6 @@ def call(logs, capsys):
         return code, *capsys.readouterr()
 
     return run_it
-
-
-def strict(text):
-    def refuse(name):
-        raise AssertionError(f"{name} in JSON")
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def test_a_clean_log_is_fit_for_use(call):

@@ -1,14 +1,13 @@
 """The commands, in process: what they print, write and refuse."""
 
-import json
 import sys
 
 import numpy as np
 import pytest
 
-from omnidyn.cli import main
 from omnidyn.logs.run_file import read_run
 from omnidyn.model.robot_file import load_robot, preset_names, robot_to_toml
+from tests.support.outputs import strict
 
 VOLTAGES = "t_s,u1_V,u2_V,u3_V\n0,0,3,-3\n1,0,0,0\n2,1,1,1\n"
 TABLE_1 = (
@@ -18,30 +17,11 @@ TABLE_1 = (
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
+def here(here):
     """An own folder with a voltage file and a steady table."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "u.csv").write_text(VOLTAGES)
-    (tmp_path / "t.csv").write_text(TABLE_1)
-    return tmp_path
-
-
-@pytest.fixture
-def call(here, capsys):
-    """Run a command: (exit code, stdout, stderr)."""
-
-    def run(*arguments):
-        code = main(list(arguments))
-        return code, *capsys.readouterr()
-
-    return run
-
-
-def strict(text):
-    def refuse(name):
-        raise AssertionError(f"{name} in JSON")
-
-    return json.loads(text, parse_constant=refuse)
+    (here / "u.csv").write_text(VOLTAGES)
+    (here / "t.csv").write_text(TABLE_1)
+    return here
 
 
 # ---- usage ----------------------------------------------------------------------------------------------

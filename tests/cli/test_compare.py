@@ -9,7 +9,7 @@ import pytest
 import omnidyn
 from omnidyn.cli import main
 from omnidyn.model.robot_file import load_robot
-from tests.comparison.logs import clean_log, coulomb_times, noisy
+from tests.support.compared_logs import clean_log, coulomb_times, noisy
 
 AXEBOT = load_robot("axebot")
 

@@ -11,6 +11,7 @@ from omnidyn.cli.demo_folder import MARKER, check_folder, write_folder
 from omnidyn.errors import InputError
 from omnidyn.paper.claim import Verdict
 from omnidyn.paper.claims import all_claims
+from tests.support.outputs import strict
 
 FIGURES = ["fig1_robot", "fig2_traces", "fig3_friction", "fig4_steps", "fig5_dead_zone", "fig6_reconcile"]
 FILES = {f"figures/{name}.{form}" for name in FIGURES for form in ("png", "svg")}
@@ -36,10 +37,7 @@ def test_it_writes_report_numbers_and_figures(made):
 
 
 def test_the_result_holds_every_claim_and_where_it_comes_from(made):
-    def refuse(name):
-        raise AssertionError(name)
-
-    result = json.loads((made / "result.json").read_text("utf-8"), parse_constant=refuse)
+    result = strict((made / "result.json").read_text("utf-8"))
     assert [claim["key"] for claim in result["claims"]] == [claim.key for claim in all_claims()]
     assert sum(result["verdicts"].values()) == len(result["claims"])
     assert [figure["name"] for figure in result["figures"]] == FIGURES

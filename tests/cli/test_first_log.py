@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation
 from omnidyn.cli import main
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "first-log.md").read_text("utf-8")

@@ -1,19 +1,18 @@
 """omnidyn identify by output error: the default method, groups, held-out logs, the report, refusals, an interrupt."""
 
-import json
-
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation, noisy
 from omnidyn.cli import main
 from omnidyn.cli.identify_fit import _Watch
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.logs.run_file import write_run
+from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation, noisy
+from tests.support.outputs import strict
 
 ROUGH = 2.6  # N along x; the preset has 2.2
 COULOMB = "friction.axes.coulomb[0]"
@@ -24,7 +23,7 @@ def logs(tmp_path_factory):
     """Two logs of 20 s on each of two floors, and one without inputs."""
     folder, axebot = tmp_path_factory.mktemp("logs"), load_robot("axebot")
     for k, name in enumerate(("smooth", "smooth", "rough", "rough")):
-        robot = axebot if name == "smooth" else with_parameter(axebot, COULOMB, ROUGH)
+        robot = axebot if name == "smooth" else Key.parse(COULOMB).set(axebot, ROUGH)
         write_run(noisy(simulate(robot, excitation(20.0, seed=k), 0.01), k), folder / f"{name}{k}.csv")
     speeds = simulate(axebot, excitation(5.0), 0.01)
     write_run(Run(t=speeds.t, wheel_speed=speeds.wheel_speed), folder / "inputless.csv")
@@ -41,13 +40,6 @@ def call(logs, tmp_path, monkeypatch, capsys):
         return code, *capsys.readouterr()
 
     return run
-
-
-def strict(text):
-    def refuse(name):
-        raise AssertionError(name)
-
-    return json.loads(text, parse_constant=refuse)
 
 
 def test_output_error_is_the_default_and_predicts_a_log_it_never_saw(call, tmp_path):

@@ -5,12 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.steady_logs import clean_runs, robot_with, spoiled
 from omnidyn.cli import main
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from tests.support.outputs import strict
+from tests.support.steady_logs import clean_runs, robot_with, spoiled
 
 DIRECTIONS = range(0, 360, 30)
 
@@ -79,10 +80,7 @@ def test_logs_of_no_group_are_not_used_and_counted(call):
 
 
 def test_json_holds_no_nan_and_says_what_was_used(call):
-    def refuse(name):
-        raise AssertionError(name)
-
-    result = json.loads(call("smooth", "--robot", "axebot", "--speed", "set", "--json")[1], parse_constant=refuse)
+    result = strict(call("smooth", "--robot", "axebot", "--speed", "set", "--json")[1])
     assert result["shape"] == "disc"
     assert result["speed_from"] == "set"
     assert result["groups"]["all"]["along_travel"]["points"] == 12

@@ -21,23 +21,6 @@ from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 MINI = ["--azimuth", "60,180,300", "--wheel-radius", "0.04", "--robot-radius", "0.125", "--mass", "8"]
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def call(here, capsys):
-    """Run a command: (exit code, stdout, stderr)."""
-
-    def run(*arguments):
-        code = main(list(arguments))
-        return code, *capsys.readouterr()
-
-    return run
-
-
 class Terminal(io.StringIO):
     """Somebody who types these lines."""
 

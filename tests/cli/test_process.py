@@ -221,12 +221,11 @@ def test_a_new_step_is_told_sooner_than_one_that_lasts(capsys, monkeypatch):
 
 
 def test_progress_says_where_a_kernel_is_compiled(capsys, monkeypatch):
-    import omnidyn.compiled
     from omnidyn.cli.terminal.progress import progress
+    from omnidyn.compiled.hearing import told
 
     monkeypatch.setattr("omnidyn.cli.terminal.progress.SILENT_S", 0.05)
-    monkeypatch.setattr(omnidyn.compiled, "compiling", lambda: True)
-    with progress("walking"):
+    with progress("walking"), told("a kernel"):
         time.sleep(0.2)
     assert "omnidyn: walking (a kernel is being compiled: once, the first time) ... 0 s" in capsys.readouterr().err
 

@@ -12,7 +12,7 @@ from omnidyn.comparison.compare import what_is_compared
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from tests.comparison.logs import NOISE, POSE_NOISE, clean_log, coulomb_times, noisy
+from tests.support.compared_logs import NOISE, POSE_NOISE, clean_log, coulomb_times, noisy
 
 AXEBOT, FOUR = load_robot("axebot"), load_robot("four-wheel")
 POSE = ("x", "y", "heading")

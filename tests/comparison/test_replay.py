@@ -13,7 +13,7 @@ from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.comparison.logs import clean_log, coulomb_times, noisy
+from tests.support.compared_logs import clean_log, coulomb_times, noisy
 
 AXEBOT = load_robot("axebot")
 SIMULATED = ("voltage", "current", "wheel_speed", "twist", "pose")

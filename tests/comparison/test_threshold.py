@@ -8,7 +8,7 @@ import omnidyn
 from omnidyn.comparison.threshold import exceeded, parse_threshold, refuse_absent, refuse_exceeded
 from omnidyn.errors import InputError, InsufficientDataError, ThresholdError
 from omnidyn.model.robot_file import load_robot
-from tests.comparison.logs import clean_log, noisy
+from tests.support.compared_logs import clean_log, noisy
 
 AXEBOT = load_robot("axebot")
 

@@ -5,6 +5,7 @@ import pytest
 
 from omnidyn.findings.check import check
 from omnidyn.logs.log import Log
+from omnidyn.model.keys import EMF
 from omnidyn.model.robot_file import load_robot
 from omnidyn.paper.tables import TABLE_1, TABLE_3
 
@@ -23,8 +24,8 @@ def table_1():
 def test_the_w_rows_of_table_1_are_impossible(table_1):
     (energy,) = check(table_1, load_robot("axebot")).of("energy")
     # By hand, from Table 3: back-EMF K_v l w b/r of a robot that turns, against the voltage printed in the same row.
-    emf = TABLE_3["motor.emf_constant"] * TABLE_3["motor.gear_ratio"] / TABLE_3["wheels.wheel_radius"]
-    above = [row.speed * TABLE_3["wheels.robot_radius"] * emf > row.voltage[0] for row in TABLE_1["yaw"]]
+    emf = TABLE_3[EMF] * TABLE_3["motor.gear_ratio"] / TABLE_3["wheels.wheel_radius_m"]
+    above = [row.speed * TABLE_3["wheels.robot_radius_m"] * emf > row.voltage[0] for row in TABLE_1["yaw"]]
     assert above == [False, True, True, True]
     assert energy.level == "fatal"
     assert energy.rows == ((11, 13),)  # the last three of twelve rows, the first of them in line 2

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.check_logs import clean
 from omnidyn.errors import InputError
 from omnidyn.findings.check import check, check_blocks
 from omnidyn.logs.log import Log
+from tests.support.random_logs import clean
 
 
 def ticking(t, **channels):

@@ -1,6 +1,5 @@
 """docs/robot-file.md: every key of the model is on it as it is, and every example loads."""
 
-import importlib.util
 import re
 from pathlib import Path
 
@@ -8,25 +7,12 @@ import pytest
 
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import PENDING, load_robot, parse_robot, preset_names
+from tests.support.robot_keys import KEYS, MADE
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "robot-file.md").read_text("utf-8")
 EXAMPLES = re.findall(r"<!-- example(?: in ([a-z.]+))? -->\n```toml\n(.*?)```", PAGE, re.DOTALL)
 SMALLEST = EXAMPLES[0][1]
-
-
-def generator():
-    """docs/robot_keys.py, which is no part of a package."""
-    spec = importlib.util.spec_from_file_location("robot_keys", ROOT / "docs" / "robot_keys.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-MADE = generator()
-KEYS = MADE.all_keys()
 
 
 def test_the_tables_are_those_of_the_model():

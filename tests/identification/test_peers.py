@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from benchmarks.identify_log import bare, cramer_rao, excitation, noisy, truth, with_friction
+from benchmarks.identify_log import cramer_rao
 from benchmarks.identify_peers import by_sysid, most_likely, our_fit, peers, residuals, run_events
 from benchmarks.table import Table
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import bare, excitation, noisy, truth, with_friction
 
 
 @pytest.fixture(scope="module")

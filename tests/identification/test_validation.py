@@ -5,17 +5,17 @@ import pytest
 from scipy.integrate import quad
 
 import omnidyn
-from benchmarks.identify import NOISE, excitation, noisy
 from omnidyn.errors import InputError
 from omnidyn.identification.as_fitted import as_fitted, at_motors, mean_before
 from omnidyn.identification.identify import choose_method, options_of
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU, fit_output_error
 from omnidyn.identification.validation import Score, coloured, validate
+from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, excitation, noisy
 
 AXEBOT = load_robot("axebot")
 LATE, GAIN, DEAD = 0.013, 0.95, 0.2
@@ -50,7 +50,7 @@ def test_a_held_out_log_is_compared_as_it_was_fitted(fit):
 
 def test_what_lasts_is_not_called_small(fit):
     """A motor twice as weak as the robot file says: the fit takes its errors for noise, the words do not."""
-    weak = with_parameter(AXEBOT, "motor.resistance_ohm", 2.0 * AXEBOT.motor.resistance)
+    weak = Key.parse("motor.resistance_ohm").set(AXEBOT, 2.0 * AXEBOT.motor.resistance)
     log = noisy(simulate(weak, excitation(20.0), 0.01), 1)
     wrong = fit_output_error(log, AXEBOT, nuisances=())
     (words,) = validate(wrong, [log], [log]).statements()
@@ -60,7 +60,7 @@ def test_what_lasts_is_not_called_small(fit):
 
 
 def test_another_floor_is_seen(fit):
-    rough = with_parameter(AXEBOT, "friction.axes.coulomb[0]", 3.0)
+    rough = Key.parse("friction.axes.coulomb[0]").set(AXEBOT, 3.0)
     plain = fit_output_error(noisy(simulate(AXEBOT, excitation(20.0), 0.01), 1), AXEBOT, nuisances=())
     other = noisy(simulate(rough, excitation(20.0, seed=5), 0.01), 2)
     found = validate(plain, [other], [other])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.statespace import state_space
 from omnidyn.simulation.simulate import simulate
-from tests.laws.robots import any_robot, volts
+from tests.support.strategies import any_robot, volts
 
 AXEBOT = load_robot("axebot")
 RATE = [-float(a) for a in np.diag(state_space(AXEBOT).A)]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.simulation.simulate import simulate
-from tests.laws.robots import any_robot, volts
+from tests.support.strategies import any_robot, volts
 
 EDGE = 1e-12
 

@@ -11,8 +11,8 @@ from omnidyn.model.motor import Motor
 from omnidyn.model.robot import Body, Robot
 from omnidyn.model.wheels import Wheels
 from omnidyn.simulation.simulate import simulate
-from tests.reference.random_robots import random_robot, random_voltages
-from tests.simulation.implicit.test_march import AXEBOT, SHAPES, implicit, shaped
+from tests.support.friction_shapes import AXEBOT, SHAPES, implicit, shaped
+from tests.support.mixed_robots import random_robot, random_voltages
 
 TOL = 1e-7
 NEAR = {"rtol": 0.0, "atol": 10 * TOL}

@@ -8,7 +8,7 @@ from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.friction import AxesFriction
 from omnidyn.model.wheels import per_wheel, rim_speed, wheel_speed, wrench_from_traction
 from omnidyn.simulation.simulate import simulate
-from tests.laws.robots import SMALL, any_robot, any_wheels, volts
+from tests.support.strategies import SMALL, any_robot, any_wheels, volts
 
 TWIST = st.tuples(SMALL, SMALL, SMALL)
 

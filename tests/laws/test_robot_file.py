@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
-from tests.laws.robots import any_robot
+from tests.support.strategies import any_robot
 
 NAME = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=40)
 KEYS = [

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
-from tests.laws.robots import any_robot, volts
+from tests.support.strategies import any_robot, volts
 
 AXEBOT, FOUR = load_robot("axebot"), load_robot("four-wheel")
 DT = np.repeat([1e-3, 0.01, 0.05], 5)

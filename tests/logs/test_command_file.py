@@ -12,13 +12,8 @@ HEADER = "t_s,u1_V,u2_V,u3_V\n"
 
 
 @pytest.fixture
-def write(tmp_path):
-    def to_file(content):
-        path = tmp_path / "u.csv"
-        path.write_text(content, encoding="utf-8")
-        return path
-
-    return to_file
+def write(write):
+    return lambda content, name="u.csv": write(content, name)
 
 
 def test_each_row_holds_until_the_next_and_the_last_as_long_as_the_one_before(write):

@@ -8,13 +8,8 @@ from omnidyn.logs.steady_table import SteadyTable, read_steady_table
 
 
 @pytest.fixture
-def write(tmp_path):
-    def to_file(content):
-        path = tmp_path / "steady.csv"
-        path.write_text(content, encoding="utf-8")
-        return path
-
-    return to_file
+def write(write):
+    return lambda content, name="steady.csv": write(content, name)
 
 
 def test_a_table_with_everything(write):

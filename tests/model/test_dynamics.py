@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench
 from omnidyn.model.statespace import discretise, is_decoupled, state_space
-from tests.reference.robots import random_robot, robot_of
+from tests.support.robots import random_robot, robot_of
 
 
 def test_state_space_to_the_digits_of_the_evidence(axebot):

@@ -1,17 +1,14 @@
 """The real logs: the folder in OMNIDYN_DATA, default ../shared/data beside the repository."""
 
-import os
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.support import real_logs
 
 
 @pytest.fixture(scope="session")
 def data():
     """The folder of the real logs; the test is skipped where it is absent."""
-    folder = Path(os.environ.get("OMNIDYN_DATA", ROOT.parent / "shared" / "data"))
+    folder = real_logs.folder()
     if not (folder / "robotino").is_dir():
         pytest.skip(f"no real logs in {folder}: set OMNIDYN_DATA")
     return folder

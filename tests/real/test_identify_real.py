@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks import real_logs as logs
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.line import fit_line
 from omnidyn.identification.steady.operating_points import force_points
@@ -13,6 +12,7 @@ from omnidyn.identification.steady.shape_fit import fit_shape, rms_and_error
 from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
+from tests.support import real_logs as logs
 
 ROBOTINO = load_robot("robotino")
 SHARE = (0.4, 0.95)  # rows that the README's numbers are from

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.reference.reference import Truth, reference
-from tests.reference.robots import TABLE_3, table_3_voltages, with_breakaway
+from tests.support.robots import TABLE_3, table_3_voltages, with_breakaway
 
 FILE = Path(__file__).with_name("table_3.npz")
 RATIOS = (1.0, 1.25, 1.5)

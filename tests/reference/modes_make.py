@@ -1,4 +1,4 @@
-"""Makes modes.npz: the reference of modes.py for the robots of seeds 0 to 39 of random_robots.py.
+"""Makes modes.npz: the reference of modes.py for the robots of seeds 0 to 39 of tests/support/mixed_robots.py.
 
     python tests/reference/modes_make.py            # PYTHONPATH=src; two processes, some minutes
     python tests/reference/modes_make.py --check 3  # and the Moreau stepper against every third of them
@@ -6,7 +6,7 @@
 Resumable: every finished robot is written at once, and one whose numbers have not changed is not run again
 (delete the file when the reference itself has changed). Each is run twice, the second time with rtol 1000
 times as coarse; `spread_*`: how far apart the two end [m/s, rad/s, pose, A], the energy residual [J], the
-time taken [s]. A robot whose reference meets a tie is not stored: count it in random_robots.REDRAWN and run
+time taken [s]. A robot whose reference meets a tie is not stored: count it in mixed_robots.REDRAWN and run
 again.
 """
 
@@ -26,7 +26,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.reference.modes import RTOL, Tie, Truth, plant_of, reference
-from tests.reference.random_robots import eager, random_robot, random_voltages
+from tests.support.mixed_robots import eager, random_robot, random_voltages
 
 FILE = Path(__file__).with_name("modes.npz")
 SEEDS = range(40)

@@ -13,7 +13,7 @@ from tests.reference.modes import plant_of, reference
 from tests.reference.modes_friction import Gauge, decide
 from tests.reference.modes_make import CLOSE, FILE, RTOL, SEEDS, load
 from tests.reference.modes_stepper import stepped
-from tests.reference.random_robots import PLACES, random_robot, random_voltages
+from tests.support.mixed_robots import PLACES, random_robot, random_voltages
 
 TURNING_VOLTAGE = (1.5, 5.5, -2.5)
 

@@ -18,7 +18,7 @@ from tests.reference.reference import (
     reference,
     wrench_matrix,
 )
-from tests.reference.robots import (
+from tests.support.robots import (
     TABLE_3,
     random_program,
     random_robot,

@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 import matplotlib
 import numpy as np
 import pytest
-from matplotlib.text import Text
 
 from omnidyn.identification.steady.band import confidence_band
 from omnidyn.identification.steady.steady_state import fit_steady_state
@@ -20,6 +19,7 @@ from omnidyn.paper.friction import table_1_points
 from omnidyn.report.figures import paper_pictures
 from omnidyn.report.figures.robot import draw_robot, wheel_places
 from omnidyn.report.style import AXIS_COLOUR, LEVEL_COLOURS, LOOK, look, new_figure, picture
+from tests.support.figures import shown_texts
 
 NAMES = ["fig1_robot", "fig2_traces", "fig3_friction", "fig4_steps", "fig5_dead_zone", "fig6_reconcile"]
 MODULES = ["robot", "traces", "friction", "steps", "dead_zone", "reconcile"]
@@ -41,26 +41,6 @@ def figures(robot):
             patch.setattr(module, "picture", lambda name, title, caption, figure: caught.setdefault(name, figure))
         list(paper_pictures(robot))
     return caught
-
-
-def shown_texts(figure):
-    """Every text that is drawn, with its box in pixels. What a tick outside the axis would say is not drawn."""
-    with look():
-        figure.canvas.draw()
-        hidden = _hidden_labels(figure)
-        texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
-        return [(text.get_text(), text.get_window_extent()) for text in texts if id(text) not in hidden]
-
-
-def _hidden_labels(figure):
-    """Labels of ticks that are not drawn: outside the limits, or of axes that are switched off."""
-    hidden = set()
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            drawn = {id(tick) for tick in axis._update_ticks()} if axes.axison else set()
-            ticks = axis.get_major_ticks() + axis.get_minor_ticks()
-            hidden |= {id(label) for tick in ticks if id(tick) not in drawn for label in (tick.label1, tick.label2)}
-    return hidden
 
 
 def test_there_is_one_picture_per_figure(pictures):

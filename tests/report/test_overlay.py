@@ -12,8 +12,8 @@ from matplotlib.text import Text
 import omnidyn
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.overlay import draw_overlay
-from tests.comparison.logs import clean_log, coulomb_times, noisy
-from tests.report.test_figures import shown_texts
+from tests.support.compared_logs import clean_log, coulomb_times, noisy
+from tests.support.figures import shown_texts
 
 AXEBOT = load_robot("axebot")
 

@@ -3,19 +3,18 @@
 import base64
 import hashlib
 import re
-from html.parser import HTMLParser
 
 import pytest
 
 from omnidyn.paper.claim import Claim, Verdict
 from omnidyn.report.page import MARKS, STYLE, render_page
 from omnidyn.report.style import Picture
+from tests.support.outputs import Reader
 
 EVIL = "<script>alert(1)</script> & \"x\" 'y' </td></table>"
 ROBOT = {"role": "robot", "name": "axebot", "sha256": "ab" * 32}
 RECORD = {"omnidyn": "0.1.0", "command": "omnidyn demo", "inputs": [ROBOT]}
 FIGURE = Picture("fig", "Title", "Caption", b"", b"<svg xmlns='http://www.w3.org/2000/svg'/>")
-VOID = {"meta", "link", "img", "br"}
 
 
 def claim(verdict=Verdict.REPRODUCED, key="key", text="a plain word", numbers=None):
@@ -24,32 +23,6 @@ def claim(verdict=Verdict.REPRODUCED, key="key", text="a plain word", numbers=No
 
 def page(claims=None, pictures=None, title="A title", record=RECORD):
     return render_page(title, "Words.", claims or [claim()], pictures or [FIGURE], record)
-
-
-class Reader(HTMLParser):
-    """Checks that tags are closed, and keeps attributes, ids and text."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.tags, self.values, self.text = [], [], [], ""
-        self.feed(text)
-        self.close()
-        assert not self.open
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-        self.values += [(tag, name, value or "") for name, value in attributes]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text += data
-
-    def all(self, name):
-        return [value for _, each, value in self.values if each == name]
 
 
 @pytest.fixture(scope="module")

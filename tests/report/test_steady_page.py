@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.steady_logs import clean_runs, robot_with, spoiled
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
@@ -12,7 +11,8 @@ from omnidyn.report.figures.shapes import shape_pictures
 from omnidyn.report.motors_page import render_motors
 from omnidyn.report.steady_page import render_study
 from omnidyn.run import Run
-from tests.report.test_page import Reader
+from tests.support.outputs import Reader
+from tests.support.steady_logs import clean_runs, robot_with, spoiled
 
 RECORD = {
     "omnidyn": "0.1.0", "command": "omnidyn identify <b>",

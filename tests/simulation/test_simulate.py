@@ -9,7 +9,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.robot_file import PRESETS, parse_robot
 from omnidyn.simulation.exact.march import why_not_exact
 from omnidyn.simulation.simulate import simulate
-from tests.reference.robots import table_3_voltages
+from tests.support.robots import table_3_voltages
 
 OPTIONS = {
     "gear_ratio = 19.0": [

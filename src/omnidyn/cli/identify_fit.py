@@ -183,7 +183,7 @@ def _fitted(
     part: Part, robot: Robot, ask: Ask, now: Any
 ) -> tuple[dict[str, OutputErrorEstimate], Sequence[Difference], bool]:
     """(fits by group, differences, whether it was interrupted)."""
-    from omnidyn.identification.output_error.group_fit import expand_keys
+    from omnidyn.identification.output_error.fit import expand_keys
 
     options: dict[str, Any] = {
         "free": expand_keys(ask.free, robot) if ask.free else None, "fixed": expand_keys(ask.fix, robot),

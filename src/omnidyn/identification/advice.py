@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 
 from omnidyn.findings.finding import FATAL, WARN, Verdict
-from omnidyn.identification.estimate import Estimate, unit
+from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.shape_residual import between_axes
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import FITTED, HELD_OUT, Validation, coloured
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.first_guess import GUESS
+from omnidyn.model.keys import unit
 
 NUMBER_HEAD = ("number", "value", "std error", "95 % interval", "unit", "")
 DIFFERENCE_HEAD = ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "")

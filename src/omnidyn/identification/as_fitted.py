@@ -13,9 +13,9 @@ from omnidyn.identification.output_error.problem.primitives import primitives
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.logs.segments import segments
 from omnidyn.logs.steady_table import AXES
+from omnidyn.model.keys import GAINS, Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import GAINS
 
 FloatArray = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
     values = {name: nuisance.value for name, nuisance in fit.nuisances.items()}
     if not values:
         return run
-    read = record(run, fit.robot, loop=any(key.startswith(GAINS) for key in fit.value))
+    read = record(run, fit.robot, loop=any(Key.parse(key).name in GAINS for key in fit.value))
     if read.set_point is not None:
         return _set_points_as_fitted(run, read.set_point, values)
     voltage = at_motors(read.voltage, run.t, values) + pushing(fit.robot, values)

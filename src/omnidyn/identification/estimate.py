@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.model.keys import unit
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
 
@@ -97,25 +98,6 @@ class Estimate:
             "data": self.data,
             "robot": robot_to_toml(self.robot),
         }
-
-
-def unit(name: str) -> str:
-    """The unit of a parameter by its key: friction depends on where it acts; other keys end in their unit, or it is 1.
-
-    A list as a whole, such as friction.axes.viscous, has the unit of its first item; a pure number has "".
-    """
-    yaw = (name.startswith("friction.axes.") and name.endswith("[2]")) or ".yaw_" in name
-    if name.startswith("friction."):
-        return ("N m s" if yaw else "N s/m") if "viscous" in name else "N m" if yaw else "N"
-    key = name.partition("[")[0].rpartition(".")[2]
-    endings = [ending for ending in _ENDINGS if key.endswith(ending)]
-    return _ENDINGS[max(endings, key=len)] if endings else ""
-
-
-_ENDINGS = {
-    "_kg": "kg", "_kg_m2": "kg m^2", "_m": "m", "_deg": "deg", "_ohm": "ohm", "_H": "H", "_Nm_A": "N m/A",
-    "_Vs_rad": "V s/rad", "_V": "V", "_A": "A", "_V_s_rad": "V s/rad", "_V_rad": "V/rad", "_Hz": "Hz",
-}  # fmt: skip
 
 
 def identified(std: float | None, source: str) -> Prior:

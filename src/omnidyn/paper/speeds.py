@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from functools import reduce
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.model.deadzone import breakaway_voltage, moves
 from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.keys import Key
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
@@ -40,16 +38,9 @@ def speed_claims(robot: Robot) -> tuple[Claim, ...]:
     return (_preset(robot), *per_axis, _no_load(robot))
 
 
-def parameter(robot: Robot, path: str) -> float:
-    """A number of a robot by its path, such as "friction.axes.viscous[0]"."""
-    names, _, index = path.rstrip("]").partition("[")
-    value: Any = reduce(getattr, names.split("."), robot)
-    return float(value[int(index)] if index else value)
-
-
 def _preset(robot: Robot) -> Claim:
-    ours = {path: parameter(robot, path) for path in TABLE_3}
-    different = [path for path, value in TABLE_3.items() if ours[path] != value]
+    ours = {key: Key.parse(key).get(robot) for key in TABLE_3}
+    different = [key for key, value in TABLE_3.items() if ours[key] != value]
     return Claim(
         key="table-3",
         place="Table 3",
@@ -59,7 +50,7 @@ def _preset(robot: Robot) -> Claim:
         verdict=judge(not different),
         why=f"{len(different)} differ{': ' + ', '.join(different) if different else ''}. i_max of (12) has no value "
         "there.",
-        numbers=plain(**{path.replace(".", "_"): value for path, value in ours.items()}),
+        numbers=plain(**{key.replace(".", "_"): value for key, value in ours.items()}),
     )
 
 

@@ -60,16 +60,16 @@ TABLE_2_COULOMB: Three = (2.2, 1.5, 0.099)
 """Table 2: C_v [N], C_vn [N], C_w [N m]."""
 
 TABLE_3: dict[str, float] = {
-    "body.mass": 1.5,
-    "body.inertia": 0.025,
-    "wheels.robot_radius": 0.1,
-    "wheels.wheel_radius": 0.035,
-    "motor.resistance": 1.69,
-    "motor.inductance": 0.00011,
-    "motor.torque_constant": 0.0059,
-    "motor.emf_constant": 0.0059,
+    "body.mass_kg": 1.5,
+    "body.inertia_kg_m2": 0.025,
+    "wheels.robot_radius_m": 0.1,
+    "wheels.wheel_radius_m": 0.035,
+    "motor.resistance_ohm": 1.69,
+    "motor.inductance_H": 0.00011,
+    "motor.torque_constant_Nm_A": 0.0059,
+    "motor.emf_constant_Vs_rad": 0.0059,
     "motor.gear_ratio": 19.0,
-    "motor.voltage_limit": 6.0,
+    "motor.voltage_limit_V": 6.0,
     "friction.axes.viscous[0]": 0.94,
     "friction.axes.viscous[1]": 0.96,
     "friction.axes.viscous[2]": 0.01,
@@ -77,7 +77,7 @@ TABLE_3: dict[str, float] = {
     "friction.axes.coulomb[1]": 1.5,
     "friction.axes.coulomb[2]": 0.099,
 }
-"""Table 3: the parameters in SI, by their path in a Robot. i_max of (12) has no value there."""
+"""Table 3: the parameters in SI, by their key in a robot file. i_max of (12) has no value there."""
 TABLE_3_UNIT_OF_B_W = "N/(rad/s)"
 """Table 3: the unit printed beside B_w."""
 INERTIA_SENTENCE = "a cylinder of the robot's dimensions"

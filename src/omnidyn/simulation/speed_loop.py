@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import AXES, GX, GY, GZ
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.release import SIGNS

@@ -34,7 +34,7 @@ def test_a_sensor_that_is_noise_only_is_dead(log, robot, with_channels, grave):
 
 def test_a_wheel_that_should_stand_is_not_dead(log, robot, with_channels):
     # Straight ahead, wheel 1 of the AxeBot has nothing to do: sin 180 deg is 0.
-    from tests.findings.conftest import clean_log
+    from tests.support.pushed_logs import clean_log
 
     straight = clean_log(robot, seed=3)
     n = len(straight)

@@ -6,11 +6,11 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from benchmarks.check_logs import clean
 from omnidyn.findings.check import check
 from omnidyn.findings.wiring.orders import Wiring, wirings
 from omnidyn.model.robot_file import load_robot
-from tests.findings.conftest import clean_log
+from tests.support.pushed_logs import clean_log
+from tests.support.random_logs import clean
 
 SOME = [((1, 0, 2), (1, 1, 1)), ((0, 2, 1), (1, 1, 1)), ((2, 0, 1), (1, 1, 1)), ((0, 1, 2), (1, -1, 1)),
         ((0, 1, 2), (-1, -1, 1)), ((2, 1, 0), (1, 1, -1))]  # fmt: skip

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation, noisy
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.group_fit import expand_keys, identify_groups
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.identification.output_error.fit import expand_keys, fit_output_error
+from omnidyn.identification.output_error.group_fit import identify_groups
+from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation, noisy
 
 AXEBOT = load_robot("axebot")
 TORQUE, EMF, COULOMB, MASS = (
@@ -25,7 +24,7 @@ def clean():
     """15 s on a smooth and a rough floor; the magnet is stronger than the robot file says."""
     found = {}
     for k, (name, level) in enumerate((("smooth", 2.2), ("rough", ROUGH))):
-        robot = with_parameter(with_parameter(with_parameter(AXEBOT, COULOMB, level), TORQUE, MAGNET), EMF, MAGNET)
+        robot = Key.parse(EMF).set(Key.parse(TORQUE).set(Key.parse(COULOMB).set(AXEBOT, level), MAGNET), MAGNET)
         found[name] = simulate(robot, excitation(15.0, seed=k), 0.01)
     return found
 
@@ -57,7 +56,7 @@ def test_with_nothing_shared_it_is_two_fits(clean):
     study = identify_groups(runs, AXEBOT, [*clean], nuisances=(), start="rest", covariance="white")
     for run, estimate in zip(runs, study.estimates.values(), strict=True):
         alone = fit_output_error(run, AXEBOT, nuisances=(), start="rest", covariance="white")
-        for key in FRICTION:
+        for key in BOX:
             assert abs(estimate.value[key] - alone.value[key]) < 0.02 * alone.std[key]
             assert estimate.std[key] == pytest.approx(alone.std[key], rel=0.05)
     assert study.shared == ()
@@ -66,18 +65,18 @@ def test_with_nothing_shared_it_is_two_fits(clean):
 def test_with_everything_shared_it_is_one_fit(clean):
     """All but one number shared between two logs of the same floor: the shared ones are those of one fit to both."""
     runs = [noisy(clean["smooth"], k) for k in range(2)]
-    both = fit_output_error(runs, AXEBOT, free=[*FRICTION, TORQUE], nuisances=(), start="rest")
+    both = fit_output_error(runs, AXEBOT, free=[*BOX, TORQUE], nuisances=(), start="rest")
     study = identify_groups(
         runs, AXEBOT, ["a", "b"], free=FREE, per_free=["friction.axes.viscous[2]"], nuisances=(), start="rest"
     )
     for name in study.shared:
         assert abs(study.estimates["a"].value[name] - both.value[name]) < 0.3 * both.std[name]
-    assert set(study.shared) == {*FRICTION, TORQUE} - {"friction.axes.viscous[2]"}
+    assert set(study.shared) == {*BOX, TORQUE} - {"friction.axes.viscous[2]"}
 
 
 def test_sharing_makes_the_motor_surer(clean):
     runs, study = fitted(clean, 3)
-    alone = [fit_output_error(run, AXEBOT, free=[*FRICTION, TORQUE], nuisances=(), start="rest") for run in runs]
+    alone = [fit_output_error(run, AXEBOT, free=[*BOX, TORQUE], nuisances=(), start="rest") for run in runs]
     expected = sum(a.std[TORQUE] ** -2 for a in alone) ** -0.5  # independent logs, to first order
     assert study.estimates["smooth"].std[TORQUE] == pytest.approx(expected, rel=0.05)
 
@@ -86,7 +85,7 @@ def test_a_load_is_a_mass_of_its_own():
     """Friction is the same, the second log carries 0.3 kg more."""
     runs = []
     for k, mass in enumerate((1.5, 1.8)):
-        runs.append(noisy(simulate(with_parameter(AXEBOT, MASS, mass), excitation(20.0, seed=k), 0.01), k))
+        runs.append(noisy(simulate(Key.parse(MASS).set(AXEBOT, mass), excitation(20.0, seed=k), 0.01), k))
     study = identify_groups(
         runs, AXEBOT, ["empty", "loaded"], free=["friction", MASS], per_free=[MASS], nuisances=(), start="rest"
     )
@@ -106,8 +105,8 @@ def test_automatic_nuisances_are_those_that_every_group_supports(clean):
 
 
 def test_keys_that_stand_for_several():
-    assert expand_keys(["friction"]) == [*FRICTION]
-    assert expand_keys(["friction.axes.coulomb", TORQUE]) == [*FRICTION[3:], TORQUE]
+    assert expand_keys(["friction"], AXEBOT) == expand_keys("friction", AXEBOT) == BOX
+    assert expand_keys(["friction.axes.coulomb", TORQUE], AXEBOT) == (*BOX[3:], TORQUE)
 
 
 def test_refusals(clean):

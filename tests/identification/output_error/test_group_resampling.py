@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 
-from benchmarks.groups import coloured
-from benchmarks.identify import excitation, noisy
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.best_so_far import WORDS, best_groups_so_far
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.group_fit import identify_groups, join_groups
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import coloured, excitation, noisy
 
 AXEBOT = load_robot("axebot")
 TORQUE, COULOMB, MASS = "motor.torque_constant_Nm_A", "friction.axes.coulomb[0]", "body.mass_kg"
@@ -23,7 +21,7 @@ def floors(runs, noise=noisy):
     """As many runs of 6 s at 50 Hz on a smooth floor and on a rough one: (runs, groups)."""
     found, names = [], []
     for g, (name, level) in enumerate((("smooth", 2.2), ("rough", 2.6))):
-        robot = with_parameter(AXEBOT, COULOMB, level)
+        robot = Key.parse(COULOMB).set(AXEBOT, level)
         for k in range(runs):
             log = simulate(robot, excitation(6.0, 50.0, seed=10 * g + k), 0.02)
             found.append(noise(log, 10 * g + k))
@@ -45,7 +43,7 @@ def test_a_bootstrap_is_as_wide_as_the_sandwich(drawn):
     plain, again, _ = drawn
     ratio = []
     for group, estimate in plain.estimates.items():
-        ratio += [again.estimates[group].std[key] / estimate.std[key] for key in FRICTION]
+        ratio += [again.estimates[group].std[key] / estimate.std[key] for key in BOX]
     ratio += [b.std / a.std for a, b in zip(plain.differences, again.differences, strict=True)]
     assert np.exp(np.mean(np.log(ratio))) == pytest.approx(1.0, abs=0.2)
     assert min(ratio) > 0.5
@@ -123,7 +121,7 @@ def test_the_best_so_far_is_what_the_state_says_and_the_same_again():
 def test_logs_with_other_channels_in_another_order():
     """Draws may begin with a log of other channels; each residual must still meet the noise of its own channel."""
     runs, names = floors(2)
-    robot = with_parameter(AXEBOT, COULOMB, 2.6)
+    robot = Key.parse(COULOMB).set(AXEBOT, 2.6)
     wheels = simulate(robot, excitation(6.0, 50.0, seed=5), 0.02)
     runs[3] = wheels.replace(twist=None, pose=None, current=None)
     joint = join_groups(runs, AXEBOT, names, free=["friction"], **QUIET)
@@ -150,7 +148,7 @@ def test_floors_of_a_robot_of_the_implicit_engine():
     rng = np.random.default_rng(3)
     true = {"gray": 36.0, "green": 31.0}
     for level in true.values():
-        own = with_parameter(robot, keys[0], level)
+        own = Key.parse(keys[0]).set(robot, level)
         volts = 2.0 * excitation(5.0, 20.0, seed=3)
         run = simulate(own, volts, 0.05)
         noise = 0.005 * rng.standard_normal(run.twist.shape)

@@ -7,12 +7,12 @@ import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error import fit as whole
-from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.identification.output_error.solve.solver import of_states
+from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+from tests.support.axebot_logs import NOISE, TRUTH, noisy, voltages
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
@@ -57,7 +57,7 @@ def test_two_runs_are_worth_two(axebot, clean):
     both = fit_output_error(logs, axebot)
     assert holds(both)
     single = [fit_output_error(log, axebot) for log in logs]
-    for key in FRICTION:
+    for key in BOX:
         together = 1.0 / np.sqrt(sum(1.0 / fit.std[key] ** 2 for fit in single))
         assert both.std[key] == pytest.approx(together, rel=0.05)
 
@@ -98,7 +98,7 @@ def test_a_duty_with_its_supply_is_a_voltage(axebot, clean):
     duty = log.voltage / supply[:, None]
     fit = fit_output_error(Run(t=log.t, duty=duty, supply=supply, twist=log.twist), axebot, start="rest")
     direct = fit_output_error(log, axebot, start="rest")
-    for key in FRICTION:
+    for key in BOX:
         assert fit.value[key] == pytest.approx(direct.value[key], rel=1e-6)
 
 
@@ -147,7 +147,7 @@ def test_breakaway_is_bracketed(axebot, clean):
     sticky = axebot.replace(friction=axebot.friction.replace(axes=axes))
     key = "friction.axes.breakaway[0]"
     fit = fit_output_error(
-        noisy(simulate(sticky, clean.voltage[:-1], 0.01), 16), axebot, free=[*FRICTION, key], start="rest"
+        noisy(simulate(sticky, clean.voltage[:-1], 0.01), 16), axebot, free=[*BOX, key], start="rest"
     )
     low, high = fit.ci95[key]
     assert low <= 2.75 <= high
@@ -169,17 +169,17 @@ def test_an_axis_that_never_moved_is_bounded_from_below(axebot, clean):
 
 def test_a_prior_counts_only_when_asked_and_never_one_of_an_earlier_fit(axebot, clean):
     log, key = noisy(clean, 18), "motor.resistance_ohm"
-    robot = axebot.replace(priors={key: Prior(std=0.05, source="datasheet"), FRICTION[0]: Prior(std=1e-6)})
+    robot = axebot.replace(priors={key: Prior(std=0.05, source="datasheet"), BOX[0]: Prior(std=1e-6)})
     plain = fit_output_error(log, robot, start="rest")
     assert key not in plain.value
     known = fit_output_error(log, robot, start="rest", use_priors=True)
     assert abs(known.value[key] - 1.69) < 0.15
     assert known.std[key] < 0.05
-    assert known.value[FRICTION[0]] == pytest.approx(0.94, abs=1e-5)  # its prior is narrow
+    assert known.value[BOX[0]] == pytest.approx(0.94, abs=1e-5)  # its prior is narrow
     loose = fit_output_error(log, axebot.replace(priors={key: Prior(std=0.05)}), start="rest", use_priors=True)
-    assert loose.std[FRICTION[3]] > plain.std[FRICTION[3]]  # an uncertain resistance makes friction uncertain
+    assert loose.std[BOX[3]] > plain.std[BOX[3]]  # an uncertain resistance makes friction uncertain
     again = fit_output_error(log, plain.robot, start="rest", use_priors=True)
-    assert again.std[FRICTION[0]] == pytest.approx(plain.std[FRICTION[0]], rel=1e-3)
+    assert again.std[BOX[0]] == pytest.approx(plain.std[BOX[0]], rel=1e-3)
 
 
 def test_what_is_written_can_be_read_and_says_where_it_comes_from(axebot, clean, tmp_path):
@@ -188,8 +188,8 @@ def test_what_is_written_can_be_read_and_says_where_it_comes_from(axebot, clean,
     fit = fit_output_error(noisy(clean, 19).replace(source="yard.csv"), axebot, start="rest")
     robot = load_robot(save_robot(fit.robot, tmp_path / "fit.toml"))
     assert robot.friction == fit.robot.friction
-    assert robot.priors[FRICTION[0]].source.startswith("identified: output error, yard.csv")
-    assert robot.priors[FRICTION[0]].std == pytest.approx(fit.std[FRICTION[0]])
+    assert robot.priors[BOX[0]].source.startswith("identified: output error, yard.csv")
+    assert robot.priors[BOX[0]].std == pytest.approx(fit.std[BOX[0]])
     assert "friction.axes.viscous[0]" in fit.summary()
     assert fit.to_dict()["covariance"] == "white"
 
@@ -198,7 +198,7 @@ def test_what_is_written_can_be_read_and_says_where_it_comes_from(axebot, clean,
     "options, message",
     [
         ({"free": ["body.mass_kg", "body.mass_kg"]}, "asked for twice; got body.mass_kg"),
-        ({"free": ["body.mas_kg"]}, "unknown key; got mas_kg"),
+        ({"free": ["body.mas_kg"]}, "unknown key; got body.mas_kg; did you mean body.mass_kg"),
         ({"free": []}, "nothing is free; got no key; expected at least one"),
         ({"nuisances": ["wind"]}, "no such nuisance; got wind; expected latency, gain, dead_band, fade"),
         ({"nuisances": ["latency.current"]}, "no such channel; got latency.current; expected twist"),

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from benchmarks.steady_logs import spoiled, steady_voltage
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.steady.axis_lines import identify_lines
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
+from tests.support.steady_logs import spoiled, steady_voltage
 
 AXEBOT = load_robot("axebot")
 SPEEDS = {0: (0.3, 0.5, 0.7, -0.4), 1: (0.3, 0.5, 0.7, -0.4), 2: (2.0, 4.0, 6.0, -3.0)}

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from benchmarks.steady_logs import FRICTIONS, TRUTH, robot_with, steady_voltage
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shapes import SHAPES, friction_of
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+from tests.support.steady_logs import FRICTIONS, TRUTH, robot_with, steady_voltage
 
 
 def points_at(robot, twists):

@@ -224,6 +224,7 @@ def test_friction_beyond_any_robot_is_not_put_into_one():
 # ---- coverage through the whole function ----------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_coverage_of_the_whole_fit():
     """600 draws with weights, three axes each: 95 % within three standard errors of a share (0.005)."""
     names = ["x"] * 5 + ["y"] * 5 + ["yaw"] * 5

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled, steady_voltage
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.steady.choice import choose_shape
 from omnidyn.identification.steady.operating_points import force_points
@@ -14,6 +13,7 @@ from omnidyn.identification.steady.study_table import study_summary, study_to_di
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
+from tests.support.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled, steady_voltage
 
 AXEBOT = load_robot("axebot")
 DIRECTIONS = range(0, 360, 15)
@@ -57,6 +57,7 @@ def test_the_true_shape_is_chosen_and_its_intervals_hold_the_truth(shape):
     assert np.mean(held) >= 0.6
 
 
+@pytest.mark.long
 def test_wheels_at_rest_do_not_decide_the_shape():
     """Draws of the benchmark in which squared errors told a level per wheel, and a disc, from one level for all."""
     rng, chosen = np.random.default_rng(0), []

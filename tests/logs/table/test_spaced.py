@@ -14,13 +14,8 @@ VALUES = {"t": [0.0, 0.1, 0.2], "w1": [1.0, -2.5, 3e-3], "u": [0.0, 6.0, -6.0]}
 
 
 @pytest.fixture
-def write(tmp_path):
-    def to_file(content, name="table.txt"):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
-
-    return to_file
+def write(write):
+    return lambda content, name="table.txt": write(content, name)
 
 
 def numbers(table):

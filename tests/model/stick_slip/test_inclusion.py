@@ -46,7 +46,7 @@ from omnidyn.model.stick_slip.inclusion import CAP, solve
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import put, start_state
 from omnidyn.model.stick_slip.workspace import scratch
-from tests.reference.random_robots import random_robot
+from tests.support.mixed_robots import random_robot
 
 PROBLEMS = 25  # for each of the 100 robots
 ROBOTS = 100

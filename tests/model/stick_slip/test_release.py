@@ -7,7 +7,7 @@ from scipy.optimize import linprog, lsq_linear
 from omnidyn.model.deadzone import breakaway_voltage, moves
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.robot_file import load_robot
-from tests.reference.random_robots import random_robot
+from tests.support.mixed_robots import random_robot
 
 
 def sets(robot, voltage):

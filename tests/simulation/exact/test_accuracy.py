@@ -10,7 +10,7 @@ import pytest
 from omnidyn.simulation.simulate import simulate
 from tests.reference.make import DT, EVERY, FILE, RATIOS
 from tests.reference.reference import reference
-from tests.reference.robots import TABLE_3, random_program, random_robot, random_steps, robot_of, with_breakaway
+from tests.support.robots import TABLE_3, random_program, random_robot, random_steps, robot_of, with_breakaway
 
 TWIST_BOUND = np.array([1e-13, 1e-13, 1e-12])
 POSE_BOUND = np.array([1e-9, 1e-9, 1e-12])

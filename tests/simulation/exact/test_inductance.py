@@ -16,7 +16,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.simulation.exact.inductance import axis_laws, current_gain, simulate_exact_inductance
 from omnidyn.simulation.exact.inductance_step import AxisLaw, response
 from omnidyn.simulation.exact.march import simulate_exact
-from tests.reference.robots import TABLE_3, random_program, random_robot, robot_of, with_breakaway
+from tests.support.robots import TABLE_3, random_program, random_robot, robot_of, with_breakaway
 
 INDUCTANCES = (1.1e-4, 2e-3, 2e-2)
 RATIOS = (1.0, 1.3)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from omnidyn.simulation.simulate import simulate
-from tests.simulation.implicit.test_march import SHAPES, shaped
+from tests.support.friction_shapes import SHAPES, shaped
 
 TOL = 1e-6
 MOTORS = {

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.layout import AXES, BOUND
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.stick_slip.plant import plant
@@ -20,49 +20,9 @@ from omnidyn.simulation.speed_loop import no_loop
 from tests.reference.make import FILE as TABLE_3_FILE
 from tests.reference.modes import reference
 from tests.reference.modes_make import SEEDS, load
-from tests.reference.random_robots import random_robot, random_voltages
-from tests.reference.robots import TABLE_3, robot_of, table_3_voltages, with_breakaway
-
-AXEBOT = load_robot("axebot")
-LEVELS = {"viscous": (0.94, 0.96, 0.01), "coulomb": (2.2, 1.5, 0.099)}
-YAW = {"yaw_coulomb": 0.099, "yaw_viscous": 0.01}
-SHAPES = {
-    "axes": Friction(axes=AxesFriction(**LEVELS)),
-    "axes, breakaway": Friction(axes=AxesFriction(**LEVELS, breakaway=(3.0, 2.0, 0.13))),
-    "disc": Friction(direction=DirectionFriction(coulomb=(2.0, 2.0), viscous=0.9, **YAW)),
-    "ellipse": Friction(direction=DirectionFriction(coulomb=(2.2, 1.4), viscous=0.9, **YAW)),
-    "ellipse, breakaway": Friction(
-        direction=DirectionFriction(coulomb=(2.2, 1.4), breakaway=(2.9, 1.8), yaw_breakaway=0.13, **YAW)
-    ),
-    "wheels": Friction(wheels=WheelFriction(coulomb=(0.8, 0.7, 0.9), coulomb_backward=0.6, viscous=0.3)),
-    "wheels, breakaway": Friction(wheels=WheelFriction(coulomb=0.8, breakaway=1.1, viscous=0.3)),
-    "axes and wheels": Friction(
-        axes=AxesFriction(viscous=(0.5, 0.5, 0.005), coulomb=(1.1, 0.8, 0.05)), wheels=WheelFriction(coulomb=0.5)
-    ),
-    "ellipse and wheels": Friction(
-        direction=DirectionFriction(coulomb=(1.2, 0.8), **YAW), wheels=WheelFriction(coulomb=(0.5, 0.4, 0.6))
-    ),
-    "all": Friction(
-        axes=AxesFriction(viscous=(0.3, 0.3, 0.003), coulomb=(0.8, 0.6, 0.03), breakaway=(1.0, 0.7, 0.04)),
-        direction=DirectionFriction(coulomb=(0.8, 0.6), breakaway=(1.0, 0.9), yaw_coulomb=0.03),
-        wheels=WheelFriction(coulomb=0.3, breakaway=0.4, viscous=0.1),
-    ),
-}
-
-
-def shaped(shape, **motor):
-    """The paper's robot in a turning frame with another friction and other motors."""
-    return AXEBOT.replace(
-        body=AXEBOT.body.replace(rotating_frame=True),
-        motor=AXEBOT.motor.replace(**motor),
-        friction=SHAPES[shape],
-    )
-
-
-def implicit(robot):
-    """The same robot, kept from the exact engine by a current limit that it never reaches."""
-    return robot.replace(motor=robot.motor.replace(current_limit=1e4))
-
+from tests.support.friction_shapes import AXEBOT, LEVELS, YAW, implicit, shaped
+from tests.support.mixed_robots import random_robot, random_voltages
+from tests.support.robots import TABLE_3, robot_of, table_3_voltages, with_breakaway
 
 # --- adaptive ---------------------------------------------------------------------------------------------------------
 

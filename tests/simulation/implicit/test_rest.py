@@ -10,7 +10,7 @@ import pytest
 from omnidyn.model.deadzone import breakaway_voltage
 from omnidyn.model.friction import Friction, WheelFriction
 from omnidyn.simulation.simulate import simulate
-from tests.simulation.implicit.test_march import AXEBOT, SHAPES, implicit, shaped
+from tests.support.friction_shapes import AXEBOT, SHAPES, implicit, shaped
 
 PATTERNS = np.array([[0.0, 1.0, -1.0], [-1.0, 0.5, 0.5], [1.0, 1.0, 1.0], [0.3, 1.0, -0.7]])
 MOTORS = {

@@ -11,7 +11,7 @@ from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.simulation.commands import commands
 from omnidyn.simulation.sensitivity.directions import derivatives, differentiate, prepared
 from omnidyn.simulation.simulate import simulate
-from tests.simulation.sensitivity.test_directions import AGREES, BODY, MOTOR, differences, held, worst
+from tests.support.run_differences import AGREES, BODY, MOTOR, differences, held, worst
 
 KP, KI, LIMIT, COULOMB = "drive.kp_V_s_rad", "drive.ki_V_rad", "motor.voltage_limit_V", "friction.axes.coulomb[0]"
 

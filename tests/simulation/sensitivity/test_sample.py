@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from omnidyn.model.friction import DirectionFriction, Friction
-from omnidyn.simulation.sensitivity.directions import derivatives, parameter, with_parameter
+from omnidyn.model.keys import Key
+from omnidyn.simulation.sensitivity.directions import derivatives
 from omnidyn.simulation.sensitivity.late_sample import Direction, sights
 from omnidyn.simulation.sensitivity.stage import EPS
 from omnidyn.simulation.simulate import simulate
@@ -39,7 +40,7 @@ def at(robot, voltage, dt, late, tol=1e-9):
 
 
 def ways(robot):
-    moved = lambda key, side: with_parameter(robot, key, parameter(robot, key) * (1.0 + side * EPS))  # noqa: E731
+    moved = lambda key, side: Key.parse(key).set(robot, Key.parse(key).get(robot) * (1.0 + side * EPS))  # noqa: E731
     return [Direction(key, moved(key, 1.0), moved(key, -1.0)) for key in KEYS]
 
 
@@ -58,8 +59,8 @@ def test_between_the_rows(robot):
         if late:  # at a row the voltage changes, and the rate with it
             np.testing.assert_allclose(own.pace[known], rate[known], atol=2e-3 * np.nanmax(np.abs(rate[known])))
         for k, key in enumerate(KEYS):
-            value, width = parameter(robot, key), 1e-4
-            up, down = (at(with_parameter(robot, key, value * (1 + s * width)), voltage, 0.01, late) for s in (1, -1))
+            value, width = Key.parse(key).get(robot), 1e-4
+            up, down = (at(Key.parse(key).set(robot, value * (1 + s * width)), voltage, 0.01, late) for s in (1, -1))
             for found, ends in ((own.twist_by[:, k], (up[0], down[0])), (own.heading_by[:, k], (up[1], down[1]))):
                 slope = (ends[0] - ends[1]) / (2.0 * width)
                 size = np.nanmax(np.abs(slope), axis=0)

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from omnidyn.cli.terminal.streams import say
+from omnidyn.compiled.hearing import Compiling, heard
 
 SILENT_S, NEW_S, BEAT_S = 2.0, 3.0, 5.0
 COMPILING = " (a kernel is being compiled: once, the first time)"
@@ -21,28 +22,27 @@ def progress(step: str) -> Iterator[Callable[[str], None]]:
     Yields the function that names the next step.
     """
     steps, done = [step], threading.Event()
-    teller = threading.Thread(target=_tell, args=(steps, done, time.monotonic()), daemon=True)
-    teller.start()
-    try:
-        yield steps.append
-    finally:
-        done.set()
-        teller.join()
+    with heard() as compiling:
+        teller = threading.Thread(target=_tell, args=(steps, done, compiling, time.monotonic()), daemon=True)
+        teller.start()
+        try:
+            yield steps.append
+        finally:
+            done.set()
+            teller.join()
 
 
-def _tell(steps: list[str], done: threading.Event, started: float) -> None:
+def _tell(steps: list[str], done: threading.Event, compiling: Compiling, started: float) -> None:
     said, wait = "", SILENT_S
     while not done.wait(wait):
-        if _now(steps) == said and done.wait(BEAT_S - NEW_S):
+        if _now(steps, compiling) == said and done.wait(BEAT_S - NEW_S):
             return
-        said, wait = _now(steps), NEW_S
+        said, wait = _now(steps, compiling), NEW_S
         with contextlib.suppress(OSError, ValueError):
             say(f"omnidyn: {said} ... {time.monotonic() - started:.0f} s")
             sys.stderr.flush()
 
 
-def _now(steps: list[str]) -> str:
-    """What is being done; of the compiler only once it is there: it must not be loaded for this."""
-    compiled = sys.modules.get("omnidyn.compiled")
-    compiling = getattr(compiled, "compiling", None)  # none yet, while that is being imported
-    return steps[-1] + (COMPILING if compiling is not None and compiling() else "")
+def _now(steps: list[str], compiling: Compiling) -> str:
+    """What is being done."""
+    return steps[-1] + (COMPILING if compiling.under_way else "")

@@ -20,6 +20,7 @@ from omnidyn.identification.output_error.problem.starts import difference_noise
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
+from omnidyn.model.keys import with_priors
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]
@@ -180,21 +181,17 @@ def intervals(
 
 def _robot(problem: Problem, values: FloatArray, std: Mapping[str, float], unseen: Sequence[str], data: str) -> Robot:
     """The robot with the fitted numbers, and where they come from."""
-    robot, priors = problem.robot, dict(problem.robot.priors)
+    robot, found = problem.robot, {}
     for p, value in zip(problem.parameters[: problem.robot_count], values, strict=False):
         if p.name in unseen:
             continue
         robot = p.on(robot, float(value))
-        whole = p.name.partition("[")[0]
-        if whole != p.name and whole in priors:  # what was known of a list goes to its items
-            inherited = priors.pop(whole)
-            priors.update({f"{whole}[{i}]": inherited for i in range(3)})
         for key, factor in ((p.name, 1.0), *p.also):
-            priors[key] = identified(std[p.name] * factor, f"output error, {data}")
+            found[key] = identified(std[p.name] * factor, f"output error, {data}")
     axes = robot.friction.axes
     if axes.breakaway is not None:
         robot = _breaking_at(robot, [max(s, c) for s, c in zip(axes.breakaway, axes.coulomb, strict=True)])
-    return robot.replace(priors=priors)
+    return with_priors(robot, found)
 
 
 def _breaking_at(robot: Robot, levels: Sequence[float]) -> Robot:
@@ -225,13 +222,13 @@ def _with_levels(robot: Robot, levels: Mapping[str, tuple[float, tuple[float, fl
     if not levels:
         return robot
     hold, coulomb = robot.friction.axes.levels[2].copy(), robot.friction.axes.coulomb
-    priors = dict(robot.priors)
+    found = {}
     for axis in range(3):
         key = f"friction.axes.breakaway[{axis}]"
         if key in levels:
             hold[axis] = max(levels[key][0], coulomb[axis])
-            priors[key] = identified(_spread(levels[key][1]), "output error, profile over the drives of the log")
-    return _breaking_at(robot, hold.tolist()).replace(priors=priors)
+            found[key] = identified(_spread(levels[key][1]), "output error, profile over the drives of the log")
+    return with_priors(_breaking_at(robot, hold.tolist()), found)
 
 
 def _correlation(names: Sequence[str], known: Trust) -> Correlation:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.estimate import unit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.engines.exact import ExactEngine
@@ -25,9 +24,9 @@ from omnidyn.identification.output_error.problem.nuisances import (
     pieces,
 )
 from omnidyn.identification.output_error.problem.parameters import (
-    FRICTION,
     Parameter,
     names_of,
+    refuse_repeated,
     refuse_unknown,
     robot_parameters,
 )
@@ -35,8 +34,6 @@ from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
 from omnidyn.identification.output_error.solve.loop import (
-    friction_keys,
-    friction_of_axis,
     left_out,
     loop_keys,
     loop_pieces,
@@ -51,11 +48,11 @@ from omnidyn.identification.output_error.trust.support import supported, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.keys import BOX, COULOMB, FRICTION, GAINS, VISCOUS, Key, expand, friction_keys, unit
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
-from omnidyn.simulation.sensitivity.directions import GAINS, parameter, with_parameter
 
 FloatArray = NDArray[np.float64]
 
@@ -129,12 +126,14 @@ def fit_output_error(
     know. Of the nuisances, robots that need the implicit engine have latencies by default; they know the others, but
     no position and no wheel angle as outputs.
     """
+    refuse_repeated(names_of(free or ()))
     given = Options(
-        None if free is None else names_of(free), names_of(fixed), nuisance_names(nuisances), start, use_priors,
+        None if free is None else expand_keys(free, robot), expand_keys(fixed, robot), nuisance_names(nuisances),
+        start, use_priors,
         None if outputs is None else names_of(outputs), loss, covariance, tick_rad,
     )  # fmt: skip
     records = read_records([runs] if isinstance(runs, Run) else list(runs), robot, given)
-    return _fitted(records, robot, given, names_of(profile), bootstrap, onlooker(watch))
+    return _fitted(records, robot, given, expand_keys(profile, robot), bootstrap, onlooker(watch))
 
 
 def _fitted(
@@ -279,7 +278,7 @@ def read_records(runs: Sequence[Run], robot: Robot, given: Options) -> list[Reco
             raise InputError(f"unknown {where}", got=value, expected=" or ".join(known), where=where)
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
-    gains = any(key.startswith(GAINS) for key in given.free or ())
+    gains = any(Key.parse(key).name in GAINS for key in given.free or ())
     found = [record(run, robot, given.outputs, gains, given.tick_rad) for run in runs]
     if len({each.set_point is None for each in found}) > 1:
         raise InputError(
@@ -300,7 +299,7 @@ def without_still_axes(
     still: list[tuple[str, float, str]] = []
     fixed, asked = set(given.fixed), given.free if given.free is not None else free_by_default(robot)
     for axis in np.flatnonzero(~found.moved):
-        own = {key for key in (*asked, *FRICTION) if friction_of_axis(key, int(axis))}
+        own = {key for key in (*asked, *BOX) if Key.parse(key).axis == axis}
         fixed |= own
         if not is_exact(robot) and not own & set(asked):
             continue  # friction along the direction of travel: no axis has its own
@@ -308,7 +307,7 @@ def without_still_axes(
         what = f"; it held {held:.4g} {unit(key)}" if held > NOTHING else "; nothing drove it"
         still.append((key, held, found.words(int(axis)) + (what if found.seen[axis] else "")))
         if is_exact(robot) and robot.friction.axes.levels[2][axis] < held:
-            robot = with_parameter(robot, f"friction.axes.coulomb[{axis}]", held)
+            robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)
     if not found.moved.any():
         raise InsufficientDataError(
             "the robot never visibly moved: its friction is only bounded from below",
@@ -331,10 +330,10 @@ def make_problem(records: Sequence[Record], robot: Robot, given: Options) -> Pro
     priors = known_priors(robot) if given.use_priors else {}
     usual = free_by_default(robot)
     keys = list(given.free) if given.free is not None else [*usual, *(key for key in priors if key not in usual)]
-    unknown = [key for key in given.fixed if key not in keys and (KEY not in keys or not key.startswith(KEY))]
+    unknown = [key for key in given.fixed if key not in keys]
     if unknown and given.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
-    keys = [key for key in keys if key not in given.fixed and not key.startswith(KEY)]
+    keys = [key for key in keys if key not in given.fixed and Key.parse(key).name != KEY]
     if not keys:
         got = ", ".join(given.free or ()) or "no key"
         raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
@@ -365,22 +364,29 @@ def _drive(records: Sequence[Record], robot: Robot) -> float:
 def _within_reach(p: Parameter, drive: float) -> Parameter:
     """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
     low = LEAST * p.value if p.low == 0.0 else p.low
-    if not p.name.startswith("friction.") or "coulomb" not in p.name or drive == 0.0:
+    if Key.parse(p.name).level != COULOMB or drive == 0.0:
         return replace(p, low=low)
     return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
 
 
-def free_by_default(robot: Robot) -> list[str]:
+def free_by_default(robot: Robot) -> tuple[str, ...]:
     """B and C of the axes; of a robot with friction elsewhere the levels that it has: one that is off has no slope."""
     if is_exact(robot):
-        return list(FRICTION)
-    return [key for key in friction_keys(robot) if "viscous" in key or parameter(robot, key) > 0.0]
+        return BOX
+    has = {key: Key.parse(key) for key in friction_keys(robot)}
+    return tuple(name for name, key in has.items() if key.level == VISCOUS or key.get(robot) > 0.0)
+
+
+def expand_keys(names: str | Sequence[str], robot: Robot) -> tuple[str, ...]:
+    """The keys that names stand for: "friction" for what is free by default, a list for its entries; others as is."""
+    each = (free_by_default(robot) if name == FRICTION else expand(name, robot) for name in names_of(names))
+    return tuple(dict.fromkeys(key for keys in each for key in keys))
 
 
 def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Priors of the robot file that are independent of any log: key -> (mean, std)."""
+    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry."""
     found = {}
-    for key, prior in robot.priors.items():
+    for name, prior in robot.priors.items():
         if prior.std is not None and not prior.source.startswith(IDENTIFIED):
-            found[key] = (float(parameter(robot, key)), prior.std)
+            found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
     return found

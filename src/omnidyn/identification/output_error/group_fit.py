@@ -21,8 +21,8 @@ from omnidyn.identification.output_error.fit import (
     GAUSS,
     Options,
     degrees,
+    expand_keys,
     fits_exactly,
-    free_by_default,
     loss_words,
     nuisance_names,
 )
@@ -38,7 +38,7 @@ from omnidyn.identification.output_error.group_problem import (
 )
 from omnidyn.identification.output_error.inputs import why_no_inputs
 from omnidyn.identification.output_error.problem.nuisances import AUTO
-from omnidyn.identification.output_error.problem.parameters import FRICTION, names_of, refuse_unknown
+from omnidyn.identification.output_error.problem.parameters import names_of, refuse_unknown
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, looped, retimed
 from omnidyn.identification.output_error.solve.progress import onlooker
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
@@ -58,8 +58,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
-
-FRICTION_KEYS = "friction"  # stands for all six
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +229,7 @@ def join_groups(
         raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
     if bootstrap:
         refuse_bootstrap(bootstrap, Counter(groups))
-    if asked_axes(names_of(free or ())):
+    if asked_axes(expand_keys(free or (), robot)):
         raise UnsupportedError(
             "breakaway is not profiled in groups", got=KEY, expected="other keys", remedy="fit each group alone",
             where="free",
@@ -241,23 +239,10 @@ def join_groups(
     if why:
         raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
     given = Options(
-        None if free is None else tuple(expand_keys(free, robot)), tuple(expand_keys(fixed, robot)),
+        None if free is None else expand_keys(free, robot), expand_keys(fixed, robot),
         nuisance_names(nuisances), start, use_priors, None if outputs is None else names_of(outputs), loss, covariance,
     )  # fmt: skip
     parts = read_parts(runs, groups, robot, given, watch, settle)
     own = own_names(expand_keys(per_free, robot), parts)
     engine = join(parts, own, FINE)
     return JointFit(Solver(engine.problem, engine, degrees(loss)), engine, tuple(own), loss, covariance)
-
-
-def expand_keys(keys: Sequence[str], robot: Robot | None = None) -> list[str]:
-    """Keys with those that stand for several written out: "friction" is what the robot has, a list its items.
-
-    Without a robot, or with one of the exact engine, "friction" is all six of the axes.
-    """
-    known = list(FRICTION) if robot is None else free_by_default(robot)
-    found: list[str] = []
-    for key in names_of(keys):
-        many = [each for each in (*known, *FRICTION) if each.startswith(f"{key}[")]
-        found += known if key == FRICTION_KEYS else many or [key]
-    return list(dict.fromkeys(found))

@@ -29,10 +29,11 @@ from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import PieceSums, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.solve.first_point import first_point, moving_start
-from omnidyn.identification.output_error.solve.loop import friction_of_axis, loop_start, looped
+from omnidyn.identification.output_error.solve.loop import loop_start, looped
 from omnidyn.identification.output_error.solve.progress import NOBODY, Onlooker
 from omnidyn.identification.output_error.solve.solver import Engine, Solver, State
 from omnidyn.identification.output_error.trust.support import supported
+from omnidyn.model.keys import Key, find_key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -41,7 +42,6 @@ IntArray = NDArray[np.int64]
 
 Watch = Callable[[str, State], None]  # the group, and a better state of its fit alone
 
-ANY_FRICTION = "friction."
 AT = "@"  # KEY@GROUP is the number that a group has for itself
 
 
@@ -155,10 +155,11 @@ def _still(name: str, records: Sequence[Record], robot: Robot, given: Options) -
     usual = free_by_default(robot)
     asked = usual if given.free is None else given.free
     resting = [int(axis) for axis in np.flatnonzero(~moved)]
-    still = [key for key in {**dict.fromkeys(usual), **dict.fromkeys(asked)} if _of_any(key, resting)]
+    axis_of = {key: Key.parse(key).axis for key in (*usual, *asked)}
+    still = [key for key, axis in axis_of.items() if axis in resting]
     notes = tuple(
         f"{found.words(axis, name)} there"
-        for axis in resting if any(friction_of_axis(key, axis) for key in still)
+        for axis in resting if axis in axis_of.values()
     )  # fmt: skip
     if not still:
         return given, notes
@@ -167,10 +168,6 @@ def _still(name: str, records: Sequence[Record], robot: Robot, given: Options) -
         return replace(given, fixed=tuple({*given.fixed, *still})), notes
     left = tuple(key for key in free if key not in still and key not in given.fixed)
     return replace(given, free=left, fixed=()), notes
-
-
-def _of_any(key: str, axes: Sequence[int]) -> bool:
-    return any(friction_of_axis(key, axis) for axis in axes)
 
 
 def _settled(
@@ -191,7 +188,7 @@ def _settled(
 def own_names(asked: Sequence[str], parts: Sequence[Part]) -> list[str]:
     """The numbers that each group has for itself. Raises InputError where one is not free, or where there is none."""
     names = list(dict.fromkeys(name for part in parts for name in part.problem.names))
-    own = list(asked) or [name for name in names if name.startswith(ANY_FRICTION)]
+    own = list(asked) or [name for name in names if (key := find_key(name)) and key.level]
     unknown = [name for name in own if name not in names]
     if unknown:
         raise InputError(

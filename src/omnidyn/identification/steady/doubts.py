@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtr
 
-from omnidyn.identification.estimate import unit
 from omnidyn.identification.steady.line import Line
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, wrench_from_currents
+from omnidyn.model.keys import unit
 from omnidyn.model.motor import back_emf
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed

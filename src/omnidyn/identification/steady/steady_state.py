@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.estimate import Correlation, Estimate, identified, unit
+from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.steady.doubts import ORIGIN, about_line, about_points
 from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.friction import AxesFriction
+from omnidyn.model.keys import unit
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from omnidyn.identification.estimate import unit
 from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_words import FORCES, label
+from omnidyn.model.keys import unit
 
 WIDTH = 100
 

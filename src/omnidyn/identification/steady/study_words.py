@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from omnidyn.identification.estimate import unit
 from omnidyn.identification.steady.choice import APART, ShapeChoice, ShapeScore
 from omnidyn.identification.steady.operating_points import CURRENT, SPEEDS, ForcePoints
 from omnidyn.identification.steady.shape_fit import ShapeFit
 from omnidyn.identification.steady.study_parts import Difference, Viscous
+from omnidyn.model.keys import unit
 
 FORCES = {"current": "motor currents, eqs (7)-(10)", "voltage": "voltage and speed, eq (11)"}
 LOW_WEIGHT = 0.5

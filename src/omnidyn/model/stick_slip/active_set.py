@@ -6,7 +6,7 @@ the scratch array as Gauss-Jordan rows (what is forbidden) and as a basis B (wha
 
 from __future__ import annotations
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import ELLIPSE, GX, GY, GZ, SIGN
 from omnidyn.model.stick_slip.workspace import BASIS, JACOBIAN, MATRIX, NEWTON, PIVOT, RESIDUAL, ROW, SPARE
 

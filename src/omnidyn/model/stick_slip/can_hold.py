@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import ELLIPSE, GX, GY, GZ, HOLD, HOLD_X, HOLD_Y, LOSS, SIGN
 from omnidyn.model.stick_slip.workspace import BASIS, RESIDUAL, WORST
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
     AXES,
     BOUND,

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
     BEFORE,
     ELLIPSE,

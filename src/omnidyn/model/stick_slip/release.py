@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import (
     AXES,
     BOUND,

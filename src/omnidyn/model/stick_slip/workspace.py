@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 
 RESIDUAL, NEWTON, TRIAL, WORST, SPARE, LINE = 0, 1, 2, 3, 4, 5
 BASIS, ROW, JACOBIAN, MATRIX = 6, 9, 12, 15  # three rows each

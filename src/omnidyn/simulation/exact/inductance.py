@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import drive_wrench, mass_matrix, wrench_from_currents
 from omnidyn.model.robot import Robot

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.compiled import kernel, maker, part
+from omnidyn.compiled.kernel import kernel, maker, part
 from omnidyn.simulation.exact.inductance_step import forces, law_of, response, roots, segment
 from omnidyn.simulation.exact.march import SETTLED
 from omnidyn.simulation.pose import put_next_pose, rotated

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 
 TERMS = 22  # of a power series in a number of size <= 1: 1/22! is below the last bit
 ROOT_STEPS = 200  # Newton takes about 5; bisection, its fallback, at most some 60

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, maker, part
+from omnidyn.compiled.kernel import kernel, maker, part
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.motor import DYNAMIC

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.simulation.exact import step as formula
 from omnidyn.simulation.exact.march import NODES, WEIGHTS, next_cut, turning
 from omnidyn.simulation.exact.slopes import hold_slopes, step_slopes, travel_slopes

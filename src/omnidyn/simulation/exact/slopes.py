@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 
 SHORT = 1e-2  # a h below which the closed forms lose digits to cancellation and a series takes over
 

@@ -6,23 +6,21 @@ a derivative of exactly 0 along what it holds; a stop, a reversal and a release 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.keys import Key
 from omnidyn.model.layout import ACTIVE, AXES, EFFICIENCY, ELLIPSE, GX, GZ, HOLD, LENGTH, SLIDE, SLIDE_X, SLIDE_Y
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant, plant
 from omnidyn.model.stick_slip.release import new_state, start_state, with_given_currents
 from omnidyn.model.stick_slip.workspace import scratch
-from omnidyn.model.value import Value, keys_of
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands
 from omnidyn.simulation.implicit.march import Outcome, begun, room
@@ -35,7 +33,6 @@ from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, curre
 FloatArray = NDArray[np.float64]
 
 RATE = "drive.rate_Hz"
-GAINS = ("drive.kp_V_s_rad", "drive.ki_V_rad")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +58,8 @@ def derivatives(
     """Simulate and differentiate with respect to numbers of the robot file, such as "friction.axes.coulomb[1]".
 
     robot, voltage or duty or set points of a speed loop, dt, supply, twist, pose, tol: as for `simulate`; the implicit
-    engine runs whatever the robot. keys: numbers that the robot has; `with_parameter` says how they are named. tol
-    None: derivatives of the fixed-step map itself.
+    engine runs whatever the robot. keys: numbers that the robot has, see `Key`. tol None: derivatives of
+    the fixed-step map itself.
 
     They belong to the sequence of starts, stops and reversals that the run shows. Not differentiable, and not seen:
     whether something breaks away at all, a stop that only just happens, an ellipse crossing rest at an angle, a voltage
@@ -221,88 +218,12 @@ def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
         )  # fmt: skip
 
 
-def with_parameter(robot: Robot, key: str, value: float) -> Robot:
-    """The robot with one number changed, checked. Raises InputError for an unknown key or a value out of range.
-
-    key: as in the robot file, such as "body.mass_kg", "friction.axes.viscous[0]". What stands once for all wheels can
-    be changed as a whole or, as "motor.resistance_ohm[2]", for one wheel, the others keeping theirs.
-    """
-    try:
-        return changed_parameter(robot, key, value, checked=True)
-    except InputError as error:
-        got, where = error.got or None, error.where if error.where.startswith(key) else key
-        raise InputError(error.what, got=got, expected=error.expected, remedy=error.remedy, where=where) from None
-
-
-def parameter(robot: Robot, key: str) -> float:
-    """The number of a robot that stands under `key`."""
-    node, field, index = _find(robot, key)
-    content = getattr(node, field)
-    return content if index is None or not isinstance(content, tuple) else content[index]
-
-
 def _scale(robot: Robot, key: str) -> float:
     """The size of a parameter, 1 where it is 0: changes are relative to it."""
-    return abs(parameter(robot, key)) or 1.0
+    return abs(Key.parse(key).get(robot)) or 1.0
 
 
 def _moved(robot: Robot, key: str, scale: float, side: float) -> Robot:
     """The robot with one number changed a little; not checked, for it may be at the end of its range."""
-    return changed_parameter(robot, key, parameter(robot, key) + side * EPS * scale, checked=False)
-
-
-_KEY = re.compile(r"([a-z_]+(?:\.[A-Za-z_0-9]+)+)(?:\[(\d+)\])?")
-
-
-def _find(robot: Robot, key: str) -> tuple[Value, str, int | None]:
-    """(the table, the name of the field, the index or None) of a key that names one number."""
-    match = _KEY.fullmatch(key)
-    if match is None:
-        raise InputError("not a key", got=key, expected='such as "body.mass_kg", "friction.axes.coulomb[1]"')
-    path, index = match[1].split("."), None if match[2] is None else int(match[2])
-    node: Any = robot
-    table, field = robot, ""
-    for part in path:
-        known = keys_of(type(node), []) if isinstance(node, Value) else {}
-        if part not in known:
-            raise InputError("unknown key", got=part, expected=" or ".join(known) or "no more", where=key)
-        table, field = node, known[part]
-        node = getattr(table, field)
-    if isinstance(node, bool) or not isinstance(node, float | int | tuple):
-        raise InputError("not a number of this robot", got=node, expected="a number that it has", where=key)
-    count = len(node) if isinstance(node, tuple) else robot.wheels.count if _one_per_wheel(path) else 0
-    if (index is None) if isinstance(node, tuple) else (index is not None and not count):
-        raise InputError("needs an index" if index is None else "has no index", got=key, where=key)
-    if index is not None and index >= count:
-        raise InputError("index out of range", got=index, expected=f"0 to {count - 1}", where=key)
-    return table, field, index
-
-
-def _one_per_wheel(path: list[str]) -> bool:
-    """Whether a list under this key means one value per wheel."""
-    return path[0] in ("wheels", "motor") or path[:2] == ["friction", "wheels"] or ".".join(path) in GAINS
-
-
-def changed_parameter(robot: Robot, key: str, value: float, checked: bool) -> Robot:
-    """As `with_parameter`; not `checked` is quick, and takes values that no robot file may have."""
-    table, field, index = _find(robot, key)
-    content: Any = value
-    if index is not None:
-        old = getattr(table, field)
-        many = list(old) if isinstance(old, tuple) else [old] * robot.wheels.count
-        many[index] = value
-        content = tuple(many)
-    changes: Any = {field: content}
-    names: list[tuple[Any, str]] = []  # the tables on the way, outermost first
-    node: Any = robot
-    for part in key.partition("[")[0].split(".")[:-1]:
-        names.append((node, keys_of(type(node), [])[part]))
-        node = getattr(*names[-1])
-    new = _changed(node, changes, checked)
-    for outer, name in reversed(names):
-        new = _changed(outer, {name: new}, checked)
-    return new
-
-
-def _changed(node: Value, changes: dict[str, Any], checked: bool) -> Any:
-    return node.replace(**changes) if checked else node.model_copy(update=changes)
+    place = Key.parse(key)
+    return place.set(robot, place.get(robot) + side * EPS * scale, checked=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
     AXES,
     BOUND,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import AXES, BOUND, LENGTH, LIMIT, VOLTAGE
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import AXES, BOUND, LENGTH, LIMIT, VOLTAGE
 from omnidyn.model.stick_slip.release import SIGNS, settle, sticks
 from omnidyn.model.stick_slip.workspace import copy_row, copy_table

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import part
+from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import LENGTH
 from omnidyn.model.stick_slip.release import SIGNS
 from omnidyn.simulation.implicit.step import GAMMA

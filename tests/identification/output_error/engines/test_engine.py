@@ -7,32 +7,13 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine, Weigh
 from omnidyn.identification.output_error.fit import Options, make_problem, read_records
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import Point, per_column
+from omnidyn.model.keys import Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
-from tests.reference.robots import random_program, random_robot, robot_of
+from tests.support.march_cases import ROBOT_KEYS, a_case
 
-ROBOT_KEYS = (
-    *(f"friction.axes.{name}[{axis}]" for name in ("viscous", "coulomb") for axis in range(3)),
-    "body.mass_kg", "body.inertia_kg_m2", "motor.resistance_ohm", "motor.torque_constant_Nm_A",
-    "motor.emf_constant_Vs_rad", "motor.gear_ratio", "wheels.wheel_radius_m", "wheels.robot_radius_m",
-)  # fmt: skip
 NUISANCES = ("latency", "gain", "dead_band", "fade")
 TRUE = {"latency": 0.0137, "gain": 1.07, "dead_band": 0.21, "fade": 0.06}
-
-
-def a_case(seed, steps=300):
-    """(robot, run): a random robot with S = C and irregular steps of 1 to 30 ms, from a start in motion."""
-    robot = robot_of(random_robot(seed))
-    robot = robot.replace(
-        friction=robot.friction.replace(axes=robot.friction.axes.replace(breakaway=None)),
-        motor=robot.motor.replace(voltage_limit=24.0),
-    )
-    rng = np.random.default_rng(seed)
-    dt = rng.uniform(0.001, 0.03, steps) if seed % 2 else np.full(steps, 0.01)
-    voltage = 0.8 * random_program(seed, steps, robot.wheels.count)
-    start = rng.normal(size=3) * [0.3, 0.3, 2.0]
-    return robot, simulate(robot, voltage, dt, twist=start), voltage, dt, start
 
 
 def problem_of(robot, run, free=ROBOT_KEYS, nuisances=(), outputs=("twist", "wheel_speed", "current", "heading")):
@@ -71,10 +52,10 @@ def test_slopes_are_central_differences_of_whole_runs(seed):
     ((_, slopes),) = ExactEngine(problem).outputs(point)
     good, total = 0, 0
     for j, key in enumerate(ROBOT_KEYS):
-        step = 1e-6 * parameter(robot, key)
+        step = 1e-6 * Key.parse(key).get(robot)
         sides = []
         for sign in (1.0, -1.0):
-            moved = with_parameter(robot, key, parameter(robot, key) + sign * step)
+            moved = Key.parse(key).set(robot, Key.parse(key).get(robot) + sign * step)
             sides.append(logged(simulate(moved, voltage, dt, twist=start)))
         differences = (sides[0] - sides[1]) / (2.0 * step)
         scale = np.abs(differences).max(axis=0) + 1e-300

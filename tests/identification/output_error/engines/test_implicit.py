@@ -13,10 +13,10 @@ from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
+from omnidyn.model.keys import Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, voltages
+from tests.support.axebot_logs import NOISE, voltages
 
 TRUTH = {
     "friction.direction.coulomb[0]": 2.2,
@@ -49,7 +49,7 @@ def log(ellipse):
 def test_an_ellipse_in_a_turning_frame_seen_late(ellipse, log):
     start = ellipse
     for key, true in TRUTH.items():
-        start = with_parameter(start, key, 1.4 * true)
+        start = Key.parse(key).set(start, 1.4 * true)
     fit = fit_output_error(log, start, free=list(TRUTH), start="rest")
     for key, true in TRUTH.items():
         assert abs(fit.value[key] - true) < 4.5 * fit.std[key]
@@ -81,7 +81,7 @@ def test_the_fast_fit_ends_where_an_independent_optimiser_does(ellipse, log):
     def residual(scaled):
         robot, late = ellipse, float(scaled[-1]) * 0.007
         for key, value in zip(TRUTH, scaled, strict=False):
-            robot = with_parameter(robot, key, float(value) * TRUTH[key])
+            robot = Key.parse(key).set(robot, float(value) * TRUTH[key])
         share = 1.0 - late / 0.01
         dt = np.tile([share * 0.01, (1.0 - share) * 0.01], len(t) - 1)
         twist = simulate(robot, np.repeat(log.voltage[:-1], 2, axis=0), dt, tol=1e-7).twist
@@ -111,7 +111,7 @@ def applied(voltage, values):
 def shown(robot, voltage, values, start=START, tol=1e-9):
     """Twist, wheel speeds, currents and heading as a log has them, each late, by runs with rows there."""
     for key, value in values.items():
-        robot = with_parameter(robot, key, value) if key.startswith(("friction", "body", "motor")) else robot
+        robot = Key.parse(key).set(robot, value) if key.startswith(("friction", "body", "motor")) else robot
     found = []
     for channel, width in (("twist", 3), ("wheel_speed", 3), ("current", 3), ("heading", 1)):
         late = values.get(f"latency.{channel}", 0.0)

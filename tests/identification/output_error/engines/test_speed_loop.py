@@ -11,11 +11,11 @@ from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem, read_records
 from omnidyn.identification.output_error.group_fit import identify_groups
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.loop import friction_keys, gain_keys, retimed
+from omnidyn.identification.output_error.solve.loop import retimed
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.keys import Key, friction_keys, gain_keys
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
 
 KP, KI = "drive.kp_V_s_rad", "drive.ki_V_rad"
@@ -59,13 +59,13 @@ def log(robot, seed, rows=500, late=0, channels=("twist", "current")):
 
 def wrong(robot, **factors):
     for key, factor in {KP: 3.0, **factors}.items():
-        robot = with_parameter(robot, key, factor * parameter(robot, key))
+        robot = Key.parse(key).set(robot, factor * Key.parse(key).get(robot))
     return robot
 
 
 def assert_near(fit, robot, most=4.5):
     for key, value in fit.value.items():
-        assert abs(value - parameter(robot, key)) < most * fit.std[key], key
+        assert abs(value - Key.parse(key).get(robot)) < most * fit.std[key], key
 
 
 def test_gains_and_friction_that_are_not_known(looped):
@@ -94,12 +94,12 @@ def test_an_ellipse_robot_seen_late(ellipse):
 def test_an_independent_optimiser_ends_at_the_same_point(ellipse):
     """scipy's least squares on `simulate`, by its own differences, weighted with the true noise."""
     run, keys = log(ellipse, 3, 250), ["friction.direction.coulomb[0]", "friction.direction.viscous", KP]
-    true = np.array([parameter(ellipse, key) for key in keys])
+    true = np.array([Key.parse(key).get(ellipse) for key in keys])
 
     def residual(scaled):
         robot = ellipse
         for key, value in zip(keys, scaled * true, strict=True):
-            robot = with_parameter(robot, key, float(value))
+            robot = Key.parse(key).set(robot, float(value))
         model = simulate(robot, dt=0.01, twist_command=run.twist_command[:-1], tol=1e-8)
         parts = (model.twist - run.twist) / NOISE, (model.current - run.current) / CURRENT_NOISE
         return np.hstack(parts).ravel()
@@ -155,7 +155,7 @@ def test_two_floors_share_the_gains(looped):
     rough = looped
     for axis in range(3):
         key = f"friction.axes.coulomb[{axis}]"
-        rough = with_parameter(rough, key, 1.3 * parameter(looped, key))
+        rough = Key.parse(key).set(rough, 1.3 * Key.parse(key).get(looped))
     runs = [log(looped, 5, 300), log(rough, 6, 300), log(looped, 7, 300), log(rough, 8, 300)]
     found = identify_groups(runs, wrong(looped), ["smooth", "rough"] * 2, nuisances=())
     assert set(found.shared) == {KP, KI}
@@ -215,10 +215,10 @@ def test_what_cannot_be_used(looped):
 
 def test_friction_keys_name_what_is_there(looped, ellipse):
     wheels = looped.replace(friction=Friction(wheels=WheelFriction(coulomb=(0.3, 0.2, 0.25), viscous=0.1)))
-    assert friction_keys(wheels) == [*(f"friction.wheels.coulomb[{w}]" for w in range(3)), "friction.wheels.viscous"]
+    assert friction_keys(wheels) == (*(f"friction.wheels.coulomb[{w}]" for w in range(3)), "friction.wheels.viscous")
     assert friction_keys(ellipse)[0] == "friction.direction.coulomb[0]"
     none = looped.replace(friction=Friction(axes=AxesFriction(viscous=(0.0,) * 3, coulomb=(0.0,) * 3)))
-    assert friction_keys(none) == []
+    assert friction_keys(none) == ()
 
 
 def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(looped):

@@ -6,31 +6,14 @@ import pytest
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.fit import Options, make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.model.keys import Key
 from omnidyn.model.statespace import state_space
-from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
-from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.engines.test_engine import ROBOT_KEYS, a_case
+from tests.support.march_cases import FACING, ROBOT_KEYS, a_case, truth
 
 OUTPUTS = ("heading", "position", "wheel_angle")
-FACING = 0.7  # heading at the start [rad]
 LATE = {"latency.heading": 0.0137, "latency.position": 0.0071, "latency.wheel_angle": 0.0113}
 TILT = {"tilt.x": 0.31, "tilt.y": -0.22, "tilt.yaw": 0.013}
-
-
-def truth(robot, voltage, dt, start, facing=FACING):
-    """(heading, x, y, angles of the wheels) at every row.
-
-    The axes do not couple: with a yaw that cannot move, the path of simulate is the integral of the speeds, which the
-    wheels have rolled.
-    """
-    run = simulate(robot, voltage, dt, twist=start, pose=[0.0, 0.0, facing])
-    levels = [*robot.friction.axes.coulomb[:2], 1e5]
-    stuck = robot.replace(friction=robot.friction.replace(axes=robot.friction.axes.replace(coulomb=tuple(levels))))
-    rolled = simulate(stuck, voltage, dt, twist=[*start[:2], 0.0]).pose.copy()
-    rolled[:, 2] = run.pose[:, 2] - facing
-    return np.hstack([run.pose[:, 2:], run.pose[:, :2], wheel_speed(robot.wheels, rolled)])
 
 
 def problem_of(robot, voltage, dt, values, nuisances=(), free=ROBOT_KEYS):
@@ -67,9 +50,9 @@ def test_outputs_and_slopes_are_those_of_whole_runs(seed):
     np.testing.assert_allclose(outputs, expected, atol=1e-11 * np.abs(expected).max())
     good, total = 0, 0
     for j, key in enumerate(ROBOT_KEYS):
-        step = 1e-6 * parameter(robot, key)
+        step = 1e-6 * Key.parse(key).get(robot)
         sides = [
-            truth(with_parameter(robot, key, parameter(robot, key) + sign * step), voltage, dt, start)
+            truth(Key.parse(key).set(robot, Key.parse(key).get(robot) + sign * step), voltage, dt, start)
             for sign in (1.0, -1.0)
         ]
         well, many = share_within(slopes[:, :, j], (sides[0] - sides[1]) / (2.0 * step))
@@ -133,8 +116,10 @@ def test_a_constant_force_is_that_of_volts_that_push_as_hard(seed):
         well, many = share_within(slopes[:, :, len(ROBOT_KEYS) + axis], (sides[0] - sides[1]) / 2e-6)
         good, total = good + well, total + many
     for key in ("body.mass_kg", "body.inertia_kg_m2"):
-        step = 1e-6 * parameter(robot, key)
-        sides = [tilted(with_parameter(robot, key, parameter(robot, key) + sign * step), force) for sign in (1.0, -1.0)]
+        step = 1e-6 * Key.parse(key).get(robot)
+        sides = [
+            tilted(Key.parse(key).set(robot, Key.parse(key).get(robot) + sign * step), force) for sign in (1.0, -1.0)
+        ]
         at = slopes[:, :, ROBOT_KEYS.index(key)]
         well, many = share_within(at, (sides[0] - sides[1]) / (2.0 * step))
         good, total = good + well, total + many

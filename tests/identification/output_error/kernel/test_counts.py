@@ -10,11 +10,11 @@ from scipy.stats import truncnorm
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.group_fit import identify_groups
 from omnidyn.identification.output_error.kernel.counts import count_terms, find_tick, information, rounding, tail
+from omnidyn.model.keys import Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.engines.test_travel import truth
-from tests.identification.output_error.test_axebot import voltages
+from tests.support.axebot_logs import voltages
+from tests.support.march_cases import truth
 
 mpmath.mp.dps = 50
 WIDE = np.exp(np.linspace(np.log(1e-9), np.log(30.0), 12))
@@ -98,7 +98,7 @@ def test_without_noise_the_spread_of_the_draws_is_what_a_fit_says(axebot, rolled
         counted = ticks_of(angle, 2.0 * np.pi / 512, np.random.default_rng(seed), 0.0)
         log = Run(t=run.t, voltage=run.voltage, wheel_angle=counted)
         fit = fit_output_error(log, axebot, nuisances=(), start="rest")
-        z.append([(v - float(parameter(axebot, key))) / fit.std[key] for key, v in fit.value.items()])
+        z.append([(v - float(Key.parse(key).get(axebot))) / fit.std[key] for key, v in fit.value.items()])
     sizes = np.sqrt(np.mean(np.square(z), axis=0))  # 1, +- 0.11 by 40 draws
     assert sizes.max() < 1.33
     assert sizes.min() > 0.67
@@ -162,7 +162,7 @@ def test_a_log_of_ticks_alone_against_another_optimiser(axebot, rolled):
     def model(values):
         moved = axebot
         for key, value in zip(free, values, strict=True):
-            moved = with_parameter(moved, key, float(value))
+            moved = Key.parse(key).set(moved, float(value))
         return truth(moved, voltage, np.full(300, 0.01), np.zeros(3), 0.0)[:, 3:]
 
     def cost(x):
@@ -196,7 +196,7 @@ def test_ticks_are_found_and_hold_the_truth(axebot, rolled):
     log = Run(t=run.t, voltage=run.voltage, wheel_angle=ticks_of(angle, tick, np.random.default_rng(7), 0.3))
     fit = fit_output_error(log, axebot, nuisances=())
     for key, value in fit.value.items():
-        assert abs(value - float(parameter(axebot, key))) <= 4.5 * fit.std[key]
+        assert abs(value - float(Key.parse(key).get(axebot))) <= 4.5 * fit.std[key]
     assert list(fit.noise) == [f"wheel_angle[{i}]" for i in range(3)]
     assert list(fit.noise.values()) == pytest.approx([0.3 * tick] * 3, rel=0.1)
 

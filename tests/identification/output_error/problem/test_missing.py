@@ -7,14 +7,13 @@ import pytest
 
 from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.output_error import fit as whole
-from omnidyn.identification.output_error.problem.parameters import FRICTION
 from omnidyn.identification.validation import validate
 from omnidyn.logs.read_log import read_log
 from omnidyn.logs.run_file import write_run
+from omnidyn.model.keys import BOX, Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import with_parameter
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import TRUTH, noisy, voltages
+from tests.support.axebot_logs import TRUTH, noisy, voltages
 
 fit_output_error = partial(whole.fit_output_error, nuisances=(), start="rest")
 EVERY = 5
@@ -77,11 +76,11 @@ def test_an_axis_without_a_sensor_has_held_nothing(axebot, log):
 
 def test_a_gap_in_motion_ends_in_a_few_steps(axebot):
     """Latency keeps the first rows of a piece out; a start that the rest has forgotten stays where it was measured."""
-    quick = with_parameter(axebot, "motor.resistance_ohm", 0.3)  # forgets in 27 ms
+    quick = Key.parse("motor.resistance_ohm").set(axebot, 0.3)  # forgets in 27 ms
     log = noisy(simulate(quick, voltages(np.random.default_rng(11)), 0.01), 0)
     there = (log.t < 10.0) | (log.t > 13.0)
     run = Run(t=log.t[there], voltage=log.voltage[there], twist=log.twist[there])
     fit = whole.fit_output_error(run, quick, nuisances=["latency", "dead_band"])
     assert fit.converged
     assert fit.iterations < 10
-    assert all(abs(fit.value[key] - TRUTH[key]) < 4.0 * fit.std[key] for key in FRICTION)
+    assert all(abs(fit.value[key] - TRUTH[key]) < 4.0 * fit.std[key] for key in BOX)

@@ -8,7 +8,7 @@ from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, TRUTH, voltages
+from tests.support.axebot_logs import NOISE, TRUTH, voltages
 
 TILTED = np.array([1.5 * 9.81 * np.sin(np.radians(1.0)), -0.1, 0.004])  # [N, N, N m]
 

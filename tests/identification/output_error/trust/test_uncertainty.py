@@ -5,14 +5,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from benchmarks.identify import excitation
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error import fit as whole
-from omnidyn.identification.output_error.problem.parameters import FRICTION
+from omnidyn.model.keys import BOX, Key
 from omnidyn.run import Run
-from omnidyn.simulation.sensitivity.directions import parameter, with_parameter
 from omnidyn.simulation.simulate import simulate
-from tests.identification.output_error.test_axebot import NOISE, TRUTH, noisy, voltages
+from tests.support.axebot_logs import NOISE, TRUTH, excitation, noisy, voltages
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
@@ -49,10 +47,10 @@ def test_coloured_noise_is_seen_and_the_intervals_follow(axebot, clean):
 
 def test_no_friction_stands_at_the_bound_with_an_interval_that_holds_it(axebot, clean):
     none = axebot
-    for key in FRICTION:
-        none = with_parameter(none, key, 0.0)
+    for key in BOX:
+        none = Key.parse(key).set(none, 0.0)
     fit = fit_output_error(noisy(simulate(none, clean.voltage[:-1], 0.01), 5), axebot, start="rest")
-    assert all(fit.ci95[key][0] <= 0.0 <= fit.ci95[key][1] for key in FRICTION)
+    assert all(fit.ci95[key][0] <= 0.0 <= fit.ci95[key][1] for key in BOX)
     assert fit.at_bound
     for key in fit.at_bound:
         assert fit.value[key] == 0.0
@@ -61,14 +59,14 @@ def test_no_friction_stands_at_the_bound_with_an_interval_that_holds_it(axebot, 
 
 def test_what_only_the_product_shows_is_named(axebot, clean):
     """Torque constant times gear ratio is all that voltage and speed see of the two; from 1.5x wrong constants."""
-    start = with_parameter(with_parameter(axebot, KT, 1.5 * 0.0059), "motor.emf_constant_Vs_rad", 1.5 * 0.0059)
-    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, "motor.gear_ratio"], start="rest")
+    start = Key.parse("motor.emf_constant_Vs_rad").set(Key.parse(KT).set(axebot, 1.5 * 0.0059), 1.5 * 0.0059)
+    fit = fit_output_error(noisy(clean, 1), start, free=[*BOX, KT, "motor.gear_ratio"], start="rest")
     assert set(fit.unidentifiable) == {KT, "motor.gear_ratio"}
     assert fit.value[KT] * fit.value["motor.gear_ratio"] == pytest.approx(0.0059 * 19.0, rel=0.01)
     (words,) = fit.blind
     assert "motor.gear_ratio +1 %" in words or "motor.gear_ratio -1 %" in words
     assert "friction" not in words
-    assert np.isfinite([fit.std[key] for key in FRICTION]).all()
+    assert np.isfinite([fit.std[key] for key in BOX]).all()
 
 
 def test_physical_numbers_with_currents(axebot, clean):
@@ -77,8 +75,8 @@ def test_physical_numbers_with_currents(axebot, clean):
     log = noisy(clean, 2).replace(current=clean.current + 0.05 * rng.normal(size=clean.current.shape))
     start = axebot
     for key, wrong in zip((*keys, "motor.emf_constant_Vs_rad"), (2.5, 0.015, 2.6, 0.009, 0.009), strict=True):
-        start = with_parameter(start, key, wrong)
-    fit = fit_output_error(log, start, free=[*FRICTION, *keys], start="rest")
+        start = Key.parse(key).set(start, wrong)
+    fit = fit_output_error(log, start, free=[*BOX, *keys], start="rest")
     for key, true in zip(keys, (1.5, 0.025, 1.69, 0.0059), strict=True):
         assert abs(fit.value[key] - true) < 4.0 * fit.std[key]
         assert fit.std[key] < 0.005 * true
@@ -86,7 +84,7 @@ def test_physical_numbers_with_currents(axebot, clean):
 
 
 def test_the_profile_agrees_where_the_likelihood_is_quadratic(axebot, clean):
-    key = FRICTION[0]
+    key = BOX[0]
     log = noisy(clean, 3)
     plain = fit_output_error(log, axebot, start="rest")
     profiled = fit_output_error(log, axebot, start="rest", profile=[key])
@@ -98,7 +96,7 @@ def test_the_profile_agrees_where_the_likelihood_is_quadratic(axebot, clean):
 @pytest.mark.parametrize("loss", ["gaussian", "student-t"])
 def test_a_profile_knows_of_colour(axebot, clean, loss):
     """Errors that remember make the likelihood too steep; it is all but a parabola, so both ways say the same."""
-    keys, how = [FRICTION[0], FRICTION[4]], {"start": "rest", "loss": loss}
+    keys, how = [BOX[0], BOX[4]], {"start": "rest", "loss": loss}
     log = coloured(clean, 3)
     plain = fit_output_error(log, axebot, **how)
     profiled = fit_output_error(log, axebot, profile=keys, **how)
@@ -116,7 +114,7 @@ def test_breakaway_knows_of_colour(axebot):
     keys, held = [f"friction.axes.breakaway[{axis}]" for axis in range(3)], 0
     for seed in range(10):
         log = coloured(simulate(robot, excitation(30.0, seed=200 + seed), 0.01), seed)
-        fit = fit_output_error(log, axebot, free=[*FRICTION, *keys], start="rest")
+        fit = fit_output_error(log, axebot, free=[*BOX, *keys], start="rest")
         held += sum(fit.ci95[key][0] <= level <= fit.ci95[key][1] for key, level in zip(keys, levels, strict=True))
     assert held >= 27
 
@@ -127,7 +125,7 @@ def test_bootstrap_over_runs(axebot):
     plain = fit_output_error(runs, axebot, start="rest")
     drawn, again = (fit_output_error(runs, axebot, start="rest", bootstrap=60) for _ in range(2))
     assert drawn.std == again.std
-    ratio = np.array([drawn.std[key] / plain.std[key] for key in FRICTION])
+    ratio = np.array([drawn.std[key] / plain.std[key] for key in BOX])
     assert (ratio > 0.5).all()
     assert (ratio < 2.0).all()
     with pytest.raises(InsufficientDataError, match="too few runs for a bootstrap; got 1; expected 5"):
@@ -146,7 +144,7 @@ def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
     for _ in range(40):
         runs = []
         for level in TRUTH[key] * (1.0 + 0.15 * rng.normal(size=25)):
-            run = simulate(with_parameter(axebot, key, float(level)), base, 0.01)
+            run = simulate(Key.parse(key).set(axebot, float(level)), base, 0.01)
             runs.append(Run(t=run.t, voltage=run.voltage, twist=run.twist + rng.normal(size=run.twist.shape) * NOISE))
         for kind, found in errors.items():
             fit = fit_output_error(runs, axebot, start="rest", covariance=kind)
@@ -161,28 +159,28 @@ def test_a_number_with_a_small_share_of_a_lost_direction_is_lost_too(axebot, cle
     """Twist tells of K/R, and of K^2/R only with viscous friction: 1 % of K and R is worth 5 % of it or more."""
     start = axebot
     for key in (KT, "motor.emf_constant_Vs_rad"):
-        start = with_parameter(start, key, 0.95 * 0.0059)
+        start = Key.parse(key).set(start, 0.95 * 0.0059)
     resistance = "motor.resistance_ohm"
-    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, resistance], start="rest")
-    lost = {KT, resistance, *FRICTION[:3]}
+    fit = fit_output_error(noisy(clean, 1), start, free=[*BOX, KT, resistance], start="rest")
+    lost = {KT, resistance, *BOX[:3]}
     assert set(fit.unidentifiable) == lost
     assert all(np.isinf(fit.std[key]) for key in lost)
     (words,) = fit.blind
     assert all(key in words for key in lost)
     known = fit_output_error(noisy(clean, 1), axebot, start="rest")
-    for key in FRICTION[3:]:  # as well known as where the other numbers are: no better
+    for key in BOX[3:]:  # as well known as where the other numbers are: no better
         assert fit.value[key] == pytest.approx(known.value[key], abs=0.2 * known.std[key])
         assert 0.95 * known.std[key] < fit.std[key] < 2.0 * known.std[key]
     for key in lost:  # together they are right, so the robot has all of them
-        assert parameter(fit.robot, key) == fit.value[key]
+        assert Key.parse(key).get(fit.robot) == fit.value[key]
 
 
 def test_what_lies_on_the_other_side_of_a_bound_is_lost_too(axebot, clean):
     """With the torque constant too large, viscous friction stops at 0; that does not tell the constant."""
     start = axebot
     for key in (KT, "motor.emf_constant_Vs_rad"):
-        start = with_parameter(start, key, 1.3 * 0.0059)
-    fit = fit_output_error(noisy(clean, 1), start, free=[*FRICTION, KT, "motor.resistance_ohm"], start="rest")
+        start = Key.parse(key).set(start, 1.3 * 0.0059)
+    fit = fit_output_error(noisy(clean, 1), start, free=[*BOX, KT, "motor.resistance_ohm"], start="rest")
     assert {KT, "motor.resistance_ohm"} <= set(fit.unidentifiable)
 
 

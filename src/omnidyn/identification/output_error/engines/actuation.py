@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel
+from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.kernel.march import DEAD, FADE, GAIN, driven
 
 FloatArray = NDArray[np.float64]

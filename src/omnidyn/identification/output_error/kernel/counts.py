@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 
 FloatArray = NDArray[np.float64]
 

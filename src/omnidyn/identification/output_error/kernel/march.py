@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, part
+from omnidyn.compiled.kernel import kernel, part
 from omnidyn.identification.output_error.kernel.counts import count_terms
 from omnidyn.simulation.exact.position import move_on, put_displacement
 from omnidyn.simulation.exact.slopes import acceleration_at_end, hold_slopes, step_slopes, travel_slopes

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel
+from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.kernel.march import FINAL, SAME, loss_terms
 from omnidyn.simulation.exact.slopes import hold_slopes, step_slopes
 

@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
+from omnidyn.model.keys import BREAKAWAY, EMF, TORQUE, Key, expand
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.sensitivity.directions import changed_parameter, parameter
 
 FloatArray = NDArray[np.float64]
 
-FRICTION = tuple(f"friction.axes.{name}[{axis}]" for name in ("viscous", "coulomb") for axis in range(3))
-TORQUE, EMF = "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad"
 FRICTION_LIMIT = 1e6  # what a robot file takes
 SPAN = 1e4  # a number that must be positive stays within so many times its start, either way
 
@@ -39,6 +37,11 @@ class Parameter:
     prior: tuple[float, float] | None = None
     also: tuple[tuple[str, float], ...] = ()
 
+    @property
+    def part(self) -> str:
+        """What it belongs to: the part of the robot, such as "motor"; of a nuisance its kind, such as "latency"."""
+        return self.name.partition(".")[0].partition("@")[0]
+
     def inner(self, value: float) -> float:
         """The number that the solver sees."""
         return math.log(value) if self.log else value
@@ -53,26 +56,42 @@ class Parameter:
 
     def on(self, robot: Robot, value: float) -> Robot:
         """The robot with this number and those tied to it; not checked, for speed."""
-        robot = changed_parameter(robot, self.name, value, checked=False)
+        robot = Key.parse(self.name).set(robot, value, checked=False)
         for key, factor in self.also:
-            robot = changed_parameter(robot, key, factor * value, checked=False)
+            robot = Key.parse(key).set(robot, factor * value, checked=False)
         return robot
 
 
-def robot_parameter(robot: Robot, key: str, tied: bool, prior: tuple[float, float] | None) -> Parameter:
-    """A number of the robot file as a free parameter.
+def robot_parameter(
+    robot: Robot, key: str, prior: tuple[float, float] | None, others: Sequence[str] = ()
+) -> Parameter:  # fmt: skip
+    """A number of the robot file as a free parameter; `others` are free beside it.
 
-    Friction may be 0: it has a linear scale and a bound at 0. What must be positive has a logarithmic one. `tied`: the
-    EMF constant keeps its ratio to the torque constant, for both are one number of the magnet.
+    Friction may be 0: it has a linear scale and a bound at 0. What must be positive has a logarithmic one.
     Raises InputError for an unknown key, and for a number that is not positive and has no bound at 0.
     """
-    value = float(parameter(robot, key))
-    if key.startswith("friction."):
+    place = Key.parse(key)
+    value = float(place.get(robot))
+    if place.level:
         return Parameter(key, value, 0.0, FRICTION_LIMIT, prior=prior)
     if value <= 0.0:
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")
-    also = ((EMF, float(parameter(robot, EMF)) / value),) if tied and key == TORQUE else ()
+    also = tuple((str(each), float(each.get(robot)) / value) for each in _followers(robot, place, others))
     return Parameter(key, value, value / SPAN, value * SPAN, True, prior, also)
+
+
+def _followers(robot: Robot, key: Key, others: Sequence[str]) -> list[Key]:
+    """The EMF constants that keep their ratio to this torque constant, for both are one number of the magnet.
+
+    Wheel by wheel where either stands once for each; those that are free themselves do not follow.
+    """
+    asked = [each for each in map(Key.parse, others) if each.name == EMF]
+    if key.name != TORQUE or Key(EMF) in asked:
+        return []
+    if key.index is None and not asked:
+        return [Key.parse(each) for each in expand(EMF, robot)]
+    wheels = range(robot.wheels.count) if key.index is None else [key.index]
+    return [each for wheel in wheels if (each := Key(EMF, wheel)) not in asked]
 
 
 def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
@@ -80,20 +99,23 @@ def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
+def refuse_repeated(names: Sequence[str]) -> None:
+    """Raises InputError for a name that is asked for twice."""
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError("asked for twice", got=", ".join(twice), expected="every key once", where="free")
+
+
 def refuse_unknown(keys: Sequence[str], robot: Robot) -> None:
     """Raises InputError for a key that the robot does not have: left alone it would hold nothing.
 
     Breakaway may be fixed where the robot has none: it follows coulomb then.
     """
-    for key in keys:
-        if not key.startswith("friction.axes.breakaway"):
-            parameter(robot, key)
+    for key in map(Key.parse, keys):
+        if key.level != BREAKAWAY:
+            key.get(robot)
 
 
 def robot_parameters(robot: Robot, keys: Sequence[str], priors: dict[str, tuple[float, float]]) -> list[Parameter]:
-    """Free parameters by key; the EMF constant is tied to the torque constant unless it is asked for itself."""
-    twice = sorted({key for key in keys if list(keys).count(key) > 1})
-    if twice:
-        raise InputError("asked for twice", got=", ".join(twice), expected="every key once", where="free")
-    tied = EMF not in keys and np.ndim(robot.motor.torque_constant) == 0 and np.ndim(robot.motor.emf_constant) == 0
-    return [robot_parameter(robot, key, tied, priors.get(key)) for key in keys]
+    """Free parameters by key; the EMF constants follow the torque constants unless they are asked for themselves."""
+    return [robot_parameter(robot, key, priors.get(key), keys) for key in keys]

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.identification.output_error.problem.parameters import FRICTION, Parameter
+from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.model.dynamics import mass_matrix, settled_currents
+from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.exact.march import axis_levels
-from omnidyn.simulation.sensitivity.directions import parameter
 
 FloatArray = NDArray[np.float64]
 
@@ -73,8 +73,8 @@ class Mapping:
         own = robot.friction.axes.breakaway
         self.breakaway = np.full(3, np.nan) if own is None else np.array(own)
         self.breakaway = self.breakaway if breakaway is None else breakaway
-        self.linear = all(p.name in FRICTION for p in parameters)
-        self._start = np.array([parameter(robot, p.name) for p in parameters])
+        self.linear = all(p.name in BOX for p in parameters)
+        self._start = np.array([Key.parse(p.name).get(robot) for p in parameters])
         self._base = primitives(robot)
         self._probe = self._friction_slopes()
 
@@ -96,7 +96,7 @@ class Mapping:
         slopes = [np.zeros((*part.shape, len(values))) for part in self._base.parts]
         fast = self._friction_at(robot)
         for j, (p, value) in enumerate(zip(self.parameters, values, strict=True)):
-            if p.name in FRICTION:
+            if p.name in BOX:
                 for slope, known in zip(slopes, fast.parts, strict=True):
                     slope[..., j] = known[..., j]
                 continue
@@ -122,7 +122,7 @@ class Mapping:
         friction = robot.friction.model_copy(update={"axes": robot.friction.axes.model_copy(update=levels)})
         more = primitives(robot.model_copy(update={"friction": friction}))
         for j, p in enumerate(self.parameters):
-            if p.name in FRICTION:
-                kind, axis = divmod(FRICTION.index(p.name), 3)
+            if p.name in BOX:
+                kind, axis = divmod(BOX.index(p.name), 3)
                 slopes[kind][axis, j] = (more.rate - base.rate, more.coulomb - base.coulomb)[kind][axis]
         return Primitives(*slopes)

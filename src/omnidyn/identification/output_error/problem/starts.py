@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled import kernel, maker
+from omnidyn.compiled.kernel import kernel, maker
 from omnidyn.identification.output_error.problem.primitives import Mapping
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.frames import world_to_body
+from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 
@@ -102,7 +103,7 @@ def friction_values(mapping: Mapping, values: FloatArray, found: FloatArray) -> 
     for j, p in enumerate(mapping.parameters):
         for kind, (have, slope) in enumerate(((now.rate, slopes.rate), (now.coulomb, slopes.coulomb))):
             axis = int(np.argmax(np.abs(slope[:, j])))
-            if p.name.startswith("friction.axes.") and slope[axis, j] != 0.0 and np.isfinite(found[kind, axis]):
+            if p.name in BOX and slope[axis, j] != 0.0 and np.isfinite(found[kind, axis]):
                 values[j] = max(values[j] + (found[kind, axis] - have[axis]) / slope[axis, j], p.low)
     return values
 

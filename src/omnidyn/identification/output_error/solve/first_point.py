@@ -14,6 +14,7 @@ from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
 from omnidyn.identification.output_error.solve.progress import Onlooker
 from omnidyn.identification.output_error.solve.solver import Solver
+from omnidyn.model.keys import FRICTION
 
 MANY = 100_000  # rows to which a long log is first fitted
 FEW = 1500  # the same for the implicit engine
@@ -88,6 +89,6 @@ def moving_start(problem: Problem, nu: float) -> Point:
     """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes."""
     own, short = problem.start(), problem.shortened(FEW)
     solver = Solver(short, TangentEngine(short), nu)
-    friction = np.array([p.name.startswith("friction.") for p in problem.parameters], bool)
+    friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
     return min(points, key=lambda point: solver.state(point).objective)

@@ -16,15 +16,14 @@ from numpy.typing import NDArray
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
 from omnidyn.identification.output_error.problem.nuisances import EARLIEST, FREE, LATEST, REST
-from omnidyn.identification.output_error.problem.parameters import FRICTION, Parameter
+from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twist
 from omnidyn.identification.output_error.solve.progress import NOBODY, Onlooker
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
-from omnidyn.model.layout import YAW
+from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.sensitivity.directions import GAINS, parameter
 
 FloatArray = NDArray[np.float64]
 
@@ -33,6 +32,7 @@ SETTING_OFF = 60  # rows of each log on which starts are tried
 STILL = 3  # rows at the beginning in which nothing may move
 CLEAR = 6.0  # standard errors, of the scatter of these rows, that count as motion
 LATENCY, CURRENTS = "latency", "latency.current"
+DRIVE = "drive"
 AROUND = 3  # periods of the loop, each way, in which a latency of the currents is tried
 GAIN_FACTORS, LEVEL_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 1.0, 3.0)
 LATE = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
@@ -47,31 +47,6 @@ def looped(records: Sequence[Record]) -> bool:
     return records[0].set_point is not None
 
 
-def gain_keys(robot: Robot) -> list[str]:
-    """The gains of the loop, one for all wheels or one each, as far as they are not 0."""
-    values = zip(GAINS, (robot.drive.kp, robot.drive.ki), strict=True)
-    return [each for key, value in values for each in _each(key, value) if parameter(robot, each) > 0.0]
-
-
-def friction_keys(robot: Robot) -> list[str]:
-    """The numbers of friction that a robot has: those of every part that is not off."""
-    friction, keys = robot.friction, []
-    if any(friction.axes.viscous) or any(friction.axes.coulomb):
-        keys += FRICTION
-    direction, wheels = friction.direction, friction.wheels
-    if any(direction.coulomb):
-        keys += [f"friction.direction.coulomb[{axis}]" for axis in range(2)]
-    keys += [
-        f"friction.direction.{name}"
-        for name in ("viscous", "yaw_coulomb", "yaw_viscous")
-        if np.any(getattr(direction, name))
-    ]
-    for name in ("coulomb", "viscous"):
-        if np.any(getattr(wheels, name)):
-            keys += _each(f"friction.wheels.{name}", getattr(wheels, name))
-    return keys
-
-
 def loop_keys(robot: Robot, moved: NDArray[np.bool_], source: str = "") -> list[str]:
     """What is free by default: friction, of axes that moved only, and the gains.
 
@@ -82,20 +57,9 @@ def loop_keys(robot: Robot, moved: NDArray[np.bool_], source: str = "") -> list[
             "the robot never visibly moved: a speed loop shows its friction in motion only", got="rest",
             expected="motion", remedy="ask for speeds at which it sets off", where=source,
         )  # fmt: skip
-    still = np.flatnonzero(~moved)
-    kept = [key for key in friction_keys(robot) if not any(friction_of_axis(key, int(axis)) for axis in still)]
+    still = np.flatnonzero(~moved).tolist()
+    kept = [key for key in friction_keys(robot) if Key.parse(key).axis not in still]
     return [*kept, *gain_keys(robot)]
-
-
-def friction_of_axis(key: str, axis: int) -> bool:
-    """Whether a number of friction acts along one axis alone."""
-    if key in FRICTION:
-        return int(key[-2]) == axis
-    return axis == YAW and key.startswith("friction.direction.yaw")
-
-
-def _each(key: str, value: float | tuple[float, ...]) -> list[str]:
-    return [f"{key}[{k}]" for k in range(len(value))] if isinstance(value, tuple) else [key]
 
 
 def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Piece]:
@@ -179,7 +143,7 @@ def retimed(solver: Solver, point: Point, watch: Onlooker = NOBODY) -> Point:
     """
     problem, nu = solver.problem, solver.nu
     period = 1.0 / (problem.robot.drive.rate or np.inf)
-    late = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
+    late = [j for j, p in enumerate(problem.parameters) if p.part == LATENCY]
     own = [j for j in late if problem.names[j].partition("@")[0] == CURRENTS]
     short = shortened(problem, SETTING_OFF)
     row = min(float(np.median(np.diff(p.record.t[p.first : p.last + 1]))) for p in short.pieces)
@@ -213,7 +177,7 @@ def best_start(solver: Solver, watch: Onlooker = NOBODY) -> Point:
     delays = _if_any(problem, LATENCY, LATE, 0.0)
     by_delay = _tried(solver, [(late, 1.0, 1.0) for late in delays], "latencies", seen)
     late = delays[int(np.argmin([state.objective for state in by_delay]))]
-    levels, gains = _if_any(problem, "friction.", LEVEL_FACTORS), _if_any(problem, "drive.", GAIN_FACTORS)
+    levels, gains = _if_any(problem, FRICTION, LEVEL_FACTORS), _if_any(problem, DRIVE, GAIN_FACTORS)
     factors = [(late, *pair) for pair in itertools.product(levels, gains)]
     states = sorted(_tried(solver, factors, "friction and gains", seen), key=lambda state: state.objective)
     tried = [solver.minimise(state.point, FEW, seen) for state in states[:BEST]]
@@ -238,10 +202,10 @@ def _moved(solver: Solver, late: float, level: float, gain: float) -> State:
     own = problem.start()
     values = own.values.copy()
     for j, p in enumerate(problem.parameters):
-        if p.name.startswith(LATENCY):
+        if p.part == LATENCY:
             values[j] = late
         else:
-            values[j] = _within(p, p.value * (gain if p.name.startswith("drive.") else level))
+            values[j] = _within(p, p.value * (gain if p.part == DRIVE else level))
     return solver.state(Point(values, own.states), np.ones(len(problem.columns)) if solver.nu else None)
 
 
@@ -259,7 +223,7 @@ def beyond_jumps(solver: Solver, solution: Solution, watch: Onlooker = NOBODY) -
         isinstance(engine, LoopEngine) and not engine.meets_limit(solution.state.point)
     ):
         return solution
-    gains = [j for j, p in enumerate(solver.problem.parameters) if p.name.startswith("drive.")]
+    gains = [j for j, p in enumerate(solver.problem.parameters) if p.part == DRIVE]
     for _ in range(ROUNDS):
         better = next(_branches(solver, solution, gains), None)
         found = None if better is None else solver.minimise(better.point, FEW, seen)
@@ -285,9 +249,9 @@ def _scale(solver: Solver, solution: Solution) -> FloatArray | None:
     return solution.state.variance if solver.nu else None
 
 
-def _if_any(problem: Problem, prefix: str, factors: tuple[float, ...], plain: float = 1.0) -> tuple[float, ...]:
-    return factors if any(p.name.startswith(prefix) for p in problem.parameters) else (plain,)
+def _if_any(problem: Problem, part: str, factors: tuple[float, ...], plain: float = 1.0) -> tuple[float, ...]:
+    return factors if any(p.part == part for p in problem.parameters) else (plain,)
 
 
 def _within(p: Parameter, value: float) -> float:
-    return float(np.clip(value, p.low, p.high)) if p.name.startswith(("drive.", "friction.")) else p.value
+    return float(np.clip(value, p.low, p.high)) if p.part in (DRIVE, FRICTION) else p.value

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.errors import InputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
@@ -43,16 +42,8 @@ class Breakaway:
 
 
 def asked_axes(free: Sequence[str], fixed: Sequence[str] = ()) -> list[int]:
-    """The axes whose breakaway is among the free keys; without an index it stands for all three.
-
-    Raises InputError for a key of no axis.
-    """
-    known = {f"{KEY}[{axis}]": axis for axis in range(3)}
-    asked = [key for key in free if key.startswith(KEY)]
-    for key in asked:
-        if key != KEY and key not in known:
-            raise InputError("not an axis", got=key, expected=", ".join(known), where="free")
-    return [axis for key, axis in known.items() if {key, KEY} & set(asked) and not {key, KEY} & set(fixed)]
+    """The axes whose breakaway is among the free keys and not among the fixed ones."""
+    return [axis for axis in range(3) if f"{KEY}[{axis}]" in free and f"{KEY}[{axis}]" not in fixed]
 
 
 class _Profile:

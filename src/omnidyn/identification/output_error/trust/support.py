@@ -26,7 +26,7 @@ def supported(solver: Solver, solution: Solution, names: tuple[str, ...]) -> tup
     limits = {LATENCY: LATENCY_STD, DEAD: DEAD_SHARE * largest, GAIN: np.inf}
     kept = []
     for j, parameter in enumerate(solver.problem.parameters):
-        kind = parameter.name.partition(".")[0]
+        kind = parameter.part
         if kind in names and not blind[j] and std[j] <= limits[kind]:
             kept.append(parameter.name)
     return tuple(kept)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from omnidyn.errors import InputError
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import Wheels
-from tests.reference.robots import random_robot, robot_of
+from tests.support.robots import random_robot, robot_of
 
 SMALL = st.floats(-3.0, 3.0, allow_subnormal=False)
 

@@ -1,7 +1,7 @@
-"""The compile cache: never stale, never in the way.
+"""What is compiled, and how: never stale, never in the way.
 
 numba looks only at the file of the kernel itself: edit a formula that a kernel calls from another file, and the old
-machine code is served without a word. `compiled.kernel` stamps every cache entry with a hash of all sources. Here a
+machine code is served without a word. `kernel` stamps every cache entry with a hash of all that it can reach. Here a
 copy of the whole package is edited and run in fresh processes; the same formulas in plain Python are the truth.
 """
 
@@ -10,21 +10,22 @@ import importlib
 import json
 import os
 import pkgutil
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
-from numba.core import event
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
 import omnidyn
-from omnidyn import compiled
+from omnidyn.compiled.entries import Entries
+from omnidyn.compiled.kernel import kernel, part
+from omnidyn.compiled.stamp import stamp
 
 PACKAGE = Path(omnidyn.__file__).parent
 
@@ -85,7 +86,7 @@ def agrees_with_python(numbers):
 
 
 def test_an_edited_formula_is_compiled_anew(copy):
-    """exact_step.py is called by both kernels of exact.py, whose own file stays untouched."""
+    """exact/step.py is called by both kernels of exact/march.py, whose own file stays untouched."""
     cache = {"NUMBA_CACHE_DIR": str(copy / "cache")}
     before = fresh(copy, **cache)
     assert agrees_with_python(before)
@@ -93,13 +94,13 @@ def test_an_edited_formula_is_compiled_anew(copy):
     again = fresh(copy, **cache)
     assert again["hits"] == [1, 1], "the second process should find the machine code of the first"
     assert {**again, "hits": 0} == {**before, "hits": 0}
-    formula = copy / "omnidyn" / "simulation" / "exact_step.py"
+    formula = copy / "omnidyn" / "simulation" / "exact" / "step.py"
     text = formula.read_text()
     edited = text.replace("slid = x + phi *", "slid = x + phi * (1 + 1) *", 1)
     edited = edited.replace(
         "return (speed - now + before * t) / rate", "return 3 * (speed - now + before * t) / rate", 1
     )
-    assert edited.count("(1 + 1)") == edited.count("3 * (speed") == 1, "exact_step.py reads differently now"
+    assert edited.count("(1 + 1)") == edited.count("3 * (speed") == 1, "exact/step.py reads differently now"
     formula.write_text(edited)
     try:
         after = fresh(copy, **cache)
@@ -123,7 +124,7 @@ def test_without_a_writable_folder_it_compiles_in_memory(copy, tmp_path):
     numbers = fresh(tmp_path, NUMBA_CACHE_DIR=str(blocked / "cache"), **homes)
     assert agrees_with_python(numbers)
     assert numbers["hits"] == [0, 0]
-    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc")]
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc", ".kernel")]
 
 
 def test_without_a_compiler_it_runs_as_plain_python(copy):
@@ -174,14 +175,14 @@ def test_every_kernel_is_stamped_and_nothing_else_is_cached():
         assert not options.get("fastmath"), name
         if name in kernels:
             assert options["nogil"] is True, name
-            assert function._cache._cache_file._source_stamp[1] == compiled.source_hash(), name
+            assert isinstance(function._cache, Entries), name
+            assert function._cache.stamp == stamp(function.py_func), name
         else:
             assert isinstance(function._cache, NullCache), f"{name} is cached without a stamp"
 
 
 def test_parts_count_no_references():
     """Counting costs three times as long as the arithmetic. If this fails, numba has changed `_nrt`: time it anew."""
-    assert compiled.UNCOUNTED == {"_nrt": False}
     counted = decorated("kernel") | decorated("maker")
     for name, function in dispatchers().items():
         assert function.targetoptions.get("_nrt", True) == (name in counted), name
@@ -189,13 +190,13 @@ def test_parts_count_no_references():
 
 @pytest.mark.parametrize("give", [lambda x: x.copy(), lambda x: x[1:]])
 def test_no_part_makes_an_array(give):
-    given = compiled.part(give)
+    given = part(give)
 
     def taker(x):
         return given(x)[0]
 
     with pytest.raises(NumbaError, match=r"NRT required|Only accept returning of array"):
-        compiled.kernel(taker)(np.zeros(3))
+        kernel(taker)(np.zeros(3))
 
 
 def sources_of(names):
@@ -236,152 +237,13 @@ def test_no_part_calls_a_maker():
 
 
 def test_nobody_compiles_behind_our_back():
-    """numba is imported in compiled.py, and in pieces.py, which only that one imports."""
+    """numba is imported in compiled/, of which others import `kernel`, and `hearing`, which needs no numba."""
     for file in PACKAGE.rglob("*.py"):
-        if file in (PACKAGE / "compiled.py", PACKAGE / "pieces.py"):
+        if file.parent == PACKAGE / "compiled":
             continue
-        assert "omnidyn.pieces" not in file.read_text(encoding="utf-8"), file
+        inside = re.findall(r"omnidyn\.compiled\b(?!\.kernel\b|\.hearing\b)", file.read_text(encoding="utf-8"))
+        assert not inside, file
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             assert not [name for name in names if name.split(".")[0] == "numba"], file
-
-
-# ---- the private corner of numba -------------------------------------------------------------------------
-
-
-def test_the_private_attribute_of_numba_is_still_what_we_stamp(tmp_path, monkeypatch):
-    """If this fails, numba has changed its cache: `compiled._stamp` must learn the new one."""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    plain = numba.njit(thrice)
-    plain.enable_caching()
-    stamp = plain._cache._cache_file._source_stamp
-    assert stamp  # of the kernel's own file: all that numba looks at
-    stamped = compiled.kernel(thrice)
-    assert stamped(2.0) == 6.0
-    assert stamped._cache._cache_file._source_stamp == (stamp, compiled.source_hash())
-    (index,) = tmp_path.rglob("*.nbi")
-    assert compiled.source_hash().encode() in index.read_bytes()
-
-
-def thrice(x):
-    return 3.0 * x
-
-
-@pytest.mark.parametrize("problem", [AttributeError, RuntimeError])
-def test_a_cache_that_cannot_be_stamped_is_not_used(monkeypatch, problem):
-    """Better compiled in each process than served stale."""
-
-    def refuse(function):
-        raise problem
-
-    monkeypatch.setattr(compiled, "_stamp", refuse)
-    kernel = compiled.kernel(thrice)
-    assert isinstance(kernel._cache, NullCache)
-    assert kernel(2.0) == 6.0
-
-
-def test_the_hash_covers_names_and_contents(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiled, "PACKAGE", tmp_path)
-    hash_now = compiled.source_hash.__wrapped__
-    (tmp_path / "a").mkdir()
-    seen = set()
-    for name, content in (("a.py", "x"), ("a.py", "y"), ("a/b.py", "y"), ("a/c.py", ""), ("a/b.py", "")):
-        (tmp_path / name).write_text(content)
-        seen.add(hash_now())
-    (tmp_path / "a" / "c.py").rename(tmp_path / "a" / "d.py")
-    seen.add(hash_now())
-    assert len(seen) == 6
-    (tmp_path / "data.toml").write_text("not a source")
-    assert hash_now() in seen
-
-
-def test_source_hash_is_computed_once_per_process():
-    assert compiled.source_hash() is compiled.source_hash()
-    assert len(compiled.source_hash()) == 64
-
-
-# ---- pieces of kernels: compiled once, in their kernels ---------------------------------------------------
-
-
-def thrice_at(x, k):
-    return 3.0 * x[k]
-
-
-@pytest.fixture
-def piece():
-    """A part with a kernel that calls it with a constant and with a variable, and two parts between them."""
-    inner = compiled.part(thrice_at)
-    first, second = compiled.part(lambda x: inner(x, 0)), compiled.part(lambda x, k: inner(x, k))
-    outer = compiled.kernel(lambda x: first(x) + second(x, len(x) - 1))
-    return inner, first, second, outer
-
-
-def test_a_piece_has_no_machine_code_of_its_own(piece):
-    """If this fails, numba compiles every formula again for each function above it: time a first run."""
-    inner, first, second, outer = piece
-    assert outer(np.array([1.0, 5.0, 10.0])) == 33.0
-    for part in (inner, first, second):
-        (result,) = part.overloads.values()
-        library, name = result.library, result.fndesc.mangled_name
-        assert not library.codegen._engine.is_symbol_defined(name)
-        assert library.get_llvm_str().count("define ") == 1, "nothing of what it calls, and no wrapper"
-    assert inner.overloads.keys() == second.overloads.keys(), "a constant is an argument like others"
-
-
-def test_a_piece_that_is_called_from_python_is_compiled_for_itself(piece):
-    inner = piece[0]
-    assert inner(np.array([1.0, 5.0]), 1) == inner(np.array([1.0, 5.0]), k=1) == 15.0
-    assert not inner.overloads
-    assert len(inner.whole.overloads) == 1
-
-
-def test_an_unknown_numba_compiles_pieces_in_its_own_way(monkeypatch):
-    """With a version that nobody tried, and with one that has not what they need."""
-    for name, value in (("PIECES_TRIED", (0, 1)), ("_piece_class", lambda: None)):
-        compiled._piece_class.cache_clear()
-        with monkeypatch.context() as patch:
-            patch.setattr(compiled, name, value)
-            inner = compiled.part(thrice_at)
-        assert type(inner) is type(numba.njit(thrice_at))
-        assert compiled.kernel(lambda x, inner=inner: inner(x, 1))(np.array([1.0, 5.0])) == 15.0
-    compiled._piece_class.cache_clear()
-
-
-def test_pieces_are_in_use_with_this_numba():
-    """If this fails, a newer numba is locked: try pieces.py with it, time a first run, and raise PIECES_TRIED."""
-    assert compiled._piece_class() is not None
-
-
-def test_a_piece_under_two_kernels_gives_both_its_code():
-    inner = compiled.part(thrice_at)
-    between = compiled.part(lambda x: inner(x, 1) + inner(x, 0))
-    for factor in (1.0, 2.0):
-        outer = compiled.kernel(lambda x, by=factor: by * between(x) + inner(x, 0))
-        assert outer(np.array([1.0, 5.0])) == factor * 18.0 + 3.0
-
-
-def test_who_waits_can_see_that_a_kernel_is_being_compiled():
-    seen = []
-
-    class Probe(event.Listener):
-        def on_start(self, event):
-            seen.append(compiled.compiling())
-
-        def on_end(self, event):
-            pass
-
-    @compiled.kernel
-    def twice(x):
-        return 2.0 * x
-
-    @compiled.kernel
-    def wrong(x):
-        return x.no_such_thing
-
-    with event.install_listener("numba:compile", Probe()):
-        assert twice(1.0) == 2.0
-        with pytest.raises(NumbaError):
-            wrong(1.0)
-    assert seen == [True, True]
-    assert not compiled.compiling()

@@ -11,7 +11,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PER_TURN = "ticks/2000@motor"  # of the Robotino's encoders
 TIME_STEP = "0.000125 s"  # of the ODrive: 8 kHz, where its header says 8 Hz
 

@@ -1,4 +1,4 @@
-"""Pieces of kernels: code to link, optimised once, in the kernel that calls it.
+"""Parts of kernels: code to link, optimised once, in the kernel that calls it.
 
 numba makes wrappers and machine code of every function, and to that end optimises each together with all that it calls:
 a formula at the bottom once for every function above it. Only kernels are ever called from outside. A piece therefore

@@ -1,0 +1,97 @@
+"""Machine code on disk: one file for each kernel, types of arguments and CPU, in the folder that numba would take.
+
+A file begins with the stamp of the kernel and a hash of the rest. What was made from other sources, or is damaged, is
+as good as not there: the kernel is compiled anew and the file replaced. (numba's own cache looks at the kernel's file
+only, trusts what it reads, and leaves files behind whenever a kernel moves to another line.)
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import pickle
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import FunctionCache, _Cache
+from numba.core.serialize import dumps
+
+from omnidyn.compiled.stamp import stamp
+
+SUFFIX = ".kernel"
+
+
+class Entries(_Cache):
+    """What numba asks for machine code before it compiles a kernel, and gives it to afterwards.
+
+    Raises RuntimeError where no folder is writable, OSError where there is no source to read.
+    """
+
+    def __init__(self, function: Callable[..., Any]):
+        known = FunctionCache(function)
+        self._key, self._impl = known._index_key, known._impl
+        self._folder = Path(known.cache_path)
+        self._stem = re.sub(r"[^\w.]", "", f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}")
+        self._enabled = True
+        self.stamp = stamp(function)
+
+    @property
+    def cache_path(self) -> Any:
+        """The folder of the entries."""
+        return str(self._folder)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled function; None where there is none of this stamp, or none that is whole."""
+        target_context.refresh()
+        key = self._key(sig, target_context.codegen())
+        content = self._content(self._file(key)) if self._enabled else None
+        found, reduced = pickle.loads(content) if content is not None else (None, None)
+        return self._impl.rebuild(target_context, reduced) if found == key else None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled function. A disk that refuses is no reason to stop: it will be compiled again."""
+        if not self._enabled or not self._impl.check_cachable(data):
+            return
+        key = self._key(sig, data.codegen)
+        content = dumps((key, self._impl.reduce(data)))
+        file = self._file(key)
+        unfinished = file.with_suffix(f".{os.getpid()}")
+        with contextlib.suppress(OSError):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            try:
+                unfinished.write_bytes(self._head(content) + content)
+                os.replace(unfinished, file)
+            finally:
+                unfinished.unlink(missing_ok=True)
+
+    def enable(self) -> None:
+        self._enabled = True
+
+    def disable(self) -> None:
+        self._enabled = False
+
+    def flush(self) -> None:
+        """Drop all entries of this kernel."""
+        for file in self._folder.glob(f"{self._stem}-*{SUFFIX}"):
+            file.unlink(missing_ok=True)
+
+    def _file(self, key: tuple[Any, ...]) -> Path:
+        """One for each types of arguments, CPU and Python; other stamps of them replace each other."""
+        kind = hashlib.sha256(repr((key[:2], sys.implementation.cache_tag)).encode()).hexdigest()
+        return self._folder / f"{self._stem}-{kind[:16]}{SUFFIX}"
+
+    def _head(self, content: bytes) -> bytes:
+        return self.stamp.encode() + hashlib.sha256(content).digest()
+
+    def _content(self, file: Path) -> bytes | None:
+        """What stands in an entry behind its head; None where the head is not the right one."""
+        try:
+            whole = file.read_bytes()
+        except OSError:
+            return None
+        size = len(self._head(b""))
+        return whole[size:] if whole[:size] == self._head(whole[size:]) else None

@@ -1,0 +1,48 @@
+"""Who waits for a compiler can hear of it.
+
+Nothing is heard unless somebody listens. Needs no numba: a command listens before it knows whether it will compile.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+
+@dataclass(eq=False)
+class Compiling:
+    """Kernels, by name: those that are being compiled just now, in any thread, and those that have been, with [s]."""
+
+    under_way: list[str] = field(default_factory=list)
+    done: list[tuple[str, float]] = field(default_factory=list)
+
+
+_listeners: list[Compiling] = []  # those who are inside `heard` just now
+
+
+@contextlib.contextmanager
+def heard() -> Iterator[Compiling]:
+    """Yields what is kept up to date with all that is compiled meanwhile."""
+    compiling = Compiling()
+    _listeners.append(compiling)
+    try:
+        yield compiling
+    finally:
+        _listeners.remove(compiling)
+
+
+@contextlib.contextmanager
+def told(name: str) -> Iterator[None]:
+    """Tells all who listen that a kernel is being compiled, and, unless that fails, that it has been."""
+    listeners, started = tuple(_listeners), time.perf_counter()
+    for each in listeners:
+        each.under_way.append(name)
+    try:
+        yield
+        for each in listeners:
+            each.done.append((name, time.perf_counter() - started))
+    finally:
+        for each in listeners:
+            each.under_way.remove(name)

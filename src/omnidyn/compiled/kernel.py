@@ -1,0 +1,74 @@
+"""The one way to compile a kernel: native code, without the GIL, with a disk cache that is never stale.
+
+numba's disk cache looks only at the file in which a kernel stands: edit a formula that the kernel calls from
+another file, and the old machine code is served without a word. Here every entry is stamped with a hash of all that
+the kernel can reach. Where no folder is writable the kernel is compiled in memory. `parallel=True` is never used: its
+thread pools break under fork and under user threads; use threads over blocks instead.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import Any
+
+import numba
+from numba.core.compiler import Compiler
+
+from omnidyn.compiled.hearing import told
+
+# Versions of numba whose private side (linking.py, `_nrt`) was tried. With others numba goes its own way: the same
+# numbers, but a first run takes twice as long and small kernels three times.
+TRIED = frozenset({(0, 61), (0, 68)})
+ERROR_MODEL = "numpy"  # a division by zero gives inf or nan, as in NumPy, and needs no branch
+
+
+class Announced(Compiler):
+    """numba's own compiler; who listens hears that it is at work."""
+
+    def compile_extra(self, func: Any) -> Any:
+        with told(func.__qualname__):
+            return super().compile_extra(func)
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """An entry point: compiled without the GIL; its cache entry belongs to all sources that it can reach."""
+    options: dict[str, Any] = {"nogil": True, "error_model": ERROR_MODEL, "no_cfunc_wrapper": True}
+    compiled: Any = numba.njit(pipeline_class=Announced, **options)(function)
+    if compiled is not function:  # else numba is switched off, for debuggers
+        with contextlib.suppress(RuntimeError, OSError, ImportError, AttributeError):
+            # No writable folder, no source, or a numba whose cache we do not know: compiled in memory.
+            from omnidyn.compiled.entries import Entries
+
+            compiled._cache = Entries(function)
+    return compiled
+
+
+def part(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A piece of a kernel: compiled into the kernels that call it, never cached by itself.
+
+    It works in arrays that its kernel holds, and does not count who holds them: numba lets it neither make nor return
+    one.
+    """
+    return _linked(function, counted=False)
+
+
+def maker(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A piece of a kernel that makes arrays, for kernels and other makers: a part would never let go of them."""
+    return _linked(function, counted=True)
+
+
+def _linked(function: Callable[..., Any], counted: bool) -> Any:
+    """A piece of kernels; where numba is switched off, for debuggers, the function itself.
+
+    numba counts who holds an array: it adds and removes one, atomically, around nearly every call that has a branch. In
+    small functions of arithmetic that costs three times as much as the rest.
+    """
+    tried = numba.version_info.short in TRIED
+    options: dict[str, Any] = {"_nrt": counted} if tried else {}
+    whole = numba.njit(error_model=ERROR_MODEL, **options)(function)
+    if whole is function or not tried:
+        return whole
+    from omnidyn.compiled.linking import Piece
+
+    return Piece(whole)

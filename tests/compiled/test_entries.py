@@ -1,0 +1,168 @@
+"""Entries on disk: taken where they fit, replaced where they do not, whatever has become of them."""
+
+import os
+
+import numba
+import pytest
+from numba.core.caching import NullCache
+
+from omnidyn.compiled import entries, stamp
+from omnidyn.compiled.kernel import kernel
+
+
+def thrice(x):
+    return 3.0 * x
+
+
+def half(x):
+    return 0.5 * x
+
+
+def hits(compiled):
+    return len(compiled.stats.cache_hits)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Where entries of this test go."""
+    with monkeypatch.context() as patch:
+        patch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+        numba.config.reload_config()
+        yield tmp_path
+    numba.config.reload_config()
+
+
+def files(folder):
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.fixture
+def entry(folder):
+    """The file of thrice(float)."""
+    assert kernel(thrice)(2.0) == 6.0
+    (file,) = files(folder)
+    return file
+
+
+def test_numba_still_asks_our_entries(folder, entry):
+    """If this fails, numba has changed how it asks its cache: every process compiles."""
+    assert entry.read_bytes()[:64].decode() == stamp.stamp(thrice)
+    again = kernel(thrice)
+    assert again(3.0) == 9.0
+    assert hits(again) == 1
+    assert again(1j) == 3j
+    assert (hits(again), len(files(folder))) == (1, 2)
+
+
+DAMAGE = {
+    "truncated": lambda whole: whole[: len(whole) // 2],
+    "only the head": lambda whole: whole[:96],
+    "less than the head": lambda whole: whole[:10],
+    "empty": lambda whole: b"",
+    "zeroed": lambda whole: bytes(len(whole)),
+    "zeroed behind the head": lambda whole: whole[:96] + bytes(len(whole) - 96),
+    "one bit": lambda whole: whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:],
+    "longer": lambda whole: whole + b"x",
+    "text": lambda whole: b"not an entry at all\n" * 50,
+    "of another stamp": lambda whole: b"0" * 64 + whole[64:],
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_entry_is_compiled_again(folder, entry, damage):
+    whole = entry.read_bytes()
+    entry.write_bytes(DAMAGE[damage](whole))
+    compiled = kernel(thrice)
+    assert compiled(2.0) == 6.0
+    assert hits(compiled) == 0
+    assert files(folder) == [entry]
+    mended = kernel(thrice)
+    assert mended(2.0) == 6.0
+    assert hits(mended) == 1
+
+
+def test_an_entry_of_another_kernel_is_not_taken(folder, entry):
+    assert kernel(half)(2.0) == 1.0
+    (other,) = set(files(folder)) - {entry}
+    entry.write_bytes(other.read_bytes())
+    compiled = kernel(thrice)
+    assert compiled(2.0) == 6.0
+    assert hits(compiled) == 0
+
+
+def test_an_entry_for_other_types_is_not_taken(folder, entry):
+    """The head fits: it is the same kernel."""
+    assert kernel(thrice)(2.0 + 0j) == 6.0
+    (other,) = set(files(folder)) - {entry}
+    entry.write_bytes(other.read_bytes())
+    compiled = kernel(thrice)
+    assert compiled(2.0) == 6.0
+    assert type(compiled(2.0)) is float
+    assert hits(compiled) == 0
+
+
+def test_files_of_numbas_own_cache_are_not_looked_at(folder, entry):
+    plain = numba.njit(cache=True)(thrice)
+    assert plain(2.0) == 6.0
+    own = [file for file in files(folder) if file != entry]
+    assert {file.suffix for file in own} == {".nbi", ".nbc"}
+    for file in own:
+        file.write_bytes(b"\0" * 100)
+    compiled = kernel(thrice)
+    assert compiled(2.0) == 6.0
+    assert hits(compiled) == 1
+
+
+def test_a_folder_in_the_place_of_an_entry_is_no_trouble(folder, entry):
+    entry.unlink()
+    entry.mkdir()
+    (entry / "full").touch()
+    compiled = kernel(thrice)
+    assert compiled(2.0) == 6.0
+    assert files(folder) == [entry / "full"]
+
+
+def test_a_disk_that_refuses_is_no_trouble(folder, monkeypatch):
+    def refuse(*paths):
+        raise OSError("no space left on device")
+
+    compiled = kernel(thrice)
+    monkeypatch.setattr(os, "replace", refuse)
+    assert compiled(2.0) == 6.0
+    assert files(folder) == []
+
+
+def test_entries_of_old_sources_are_replaced(folder, entry, monkeypatch):
+    """A cache does not grow with every edit."""
+    monkeypatch.setattr(entries, "stamp", lambda function: "1" * 64)
+    assert kernel(thrice)(2.0) == 6.0
+    assert files(folder) == [entry]
+    assert entry.read_bytes()[:64] == b"1" * 64
+
+
+def test_flush_drops_the_entries_of_one_kernel(folder, entry):
+    assert kernel(half)(2.0) == 1.0
+    assert kernel(thrice)(1j) == 3j
+    assert len(files(folder)) == 3
+    kernel(thrice)._cache.flush()
+    (left,) = files(folder)
+    assert "half" in left.name
+
+
+@pytest.mark.parametrize("problem", [AttributeError, RuntimeError, OSError, ImportError])
+def test_a_cache_that_cannot_be_stamped_is_not_used(monkeypatch, problem):
+    """Better compiled in each process than served stale."""
+
+    def refuse(function):
+        raise problem
+
+    monkeypatch.setattr(entries, "stamp", refuse)
+    compiled = kernel(thrice)
+    assert isinstance(compiled._cache, NullCache)
+    assert compiled(2.0) == 6.0
+
+
+def test_two_kernels_of_one_name_are_told_apart(folder):
+    first, second = [kernel(lambda x: 2.0 * x),
+                     kernel(lambda x: 5.0 * x)]  # fmt: skip
+    assert (first(1.0), second(1.0), first(2.0)) == (2.0, 5.0, 4.0)
