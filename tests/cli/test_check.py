@@ -79,6 +79,15 @@ def test_a_log_that_cannot_be_read_does_not_stop_the_others(call):
     assert "missing.csv: no such file" in err
 
 
+def test_a_column_name_of_a_megabyte_is_refused_in_a_sentence(call, logs):
+    """It took minutes, and nothing was said."""
+    (logs / "long.csv").write_text(f"t,{'w' * 2**20}\n0,1\n1,2\n")
+    code, _, talk = call("check", "long.csv")
+    assert code == 3
+    assert "long.csv:1: the name of column 2 is too long; got 1048576 characters, wwww" in talk
+    assert len(talk) < 1000
+
+
 def test_a_folder_is_its_logs_in_brief_with_a_summary(call, run):
     write_run(run, "again.csv")
     code, out, _ = call(".", "--robot", "axebot")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.comparison.difference import autocovariance, block_length, difference
+from omnidyn.comparison.difference import difference
 from omnidyn.comparison.traces import Trace
 
 
@@ -108,18 +108,3 @@ def test_equal_models_are_the_same_and_few_blocks_cannot_tell():
     assert (few.std_error, few.better) == (None, None)
     nothing = np.full(50, np.nan)
     assert difference(*([each] for each in pair(nothing, nothing, nothing))) is None
-
-
-def test_autocovariance_is_the_sum_of_products():
-    series = np.random.default_rng(6).normal(size=37)
-    direct = [float(series[: 37 - k] @ series[k:]) for k in range(37)]
-    np.testing.assert_allclose(autocovariance(series, 50), [*direct, *[0.0] * 13], atol=1e-12)
-
-
-def test_blocks_grow_with_the_memory_and_stay_within_a_piece():
-    random = np.random.default_rng(8)
-    lengths = [block_length([coloured(random, 5000, memory)]) for memory in (0.0, 0.9, 0.98)]
-    assert lengths[0] == 18  # cube root of 5000, rounded up
-    assert 40 < lengths[1] < 160  # 4 times a memory of (1 + 0.9)/(1 - 0.9) = 19
-    assert lengths[2] > 200
-    assert block_length([np.arange(30.0)] * 4) <= 30

@@ -25,6 +25,7 @@ from omnidyn.model.drive import COAST, DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.simulate import TOLERANCE, simulate
+from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 
@@ -184,8 +185,7 @@ def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatAr
 def _usable_pieces(rows: slice, usable: NDArray[np.bool_]) -> Iterator[slice]:
     """The longest runs of rows whose inputs are known; the row after the last one belongs to it as its end."""
     inside = usable[rows.start : max(rows.start, rows.stop - 1)]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
-    for first, end in edges.reshape(-1, 2) + rows.start:
+    for first, end in stretches(inside) + rows.start:
         yield slice(int(first), int(end) + 1)
 
 

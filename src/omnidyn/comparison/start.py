@@ -11,6 +11,7 @@ from omnidyn.model.frames import world_to_body
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
+from omnidyn.statistics import robust_std
 
 FloatArray = NDArray[np.float64]
 
@@ -19,7 +20,6 @@ FEWEST, MOST = 5, 65  # samples of a line through the first ones; each try doubl
 LONGEST = 0.25  # [s] FEWEST samples that take longer are no neighbours: only the first one counts
 SURE = 2.0  # standard errors beyond which a difference is believed
 END_OF_LINE = 2.2  # standard error of a Theil-Sen line at its end, times sqrt(n) over the noise
-TO_STD = 1.4826  # median absolute deviation to standard deviation, for normal noise
 FAR = 3.0  # a first sample so many ranges of the next ones away from them is a spike
 
 
@@ -87,7 +87,7 @@ def scatter(t: FloatArray, values: FloatArray) -> float:
         return 0.0
     w = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
     bends = values[1:-1] - w * values[:-2] - (1.0 - w) * values[2:]
-    return float(TO_STD * np.median(np.abs(bends) / np.sqrt(1.0 + w**2 + (1.0 - w) ** 2)))
+    return float(robust_std(bends / np.sqrt(1.0 + w**2 + (1.0 - w) ** 2), 0.0))
 
 
 def _is_spike(t: FloatArray, values: FloatArray, noise: float, at_rest: bool) -> bool:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.statistics import stretches
+
 FATAL, WARN, NOTE = "fatal", "warn", "note"
 LEVELS = (FATAL, WARN, NOTE)
 WORDS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
@@ -112,9 +114,7 @@ def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 def spans_of(bad: NDArray[np.bool_], lines: NDArray[np.int64]) -> tuple[Span, ...]:
     """The first stretches of rows where `bad` holds, as (first line, last line). Shapes (rows,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
-    starts, ends = edges[::2][:MAX_SPANS], edges[1::2][:MAX_SPANS]
-    return tuple((int(lines[a]), int(lines[b - 1])) for a, b in zip(starts, ends, strict=True))
+    return tuple((int(lines[a]), int(lines[b - 1])) for a, b in stretches(bad)[:MAX_SPANS])
 
 
 def merged(findings: Sequence[Finding], blocks: int) -> Finding:

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
 from omnidyn.findings.signal.reference import ground, volts
-from omnidyn.findings.signal.robust import quantum, runs, slope, smooth, white_noise
+from omnidyn.findings.signal.robust import quantum, slope, smooth, white_noise
 from omnidyn.logs.channels import components
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.wheels import wheel_speed
+from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 
@@ -127,7 +128,7 @@ def _blocked(work: Work, still: NDArray[np.bool_]) -> list[Finding]:
 def _long(bad: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
     """Only the stretches of at least so many rows, without their first half second of starting."""
     out = np.zeros_like(bad)
-    for a, b in runs(bad):
+    for a, b in stretches(bad):
         if b - a >= max(least, 5):
             out[a:b] = True
     return out

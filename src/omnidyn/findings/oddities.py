@@ -6,7 +6,7 @@ import numpy as np
 
 from omnidyn.findings.finding import NOTE, Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, Work
-from omnidyn.findings.signal.robust import runs
+from omnidyn.statistics import stretches
 
 BURST, SHORT = 10.0, 0.25  # times what 90 % of the rows stay below; [s]
 
@@ -27,7 +27,7 @@ def _bursts(work: Work) -> list[Finding]:
         size = np.abs(values)
         usual = float(np.nanquantile(size, 0.9))
         bad = np.zeros(len(work), dtype=bool)
-        for a, b in runs(size > BURST * usual):
+        for a, b in stretches(size > BURST * usual):
             bad[a:b] = work.t[min(b, len(work) - 1)] - work.t[a] < SHORT
         if usual <= 0.0 or not bad.any():
             continue

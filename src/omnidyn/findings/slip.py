@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
 from omnidyn.findings.signal.reference import ground, wheels_twist
-from omnidyn.findings.signal.robust import MAD, products, slope, smooth
+from omnidyn.findings.signal.robust import products, slope, smooth
 from omnidyn.logs.channels import components
+from omnidyn.statistics import robust_std
 
 FloatArray = NDArray[np.float64]
 
@@ -141,7 +142,7 @@ def _noise(top: FloatArray, below: FloatArray, overall: float, moving: NDArray[n
         return np.inf if size > 1 else 1.0
     t, b = (each[: groups * size].reshape(groups, size).sum(axis=1) for each in (t, b))
     changes = np.abs(np.diff((t - overall * b) / np.sqrt(b))) / np.sqrt(2.0)
-    return max(MAD * float(np.median(changes)), float(np.quantile(changes, 0.9)) / 2.0)
+    return max(float(robust_std(changes, 0.0)), float(np.quantile(changes, 0.9)) / 2.0)
 
 
 def _at_edges(values: FloatArray, ids: NDArray[np.int64], count: int) -> FloatArray:

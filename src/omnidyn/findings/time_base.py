@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
-from omnidyn.findings.signal.robust import MAD
 from omnidyn.logs.log import MAX_MISSING, Log
 from omnidyn.logs.segments import GAP, segments
 from omnidyn.model.robot import Robot
+from omnidyn.statistics import robust_std
 
 JITTER_WARN, JITTER_NOTE = 0.5, 0.1  # spread of the steps, of the usual step
 LONGEST_STEP, SHORTEST_STEP = 2.0, 2e-5  # [s] outside of which no robot is logged
@@ -145,7 +145,7 @@ def _jitter(work: Work) -> list[Finding]:
     steps = np.diff(work.t)
     if len(steps) < MIN_ROWS or work.step <= 0.0:
         return []
-    relative = float(MAD * np.median(np.abs(steps - work.step)) / work.step)
+    relative = float(robust_std(steps, work.step) / work.step)
     low, high = np.quantile(steps, [0.05, 0.95])
     if relative < JITTER_NOTE and (high - low) < 4.0 * JITTER_NOTE * work.step:
         return []

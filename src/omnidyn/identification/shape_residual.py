@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from omnidyn.comparison.result import Comparison
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
+from omnidyn.statistics import t_quantile
 
 FloatArray = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def between_axes(found: Comparison, robot: Robot) -> Between | None:
         return None
     change = float(between.mean() - along.mean())
     std = float(np.sqrt(along.var(ddof=1) / len(along) + between.var(ddof=1) / len(between)))
-    return Between(change, std, abs(change) > float(stdtrit(degrees, 1.0 - CHANCE / 2.0)) * std)
+    return Between(change, std, abs(change) > t_quantile(degrees, 1.0 - CHANCE / 2.0) * std)
 
 
 def _twist(robot: Robot, run: Run) -> FloatArray | None:

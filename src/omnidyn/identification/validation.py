@@ -15,6 +15,7 @@ from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
 from omnidyn.run import Run
+from omnidyn.statistics import robust_std
 
 STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
 HEAD = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
@@ -24,7 +25,6 @@ LASTING = 2.0  # errors over their scatter from row to row, beyond which most of
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
 TINY = 0.001
-TO_STD = 1.4826  # median size to standard deviation, for Gaussian noise
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def _chi2(fit: OutputErrorEstimate, found: Comparison, name: str, rmse: float) -
     if STUDENT_WORDS not in fit.method:
         return rmse**2 / noise**2
     errors = np.concatenate([found.trace(found.robots[0], name, segment).error for segment in found.segments])
-    return float((TO_STD * np.nanmedian(np.abs(errors)) / noise) ** 2)
+    return float((robust_std(errors[np.isfinite(errors)], 0.0) / noise) ** 2)
 
 
 def output_name(component: str) -> str:

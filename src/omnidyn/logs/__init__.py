@@ -2,5 +2,5 @@
 
 read_log is the door, log what a file holds by channel (channels, column); on the way: readers/ (formats), table/
 (text), columns/ (which column is what), clock/ (time and counters). Then what is made from a Run: segments, plateaus,
-average, resolved. Other files with a fixed form: run_file, command_file, steady_table.
+resolved. Other files with a fixed form: run_file, command_file, steady_table.
 """

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.logs.average import robust_mean
 from omnidyn.logs.segments import segments
 from omnidyn.model.frames import world_to_body
 from omnidyn.run import Run
+from omnidyn.statistics import robust_mean, robust_std
 
 FloatArray = NDArray[np.float64]
 
@@ -208,7 +208,7 @@ def _responses(run: Run, rows: slice, angle: FloatArray | None) -> FloatArray:
     table = np.concatenate(parts, axis=1)
     table = table[:, np.isfinite(table).all(axis=0)]
     middle = np.median(table, axis=0)
-    spread = 1.4826 * np.median(np.abs(table - middle), axis=0)
+    spread = robust_std(table, middle, axis=0)
     spread = np.where(spread > 0.0, spread, np.std(table, axis=0))
     moving = spread > 0.0
     return np.clip((table[:, moving] - middle[moving]) / spread[moving], -5.0, 5.0)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.logs.plateaus import STEPWISE
+from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -47,8 +48,7 @@ def unresolved_rows(u: FloatArray) -> BoolArray:
     rough[:whole] = np.repeat(_jumps(windows, largest, JITTER_ROWS), CONTEXT_ROWS)
     if whole < len(u) > 1:
         rough[whole:] = unresolved_input(u, slice(whole, len(u)), largest, JITTER_ROWS)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], rough, [False]]).astype(np.int8)))
-    begin, end = edges[::2], edges[1::2]
+    begin, end = stretches(rough).T
     length = end - begin
     for k in range(len(length) - 1):
         if begin[k + 1] - end[k] < min(length[k], length[k + 1]):

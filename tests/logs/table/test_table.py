@@ -461,3 +461,34 @@ def test_a_million_rows_take_seconds(write, separator, limit):
     assert time.process_time() - start < limit
     assert table.numbers("a")[-1] == 999.999
     assert table.numbers("b")[:4].tolist() == [-3.25, -2.25, -1.25, -0.25]
+
+
+MEGABYTE = 2**20
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "w" * MEGABYTE,
+        "w_" * (MEGABYTE // 2),
+        " (" * (MEGABYTE // 2),
+        "1" * MEGABYTE + "w",
+        "w1 [rad/s" * (MEGABYTE // 9),
+    ],
+)
+def test_a_very_long_name_of_a_column_is_refused_at_once(tmp_path, name):
+    """Taking such a name apart took minutes."""
+    path = tmp_path / "log.csv"
+    path.write_text(f"t,{name},x\n" + "".join(f"{0.01 * k:g},1,2\n" for k in range(60)))
+    words = (
+        r"log.csv:1: the name of column 2 is too long; got \d{6,7} characters, .{40}\.\.\.; expected at most 1000; give"
+    )
+    with pytest.raises(InputError, match=words) as refused:
+        read_table(path)
+    assert len(str(refused.value)) < 400
+
+
+def test_a_name_of_a_thousand_characters_is_a_name(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(f"t,{'w' * 1000}\n0,1\n1,2\n")
+    assert read_table(path).names == ("t", "w" * 1000)

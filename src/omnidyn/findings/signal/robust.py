@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.statistics import robust_std
+
 FloatArray = NDArray[np.float64]
-MAD = 1.4826  # of a normal distribution: standard deviation / median absolute deviation
 SAMPLE = 40_000  # rows that are enough to learn a noise or a quantum from
 
 
@@ -40,7 +41,7 @@ def spread(values: FloatArray) -> float:
     values = values[np.isfinite(values)]
     if not values.size:
         return 0.0
-    return float(MAD * np.median(np.abs(values - np.median(values))))
+    return float(robust_std(values))
 
 
 def white_noise(values: FloatArray) -> float:
@@ -49,8 +50,8 @@ def white_noise(values: FloatArray) -> float:
     values = values[np.isfinite(values)]
     if len(values) < 5:
         return 0.0
-    bend = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
-    return float(MAD * np.median(bend) / np.sqrt(6.0))
+    bend = values[2:] - 2.0 * values[1:-1] + values[:-2]
+    return float(robust_std(bend, 0.0) / np.sqrt(6.0))
 
 
 def quantum(values: FloatArray) -> float:
@@ -139,12 +140,6 @@ def ratio(top: FloatArray, below: FloatArray) -> Slope:
     residual = top - value * below
     error = np.sqrt((residual**2).sum() * windows / (windows - 1)) / below.sum()
     return Slope(float(value), float(error), windows)
-
-
-def runs(bad: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(start, end) of each stretch where `bad` holds. Shape (stretches, 2)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
-    return edges.reshape(-1, 2)
 
 
 def smooth(values: FloatArray, width: int) -> FloatArray:

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, Work
-from omnidyn.findings.signal.robust import MAD, quantum, sample, spread
+from omnidyn.findings.signal.robust import quantum, sample, spread
 from omnidyn.logs.channels import place
 from omnidyn.logs.log import ON_CHANGE
+from omnidyn.statistics import robust_std
 
 FloatArray = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def _isolated(values: FloatArray) -> NDArray[np.bool_]:
     small = small[np.isfinite(small)]
     if not small.size:
         return bad
-    scale = max(MAD * float(np.median(small)), quantum(values), 1e-3 * spread(values), 1e-12)
+    scale = max(float(robust_std(small, 0.0)), quantum(values), 1e-3 * spread(values), 1e-12)
     # Heavy tails are no spikes: what is far must be far beyond the usual largest as well.
     scale = max(scale, float(np.quantile(small, 0.99)) / 3.0)
     with np.errstate(invalid="ignore"):

@@ -14,8 +14,9 @@ from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, SENSORS, Work
 from omnidyn.findings.signal.predicted_wheel import Learner
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
-from omnidyn.findings.signal.robust import MAD, quantum, runs, smooth
+from omnidyn.findings.signal.robust import quantum, smooth
 from omnidyn.logs.channels import place
+from omnidyn.statistics import robust_std, stretches
 
 FloatArray = NDArray[np.float64]
 
@@ -36,9 +37,9 @@ def check_stuck(work: Work) -> tuple[list[Finding], Work]:
     for channel in SENSORS:
         # The longest repeat first: a wheel that sticks is no witness against the others.
         columns = [(*each, _repeats(each[1])) for each in work.columns(channel)]
-        for component, values, stretches in sorted(columns, key=lambda each: -_longest(each[1], each[2])):
+        for component, values, repeats in sorted(columns, key=lambda each: -_longest(each[1], each[2])):
             k = place(component)[1]  # type: ignore[index]
-            judge = _Judge(work, values, stretches)
+            judge = _Judge(work, values, repeats)
             judge.steady = _Steady(work, channel, k).during
             if channel == "wheel_speed":
                 judge.learn = partial(learner.wheel_speed, k)
@@ -48,7 +49,7 @@ def check_stuck(work: Work) -> tuple[list[Finding], Work]:
             bad = judge.frozen()
             if not bad.any():
                 continue
-            each = runs(bad)
+            each = stretches(bad)
             longest = max(work.t[b - 1] - work.t[a] for a, b in each)
             found.append(Finding(
                 "stuck", WARN, component,
@@ -64,12 +65,12 @@ def check_stuck(work: Work) -> tuple[list[Finding], Work]:
 
 def _repeats(values: FloatArray) -> NDArray[np.int64]:
     """(start, end) of each stretch of rows with one value. Shape (stretches, 2)."""
-    return runs(np.diff(values) == 0.0) + np.array([0, 1])
+    return stretches(np.diff(values) == 0.0) + np.array([0, 1])
 
 
-def _longest(values: FloatArray, stretches: NDArray[np.int64]) -> int:
+def _longest(values: FloatArray, repeats: NDArray[np.int64]) -> int:
     """Rows in the longest repeat of a value that is not 0."""
-    return int(np.diff(stretches, axis=1)[values[stretches[:, 0]] != 0.0].max(initial=0))
+    return int(np.diff(repeats, axis=1)[values[repeats[:, 0]] != 0.0].max(initial=0))
 
 
 class _Judge:
@@ -80,11 +81,11 @@ class _Judge:
     steady: Callable[[int, int], bool] | None = None  # whether nothing in the log changes, commands least of all
     measured = False  # expected is what the wheel did; a command it follows later, or, at rest, not at all
 
-    def __init__(self, work: Work, values: FloatArray, stretches: NDArray[np.int64]) -> None:
-        self.values, self.stretches, self.slow = values, stretches, max(10, round(FOLLOWS / work.step))
-        self.lengths = stretches[:, 1] - stretches[:, 0]
+    def __init__(self, work: Work, values: FloatArray, repeats: NDArray[np.int64]) -> None:
+        self.values, self.repeats, self.slow = values, repeats, max(10, round(FOLLOWS / work.step))
+        self.lengths = repeats[:, 1] - repeats[:, 0]
         self.long = self.lengths >= LONG
-        self.moving = values[stretches[:, 0]] != 0.0
+        self.moving = values[repeats[:, 0]] != 0.0
 
     @cached_property
     def learned(self) -> _Walk | None:
@@ -95,7 +96,7 @@ class _Judge:
     def repeated(self) -> NDArray[np.bool_]:
         """Rows in repeats that are asked about: nothing is learned from them."""
         edges = np.zeros(len(self.values) + 1, dtype=np.int64)
-        asked = self.stretches[self.lengths >= max(LONG, self.slow // 2)]
+        asked = self.repeats[self.lengths >= max(LONG, self.slow // 2)]
         np.add.at(edges, asked[:, 0], 1)
         np.add.at(edges, asked[:, 1], -1)
         return np.cumsum(edges[:-1]) > 0
@@ -106,7 +107,7 @@ class _Judge:
         if not self.long.any():
             return bad
         chance, usual = _chance_of_a_repeat(self.lengths[self.moving])
-        for a, b in self.stretches[self.long]:
+        for a, b in self.repeats[self.long]:
             if self._unlikely(a, b, chance, usual) or self._walked(a, b):
                 bad[a:b] = True
         return bad
@@ -240,7 +241,7 @@ class _Away:
     def __init__(self, values: FloatArray, reference: FloatArray) -> None:
         self.size, self.reference, self.step = np.abs(values - reference), reference, quantum(values)
         self.good = np.isfinite(self.size)
-        self.least = max(MAD * float(np.median(self.size[self.good])), self.step) if self.good.any() else np.inf
+        self.least = max(float(robust_std(self.size[self.good], 0.0)), self.step) if self.good.any() else np.inf
 
     def during(self, a: int, b: int) -> bool:
         """Over rows a to b."""

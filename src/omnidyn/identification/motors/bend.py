@@ -13,17 +13,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtri, stdtrit
+from scipy.special import fdtri
 
 from omnidyn.identification.motors.engine import SPEED, MotorEngine, MotorProblem
 from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, SLOPE
 from omnidyn.identification.output_error.problem.problem import Piece, Point
 from omnidyn.identification.output_error.solve.solver import Solver, State
+from omnidyn.statistics import t_quantile
 
 FloatArray = NDArray[np.float64]
 
 BLOCKS, LEAST_BLOCK = 60, 8  # blocks of rows in all, rows of one at least
-SURE, TAIL = 0.95, 0.975
+SURE = 0.95
 MOST_NUMBERS = 20_000_000  # what is longer is not looked at: every row has all its slopes in memory
 BENDS, LOW = 3, 0.25  # how many; w0 over the highest speed
 
@@ -77,7 +78,7 @@ def bend(solver: Solver[MotorProblem], state: State) -> Bend | None:
     at = int(used[: problem.where(name)].sum())
     value = float(state.point.values[problem.where(name)] + step[at] / size[problem.where(name)])
     std = float(np.sqrt(covariance[at, at]) / size[problem.where(name)])
-    half = float(stdtrit(degrees, TAIL)) * std
+    half = t_quantile(degrees) * std
     share = float(np.sqrt(np.mean(weight * left**2) / np.mean(weight * residual**2)))
     return Bend(
         max(value, 0.0), std, (max(value - half, 0.0), max(value + half, 0.0)),

@@ -18,8 +18,14 @@ from numpy.typing import NDArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, WINDOWS, MotorEstimate
 from omnidyn.identification.motors.windows import MotorWindows
-from omnidyn.identification.steady.line import quantile
-from omnidyn.logs.average import autocorrelation_time
+from omnidyn.statistics import (
+    autocorrelation_time,
+    central_interval,
+    drawn_times,
+    errors_in_variables,
+    huber_weight,
+    t_quantile,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +34,6 @@ ITERATIONS, SETTLED = 200, 1e-8
 HUBER = 2.5
 MIN_WINDOWS = 6
 ALIKE = 1e-3  # share of a column that the others leave over: below it they say the same
-LEVEL = 0.95
 
 
 def fit_line(windows: MotorWindows, motor: int | None, source: str, *, draws: int = DRAWS) -> MotorEstimate:
@@ -54,7 +59,7 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str, *, draws: in
         motor=motor, kind=windows.kind, unit=windows.unit, way=WINDOWS, source=source, count=count,
         value={name: float(each[0]) for name, each in numbers.items()},
         std={name: _robust_std(each[1:]) for name, each in numbers.items()},
-        ci95={name: _interval(each[1:], LEVEL) for name, each in numbers.items()},
+        ci95={name: central_interval(each[1:]) for name, each in numbers.items()},
         correlation=float(np.corrcoef(drawn[1:, :2].T)[0, 1]), rmse=float(np.sqrt(np.mean(residual**2))) / abs(slope),
         unidentifiable=tuple(name for name, each in numbers.items() if np.isnan(each[0])),
         one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
@@ -91,7 +96,7 @@ def _fit(design: FloatArray, put_in: FloatArray, speed_std: FloatArray) -> _Fit:
         error = (parameters[0] * speed_std) ** 2
         extra = _extra_variance(residual, error, weight, design.shape[1])
         size = np.abs(residual) / np.sqrt(extra + error + 1e-300)
-        weight = np.minimum(1.0, HUBER / np.maximum(size, 1e-300))
+        weight = huber_weight(size, HUBER)
         new = _york(design[None], put_in[None], speed_std[None], extra, weight[None])[0]
         if np.abs(new - parameters).max() <= SETTLED * np.abs(new).max():
             break
@@ -120,28 +125,18 @@ def _york(
 ) -> FloatArray:
     """Least sum of w r^2 / (s^2 + k^2 speed_std^2), for many draws at once. design: (draws, n, p). Returns (draws, p).
 
-    The gradient gives the normal equations with adjusted speeds x + k speed_std^2 W r, iterated, as in steady/line.py.
+    A ridge keeps draws apart that determine no line.
     """
     scale = np.sqrt(np.mean(design**2, axis=1)) + 1e-300
-    variance = speed_std**2
-    parameters = np.zeros(design.shape[::2])
-    adjusted = design
-    inner = weight / (extra + 1e-300) if extra > 0.0 else weight
-    for _ in range(ITERATIONS):
-        normal = np.einsum("bn,bnp,bnq->bpq", inner, adjusted, design) / (scale[:, :, None] * scale[:, None, :])
-        right = np.einsum("bn,bnp,bn->bp", inner, adjusted, put_in) / scale
-        normal += 1e-12 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(normal.shape[1])
-        new = np.linalg.solve(normal, right[:, :, None])[:, :, 0] / scale
-        settled = np.abs(new - parameters).max() <= SETTLED * np.abs(new).max()
-        parameters = new
-        if settled or not variance.any():
-            break
-        slope = parameters[:, :1]
-        inner = weight / (extra + slope**2 * variance + 1e-300)
-        residual = put_in - np.einsum("bnp,bp->bn", design, parameters)
-        adjusted = design.copy()
-        adjusted[:, :, 0] += slope * variance / (extra + slope**2 * variance + 1e-300) * residual
-    return parameters
+
+    def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+        matrix = matrix / (scale[:, :, None] * scale[:, None, :])
+        matrix += 1e-12 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(matrix.shape[1])
+        return np.linalg.solve(matrix, (right / scale)[:, :, None])[:, :, 0] / scale
+
+    return errors_in_variables(
+        design, put_in, extra, speed_std**2, solve, weight=weight, tolerance=SETTLED, most=ITERATIONS
+    ).parameters
 
 
 def _bootstrap(
@@ -157,11 +152,7 @@ def _bootstrap(
     residual = np.bincount(own, put_in - design @ fit.parameters) / np.bincount(own)
     memory = int(np.ceil(2.0 * autocorrelation_time(residual)))
     length = min(max(1 if settled else BLOCK, memory), max(1, len(blocks) // 2))
-    generator = np.random.default_rng(SEED)
-    starts = generator.integers(0, len(blocks), size=(draws, -(-len(blocks) // length)))
-    chosen = ((starts[:, :, None] + np.arange(length)) % len(blocks)).reshape(draws, -1)[:, : len(blocks)]
-    times = np.zeros((draws, len(blocks)))
-    np.add.at(times, (np.arange(draws)[:, None], chosen), 1.0)
+    times = drawn_times(len(blocks), length, draws, np.random.default_rng(SEED))
     found = []
     for part in np.array_split(times, max(1, draws * len(put_in) // 100_000)):
         weight = fit.weight * part[:, own]
@@ -174,16 +165,11 @@ def _bootstrap(
         )  # fmt: skip
     drawn = np.concatenate(found)
     freedom = max(len(blocks) / length - design.shape[1], 1.0)
-    wider = np.sqrt(1.0 + design.shape[1] / freedom) * quantile(int(max(freedom, 1))) / quantile(10**6)
+    wider = np.sqrt(1.0 + design.shape[1] / freedom) * t_quantile(int(max(freedom, 1))) / t_quantile(10**6)
     return fit.parameters + wider * (drawn - fit.parameters)
-
-
-def _interval(values: FloatArray, level: float) -> tuple[float, float]:
-    low, high = np.quantile(values, [0.5 - level / 2.0, 0.5 + level / 2.0])
-    return float(low), float(high)
 
 
 def _robust_std(values: FloatArray) -> float:
     """Half the width of the middle 68 %: a few wild draws of a line that is hardly determined do not count."""
-    low, high = _interval(values, 0.6827)
+    low, high = central_interval(values, 0.6827)
     return 0.5 * (high - low)

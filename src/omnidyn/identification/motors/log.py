@@ -15,6 +15,7 @@ from omnidyn.logs.segments import segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
+from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 
@@ -100,12 +101,6 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces)
 
 
-def stretches(pieces: Sequence[slice], known: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def rows_with(known: NDArray[np.bool_], pieces: Sequence[slice]) -> list[tuple[int, int]]:
     """(first, last) rows between gaps throughout which `known` (rows,) holds."""
-    found = []
-    for piece in pieces:
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], known[piece], [False]]).astype(np.int8)))
-        found += [
-            (piece.start + int(a), piece.start + int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)
-        ]
-    return found
+    return [(p.start + a, p.start + b - 1) for p in pieces for a, b in stretches(known[p]).tolist()]

@@ -12,7 +12,7 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors.between import CURVE, MEAN, SUB, refined
 from omnidyn.identification.motors.engine import ANGLE, SPEED, MotorProblem
 from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, SLOPE
-from omnidyn.identification.motors.log import MotorLog, stretches
+from omnidyn.identification.motors.log import MotorLog, rows_with
 from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point
@@ -43,7 +43,7 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> Record
     values[unresolved_rows(u)] = np.nan
     if between == MEAN:
         u = np.append(0.5 * (u[1:] + u[:-1]), u[-1])
-    pieces = [rows for rows in stretches(log.pieces, np.isfinite(u)) if rows[1] - rows[0] + 1 >= SHORTEST]
+    pieces = [rows for rows in rows_with(np.isfinite(u), log.pieces) if rows[1] - rows[0] + 1 >= SHORTEST]
     if not pieces:
         raise InsufficientDataError(
             "no stretch of the log has inputs throughout", got=f"{int(np.isfinite(u).sum())} rows",
@@ -93,10 +93,12 @@ def begin(problem: MotorProblem, lag: float) -> Point:
     point = problem.start()
     up = low = 0.0
     for r in {id(piece.record): piece.record for piece in problem.pieces}.values():
-        speed = r.outputs[:, r.columns.index(SPEED)] if SPEED in r.columns else np.gradient(r.outputs[:, 0], r.t)
-        known = np.isfinite(speed)
+        known = np.isfinite(r.outputs[:, 0])
+        speed = r.outputs[known, 0]
+        if SPEED not in r.columns:
+            speed = np.gradient(speed, r.t[known]) if len(speed) > 1 else np.zeros_like(speed)
         up += float(np.abs(r.voltage[known, 0]).sum())
-        low += float(np.abs(speed[known]).sum())
+        low += float(np.abs(speed).sum())
     values = point.values.copy()
     values[0], values[1] = up / low if low > 0.0 else 1.0, lag
     return replace(point, values=values)

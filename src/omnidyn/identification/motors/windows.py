@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.between import InputIntegral
-from omnidyn.identification.motors.log import MotorLog, stretches
-from omnidyn.logs.average import TO_SIGMA, robust_mean, sensor_step
+from omnidyn.identification.motors.log import MotorLog, rows_with
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus
 from omnidyn.logs.resolved import unresolved_input
+from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step
 
 FloatArray = NDArray[np.float64]
 
@@ -165,7 +165,7 @@ def _mean_speed(log: MotorLog, window: slice) -> tuple[FloatArray, FloatArray]:
     angle = log.angle[window]
     steps = np.diff(angle, axis=0) / np.diff(t)[:, None]
     # white noise of the angle, as it shows in the second differences, enters through the two ends
-    noise = np.median(np.abs(np.diff(angle, n=2, axis=0)), axis=0) * TO_SIGMA / np.sqrt(6.0)
+    noise = np.median(np.abs(np.diff(angle, n=2, axis=0)), axis=0) * MAD_TO_STD / np.sqrt(6.0)
     mean = (angle[-1] - angle[0]) / (t[-1] - t[0])
     return np.where(np.isfinite(steps).all(axis=0), mean, np.nan), np.sqrt(2.0) * noise / (t[-1] - t[0])
 
@@ -177,7 +177,7 @@ def _mean_of_noisy(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
         return np.nan, np.nan
     x, y = 2.0 * (t[known] - t[0]) / (t[-1] - t[0]) - 1.0, speed[known]
     middle = np.median(y)
-    reach = WILD * TO_SIGMA * np.median(np.abs(y - middle)) + sensor_step(y)
+    reach = WILD * MAD_TO_STD * np.median(np.abs(y - middle)) + sensor_step(y)
     table = np.polynomial.legendre.legvander(x, min(3, len(x) // 6))
     smooth = table @ np.linalg.lstsq(table, np.clip(y, middle - reach, middle + reach), rcond=None)[0]
     rest, error = robust_mean(y - smooth)
@@ -193,7 +193,7 @@ class _Reader:
         self.rest = np.full(log.motors, np.nan)
         self._largest = np.nanmax(np.abs(log.put_in), axis=0, initial=0.0)
         self._put_in = [
-            InputIntegral(log.t, log.put_in[:, m], stretches(log.pieces, np.isfinite(log.put_in[:, m])))
+            InputIntegral(log.t, log.put_in[:, m], rows_with(np.isfinite(log.put_in[:, m]), log.pieces))
             for m in range(log.motors)
         ]
 
@@ -228,7 +228,7 @@ class _Reader:
         speed = self.log.motion[window, motor]
         speed = np.where(np.isfinite(speed), speed, np.nanmedian(speed))
         rows = len(speed)
-        noise = max(float(np.median(np.abs(np.diff(speed)))) * TO_SIGMA / np.sqrt(2.0), error * np.sqrt(rows))
+        noise = max(float(np.median(np.abs(np.diff(speed)))) * MAD_TO_STD / np.sqrt(2.0), error * np.sqrt(rows))
         count = int(np.ceil((noise / (SIGN_NOISE * self.usual)) ** 2)) if self.usual > 0.0 else rows
         if count >= rows:
             return np.full(rows, np.sign(put_in))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.steady.line import quantile
+from omnidyn.statistics import t_quantile
 
 FloatArray = NDArray[np.float64]
 
@@ -21,4 +21,4 @@ def confidence_band(estimate: Estimate, axis: int, speed: FloatArray) -> tuple[F
     joint = 2.0 * estimate.correlation.between(slope, level) * of_slope * of_level
     spread = np.sqrt(of_slope**2 + joint + of_level**2)
     middle = estimate.value[slope] * speed + estimate.value[level]
-    return middle, quantile(estimate.degrees_of_freedom[slope]) * spread
+    return middle, t_quantile(estimate.degrees_of_freedom[slope]) * spread

@@ -33,6 +33,7 @@ from omnidyn.identification.steady.shape_fit import (
 )
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS
 from omnidyn.model.robot import Robot
+from omnidyn.statistics import huber_loss
 
 FloatArray = NDArray[np.float64]
 
@@ -180,11 +181,9 @@ def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], judge: _Judge) -> tuple[
 
 
 def _capped(squares: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Huber's loss of squared lengths: l^2 up to k, then 2 k l - k^2, k two scales of the shape that has the least."""
+    """Huber's loss of squared lengths, its bound two scales of the shape that has the least."""
     limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(each) for each in squares.values())))
-    return {
-        name: np.where(each <= limit**2, each, 2.0 * limit * np.sqrt(each) - limit**2) for name, each in squares.items()
-    }
+    return {name: huber_loss(each, limit) for name, each in squares.items()}
 
 
 def _difference(first: FloatArray, second: FloatArray, fold: NDArray[np.int64]) -> tuple[float, float]:

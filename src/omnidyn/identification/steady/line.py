@@ -3,26 +3,25 @@
     force = B speed + C sgn(speed),  B >= 0, C >= 0                                 eqs (15)-(17)
 
 Weighted least squares. Where the speeds carry errors too, the sum of r^2 / (force_std^2 + B^2 speed_std^2) is
-minimised over B and C (effective variance, with the slope in it): York et al., Am. J. Phys. 72, 367 (2004).
-Iterating weights alone would leave the slope too flat, as much as ordinary least squares does.
+minimised over B and C (effective variance, with the slope in it): `errors_in_variables`.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtrit
 
 from omnidyn.errors import InsufficientDataError
+from omnidyn.statistics import FittedLine, errors_in_variables, t_quantile
 
 FloatArray = NDArray[np.float64]
 
 PARAMETERS = 2
 MAX_ITERATIONS, TOLERANCE = 500, 1e-12
 MAX_CONDITION = 1e13
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,51 +96,34 @@ def fit_line(
     design = np.stack([speed / scale[0], side], axis=1)
     variance = np.ones_like(speed) if force_std is None else force_std**2
     wobble = np.zeros_like(speed) if speed_std is None else np.where(speed != 0.0, speed_std / scale[0], 0.0) ** 2
-    free, adjusted, weight, converged = _minimise(design, force, variance, wobble, (True, True))
+    problem = (design, force, variance, wobble)
+    best, free = _minimise(*problem, (True, True))
     rows = len(speed)
-    mean_square = _cost(free, design, force, variance, wobble) / max(rows - PARAMETERS, 1)
-    normal = adjusted.T @ (weight[:, None] * adjusted)
+    mean_square = _cost(free, *problem) / max(rows - PARAMETERS, 1)
+    normal = best.adjusted.T @ (best.weight[:, None] * best.adjusted)
     covariance = _solve(normal, np.eye(PARAMETERS)) * (1.0 if absolute_std else mean_square)
     return Line(
-        estimate=_bounded(free, design, force, variance, wobble) / scale,
+        estimate=_bounded(free, *problem) / scale,
         free=free / scale,
         covariance=covariance / np.outer(scale, scale),
         rows=rows,
         reduced_chi2=mean_square,
-        quantile=quantile(rows - PARAMETERS, absolute_std),
-        converged=converged,
+        quantile=t_quantile(math.inf if absolute_std else rows - PARAMETERS),
+        converged=best.converged,
     )
-
-
-def quantile(degrees_of_freedom: int, absolute_std: bool = False) -> float:
-    """Standard errors in half a 95 % interval: Student's t, or the normal 1.96."""
-    tail = 0.5 + CONFIDENCE / 2.0
-    return float(ndtri(tail) if absolute_std else stdtrit(degrees_of_freedom, tail))
 
 
 def _minimise(
     design: FloatArray, force: FloatArray, variance: FloatArray, wobble: FloatArray, free: tuple[bool, bool]
-) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-    """Best (B, C) over the free ones: (parameters, speeds adjusted to the line, weights, converged).
-
-    The gradient of the cost is sum W r (x + B wobble W r): the normal equations with adjusted speeds, repeated.
-    """
+) -> tuple[FittedLine, FloatArray]:
+    """The line of the free ones among B and C, and (B, C)."""
     chosen = np.flatnonzero(free)
+    columns = np.ascontiguousarray(design[:, chosen])
+    wobble = wobble if free[0] else 0.0 * wobble
+    found = errors_in_variables(columns, force, variance, wobble, _solve, tolerance=TOLERANCE, most=MAX_ITERATIONS)
     parameters = np.zeros(PARAMETERS)
-    adjusted, weight = design, 1.0 / variance
-    for _ in range(MAX_ITERATIONS):
-        weighted = (weight[:, None] * adjusted[:, chosen]).T
-        previous = parameters
-        parameters = np.zeros(PARAMETERS)
-        parameters[chosen] = _solve(weighted @ design[:, chosen], weighted @ force)
-        if not wobble.any() or not free[0]:
-            return parameters, design, weight, True
-        weight = 1.0 / (variance + parameters[0] ** 2 * wobble)
-        residual = force - design @ parameters
-        adjusted = design + np.outer(parameters[0] * wobble * weight * residual, [1.0, 0.0])
-        if np.abs(parameters - previous).max() <= TOLERANCE * np.abs(parameters).max():
-            return parameters, adjusted, weight, True
-    return parameters, adjusted, weight, False
+    parameters[chosen] = found.parameters
+    return found, parameters
 
 
 def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
@@ -170,6 +152,6 @@ def _bounded(
     if (free >= 0.0).all():
         return free
     problem = (design, force, variance, wobble)
-    corners = [_minimise(*problem, choice)[0] for choice in ((True, False), (False, True))]
+    corners = [_minimise(*problem, choice)[1] for choice in ((True, False), (False, True))]
     allowed = [corner for corner in (*corners, np.zeros(PARAMETERS)) if (corner >= 0.0).all()]
     return min(allowed, key=lambda parameters: _cost(parameters, *problem))

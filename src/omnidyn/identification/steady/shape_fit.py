@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shapes import Shape
-from omnidyn.logs.average import standard_error
 from omnidyn.model.robot import Robot
+from omnidyn.statistics import huber_weight, standard_error
 
 FloatArray = NDArray[np.float64]
 
@@ -195,7 +195,7 @@ class _Problem:
             scale = float(np.median(length)) / RAYLEIGH
             if scale == 0.0:
                 break
-            weight = np.minimum(1.0, HUBER * scale / np.maximum(length, 1e-300))
+            weight = huber_weight(length, HUBER * scale)
             new = self.solve(weight, level)
             if new is None:
                 break

@@ -19,7 +19,6 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import AUTO, ShapeChoice, base_name, choose_shape, speeds_differ
-from omnidyn.identification.steady.line import quantile
 from omnidyn.identification.steady.operating_points import WHEEL, ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import AXES, DIRECTION, SHAPES, VISCOUS, friction_of
@@ -27,6 +26,7 @@ from omnidyn.identification.steady.study_parts import Difference, Travel, Viscou
 from omnidyn.model.friction import Friction
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.run import Run
+from omnidyn.statistics import t_quantile
 
 FloatArray = NDArray[np.float64]
 
@@ -129,7 +129,7 @@ def _viscous(
         return ()
     for k, key in enumerate(fit.keys):
         if ".viscous" in key:
-            half = quantile(fit.degrees_of_freedom) * float(fit.std[k])
+            half = t_quantile(fit.degrees_of_freedom) * float(fit.std[k])
             value, low, high = float(fit.free[k]), float(fit.free[k]) - half, float(fit.free[k]) + half
             effect = max(abs(low), abs(high)) * (travel.fast - travel.slow)
             seen = not low <= 0.0 <= high
@@ -162,7 +162,7 @@ def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str
 
 def _intervals(fit: ShapeFit) -> dict[str, tuple[float, float]]:
     """95 % intervals; at a bound from 0 to what the free fit would reach from 0, as with a line."""
-    half = quantile(fit.degrees_of_freedom) * fit.std
+    half = t_quantile(fit.degrees_of_freedom) * fit.std
     low, high = fit.free - half, fit.free + half
     bound = fit.free < 0.0
     low = np.where(bound, 0.0, np.minimum(low, fit.level))
@@ -209,7 +209,7 @@ def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
             j = other.keys.index(key)
             values = float(one.free[k]), float(other.free[j])
             std = float(np.hypot(one.std[k], other.std[j]))
-            half = quantile(min(one.degrees_of_freedom, other.degrees_of_freedom)) * std
+            half = t_quantile(min(one.degrees_of_freedom, other.degrees_of_freedom)) * std
             gap = values[1] - values[0]
             found.append(Difference(key, first, second, values, gap, std, gap - half, gap + half))
     return tuple(found)

@@ -19,7 +19,7 @@ import numpy as np
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.files import default_max_bytes, open_regular, too_large
 from omnidyn.logs.readers.parquet_pages import declared_bytes
-from omnidyn.logs.table.header import MAX_COLUMNS, split_units
+from omnidyn.logs.table.header import MAX_COLUMNS, check_name, split_units
 from omnidyn.logs.table.rows import INFINITE, Column, FloatArray, column_of, refuse_infinite, skip_note
 from omnidyn.logs.table.table import MAX_CELLS, ROWS, Table, join
 from omnidyn.logs.table.text import BLOCK_BYTES, TOO_LARGE_REMEDY, Progress
@@ -204,11 +204,8 @@ class _Columns:
                 "too many columns" if self.raw else "no columns", got=len(self.raw),
                 expected=f"1 to {MAX_COLUMNS}", where=source,
             )  # fmt: skip
-        for k, name in enumerate(self.raw):
-            if not name.strip():
-                raise InputError(f"column {k + 1} has no name", expected="a name for every column", where=source)
-            if name in self.raw[:k]:
-                raise InputError("two columns have the same name", got=name, expected="different names", where=source)
+        for k in range(len(self.raw)):
+            check_name(k, [name if name.strip() else "" for name in self.raw], source)
         self.kinds = [_kind(pyarrow.types, field.type) for field in schema]
         self._refuse(schema, source)
         names, self.units = split_units(self.raw)

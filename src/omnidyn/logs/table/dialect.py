@@ -19,7 +19,7 @@ SEPARATORS = (",", ";", "\t")
 SEPARATOR_WORDS = {",": "a comma", ";": "a semicolon", "\t": "a tab"}
 SAMPLE_ROWS = 50  # rows that vote on the separator; a later row that differs is refused as ragged
 
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE | re.ASCII)
 MISSING = re.compile(r"(?:[+-]?nan(?:\(\w*\))?)?", re.IGNORECASE | re.ASCII)  # C prints -nan and nan(ind) as well
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)

@@ -16,6 +16,7 @@ from omnidyn.logs.table import dialect
 from omnidyn.logs.table.dialect import SAMPLE_ROWS, SEPARATOR_WORDS, SEPARATORS
 
 MAX_COLUMNS = 1000
+MAX_NAME = 1000  # characters
 TABS_NOTE = "columns are separated by " + SEPARATOR_WORDS["\t"]
 HEAD_ROWS = 3  # at most so many lines above the first row: titles, units, names
 
@@ -197,14 +198,7 @@ def _names(head: _Head, separator: str, body: list[Line], source: str) -> list[s
         if all(len(names) - 1 in counts for counts in rows):
             names = names[:-1]
     for k, name in enumerate(names):
-        if not name:
-            raise InputError(
-                f"column {k + 1} has no name",
-                got=line.text,
-                expected="a name for every column",
-                remedy="name it or remove it",
-                where=where,
-            )
+        check_name(k, names, where, got=line.text)
         if dialect.looks_like_number(name):
             raise InputError(
                 "the table has no header: a number stands where a name should",
@@ -213,9 +207,30 @@ def _names(head: _Head, separator: str, body: list[Line], source: str) -> list[s
                 remedy="add a first line with the column names, or use --no-header",
                 where=where,
             )
-        if name in names[:k]:
-            raise InputError("two columns have the same name", got=name, expected="different names", where=where)
     return names
+
+
+def check_name(k: int, names: Sequence[str], where: str, got: str | None = None) -> None:
+    """Raises InputError where the name of column k is blank, too long, or that of an earlier one. got: the header."""
+    name = names[k]
+    if not name:
+        raise InputError(
+            f"column {k + 1} has no name",
+            got=got,
+            expected="a name for every column",
+            remedy="name it or remove it",
+            where=where,
+        )
+    if len(name) > MAX_NAME:
+        raise InputError(
+            f"the name of column {k + 1} is too long",
+            got=f"{len(name)} characters, {name[:40]}...",
+            expected=f"at most {MAX_NAME}",
+            remedy="give it a short name, or see whether this line is the header",
+            where=where,
+        )
+    if name in names[:k]:
+        raise InputError("two columns have the same name", got=name, expected="different names", where=where)
 
 
 def _refuse_width(columns: int, where: str) -> None:

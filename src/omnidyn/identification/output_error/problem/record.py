@@ -16,6 +16,7 @@ from omnidyn.model.motor import clip_voltage
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
+from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 
@@ -141,6 +142,5 @@ def _whole(known: NDArray[np.bool_], start: int, stop: int) -> list[tuple[int, i
     """Stretches of rows with all inputs, (first, last). The last row needs none: nothing follows it."""
     if known[start : stop - 1].all():
         return [(start, stop - 1)] if stop - start >= SHORTEST else []
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], known[start:stop].astype(int), [0]])))
-    runs = zip(start + edges[::2], start + edges[1::2] - 1, strict=True)
-    return [(int(a), int(b)) for a, b in runs if b - a + 1 >= SHORTEST]
+    found = start + stretches(known[start:stop])
+    return [(int(a), int(b) - 1) for a, b in found if b - a >= SHORTEST]

@@ -16,13 +16,14 @@ from omnidyn.model.frames import body_to_world
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
+from omnidyn.statistics import MAD_TO_STD
 
 FloatArray = NDArray[np.float64]
 
 NEAR = 0.2  # of what independent measurements part by
 WINDOWS = (1, 16, 256)  # rows
 ENOUGH, LEAST = 50_000, 30  # rows looked at; windows needed
-TO_STD = 1.4826 / np.sqrt(20.0)  # from the median size of third differences to the noise of a row
+TO_STD = MAD_TO_STD / np.sqrt(20.0)  # from the median size of third differences to the noise of a row
 
 
 def doubled(run: Run, robot: Robot) -> dict[str, str]:

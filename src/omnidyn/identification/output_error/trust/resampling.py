@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtrit
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.problem.problem import Point
@@ -15,13 +14,13 @@ from omnidyn.identification.output_error.solve.difference import TiedEngine
 from omnidyn.identification.output_error.solve.progress import NOBODY, Onlooker
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import Trust
+from omnidyn.statistics import central_interval, t_quantile
 
 FloatArray = NDArray[np.float64]
 
 OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
 LEAST_RUNS, LEAST_DRAWS = 5, 20
 SEED = 20120101
-TAIL = 0.975
 
 Strata = Mapping[int, str]  # id of a record -> the group it belongs to
 
@@ -73,8 +72,8 @@ def resampled(
 
 def draw_interval(value: float, draws: FloatArray, widening: float) -> tuple[float, float]:
     """95 % interval of draws (N,) around a value: their quantiles, as much farther away as few runs ask for."""
-    low, high = np.quantile(draws, [1.0 - TAIL, TAIL])
-    return value + widening * (float(low) - value), value + widening * (float(high) - value)
+    low, high = central_interval(draws)
+    return value + widening * (low - value), value + widening * (high - value)
 
 
 def widening_of_std(runs: int) -> float:
@@ -88,7 +87,7 @@ def small_sample(runs: int) -> float:
     Hesterberg, "What teachers should know about the bootstrap", Am. Stat. 69 (2015), the expanded percentile interval,
     here as a factor.
     """
-    return widening_of_std(runs) * float(stdtrit(runs - 1.0, TAIL) / ndtri(TAIL))
+    return widening_of_std(runs) * (t_quantile(runs - 1.0) / t_quantile(np.inf))
 
 
 def profile_interval(solver: Solver, solution: Solution, known: Trust, index: int) -> tuple[float, float]:

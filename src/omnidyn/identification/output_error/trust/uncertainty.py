@@ -18,13 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, ndtri, stdtrit
+from scipy.special import chdtri
 
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import PieceSums, per_column
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.trust.rounding import rounding_scatter, silent
+from omnidyn.statistics import t_quantile
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -36,7 +37,6 @@ BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below w
 WEAK = 1e-4  # below it, is hardly seen
 SHARE = 0.05  # of a blind direction that a parameter must have to be named
 WHITE, SANDWICH = "white", "sandwich"
-TAIL = 0.975
 RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 
 
@@ -110,7 +110,7 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     covariance[~seen, ~seen] = np.inf
     return Trust(
         covariance, normal.held, ~seen, np.diag(normal.information) <= 0.0, _free_step(plain, normal), kind, widening,
-        float(stdtrit(degrees, TAIL) if degrees > 0 else ndtri(TAIL)), max(int(degrees), 0), neighbours, directions,
+        t_quantile(degrees if degrees > 0 else np.inf), max(int(degrees), 0), neighbours, directions,
         count if kind == SANDWICH else 0, plain,
     )  # fmt: skip
 
