@@ -194,6 +194,20 @@ def test_motors_in_words(call, bench):
     assert "-o is not used" in err
 
 
+def test_motors_go_into_a_robot_file(call, bench, tmp_path):
+    """u = 0.5 w + 0.4 sgn w at the wheel: K_v = 0.5 V s/rad over the gear of 16, c = g 0.4 V, of two wheels of three."""
+    out = tmp_path / "fit.toml"
+    code, text, _ = call(str(bench), "--what", "motors", "--robot", "robotino", "-o", str(out), "--json")
+    assert code == 0
+    robot, told = load_robot(out), json.loads(text)["robot"]["numbers"]
+    key = "motor.emf_constant_Vs_rad[0]"
+    assert robot.motor.emf_constant[0] == told[key]["value"] == pytest.approx(0.5 / 16.0, rel=0.02)
+    assert robot.motor.emf_constant[2] == load_robot("robotino").motor.emf_constant
+    assert "bench.csv" in robot.priors[key].source
+    force = 0.5 / (5.95 * 0.04) * 0.4
+    assert robot.friction.wheels.coulomb == pytest.approx((force, force, 0.0), rel=0.05)
+
+
 @pytest.mark.parametrize("option", ["-o", "--report", "--save-map"])
 def test_no_result_replaces_a_log_even_when_forced(call, floors, tmp_path, option):
     log = tmp_path / "drive.csv"

@@ -10,6 +10,7 @@ from omnidyn.cli.identify_steady import How, say_written
 from omnidyn.cli.terminal.streams import say, show, show_json
 
 if TYPE_CHECKING:
+    from omnidyn.identification.motors.into_robot import MotorNumbers
     from omnidyn.identification.motors.study import MotorStudy
     from omnidyn.model.robot import Robot
 
@@ -26,7 +27,7 @@ def run_motors(method: str, loaded: Loaded, robot: Robot | None, asked: Any, rec
         now=now,
     )  # fmt: skip
     now("writing")
-    _tell(study, record, asked.places())
+    _tell(study, robot, record, asked.places())
 
 
 def _latency(asked: str | list[str]) -> bool | None:
@@ -41,12 +42,30 @@ def _latency(asked: str | list[str]) -> bool | None:
     return bool(asked)
 
 
-def _tell(study: MotorStudy, record: dict[str, Any], to: Out) -> None:
-    """Write and show: report, JSON or the summary."""
+def _into_file(study: MotorStudy, robot: Robot | None, to: Out) -> MotorNumbers | None:
+    """Write the robot file where one is asked for, and the logs determine a number of it."""
+    from omnidyn.identification.motors.into_robot import motors_into_robot
+    from omnidyn.model.robot_file import save_robot
+
+    if not to.out:
+        return None
+    if robot is None:
+        say("omnidyn: a robot file needs the robot that the motors belong to, --robot ROBOT; -o is not used")
+        return None
+    numbers = motors_into_robot(study, robot)
+    if numbers.value:
+        save_robot(numbers.robot, to.out, to.force)
+    else:
+        say("omnidyn: the logs determine no number of a robot file; -o is not used")
+    return numbers
+
+
+def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out) -> None:
+    """Write and show: robot file, report, JSON or the summary."""
     from omnidyn.files import write_atomic
 
-    if to.out:
-        say("omnidyn: the numbers of the motors do not go into a robot file; -o is not used")
+    numbers = _into_file(study, robot, to)
+    output = to.out if numbers is not None and numbers.value else ""
     if to.report:
         from omnidyn.report.motors_page import render_motors
 
@@ -54,7 +73,10 @@ def _tell(study: MotorStudy, record: dict[str, Any], to: Out) -> None:
     if to.json:
         for warning in study.doubts:
             say(f"omnidyn: warning: {warning}")
-        show_json({**study.to_dict(), "report": to.report or None, "provenance": record})
+        own = numbers.to_dict() if numbers is not None else None
+        show_json({
+            **study.to_dict(), "robot": own, "output": output or None, "report": to.report or None, "provenance": record
+        })  # fmt: skip
     else:
-        show(study.summary().rstrip("\n"))
-    say_written([to.report])
+        show("\n".join([study.summary(), *(numbers.lines() if numbers is not None else [])]).rstrip("\n"))
+    say_written([output, to.report])

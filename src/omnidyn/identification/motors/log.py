@@ -21,6 +21,7 @@ FloatArray = NDArray[np.float64]
 
 INPUTS = {"voltage": ("V", 1.0), "duty": ("%", 100.0), "current": ("A", 1.0)}  # unit, and how many of it in one SI unit
 WHEEL, GROUND = "wheel", "ground"
+HEADING = "heading, the robot turning on the spot"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
             raise InputError("the heading is not known", got=", ".join(run.channels), expected="heading, and a robot",
                              where=run.source)  # fmt: skip
         angle, measured = run.pose[:, 2:] * wheel_speed(robot.wheels, [0.0, 0.0, 1.0]), None
-        origin = "heading, the robot turning on the spot"
+        origin = HEADING
     elif speed == WHEEL:
         angle, measured = live_angle(run), run.wheel_speed
         origin = "wheel_speed" if angle is None else "wheel_angle"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -29,7 +30,8 @@ class MotorStudy:
     """motors: an estimate each, the last for all together where there are several in windows.
 
     plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
-    found. windows: that the lines go through, None of free runs. warnings: of the logs, in words.
+    found. windows: that the lines go through, None of free runs. supply [V]: of a
+    duty, the mean of the logs; NaN where it is not logged. warnings: of the logs, in words.
     """
 
     method: str
@@ -39,6 +41,7 @@ class MotorStudy:
     motors: tuple[MotorEstimate, ...]
     plain: tuple[MotorEstimate, ...] = ()
     windows: MotorWindows | None = None
+    supply: float = math.nan
     warnings: tuple[str, ...] = ()
 
     @property
@@ -123,7 +126,7 @@ def identify_motors(
     motors = [int(motor) for motor in np.unique(windows.motor)]
     lines = [fit_line(windows, motor, source, draws=draws) for motor in (*motors, *([None] if motors[1:] else []))]
     return MotorStudy(
-        method, windows.kind, windows.unit, windows.speed_from, tuple(lines), (), windows,
+        method, windows.kind, windows.unit, windows.speed_from, tuple(lines), (), windows, _supply(logs),
         tuple(_of_windows(windows, lines)),
     )  # fmt: skip
 
@@ -148,7 +151,13 @@ def _free_runs(
         pairs.append([replace(fit, held_out=fit_rmse(fit, held_out)) if held_out else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
-    return MotorStudy(OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain)
+    return MotorStudy(OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, supply=_supply(logs))
+
+
+def _supply(logs: Sequence[MotorLog]) -> float:
+    """Mean supply of the logs [V], NaN where one has none."""
+    means = [float(np.nanmean(log.run.supply)) if log.run.supply is not None else math.nan for log in logs]
+    return float(np.mean(means))
 
 
 def _driven(log: MotorLog, motor: int) -> bool:

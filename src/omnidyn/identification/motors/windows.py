@@ -85,7 +85,7 @@ def motor_windows(
         if not sharp and not steady and share is None and all(map(_in_steps, logs)):
             share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
-    every = -(-sum(map(len, windows)) // MAX_WINDOWS)
+    every = max(1, -(-sum(map(len, windows)) // MAX_WINDOWS))
     block, readers = 0, []
     rows: list[tuple[float, ...]] = []
     for log, several in zip(logs, windows, strict=True):
