@@ -195,7 +195,7 @@ def test_motors_in_words(call, bench):
 
 
 def test_motors_go_into_a_robot_file(call, bench, tmp_path):
-    """u = 0.5 w + 0.4 sgn w at the wheel: K_v = 0.5 V s/rad over the gear of 16, c = g 0.4 V, of two wheels of three."""
+    """u = 0.5 w + 0.4 sgn w at two wheels of three: K_v = 0.5 V s/rad over the gear of 16, c = g 0.4 V."""
     out = tmp_path / "fit.toml"
     code, text, _ = call(str(bench), "--what", "motors", "--robot", "robotino", "-o", str(out), "--json")
     assert code == 0

@@ -41,7 +41,24 @@ def log(kind="voltage", seed=0, motors=TRUE, noise=0.02, hold=40, **how):
     rng = np.random.default_rng(seed)
     shape = ROWS // hold, len(motors)
     voltage = np.repeat(rng.uniform(3.0, 9.0, shape) * rng.choice([-1.0, 1.0], shape), hold, axis=0)
-", latency=False), tied())
+    speed, current = np.stack([wheel(u, *own, **how) for u, own in zip(voltage.T, motors, strict=True)], axis=-1)
+    put_in = {"duty": {"duty": voltage / 12.0}, "current": {"current": current, "voltage": voltage}}
+    return Run(
+        t=DT * np.arange(ROWS), **put_in.get(kind, {kind: voltage}),
+        wheel_speed=speed + noise * rng.standard_normal(speed.shape),
+        supply=np.full(ROWS, 12.0) if kind == "duty" else None, source="bench.csv",
+    )  # fmt: skip
+
+
+def tied():
+    """robotino, whose K_t and K_v are one number."""
+    return load_robot("robotino")
+
+
+@pytest.mark.parametrize("method", ["steady-state", "output-error"])
+def test_the_numbers_come_back(method):
+    """Within four standard errors, and what steps of 0.5 ms are off by."""
+    numbers = motors_into_robot(identify_motors([log()], method=method, between="hold", latency=False), tied())
     for m, (constant, coulomb) in enumerate(TRUE):
         for key, true in ((EMF, constant), (TORQUE, constant), (COULOMB, coulomb)):
             own = f"{key}[{m}]"

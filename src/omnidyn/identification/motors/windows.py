@@ -132,9 +132,11 @@ def _length(logs: Sequence[MotorLog], usual: float) -> tuple[float, bool]:
         errors, rows = [], []
         for log in logs:
             for window in _windows(log, length)[:: max(1, len(log.t) // 500)]:
-                errors.append(np.max(_mean_speed(log, window)[1]))
+                error = _mean_speed(log, window)[1]
+                known = np.isfinite(error)  # a robot may have more wheels than the log has motors
+                errors += [float(error[known].max())] if known.any() else []
                 rows.append(window.stop - window.start)
-        if errors and np.nanmedian(errors) <= SHARP * usual and np.median(rows) >= 2 * MIN_ROWS:
+        if errors and np.median(errors) <= SHARP * usual and np.median(rows) >= 2 * MIN_ROWS:
             return length, True
     return LENGTHS[-1], False
 
