@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.table import Table, machine
-from omnidyn.logs.readers.any_table import iter_tables
+from omnidyn.logs.readers.read_table import iter_tables
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 

@@ -30,7 +30,7 @@ from benchmarks.table import Table, machine
 from omnidyn.errors import OmnidynError
 from omnidyn.logs.command_file import read_commands
 from omnidyn.logs.read_log import read_log
-from omnidyn.logs.readers.any_table import iter_tables, read_any
+from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.run_file import read_run, run_to_csv, run_to_parquet
 from omnidyn.logs.steady_table import read_steady_table
 from omnidyn.run import CHANNELS, Run
@@ -97,14 +97,14 @@ def _parquet_seeds() -> list[bytes]:
 
 
 READERS: dict[str, tuple[Callable[[], list[bytes]], Callable[[str], Any]]] = {
-    "read_any, text": (_table_seeds, read_any),
-    "read_any, options": (_table_seeds, lambda path: read_any(path, header=False, skip_bad_rows=True)),
+    "read_table, text": (_table_seeds, read_table),
+    "read_table, options": (_table_seeds, lambda path: read_table(path, header=False, skip_bad_rows=True)),
     "iter_tables, text": (_table_seeds, lambda path: list(iter_tables(path, 3, skip_bad_rows=True))),
     "read_log": (_table_seeds, read_log),
     "read_run, text": (_table_seeds, read_run),
     "read_commands": (_table_seeds, lambda path: read_commands(path, 3)),
     "read_steady_table": (_table_seeds, read_steady_table),
-    "read_any, Parquet": (_parquet_seeds, read_any),
+    "read_table, Parquet": (_parquet_seeds, read_table),
     "iter_tables, Parquet": (_parquet_seeds, lambda path: list(iter_tables(path, 3, skip_bad_rows=True))),
     "read_run, Parquet": (_parquet_seeds, read_run),
 }

@@ -17,7 +17,7 @@ from benchmarks.identify_log import COUNTING, SHARE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
@@ -89,7 +89,7 @@ def bound() -> np.ndarray:
 def _solver(run: Run, tol: float) -> Solver:
     given = Options(KEYS, nuisances=("latency",), start="rest")
     problem = make_problem([record(run, ellipse())], ellipse(), given)
-    return Solver(problem, TangentEngine(problem, tol))
+    return Solver(problem, ImplicitEngine(problem, tol))
 
 
 def measure() -> Table:

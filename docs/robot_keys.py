@@ -12,16 +12,12 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
+from omnidyn.model.keys import TABLES, unit
 from omnidyn.model.robot import Robot
 from omnidyn.model.value import keys_of
 
 PAGE = Path(__file__).with_name("robot-file.md")
-TABLES = ("body", "wheels", "motor", "drive", "friction")
-UNITS = {
-    "_kg": "kg", "_kg_m2": "kg m²", "_m": "m", "_deg": "degree", "_ohm": "Ω", "_H": "H", "_Nm_A": "N m/A",
-    "_Vs_rad": "V s/rad", "_V": "V", "_A": "A", "_V_s_rad": "V s/rad", "_V_rad": "V/rad", "_Hz": "Hz",
-}  # fmt: skip
-
+PRETTY = {"kg m^2": "kg m²", "deg": "degree", "ohm": "Ω"}
 
 # The descriptions in the model are notes for the margin of a robot file; these are sentences.
 MEANING = {
@@ -94,7 +90,8 @@ def _keys(table: str, model: type[BaseModel]) -> Iterator[Key]:
         if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
             inner.append((f"{table}.{key}", field.annotation))
             continue
-        unit, meaning = _unit(key, field.description or "", schema[key]), MEANING[f"{table}.{key}"]
+        path = f"{table}.{key}"
+        unit, meaning = _unit(path, field.description or "", schema[key]), MEANING[path]
         default = "needed" if field.is_required() else _literal(field.default)
         yield Key(table, key, unit, meaning, default, _allowed(schema[key]))
     for path, each in inner:
@@ -102,14 +99,11 @@ def _keys(table: str, model: type[BaseModel]) -> Iterator[Key]:
 
 
 def _unit(key: str, words: str, schema: dict[str, Any]) -> str:
-    """From the ending of the key, else from the brackets of its description; 1 for a pure number."""
-    endings = sorted((ending for ending in UNITS if key.endswith(ending)), key=len)
+    """Of each axis, as the brackets of its description say, else that of the key; 1 for a pure number."""
     found = re.search(r"\[(.+?)\]", words)
-    if endings:
-        return UNITS[endings[-1]]
     if found:
         return found.group(1)
-    return "1" if "number" in str(schema) else ""
+    return PRETTY.get(unit(key), unit(key)) or ("1" if "number" in str(schema) else "")
 
 
 def _literal(value: Any) -> str:

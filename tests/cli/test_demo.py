@@ -6,11 +6,11 @@ import signal
 import pytest
 
 from omnidyn.cli import main
-from omnidyn.cli.claims_table import claims_table
-from omnidyn.cli.demo_folder import MARKER, check_folder, write_folder
+from omnidyn.cli.terminal.folder import MARKER, check_folder, write_folder
+from omnidyn.cli.terminal.streams import width
 from omnidyn.errors import InputError
 from omnidyn.paper.claim import Verdict
-from omnidyn.paper.claims import all_claims
+from omnidyn.paper.claims import all_claims, claims_document
 from tests.support.outputs import strict
 
 FIGURES = ["fig1_robot", "fig2_traces", "fig3_friction", "fig4_steps", "fig5_dead_zone", "fig6_reconcile"]
@@ -114,7 +114,7 @@ def test_a_damaged_marker_removes_nothing_outside(tmp_path, marker):
 
 
 def test_a_demo_that_was_killed_can_be_done_again(tmp_path, monkeypatch):
-    import omnidyn.cli.demo_folder as module
+    import omnidyn.cli.terminal.folder as module
 
     folder = tmp_path / "demo"
     real = module.write_atomic
@@ -146,14 +146,13 @@ def test_sigterm_in_the_middle_unwinds(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("columns", [20, 40, 110])
 def test_the_table_fits_the_terminal(monkeypatch, columns):
     monkeypatch.setenv("COLUMNS", str(columns))
-    lines = claims_table(all_claims()).splitlines()
+    lines = claims_document(all_claims()).to_text(width()).splitlines()
     assert max(map(len, lines)) <= columns
 
 
-def test_the_table_has_every_claim_and_the_counts(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "4000")
+def test_the_table_has_every_claim_and_the_counts():
     claims = all_claims()
-    table = claims_table(claims)
+    table = claims_document(claims).to_text(4000)
     for claim in claims:
         assert f"{claim.place}: {claim.statement}" in table
     for verdict in Verdict:

@@ -54,8 +54,8 @@ def test_azimuths_radii_and_a_mass_are_enough(call, here):
     assert (robot.body.mass, robot.wheels.wheel_radius, robot.wheels.robot_radius) == (8.0, 0.04, 0.125)
     assert robot.wheels.azimuth_deg == (60.0, 180.0, 300.0)
     assert robot.body.rotating_frame is True
-    assert robot.priors["body.mass_kg"] == Prior(source="given")
-    assert robot.priors["motor.resistance_ohm"] == Prior(std=robot.motor.resistance, source="guess")
+    assert robot.priors["body.mass_kg"] == Prior(origin="given")
+    assert robot.priors["motor.resistance_ohm"] == Prior(std=robot.motor.resistance, origin="guess")
 
 
 def test_the_file_is_for_people_too(call, here):
@@ -63,7 +63,7 @@ def test_the_file_is_for_people_too(call, here):
     text = (here / "mini.toml").read_text()
     assert text.startswith("# Written by omnidyn init.")
     assert "#   body.inertia_kg_m2: a uniform disc out to the wheels, M b^2/2\n" in text
-    assert 'mass_kg = { value = 8.0, source = "given" }  # M\n' in text
+    assert 'mass_kg = { value = 8.0, origin = "given" }  # M\n' in text
     assert "[N]" in text
     assert text.endswith(robot_to_toml(load_robot(here / "mini.toml")))
 
@@ -122,8 +122,8 @@ def test_like_a_preset(call, here):
     assert robot.motor == preset.motor
     assert robot.drive == preset.drive
     assert robot.friction.direction.coulomb == (85.0, 72.2)
-    assert robot.priors["body.mass_kg"] == Prior(source="given")
-    assert robot.priors["motor.gear_ratio"] == Prior(std=4.8, source="like robotino")
+    assert robot.priors["body.mass_kg"] == Prior(origin="given")
+    assert robot.priors["motor.gear_ratio"] == Prior(std=4.8, source="like robotino", origin="imported")
 
 
 def test_like_a_preset_with_other_wheels(call, here):
@@ -156,7 +156,7 @@ def test_a_log_shows_where_the_wheels_stand(call, here, gear):
     assert robot.wheels.azimuth_deg == (60.0, 180.0, 300.0)
     assert robot.wheels.robot_radius == 0.125
     assert robot.priors["wheels.azimuth_deg"].source == "logs: twist_command and wheel_speed_command"
-    assert robot.priors["wheels.wheel_radius_m"].source == "given"
+    assert robot.priors["wheels.wheel_radius_m"] == Prior(origin="given")
     plain = first_guess("bot", robot.wheels, 8.0)
     assert (robot.motor.gear_ratio == 16.0) == (gear == 16.0)
     assert robot.motor.gear_ratio * robot.motor.emf_constant == pytest.approx(
@@ -214,7 +214,7 @@ def test_it_asks_at_a_terminal(typed, here):
     assert robot.wheels.azimuth_deg == (45.0, 135.0, 225.0, 315.0)
     assert (robot.wheels.wheel_radius, robot.wheels.robot_radius, robot.body.mass) == (0.06, 0.2, 10.0)
     assert robot.priors["wheels.azimuth_deg"] == Prior(source="default of omnidyn init, accepted")
-    assert robot.priors["body.mass_kg"] == Prior(source="given")
+    assert robot.priors["body.mass_kg"] == Prior(origin="given")
 
 
 def test_enter_accepts_everything_and_a_default_is_no_measurement(typed, here):

@@ -123,7 +123,7 @@ def test_guesses_of_a_robot_file_are_no_evidence_against_a_log(log, robot):
     strong = robot.replace(motor=robot.motor.replace(emf_constant=2.0 * robot.motor.emf_constant))
     (finding,) = check(log, strong).of("energy")
     assert finding.level == "fatal"
-    guess = strong.replace(priors={"motor.emf_constant_Vs_rad": Prior(source="guess")})
+    guess = strong.replace(priors={"motor.emf_constant_Vs_rad": Prior(origin="guess")})
     (finding,) = check(log, guess).of("energy")
     assert finding.level == "warn"
     assert "motor.emf_constant_Vs_rad of the robot file is only guessed" in finding.remedy

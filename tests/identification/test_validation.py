@@ -6,11 +6,12 @@ from scipy.integrate import quad
 
 import omnidyn
 from omnidyn.errors import InputError
-from omnidyn.identification.as_fitted import as_fitted, at_motors, mean_before
+from omnidyn.identification.as_fitted import as_fitted, mean_before
 from omnidyn.identification.identify import choose_method, options_of
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU, fit_output_error
 from omnidyn.identification.validation import Score, coloured, validate
+from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -98,9 +99,8 @@ def test_mean_of_a_held_voltage():
 
 
 def test_voltage_at_the_motors():
-    left = at_motors(
-        np.array([[3.0], [-3.0], [0.1]]), np.array([0.0, 1.0, 2.0]), {"gain": 0.5, "dead_band": 1.0, "fade": 0.2}
-    )
+    driver = Driver(**{"gain": 0.5, "dead_band": 1.0, "fade": 0.2})
+    left, _ = at_motors(np.array([[3.0], [-3.0], [0.1]]), np.array([0.0, 1.0, 2.0]) / 2.0, driver)
     assert left[:, 0] == pytest.approx([1.0, -0.9, 0.0])
 
 

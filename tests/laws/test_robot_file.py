@@ -1,9 +1,11 @@
 """A robot survives being written and read, to the last bit, whatever its numbers, names and priors."""
 
+from typing import get_args
+
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnidyn.model.robot import Prior
+from omnidyn.model.robot import Origin, Prior
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from tests.support.strategies import any_robot
 
@@ -15,7 +17,8 @@ KEYS = [
     "friction.axes.coulomb[1]",
     "wheels.azimuth_deg[0]",
 ]
-PRIOR = st.builds(Prior, std=st.none() | st.floats(1e-12, 1e6), source=NAME | st.just(""))
+ORIGIN = st.sampled_from(get_args(Origin))
+PRIOR = st.builds(Prior, std=st.none() | st.floats(1e-12, 1e6), source=NAME | st.just(""), origin=ORIGIN)
 
 
 @given(any_robot(), NAME, NAME | st.just(""), st.dictionaries(st.sampled_from(KEYS), PRIOR))

@@ -21,7 +21,7 @@ from omnidyn.errors import InputError
 from omnidyn.files import read_text
 from omnidyn.logs.command_file import read_commands
 from omnidyn.logs.read_log import read_log
-from omnidyn.logs.readers.any_table import iter_tables, read_any
+from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.run_file import read_run
 from omnidyn.logs.steady_table import read_steady_table
 
@@ -88,7 +88,7 @@ def test_a_format_is_refused_by_name(tmp_path, kind, name):  # 37
     content, words = FORMATS[kind]
     path = tmp_path / name
     path.write_bytes(content)
-    for read in (read_any, read_log, read_run, lambda path: list(iter_tables(path))):
+    for read in (read_table, read_log, read_run, lambda path: list(iter_tables(path))):
         with pytest.raises(InputError, match=words) as seen:
             read(path)
         assert str(seen.value).startswith(str(path))
@@ -98,7 +98,7 @@ def test_a_bag_of_ros_2_is_refused_by_name(tmp_path):
     path = tmp_path / "bag.csv"
     path.write_bytes(database(tmp_path))
     with pytest.raises(InputError, match=r"an SQLite database \(a ROS 2 \.db3 bag\)"):
-        read_any(path)
+        read_table(path)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_a_bag_of_ros_2_is_refused_by_name(tmp_path):
 )
 def test_text_that_begins_like_another_format_is_text(tmp_path, text):
     (tmp_path / "log.csv").write_text(text)
-    assert len(read_any(tmp_path / "log.csv")) == 1
+    assert len(read_table(tmp_path / "log.csv")) == 1
 
 
 def test_a_robot_file_is_told_the_same(tmp_path):
@@ -116,7 +116,7 @@ def test_a_robot_file_is_told_the_same(tmp_path):
 
 
 READERS = [
-    read_any,
+    read_table,
     read_log,
     read_run,
     read_steady_table,
@@ -151,4 +151,4 @@ def test_a_file_one_may_not_read_is_refused(tmp_path):  # 1
     (tmp_path / "log.csv").write_text("t,u\n0,1\n")
     (tmp_path / "log.csv").chmod(0)
     with pytest.raises(InputError, match="cannot read it; got Permission denied"):
-        read_any(tmp_path / "log.csv")
+        read_table(tmp_path / "log.csv")

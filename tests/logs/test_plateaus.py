@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.logs.plateaus import ANGLE, SPEED, find_plateaus, live_angle, plateau, pool, stretches
+from omnidyn.logs.plateaus import ANGLE, SPEED, find_plateaus, holds, live_angle, plateau, pool
 from omnidyn.run import Run
 
 DT, TAU = 0.02, 0.15
@@ -78,7 +78,7 @@ def test_without_a_stepped_command_windows_have_a_fixed_length():
     run = Run(
         t=np.arange(300) * DT, duty=0.3 + 0.05 * rng.standard_normal((300, 1)), wheel_speed=np.full((300, 1), 2.0)
     )
-    lengths = [run.t[each.stop - 1] - run.t[each.start] for each in stretches(run)[:-1]]
+    lengths = [run.t[each.stop - 1] - run.t[each.start] for each in holds(run)[:-1]]
     assert lengths
     assert np.allclose(lengths, 0.48, atol=0.021)
 

@@ -10,7 +10,6 @@ from omnidyn.model.deadzone import axis_patterns, dead_zone_force
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.first_guess import (
     AXES,
-    GUESS,
     WHY,
     default_prior,
     even_azimuths,
@@ -18,11 +17,11 @@ from omnidyn.model.first_guess import (
     guessed,
     like,
     mecanum_wheels,
-    numbers_of,
     reasons,
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
-from omnidyn.model.robot import Prior
+from omnidyn.model.keys import Key, all_keys
+from omnidyn.model.robot import GUESS, Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, preset_names, robot_to_toml
 from omnidyn.model.wheels import Wheels
 from omnidyn.simulation.simulate import simulate
@@ -86,12 +85,12 @@ def test_it_rests_up_to_its_friction():
 
 def test_every_number_says_where_it_comes_from_and_every_guess_how_wide():
     for robot in (MINI, first_guess("box", omni(), 8.0, shape=AXES), first_guess("known", omni(), 8.0, 11.1)):
-        for key, value in numbers_of(robot):
-            prior = robot.priors.get(key) or robot.priors[key.partition("[")[0]]
-            assert (prior.std is not None) == (prior.source == GUESS)
+        for key in map(Key.parse, all_keys(robot)):
+            prior, value = robot.priors.get(str(key)) or robot.priors[key.name], key.get(robot)
+            assert (prior.std is not None) == (prior.origin == GUESS)
             assert prior.std is None or 0.4 * value < prior.std < 1.1 * value
         assert {key for key, _ in reasons(robot)} <= set(WHY)
-        assert len(reasons(robot)) == len({key.partition("[")[0] for key, p in robot.priors.items() if p.std})
+        assert len(reasons(robot)) == len({Key.parse(key).name for key, p in robot.priors.items() if p.std})
     assert set(WHY) == {
         key for robot in (MINI, first_guess("box", omni(), 8.0, shape=AXES)) for key, _ in reasons(robot)
     }
@@ -145,17 +144,17 @@ def test_a_copy_of_a_preset_is_the_preset_but_for_what_is_known(name):
         preset.drive,
         preset.friction,
     )
-    assert {prior.source for prior in copy.priors.values()} == {f"like {name}"}
+    assert {(prior.source, prior.origin) for prior in copy.priors.values()} == {(f"like {name}", "imported")}
     assert parse_robot(robot_to_toml(copy)) == copy
 
 
 def test_numbers_taken_over_are_less_certain_than_the_preset_s():
     preset = load_robot("robotino")
     priors = like(preset, "copy", preset.wheels, 8.0).priors
-    assert priors["motor.resistance_ohm"] == Prior(std=1.78, source="like robotino")
+    assert priors["motor.resistance_ohm"] == Prior(std=1.78, source="like robotino", origin="imported")
     assert priors["body.inertia_kg_m2"].std == 0.04  # more than 30 %: the preset knows no better
-    assert priors["friction.direction.viscous"] == Prior(std=2.0, source="like robotino")
-    assert priors["wheels.azimuth_deg"] == Prior(source="like robotino")
+    assert priors["friction.direction.viscous"] == Prior(std=2.0, source="like robotino", origin="imported")
+    assert priors["wheels.azimuth_deg"] == Prior(source="like robotino", origin="imported")
     assert priors["friction.direction.coulomb[1]"].std == pytest.approx(0.3 * 36.1, rel=1e-2)
 
 
@@ -168,7 +167,7 @@ def test_a_larger_one_is_heavier_to_move():
     np.testing.assert_allclose(robot.friction.axes.coulomb, [4.4, 3.0, 4 * 0.099], rtol=1e-5)
     np.testing.assert_allclose(robot.friction.axes.viscous, [1.88, 1.92, 8 * 0.01], rtol=1e-5)
     assert robot.motor == preset.motor.replace(voltage_limit=12.0)
-    given_keys = {key for key, prior in robot.priors.items() if prior.source == "given"}
+    given_keys = {key for key, prior in robot.priors.items() if prior.origin == "given"}
     assert given_keys == {"body.mass_kg", "wheels.robot_radius_m", "motor.voltage_limit_V"}
 
 

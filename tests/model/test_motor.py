@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.model.motor import Motor, back_emf, clip_voltage, no_load_speed, settled_current, traction, wheel_torque
+from omnidyn.model.actuation import clip_voltage
+from omnidyn.model.motor import Motor, back_emf, no_load_speed, settled_current, traction, wheel_torque
 
 
 def test_stall_current_at_6_volts(axebot):

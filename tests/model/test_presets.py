@@ -42,7 +42,7 @@ def test_it_says_where_its_numbers_come_from(name):
     assert len(robot.source) > 40
     for key, prior in robot.priors.items():
         assert prior.source, key
-        assert prior.source != "guess" or prior.std, f"{key}: a guess without a spread"
+        assert prior.origin != "guess" or prior.std, f"{key}: a guess without a spread"
 
 
 @pytest.mark.parametrize("name", preset_names())

@@ -166,6 +166,11 @@ BAD = {
         r"\[body\] mass_kg: std: .*got -1.0; expected greater",
     ),
     "misspelt deviation": (MASS, "mass_kg = { value = 1.5, st = 1.0 }", "mass_kg: st: unknown key; .*did you mean std"),
+    "unknown origin": (
+        MASS,
+        'mass_kg = { value = 1.5, origin = "guessed" }',
+        r"\[body\] mass_kg: origin: .*got guessed; expected 'guess', 'given', 'datasheet', 'measured'",
+    ),
     "deviation without value": (MASS, "mass_kg = { std = 1.0 }", "mass_kg: cannot use this value"),
     "priors": ("schema = 1", "schema = 1\npriors = {}", "unknown key; got priors"),
 }

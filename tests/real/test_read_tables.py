@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from omnidyn.logs.table.table import read_table
+from omnidyn.logs.readers.read_table import read_table
 
 NAMES = (
     "t xsetspeed ysetspeed setvel m1setvel m2setvel m3setvel m1pos m2pos m3pos m1vel m2vel m3vel m1cur m2cur m3cur "

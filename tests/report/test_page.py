@@ -7,7 +7,7 @@ import re
 import pytest
 
 from omnidyn.paper.claim import Claim, Verdict
-from omnidyn.report.page import MARKS, STYLE, render_page
+from omnidyn.report.page import SIGNS, STYLE, render_page
 from omnidyn.report.style import Picture
 from tests.support.outputs import Reader
 
@@ -76,7 +76,7 @@ def test_all_text_is_escaped():
 
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_a_verdict_has_a_colour_a_sign_and_words(verdict):
-    colour, sign = MARKS[verdict]
+    colour, sign = verdict.short, SIGNS[verdict.short]
     text = page([claim(verdict)])
     assert f'class="badge {colour}"' in text
     assert sign in text

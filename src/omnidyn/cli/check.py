@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import os
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from omnidyn.cli import log_options
+from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import progress
-from omnidyn.cli.terminal.streams import coloured, say, show, show_json, width
+from omnidyn.cli.terminal.streams import painted, say, show, show_json, width
+from omnidyn.errors import InputError, OmnidynError
 
 if TYPE_CHECKING:
-    from omnidyn.errors import OmnidynError
     from omnidyn.findings.finding import Finding, Verdict
     from omnidyn.logs.log import Log
     from omnidyn.logs.read_log import LogOptions
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
 BLOCK = 500_000  # rows that are held at once
 WHOLE = 3  # logs that are shown one by one in full
 BAD_INPUT, INSUFFICIENT = 3, 4
-COLOURS = {"fatal": "red", "warn": "yellow", "note": "white"}
 
 
 @dataclass
@@ -58,7 +59,9 @@ def check(
     Time base, sensors, units, wiring, scales, slip, lag, limits, energy, and what the log excites. Without a robot what
     needs none is checked. Exit code 4 when a finding is fatal, 3 when a log could not be read; the rest is still shown.
     """
-    _refuse_picture(picture, force, log)
+    if picture and (len(log) > 1 or os.path.isdir(log[0])):
+        raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
+    refuse_picture(picture, force)
     log_options.keep_logs(log, picture, save_map)
     options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
     maps = log_options.Maps(save_map, force)
@@ -74,21 +77,6 @@ def check(
         raise typer.Exit(INSUFFICIENT)
 
 
-def _refuse_picture(path: str, force: bool, log: Sequence[str]) -> None:
-    import os
-
-    from omnidyn.errors import InputError
-    from omnidyn.files import check_output
-
-    if not path:
-        return
-    if not path.endswith((".png", ".svg")) or "\0" in path:
-        raise InputError("cannot tell the kind of picture", got=path, expected="a name that ends in .png or .svg")
-    if len(log) > 1 or os.path.isdir(log[0]):
-        raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
-    check_output(path, force)
-
-
 def _robot(robot: str) -> Robot | None:
     from omnidyn.model.robot_file import load_robot
 
@@ -100,7 +88,6 @@ def _checked(
     picture: str, force: bool,
 ) -> Checked:  # fmt: skip
     """One log, block by block; an error in reading it does not stop the others."""
-    from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check as check_log
     from omnidyn.findings.check import check_blocks
     from omnidyn.logs.read_log import iter_logs
@@ -118,7 +105,9 @@ def _checked(
             done.notes = kept.log.notes
         done.verdict = check_log(kept.log, robot) if kept.only else check_blocks(blocks, robot)  # type: ignore[arg-type]
         if picture and kept.log is not None:
-            _draw(kept.log, done.verdict, picture, force)
+            from omnidyn.report.figures.raw_log import draw_raw_log
+
+            write_picture(draw_raw_log(kept.log, done.verdict), picture, force)
     except OmnidynError as error:
         done.error = error
     done.digest, done.sha256 = digest.value, digest.sha256
@@ -182,15 +171,6 @@ def _compare_data(done: list[Checked]) -> None:
             each.verdict = replace(each.verdict, findings=in_order([*each.verdict.findings, finding]))
 
 
-def _draw(log: Log, verdict: Verdict, path: str, force: bool) -> None:
-    from omnidyn.files import write_atomic
-    from omnidyn.report.figures.raw_log import draw_raw_log
-
-    drawn = draw_raw_log(log, verdict)
-    write_atomic(path, drawn.png if path.endswith(".png") else drawn.svg, force)
-    say(f"omnidyn: wrote {path}")
-
-
 def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
     for each in done:
         if each.error is not None:
@@ -225,31 +205,29 @@ def _document(done: list[Checked], robot: str) -> dict[str, Any]:
 
 def _brief(verdict: Verdict) -> str:
     """One log in a line: its findings by name."""
+    from omnidyn.findings.finding import FATAL, LABELS, WARN
+
     parts = []
-    for level in ("fatal", "warn"):
+    for level in (FATAL, WARN):
         codes = [f"{each.code} {each.where}".rstrip() for each in verdict.findings if each.level == level]
         if codes:
-            word = level.upper() if level == "fatal" else level
-            parts.append(f"{coloured(word, COLOURS[level])} {', '.join(codes)}")
+            parts.append(f"{painted(LABELS[level], level)} {', '.join(codes)}")
     return f"{verdict.source}: {'; '.join(parts) or 'nothing to heed'}"
-
-
-def _gravest_first(group: tuple[tuple[str, str], list[Any]]) -> tuple[int, int]:
-    (level, _), members = group
-    return list(COLOURS).index(level), -len(members)
 
 
 def _summary(done: list[Checked], read: list[Checked]) -> str:
     """What was found over all logs: each kind once, in how many logs, with one example."""
+    from omnidyn.findings.finding import LABELS, LEVELS
+
     groups: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
     for each in read:
         for finding in each.verdict.findings if each.verdict is not None else ():
             groups.setdefault((finding.level, finding.code), []).append((each.path, finding))
     lines = [f"{len(done)} logs, {len(read)} read:"]
-    for (level, code), members in sorted(groups.items(), key=_gravest_first):
+    for (level, code), members in sorted(groups.items(), key=lambda kind: (LEVELS.index(kind[0][0]), -len(kind[1]))):
         logs = len({path for path, _ in members})
         path, example = members[0]
-        word = coloured(f"{level.upper() if level == 'fatal' else level:5s}", COLOURS[level])
+        word = painted(f"{LABELS[level]:5s}", level)
         lines.append(f"  {word}  {code}: in {logs} log{'s' * (logs > 1)}, such as {path}: {example.message}")
         if example.remedy:
             lines.append(f"         -> {example.remedy}")

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli import log_options
+from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import progress
-from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.cli.terminal.telling import tell
 
 if TYPE_CHECKING:
     from omnidyn.comparison.result import Comparison
@@ -52,7 +53,7 @@ def compare(
 
     if len(robot) > MOST_ROBOTS:
         raise typer.BadParameter(f"--robot may be given once or twice, not {len(robot)} times.")
-    _refuse_picture(picture, force)
+    refuse_picture(picture, force)
     log_options.keep_logs(log, picture, save_map)
     rules = [parse_threshold(text) for text in fail_if]
     options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows)
@@ -65,19 +66,8 @@ def compare(
         if picture:
             now("drawing")
             _draw(found, picture, channels, force)
-    _tell(found, segments, json, robot, files, hashes)
+    tell(found.document(segments), json, _record(robot, files, hashes))
     refuse_exceeded(found, rules)
-
-
-def _refuse_picture(path: str, force: bool) -> None:
-    """Before any work: a place where the picture could not be written in the end."""
-    from omnidyn.errors import InputError
-    from omnidyn.files import check_output
-
-    if path and (not path.endswith((".png", ".svg")) or "\0" in path):
-        raise InputError("cannot tell the kind of picture", got=path, expected="a name that ends in .png or .svg")
-    if path:
-        check_output(path, force)
 
 
 def _robots(names: Sequence[str]) -> list[Robot]:
@@ -124,24 +114,14 @@ def _compared(
 
 
 def _draw(found: Comparison, path: str, channels: Sequence[str], force: bool) -> None:
-    from omnidyn.files import write_atomic
     from omnidyn.report.figures.overlay import draw_overlay
 
-    drawn = draw_overlay(found, channels=channels)
-    write_atomic(path, drawn.svg if path.endswith(".svg") else drawn.png, force)
     which = f", the first of {len(found.measured)} logs" if len(found.measured) > 1 else ""
-    say(f"omnidyn: wrote {path}{which}")
+    write_picture(draw_overlay(found, channels=channels), path, force, which)
 
 
-def _tell(
-    found: Comparison, segments: bool, json: bool, robots: Sequence[str], files: Sequence[str], hashes: Sequence[str]
-) -> None:
-    if not json:
-        show(found.summary(segments).rstrip("\n"))
-        return
+def _record(robots: Sequence[str], files: Sequence[str], hashes: Sequence[str]) -> dict[str, Any]:
     from omnidyn.cli.terminal.session import provenance, robot_input
 
-    for warning in found.warnings:
-        say(f"omnidyn: warning: {warning}")
     logs = [{"role": "log", "name": path, "sha256": digest} for path, digest in zip(files, hashes, strict=True)]
-    show_json({**found.to_dict(), "provenance": provenance([*map(robot_input, robots), *logs])})
+    return provenance([*map(robot_input, robots), *logs])

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
+from omnidyn.cli.terminal.telling import tell
+from omnidyn.document import Document
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -22,7 +24,7 @@ def deadzone(
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:
     """Show at which voltage it starts to move."""
-    _refuse_picture(picture, force)
+    refuse_picture(picture, force)
     from omnidyn.cli.terminal.numbers import number_list
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.model.deadzone import axis_patterns
@@ -33,34 +35,17 @@ def deadzone(
     rows = [_row(loaded, each) for each in patterns]
     if picture:
         _draw(loaded, picture, force)
-    if json:
-        show_json({"robot": loaded.name, "dead_zone": rows, "provenance": provenance([source])})
-        return
-    show(f"{loaded.name} at rest: it starts to move when the voltages of the wheels exceed\n")
-    for row in rows:
-        show(_line(loaded, row))
-
-
-def _refuse_picture(path: str, force: bool) -> None:
-    """Before any work: a place where the map could not be written in the end."""
-    from omnidyn.errors import InputError
-    from omnidyn.files import check_output
-
-    if path and (not path.endswith((".png", ".svg")) or "\0" in path):
-        raise InputError("cannot tell the kind of picture", got=path, expected="a name that ends in .png or .svg")
-    if path:
-        check_output(path, force)
+    head = f"{loaded.name} at rest: it starts to move when the voltages of the wheels exceed"
+    told = Document([head, "", *(_line(loaded, row) for row in rows)], {"robot": loaded.name, "dead_zone": rows})
+    tell(told, json, provenance([source]))
 
 
 def _draw(robot: Robot, path: str, force: bool) -> None:
     from omnidyn.cli.terminal.progress import progress
-    from omnidyn.files import write_atomic
     from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 
     with progress("drawing the map"):
-        drawn = draw_dead_zone_map({robot.name: robot})
-        write_atomic(path, drawn.svg if path.endswith(".svg") else drawn.png, force)
-    say(f"omnidyn: wrote {path}")
+        write_picture(draw_dead_zone_map({robot.name: robot}), path, force)
 
 
 def _row(robot: Robot, pattern: list[float]) -> dict[str, Any]:
@@ -89,7 +74,7 @@ def _line(robot: Robot, row: dict[str, Any]) -> str:
 
 def _limit_note(robot: Robot, voltage: list[float]) -> str:
     """A robot whose motors cannot reach that voltage does not move at all."""
-    from omnidyn.model.motor import clip_voltage
+    from omnidyn.model.actuation import clip_voltage
     from omnidyn.simulation.simulate import as_floats
 
     volts = as_floats("voltage", voltage)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from omnidyn.cli.terminal.progress import progress
-from omnidyn.cli.terminal.streams import say, show, show_json, to_json
+from omnidyn.cli.terminal.streams import say, to_json, width
+from omnidyn.cli.terminal.telling import as_json, tell
 
 if TYPE_CHECKING:
+    from omnidyn.document import Document
     from omnidyn.paper.claim import Claim
     from omnidyn.report.style import Picture
 
@@ -31,20 +34,15 @@ def demo(
 
     Prints every claim with its verdict; writes report.html, result.json and the figures.
     """
-    from omnidyn.cli.demo_folder import check_folder, write_folder
+    from omnidyn.cli.terminal.folder import check_folder, write_folder
 
     folder = check_folder(out, force)
     with progress("loading") as now:
         claims, pictures, record = _made(now)
-        result = _result(claims, pictures, record)
+        document = _document(claims, pictures)
         now("writing the report")
-        write_folder(folder, _files(claims, pictures, record, result))
-    if json:
-        show_json(result)
-    else:
-        from omnidyn.cli.claims_table import claims_table
-
-        show(claims_table(claims))
+        write_folder(folder, _files(claims, pictures, document, record))
+    tell(document, json, record, width=width())
     say(f"omnidyn: open {folder / 'report.html'}")
 
 
@@ -64,29 +62,24 @@ def _made(now: Any) -> tuple[tuple[Claim, ...], list[Picture], dict[str, Any]]:
     return claims, pictures, provenance([robot_input(PRESET)])
 
 
-def _result(claims: tuple[Claim, ...], pictures: list[Picture], record: dict[str, Any]) -> dict[str, Any]:
-    from dataclasses import asdict
+def _document(claims: tuple[Claim, ...], pictures: list[Picture]) -> Document:
+    """What the claims say; for machines the figures too."""
+    from omnidyn.paper.claims import claims_document
 
-    from omnidyn.paper.claim import Verdict
-
-    return {
-        "verdicts": {verdict.value: sum(claim.verdict == verdict for claim in claims) for verdict in Verdict},
-        "claims": [asdict(claim) for claim in claims],
-        "figures": [{"name": each.name, "title": each.title, "caption": each.caption} for each in pictures],
-        "provenance": record,
-    }
+    told = claims_document(claims)
+    figures = [{"name": each.name, "title": each.title, "caption": each.caption} for each in pictures]
+    return replace(told, data={**told.data, "figures": figures})
 
 
 def _files(
-    claims: tuple[Claim, ...], pictures: list[Picture], record: dict[str, Any], result: dict[str, Any]
+    claims: tuple[Claim, ...], pictures: list[Picture], document: Document, record: dict[str, Any]
 ) -> dict[str, bytes]:
     from omnidyn.report.page import render_page
 
     files = {
         "report.html": render_page(TITLE, INTRODUCTION, claims, pictures, record).encode(),
-        "result.json": (to_json(result) + "\n").encode(),
+        "result.json": (to_json(as_json(document, record)) + "\n").encode(),
     }
     for picture in pictures:
-        files[f"figures/{picture.name}.png"] = picture.png
-        files[f"figures/{picture.name}.svg"] = picture.svg
+        files |= {f"figures/{picture.name}.png": picture.png, f"figures/{picture.name}.svg": picture.svg}
     return files

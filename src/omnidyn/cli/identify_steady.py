@@ -9,6 +9,7 @@ import typer
 
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.cli.terminal.telling import tell
 
 if TYPE_CHECKING:
     from omnidyn.cli.identify_fit import Out
@@ -62,7 +63,7 @@ def tell_study(study: SteadyStudy, record: dict[str, Any], to: Out) -> None:
     """Write and show friction and its shape: robot files, report, JSON or the summary."""
     from omnidyn.cli.identify_logs import outputs
     from omnidyn.files import check_output, write_atomic
-    from omnidyn.identification.steady.study_table import study_summary, study_to_dict
+    from omnidyn.identification.steady.study_table import study_document
     from omnidyn.model.robot_file import save_robot
 
     files = outputs(to.out, list(study.estimates))
@@ -74,12 +75,7 @@ def tell_study(study: SteadyStudy, record: dict[str, Any], to: Out) -> None:
         write_atomic(to.report, render_study(study, record), to.force)
     for group, path in files.items():
         save_robot(study.estimates[group].robot, path, to.force)
-    if to.json:
-        for warning in study.warnings:
-            say(f"omnidyn: warning: {warning}")
-        show_json({**study_to_dict(study), "output": files or None, "report": to.report or None, "provenance": record})
-    else:
-        show(study_summary(study).rstrip("\n"))
+    tell(study_document(study), to.json, record, output=files or None, report=to.report or None)
     say_written([*files.values(), to.report])
 
 
@@ -120,12 +116,7 @@ def from_table(table: str, robot: str, rest: str, to: Out) -> None:
         from omnidyn.model.robot_file import save_robot
 
         save_robot(estimate.robot, to.out, to.force)
-    if to.json:
-        for warning in estimate.warnings:
-            say(f"omnidyn: warning: {warning}")
-        show_json({**estimate.to_dict(), "output": to.out or None, "provenance": record})
-    else:
-        show(estimate.summary().rstrip("\n"))
+    tell(estimate.document(), to.json, record, output=to.out or None)
     say_written([to.out])
 
 

@@ -13,7 +13,9 @@ import typer
 from omnidyn.cli import log_options as logs
 from omnidyn.cli.init_logs import as_seen, from_logs
 from omnidyn.cli.terminal.numbers import number_words
-from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.cli.terminal.streams import say, show
+from omnidyn.cli.terminal.telling import tell
+from omnidyn.document import Document
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -326,11 +328,9 @@ def _write(robot: Robot, path: str, force: bool, json: bool, like: str) -> None:
         show(text.rstrip("\n"))
     else:
         write_atomic(path, text, force)
-    if json:
-        record = provenance([robot_input(like)] if like else [])
-        show_json({"robot": robot.name, "output": path, "guessed": guessed(robot), "provenance": record})
-    elif path != "-":
-        show(path)
+    if path != "-":
+        told = Document([path], {"robot": robot.name, "output": path, "guessed": guessed(robot)})
+        tell(told, json, provenance([robot_input(like)] if like else []))
     if robot.wheels.radii.max() > _smallest(robot):
         say("omnidyn: warning: a wheel is larger than the robot; are both radii in metres?")
     if guessed(robot):
@@ -351,8 +351,8 @@ def _head(robot: Robot) -> str:
 
     lines = [
         "Written by omnidyn init. SI units; azimuths count counter-clockwise from forward (x forward, y left).",
-        'Where a number comes from stands beside it: "given" by you, a "guess", "like" another robot. std is the',
-        'standard deviation. Put in what you know, such as { value = 1.7, std = 0.1, source = "datasheet" }.',
+        'The origin of a number stands beside it: "given" by you, a "guess", "imported" from another robot. std is the',
+        'standard deviation. Put in what you know, such as { value = 1.7, std = 0.1, origin = "datasheet" }.',
     ]
     guesses = reasons(robot)
     if guesses:

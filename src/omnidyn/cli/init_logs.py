@@ -47,11 +47,11 @@ def as_seen(robot: Robot, seen: Geometry | None, from_logs: set[str]) -> Robot:
     from_logs: keys of the robot file whose numbers the logs gave; their source says so.
     """
     from omnidyn.model.first_guess import with_gear
-    from omnidyn.model.robot import Prior
+    from omnidyn.model.robot import MEASURED, Prior
 
     if seen is None:
         return robot
-    told = Prior(source=f"logs: {seen.source}")
+    told = Prior(source=f"logs: {seen.source}", origin=MEASURED)
     robot = robot.replace(priors=robot.priors | dict.fromkeys(from_logs, told))
     ratio = seen.per_metre * float(robot.wheels.radii.mean())
     if ratio < GEARED:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from omnidyn.cli.terminal.streams import show, show_json
+from omnidyn.cli.terminal.telling import tell
+from omnidyn.document import Document, Table
 
 
 def robots(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
@@ -13,10 +14,6 @@ def robots(json: bool = typer.Option(False, "--json", help="For machines.")) -> 
     from omnidyn.model.robot_file import load_robot, preset_names
 
     known = {name: load_robot(name) for name in preset_names()}
-    if json:
-        rows = [{"name": name, "wheels": robot.wheels.count, "source": robot.source} for name, robot in known.items()]
-        show_json({"robots": rows, "provenance": provenance([robot_input(name) for name in known])})
-        return
-    longest = max(map(len, known))
-    for name, robot in known.items():
-        show(f"{name:{longest}}  {robot.wheels.count} wheels  {robot.source}")
+    data = [{"name": name, "wheels": robot.wheels.count, "source": robot.source} for name, robot in known.items()]
+    rows = [(name, f"{robot.wheels.count} wheels", robot.source) for name, robot in known.items()]
+    tell(Document([Table((), rows, "<")], {"robots": data}), json, provenance([robot_input(name) for name in known]))

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli.terminal.progress import progress
-from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.cli.terminal.streams import say, show
+from omnidyn.cli.terminal.telling import tell
+from omnidyn.document import Document
 
 if TYPE_CHECKING:
     from omnidyn.run import Run
@@ -49,10 +51,9 @@ def simulate(
         _write(run, out, force)
     for warning in run.warnings:
         say(f"omnidyn: warning: {warning}")
-    if json:
-        show_json({**_summary(run), "output": out or None, "provenance": record})
-    elif out != "-":
-        show(_text(run))
+    if out != "-":
+        tell(_document(run), json, record, output=out or None)
+    if out != "-" and not json:
         say(f"omnidyn: wrote {out}" if out else "omnidyn: nothing written; -o FILE writes the run")
 
 
@@ -97,30 +98,27 @@ def _write(run: Run, out: str, force: bool) -> None:
         write_run(run, out, force)
 
 
-def _summary(run: Run) -> dict[str, Any]:
-    """What one wants to know first about a run, for machines."""
+def _document(run: Run) -> Document:
+    """What one wants to know first about a run."""
     assert run.twist is not None
     assert run.pose is not None
-    return {
+    moved, duration = bool(run.twist.any()), run.t[-1] - run.t[0]
+    vx, vy, omega = run.twist[-1].tolist()
+    x, y, heading = run.pose[-1].tolist()
+    data = {
         "source": run.source,
         "samples": len(run),
-        "duration_s": run.t[-1] - run.t[0],
-        "moved": bool(run.twist.any()),
-        "final_twist": dict(zip(("vx_m_s", "vy_m_s", "omega_rad_s"), run.twist[-1].tolist(), strict=True)),
-        "final_pose": dict(zip(("x_m", "y_m", "heading_rad"), run.pose[-1].tolist(), strict=True)),
+        "duration_s": duration,
+        "moved": moved,
+        "final_twist": {"vx_m_s": vx, "vy_m_s": vy, "omega_rad_s": omega},
+        "final_pose": {"x_m": x, "y_m": y, "heading_rad": heading},
         "warnings": run.warnings,
     }
-
-
-def _text(run: Run) -> str:
-    """The same for people."""
-    assert run.twist is not None
-    assert run.pose is not None
-    vx, vy, omega = run.twist[-1]
-    x, y, heading = run.pose[-1]
-    lines = [f"{run.source}: {len(run)} samples, {run.t[-1] - run.t[0]:.6g} s"]
-    if not run.twist.any():
-        lines.append("it never moved: the voltages stay within the dead zone (see: omnidyn deadzone)")
-    lines.append(f"at the end   vx {vx:.4f} m/s   vy {vy:.4f} m/s   omega {omega:.4f} rad/s")
-    lines.append(f"             x {x:.4f} m   y {y:.4f} m   heading {heading:.4f} rad")
-    return "\n".join(lines)
+    still = "it never moved: the voltages stay within the dead zone (see: omnidyn deadzone)"
+    lines = [
+        f"{run.source}: {len(run)} samples, {duration:.6g} s",
+        *([] if moved else [still]),
+        f"at the end   vx {vx:.4f} m/s   vy {vy:.4f} m/s   omega {omega:.4f} rad/s",
+        f"             x {x:.4f} m   y {y:.4f} m   heading {heading:.4f} rad",
+    ]
+    return Document(lines, data)

@@ -21,7 +21,7 @@ from omnidyn.comparison.start import start_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.logs.segments import segments
-from omnidyn.model.drive import COAST, DUTY, SPEED
+from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.simulate import TOLERANCE, simulate
@@ -105,8 +105,7 @@ def choose_input(robot: Robot, run: Run, apply: str | None = None) -> str:
         )  # fmt: skip
     whole = [name for name in there if not _blank_components(run, name)]
     # A duty of 0 that coasts is an open circuit, which its voltage of 0 does not tell.
-    coasts = robot.drive.kind == DUTY and robot.drive.off == COAST and DUTY in whole
-    chosen = apply or (DUTY if coasts else [*whole, *there][0])
+    chosen = apply or (DUTY if robot.drive.coasts and DUTY in whole else [*whole, *there][0])
     blank = _blank_components(run, chosen)
     if blank:
         raise InputError(

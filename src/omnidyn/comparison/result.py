@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -11,9 +10,8 @@ from omnidyn.comparison import text
 from omnidyn.comparison.difference import Difference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
+from omnidyn.document import Document, Part, Points, Words
 from omnidyn.run import Run
-
-WIDTH = 100
 
 
 @dataclass(frozen=True)
@@ -83,35 +81,40 @@ class Comparison:
 
     def summary(self, segments: bool = False) -> str:
         """The comparison as plain tables, for reading; with `segments`, each segment too. ASCII only."""
-        lines: list[str] = []
-        for robot in self.robots:
-            lines += [*self._title(robot), "", text.HEAD, *text.rows(self.channels, self.overall[robot]), ""]
-            if segments:
-                lines += [line for k in range(len(self.segments)) for line in self._segment(robot, k)]
-        if self.difference:
-            lines += [*text.differences(self.robots, self.difference), ""]
-        lines += text.legend([each for found in self.overall.values() for each in found.values()])
-        if self.current_unsigned:
-            lines.append("currents are compared by size, without sign.")
-        for warning in self.warnings:
-            lines += textwrap.wrap(f"warning: {warning}", WIDTH, subsequent_indent="  ")
-        return "\n".join(line.encode("ascii", "backslashreplace").decode().rstrip() for line in lines) + "\n"
+        return self.document(segments).to_text() + "\n"
 
-    def _title(self, robot: str) -> list[str]:
+    def document(self, segments: bool = False) -> Document:
+        """What the comparison says; with `segments`, of each segment too."""
+        parts: list[Part] = []
+        for robot in self.robots:
+            parts += [*self._title(robot), "", text.metrics_table(self.channels, self.overall[robot]), ""]
+            for k in range(len(self.segments) if segments else 0):
+                of_segment = {name: found[k] for name, found in self.by_segment[robot].items()}
+                parts += [self._name(k), text.metrics_table(self.channels, of_segment, head=()), ""]
+        if self.difference:
+            first, second = self.robots
+            parts += [
+                f"rmse of {first} minus rmse of {second}, with its standard error (block bootstrap)", "",
+                text.difference_table(self.robots, self.difference), "",
+            ]  # fmt: skip
+        parts += text.legend([each for found in self.overall.values() for each in found.values()])
+        parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
+        parts.append(Points(self.warnings, "warning:"))
+        return Document(parts, self.to_dict(), self.warnings, ascii=True)
+
+    def _title(self, robot: str) -> tuple[Words, Words]:
         """Which robot met which logs, and what drove it."""
         seconds = sum(segment.end - segment.begin for segment in self.segments)
         logs, count = len(self.measured), len(self.segments)
         where = self.measured[0].source or "one run"
         where = where if logs == 1 else f"{logs} logs, first {where}"
         title = f"{robot} against {where}: {count} free run{'s' * (count > 1)}, {seconds:.4g} s"
-        return [*textwrap.wrap(title, WIDTH), *textwrap.wrap(f"applied: {self.applied[robot]}", WIDTH)]
+        return Words(title), Words(f"applied: {self.applied[robot]}")
 
-    def _segment(self, robot: str, k: int) -> Iterator[str]:
+    def _name(self, k: int) -> str:
         at = self.segments[k]
         log = f"log {at.log + 1}, " if len(self.measured) > 1 else ""
-        yield f"segment {k + 1}: {log}rows {at.start} to {at.stop - 1}, {at.begin:.4g} to {at.end:.4g} s"
-        yield from text.rows(self.channels, {name: found[k] for name, found in self.by_segment[robot].items()})
-        yield ""
+        return f"segment {k + 1}: {log}rows {at.start} to {at.stop - 1}, {at.begin:.4g} to {at.end:.4g} s"
 
     def to_dict(self) -> dict[str, Any]:
         """The comparison as JSON can hold it, without the runs."""

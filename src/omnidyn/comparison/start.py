@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.model.frames import world_to_body
+from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
@@ -128,9 +128,7 @@ def _first_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
 
 def _continuous(pose: FloatArray) -> FloatArray:
     """The pose with a heading that does not jump by a turn."""
-    pose, known = pose.copy(), np.isfinite(pose[:, 2])
-    pose[known, 2] = np.unwrap(pose[known, 2])
-    return pose
+    return np.column_stack([pose[:, :2], unwrapped(pose[:, 2])])
 
 
 def _twist_from_pose(t: FloatArray, pose: FloatArray) -> FloatArray:

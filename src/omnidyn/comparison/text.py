@@ -1,4 +1,4 @@
-"""Tables of a comparison as plain text: one line per component."""
+"""What a comparison says in tables and words: one row per component."""
 
 from __future__ import annotations
 
@@ -7,38 +7,34 @@ from collections.abc import Iterator, Mapping, Sequence
 from omnidyn.comparison.difference import Difference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import unit
+from omnidyn.document import Table, cell, chance_cell
 
-TINY_P = 0.001
-HEAD = (
-    f"{'':9} {'unit':6} {'samples':>8} {'rmse':>10} {'max':>10} {'bias':>10} {'fit %':>8} {'VAF %':>8} {'white p':>8} "
-    f"{'lag s':>7}"
-)
+HEAD = ("", "unit", "samples", "rmse", "max", "bias", "fit %", "VAF %", "white p", "lag s")
+WIDTHS = (8, 6, 7, 9, 9, 9, 7, 7, 7, 6)  # the same for all tables, so that they can be read below each other
 
 
-def rows(names: Sequence[str], found: Mapping[str, Metrics | None]) -> Iterator[str]:
-    """One line per component."""
-    for name in names:
-        each = found[name]
-        if each is None:
-            yield f"{name:9} {unit(name):6} {0:8}"
-        else:
-            yield (
-                f"{name:9} {unit(name):6} {each.samples:8} {each.rmse:10.4g} {each.max:10.4g} {each.bias:+10.3g} "
-                f"{_cell(each.fit_percent, '.1f'):>8} {_cell(each.vaf, '.1f'):>8} {_p(each.whiteness):>8} "
-                f"{_cell(each.lag, '+.3f'):>7}"
-            )
+def metrics_table(names: Sequence[str], found: Mapping[str, Metrics | None], head: Sequence[str] = HEAD) -> Table:
+    """How near a model comes, a row per component."""
+    return Table(head, [_row(name, found[name]) for name in names], "<<>", WIDTHS)
 
 
-def differences(robots: Sequence[str], found: Mapping[str, Difference]) -> Iterator[str]:
-    """Which of two robots is better, one line per component."""
-    yield f"rmse of {robots[0]} minus rmse of {robots[1]}, with its standard error (block bootstrap)"
-    yield ""
-    yield f"{'':9} {'difference':>12} {'std error':>10} {'blocks':>7}  better"
+def _row(name: str, each: Metrics | None) -> tuple[str, ...]:
+    if each is None:
+        return name, unit(name), "0"
+    return (
+        name, unit(name), f"{each.samples}", f"{each.rmse:.4g}", f"{each.max:.4g}", f"{each.bias:+.3g}",
+        cell(each.fit_percent, ".1f"), cell(each.vaf, ".1f"), chance_cell(each.whiteness), cell(each.lag, "+.3f"),
+    )  # fmt: skip
+
+
+def difference_table(robots: Sequence[str], found: Mapping[str, Difference]) -> Table:
+    """Which of two robots is better, a row per component."""
+    rows = []
     for name, each in found.items():
-        error = "-" if each.std_error is None else f"{each.std_error:.2g}"
         told = "the same" if each.std_error == 0.0 else "cannot tell"
         told = told if each.better is None else robots[each.better]
-        yield f"{name:9} {each.rmse_difference:+12.4g} {error:>10} {each.blocks:7}  {told}"
+        rows.append((name, f"{each.rmse_difference:+.4g}", cell(each.std_error, ".2g"), f"{each.blocks}", told))
+    return Table(("", "difference", "std error", "blocks", "better"), rows, "<>>><", (8, 12, 9, 6))
 
 
 def legend(shown: Sequence[Metrics]) -> Iterator[str]:
@@ -48,13 +44,3 @@ def legend(shown: Sequence[Metrics]) -> Iterator[str]:
         yield "lag: the robot is later than the model by so much, where that explains clearly more; a hint."
     if any(each.fit_percent is None for each in shown):
         yield "no fit and no VAF where the measured signal never changes."
-
-
-def _cell(value: float | None, form: str) -> str:
-    return "-" if value is None else f"{value:{form}}"
-
-
-def _p(value: float | None) -> str:
-    if value is None:
-        return "-"
-    return f"<{TINY_P:g}" if value < TINY_P else f"{value:.3f}"

@@ -19,7 +19,7 @@ from omnidyn.findings.motion import check_motion
 from omnidyn.findings.oddities import check_oddities
 from omnidyn.findings.scale.lag import check_lag
 from omnidyn.findings.scale.scale import check_dead_wheels, check_scale
-from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.slip import check_slip
 from omnidyn.findings.time_base import begin, between
 from omnidyn.findings.values.values import check_values
@@ -29,7 +29,7 @@ from omnidyn.model.robot import Robot
 
 __all__ = ["check", "check_blocks"]
 
-Family = Callable[[Work], tuple[list[Finding], Work]]
+Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
     check_values, check_limits, check_wiring, check_dead_wheels, check_slip, check_scale, check_lag, check_energy,
     check_motion, check_oddities, check_excitation,

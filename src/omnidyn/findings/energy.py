@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, WARN, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import white_noise
 from omnidyn.model.dynamics import mass_matrix
-from omnidyn.model.first_guess import GUESS
+from omnidyn.model.keys import EMF
 from omnidyn.model.motor import back_emf, settled_current, wheel_torque
-from omnidyn.model.robot import Robot
+from omnidyn.model.robot import GUESS, Robot
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 
 FloatArray = NDArray[np.float64]
@@ -25,10 +25,10 @@ MARGIN = 0.08  # of the power that turns with the back-EMF: K, R and the gear ar
 WINDOW = 0.4  # [s]
 MOVING = 0.2  # of the back-EMF that 95 % of the rows stay below: a robot at rest says nothing
 LEAST_SHARE = 0.02  # of the rows
-OF_BACK_EMF = ("motor.emf_constant_Vs_rad", "motor.gear_ratio", "wheels.wheel_radius_m")
+OF_BACK_EMF = (EMF, "motor.gear_ratio", "wheels.wheel_radius_m")
 
 
-def check_energy(work: Work) -> tuple[list[Finding], Work]:
+def check_energy(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """The finding on rows whose energy is impossible."""
     voltage, robot = volts(work), work.geometry
     speed = _speed(work)
@@ -39,7 +39,7 @@ def check_energy(work: Work) -> tuple[list[Finding], Work]:
     if not bad.any() or bad.mean() < (0.0 if points else LEAST_SHARE):
         return [], work
     excess = _excess(robot, voltage[bad], speed[bad])
-    guessed = [key for key in OF_BACK_EMF if (prior := robot.priors.get(key)) and prior.source == GUESS]
+    guessed = [key for key in OF_BACK_EMF if (prior := robot.priors.get(key)) and prior.origin == GUESS]
     return [Finding(
         "energy", WARN if guessed else FATAL, "",
         f"the motors would take up to {worst:.3g} W out of the robot while it does not slow down: the back-EMF is "
@@ -61,7 +61,7 @@ def _remedy(guessed: list[str]) -> str:
     )
 
 
-def _speed(work: Work) -> FloatArray | None:
+def _speed(work: LogUnderCheck) -> FloatArray | None:
     speed, robot = work.full("wheel_speed"), work.geometry
     if speed is not None or robot is None:
         return speed
@@ -90,12 +90,16 @@ def _points(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[NDArr
     return bad, float(-power[bad].min()) if bad.any() else 0.0
 
 
-def _windows(work: Work, robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[NDArray[np.bool_], float]:
+def _windows(
+    work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: FloatArray
+) -> tuple[NDArray[np.bool_], float]:
     """Balance over windows: work of the motors, change of kinetic energy."""
     none = np.zeros(len(work), dtype=bool), 0.0
     width = max(4, round(WINDOW / work.step))
-    edges = [(a, min(a + width, piece.stop - 1)) for piece in work.pieces for a in range(piece.start, piece.stop, width)
-             if min(a + width, piece.stop - 1) - a >= width // 2]  # fmt: skip
+    edges = []
+    for segment in work.segments:
+        ends = ((a, min(a + width, segment.stop - 1)) for a in range(segment.start, segment.stop, width))
+        edges += [(a, b) for a, b in ends if b - a >= width // 2]
     if not edges:
         return none
     low, high = np.array(edges).T

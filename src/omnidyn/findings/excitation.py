@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import NOTE, SECTORS, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.model.wheels import twist_from_wheel_speed
@@ -19,7 +19,7 @@ HARDLY = 0.1  # of the motion along the axis that moves most
 SPEEDS = 2.0  # fastest over slowest motion, below which viscous and dry friction look alike
 
 
-def motion_of(work: Work) -> FloatArray | None:
+def motion_of(work: LogUnderCheck) -> FloatArray | None:
     """Twist of the robot by the best source: floor, wheels, command. Shape (rows, 3), NaN where unknown."""
     seen, speed, robot = ground(work), work.full("wheel_speed"), work.geometry
     if seen is not None and len(seen.axes) == 3:
@@ -34,7 +34,7 @@ def motion_of(work: Work) -> FloatArray | None:
     return work.get("twist_command")
 
 
-def excitation(work: Work) -> dict[str, float]:
+def excitation(work: LogUnderCheck) -> dict[str, float]:
     """Measures of what moves, empty where no motion was recorded.
 
     time_s: length of the log. moving: share of rows in motion. x, y, yaw: root mean square speed while moving [m/s,
@@ -47,7 +47,7 @@ def excitation(work: Work) -> dict[str, float]:
         return {}
     robot = work.geometry
     length = float(np.mean(robot.wheels.robot_radius)) if robot is not None else 0.15
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     level = smooth(twist, width) * [1.0, 1.0, length]
     size = np.sqrt(np.nansum(level**2, axis=1))
     top = float(np.quantile(size, 0.95))
@@ -132,7 +132,7 @@ def joined(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return known
 
 
-def check_excitation(work: Work) -> tuple[list[Finding], Work]:
+def check_excitation(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Notes on what is not excited; the measures themselves are passed on as `known["excitation"]`."""
     known = excitation(work)
     robot = work.geometry

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.document import Document, Words
 from omnidyn.statistics import stretches
 
 FATAL, WARN, NOTE = "fatal", "warn", "note"
 LEVELS = (FATAL, WARN, NOTE)
-WORDS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
+LABELS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
 MAX_SPANS = 20  # spans of rows that a finding keeps; it counts all
 SHOWN_SPANS = 4
+LEAST_WIDTH, INDENT = 40, " " * 9  # of text
 SECTORS = 12  # of directions of travel
 
 Span = tuple[int, int]
@@ -91,11 +92,8 @@ class Verdict:
 
     def as_text(self, width: int = 110) -> str:
         """The verdict for people: headline, then a paragraph per finding. ASCII only."""
-        lines = [self.headline()]
-        for finding in self.findings:
-            lines += _paragraph(finding, width)
-        lines += _excited(self.excitation, width)
-        return "\n".join(lines)
+        paragraphs = [words for finding in self.findings for words in _paragraphs(finding)]
+        return Document([self.headline(), *paragraphs, _excited(self.excitation)]).to_text(max(LEAST_WIDTH, width))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, without NaN."""
@@ -136,14 +134,12 @@ def merged(findings: Sequence[Finding], blocks: int) -> Finding:
     return replace(heaviest, message=words, rows=tuple(rows[:MAX_SPANS]), count=total)
 
 
-def _paragraph(finding: Finding, width: int) -> list[str]:
-    head = f"  {WORDS[finding.level]:5s}  {finding.code}{' ' + finding.where if finding.where else ''}: "
-    body = finding.message + (f" [{_lines(finding)}]" if finding.rows else "")
-    wrapped = textwrap.wrap(head + body, max(40, width), subsequent_indent=" " * 9) or [head]
+def _paragraphs(finding: Finding) -> Iterator[Words]:
+    """What is the case, and what to do."""
+    head = f"  {LABELS[finding.level]:5s}  {finding.code}{' ' + finding.where if finding.where else ''}: "
+    yield Words(head + finding.message + (f" [{_lines(finding)}]" if finding.rows else ""), rest=INDENT)
     if finding.remedy:
-        wrapped += textwrap.wrap("-> " + finding.remedy, max(40, width), initial_indent=" " * 9,
-                                 subsequent_indent=" " * 12)  # fmt: skip
-    return wrapped
+        yield Words("-> " + finding.remedy, INDENT, INDENT + "   ")
 
 
 def _lines(finding: Finding) -> str:
@@ -153,9 +149,8 @@ def _lines(finding: Finding) -> str:
     return f"line {', '.join(shown)}{more}{count}"
 
 
-def _excited(excitation: Mapping[str, float], width: int) -> list[str]:
-    if not excitation:
-        return []
+def _excited(excitation: Mapping[str, float]) -> Words:
+    """What the log excites; no words where nothing was measured."""
     known = {name: value for name, value in excitation.items() if math.isfinite(value)}
     parts = []
     if "moving" in known:
@@ -169,7 +164,7 @@ def _excited(excitation: Mapping[str, float], width: int) -> list[str]:
         parts.append(f"directions {known['directions']:.0f} of {SECTORS}")
     if "speeds" in known:
         parts.append(f"speeds a factor of {known['speeds']:.2g} apart")
-    return textwrap.wrap("shows  " + "; ".join(parts), max(40, width), initial_indent="  ", subsequent_indent=" " * 9)
+    return Words("shows  " + "; ".join(parts) if excitation else "", "  ", INDENT)
 
 
 def _finite(value: float) -> float | None:

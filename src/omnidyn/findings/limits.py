@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, smooth, white_noise
 from omnidyn.logs.channels import components
 from omnidyn.logs.resolved import unresolved_rows
@@ -21,7 +21,7 @@ BOTH_WAYS = 0.05  # of the rows, each way: more than a wheel goes on against wha
 TOO_FAST = 0.1  # of the rows
 
 
-def check_limits(work: Work) -> tuple[list[Finding], Work]:
+def check_limits(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on saturation, supply and signs; the work without what has lost its sign."""
     if len(work) < MIN_ROWS:
         return [], work
@@ -36,7 +36,7 @@ def check_limits(work: Work) -> tuple[list[Finding], Work]:
     return found + more, work.replace(current=None) if any(each.level == FATAL for each in more) else work
 
 
-def _one_way_drive(work: Work, channel: str) -> list[Finding]:
+def _one_way_drive(work: LogUnderCheck, channel: str) -> list[Finding]:
     """A voltage or duty that is never negative, though one wheel under it turns both ways for long."""
     driven, speed = work.get(channel), work.get("wheel_speed")
     if driven is None or speed is None or driven.shape != speed.shape:
@@ -45,7 +45,7 @@ def _one_way_drive(work: Work, channel: str) -> list[Finding]:
     with np.errstate(invalid="ignore"):
         if high <= 0.0 or (driven < -0.01 * high).any():
             return []
-        width = max(3, round(0.2 / work.step) | 1) if work.step > 0.0 else 3
+        width = work.width(0.2)
         mean, noise = smooth(speed, width), np.array([white_noise(column) for column in speed.T])
         usual = np.maximum(0.3 * np.nanquantile(np.abs(mean), 0.9), 5.0 * noise / np.sqrt(width))
         pushed = driven > 0.2 * high
@@ -64,7 +64,7 @@ def _one_way_drive(work: Work, channel: str) -> list[Finding]:
     )]  # fmt: skip
 
 
-def _limit(work: Work, channel: str) -> tuple[FloatArray | float | None, str]:
+def _limit(work: LogUnderCheck, channel: str) -> tuple[FloatArray | float | None, str]:
     """What a channel cannot exceed, and whose limit that is."""
     robot, supply = work.geometry, work.get("supply")
     if channel == "duty":
@@ -79,7 +79,7 @@ def _limit(work: Work, channel: str) -> tuple[FloatArray | float | None, str]:
     return per_wheel(robot.motor.voltage_limit, work.wheels), "voltage_limit_V of the robot file"
 
 
-def _saturated(work: Work, channel: str) -> list[Finding]:
+def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
     values = work.get(channel)
     limit, whose = _limit(work, channel)
     if values is None or limit is None:
@@ -105,7 +105,7 @@ def _saturated(work: Work, channel: str) -> list[Finding]:
     )]  # fmt: skip
 
 
-def _too_fast(work: Work) -> list[Finding]:
+def _too_fast(work: LogUnderCheck) -> list[Finding]:
     """Inputs that change more from row to row than the rows can tell."""
     name = next((each for each in ("voltage", "duty") if work.get(each) is not None), "")
     values = work.get(name) if name else None
@@ -125,11 +125,11 @@ def _too_fast(work: Work) -> list[Finding]:
     )]  # fmt: skip
 
 
-def _sag(work: Work) -> list[Finding]:
+def _sag(work: LogUnderCheck) -> list[Finding]:
     supply = work.get("supply")
     if supply is None or not np.isfinite(supply).any():
         return []
-    width = max(3, round(0.1 / work.step) | 1) if work.step > 0.0 else 3
+    width = work.width(0.1)
     level = smooth(supply, width)
     high = float(np.nanquantile(level, 0.98))
     noise = white_noise(supply) / np.sqrt(width)
@@ -150,7 +150,7 @@ def _sag(work: Work) -> list[Finding]:
     )]  # fmt: skip
 
 
-def _no_supply(work: Work) -> list[Finding]:
+def _no_supply(work: LogUnderCheck) -> list[Finding]:
     if work.get("duty") is None or work.get("supply") is not None or work.get("voltage") is not None:
         return []
     nominal = work.geometry.drive.supply if work.geometry is not None else None
@@ -161,7 +161,7 @@ def _no_supply(work: Work) -> list[Finding]:
     )]  # fmt: skip
 
 
-def _unsigned(work: Work) -> list[Finding]:
+def _unsigned(work: LogUnderCheck) -> list[Finding]:
     """Currents that are never negative though the motors turn both ways."""
     current = work.get("current")
     if current is None:

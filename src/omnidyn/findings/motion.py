@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import quantum, slope, smooth, white_noise
 from omnidyn.logs.channels import components
@@ -22,7 +22,7 @@ MOMENT = 0.15  # [s]
 SAFETY = 1.6  # a robot that stands although its voltages are so many times those that move it was held
 
 
-def check_motion(work: Work) -> tuple[list[Finding], Work]:
+def check_motion(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on motion."""
     if len(work) < MIN_ROWS or work.step <= 0.0:
         return [], work
@@ -34,7 +34,7 @@ def check_motion(work: Work) -> tuple[list[Finding], Work]:
     return _start_up(work, still) + _blocked(work, still) + _droop(work), work
 
 
-def _start_up(work: Work, still: NDArray[np.bool_]) -> list[Finding]:
+def _start_up(work: LogUnderCheck, still: NDArray[np.bool_]) -> list[Finding]:
     """A log that begins with its command already set: the first rows are the start, not the motion asked for."""
     rows = int(np.argmin(still))
     if rows < 2:
@@ -52,14 +52,14 @@ def _start_up(work: Work, still: NDArray[np.bool_]) -> list[Finding]:
     return []
 
 
-def _still(work: Work) -> NDArray[np.bool_] | None:
+def _still(work: LogUnderCheck) -> NDArray[np.bool_] | None:
     """Rows in which nothing moves beyond noise; None where no motion was recorded."""
     speed, seen = work.get("wheel_speed"), ground(work)
     if speed is None and seen is not None and len(seen.axes) == 3:
         speed = seen.twist
     if speed is None:  # a gyro alone does not know
         return None
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     still = np.asarray(np.isfinite(speed).any(axis=1))  # what is not known is no rest
     for column in speed.T:
         if np.isfinite(column).any():
@@ -73,28 +73,28 @@ def _rest_level(column: FloatArray, width: int) -> float:
     return max(4.0 * white_noise(column) / np.sqrt(width), 1.01 * quantum(column), 1e-9)
 
 
-def _level(work: Work) -> float:
+def _level(work: LogUnderCheck) -> float:
     """The same as a speed of wheels [rad/s]."""
     speed, robot = work.get("wheel_speed"), work.geometry
     seen = ground(work)
     if speed is None and seen is not None and robot is not None:
         speed = wheel_speed(robot.wheels, seen.twist)
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     return np.inf if speed is None else max(_rest_level(column, width) for column in speed.T)
 
 
-def _never_moved(work: Work) -> Finding:
+def _never_moved(work: LogUnderCheck) -> Finding:
     driven = any(work.get(name) is not None and np.nanmax(np.abs(work.channels[name])) > 0.0
                  for name in ("voltage", "duty", "wheel_speed_command", "twist_command"))  # fmt: skip
     why = "it was driven, but never beyond its dead zone, or it was blocked" if driven else "and nothing drove it"
     return Finding(
         "never_moved", FATAL, "", f"the robot never moves beyond the noise of its sensors: {why}",
         "drive with more; such a log bounds friction from below and says nothing else",
-        work.lines(np.ones(len(work), dtype=bool)), len(work), {},
+        work.lines(work.everywhere), len(work), {},
     )  # fmt: skip
 
 
-def _blocked(work: Work, still: NDArray[np.bool_]) -> list[Finding]:
+def _blocked(work: LogUnderCheck, still: NDArray[np.bool_]) -> list[Finding]:
     """At rest although the motors are driven as they are elsewhere where the robot moves."""
     voltage, robot = volts(work), work.geometry
     current = work.get("current")
@@ -134,14 +134,14 @@ def _long(bad: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
     return out
 
 
-def held(work: Work, command: FloatArray, seconds: float = HELD) -> NDArray[np.bool_]:
+def held(work: LogUnderCheck, command: FloatArray, seconds: float = HELD) -> NDArray[np.bool_]:
     """Rows whose command has been the same for so long. Shape (rows,)."""
     change = np.concatenate([[True], (np.diff(command, axis=0) != 0.0).any(axis=1)])
     last = np.maximum.accumulate(np.where(change, np.arange(len(change)), 0))
     return work.t - work.t[last] >= seconds
 
 
-def _droop(work: Work) -> list[Finding]:
+def _droop(work: LogUnderCheck) -> list[Finding]:
     """Commanded against measured wheel speed, where the command has been held."""
     speed, command = work.get("wheel_speed"), work.get("wheel_speed_command")
     name = "wheel_speed_command"

@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.findings.finding import NOTE, Finding
-from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
 from omnidyn.statistics import stretches
 
 BURST, SHORT = 10.0, 0.25  # times what 90 % of the rows stay below; [s]
 
 
-def check_oddities(work: Work) -> tuple[list[Finding], Work]:
+def check_oddities(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Notes; nothing is masked."""
     if len(work) < MIN_ROWS:
         return [], work
     return _bursts(work) + _last_row(work), work
 
 
-def _bursts(work: Work) -> list[Finding]:
+def _bursts(work: LogUnderCheck) -> list[Finding]:
     """Speeds over the floor that shoot up for a moment, in a log without wheel speeds to hold them against."""
     if work.get("wheel_speed") is not None:
         return []
@@ -42,7 +42,7 @@ def _bursts(work: Work) -> list[Finding]:
     return found
 
 
-def _last_row(work: Work) -> list[Finding]:
+def _last_row(work: LogUnderCheck) -> list[Finding]:
     """Commands that are 0 in the last row only: the recorder stopped the robot, the row is no part of the run."""
     for channel in INPUTS:
         values = work.get(channel)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import WARN, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import products, slope, smooth
 from omnidyn.logs.channels import components
@@ -24,7 +24,7 @@ LAG = 1.5  # rows by which the channels may lag each other
 MAX_WINDOWS = 400
 
 
-def check_slip(work: Work) -> tuple[list[Finding], Work]:
+def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on stretches that slip; the motion over the floor is masked there."""
     found: list[Finding] = []
     for _ in range(STRETCHES):
@@ -51,7 +51,7 @@ def check_slip(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _worst(work: Work) -> tuple[NDArray[np.bool_], float, float, float] | None:
+def _worst(work: LogUnderCheck) -> tuple[NDArray[np.bool_], float, float, float] | None:
     """(rows, ratio inside, ratio outside, error of their quotient) of the stretch that differs most, if it is sure."""
     speed, seen = work.full("wheel_speed"), ground(work)
     if speed is None or seen is None or work.geometry is None or len(work) < 3 * MIN_ROWS:
@@ -75,7 +75,7 @@ def _witness(own: FloatArray, axes: list[int]) -> bool:
     return bool(np.sqrt((size[axes] ** 2).sum()) > 0.3 * np.sqrt((size**2).sum()))
 
 
-def _levelled(work: Work, floor: FloatArray, own: FloatArray, length: FloatArray) -> FloatArray:
+def _levelled(work: LogUnderCheck, floor: FloatArray, own: FloatArray, length: FloatArray) -> FloatArray:
     """Weights that give floor and wheels the same slope about yaw as along x and y."""
     ids, count = work.windows()
     linear, yaw = slope(floor[:, :2], own[:, :2], ids, count), slope(floor[:, 2], own[:, 2], ids, count)
@@ -86,7 +86,7 @@ def _levelled(work: Work, floor: FloatArray, own: FloatArray, length: FloatArray
 
 
 def _contrast(
-    work: Work, floor: FloatArray, own: FloatArray, axes: list[int]
+    work: LogUnderCheck, floor: FloatArray, own: FloatArray, axes: list[int]
 ) -> tuple[NDArray[np.bool_], float, float, float] | None:
     ids, count = work.windows(WINDOW)
     top, below = products(floor[:, axes], own[:, axes], ids, count)

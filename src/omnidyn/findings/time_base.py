@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.logs.log import MAX_MISSING, Log
 from omnidyn.logs.segments import GAP, segments
 from omnidyn.model.robot import Robot
@@ -16,8 +16,8 @@ JITTER_WARN, JITTER_NOTE = 0.5, 0.1  # spread of the steps, of the usual step
 LONGEST_STEP, SHORTEST_STEP = 2.0, 2e-5  # [s] outside of which no robot is logged
 
 
-def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], Work]:
-    """The findings on time, and the work on the rows that have one: sorted, each time once."""
+def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], LogUnderCheck]:
+    """The findings on time, and the log under check: the rows that have a time, sorted, each time once."""
     found: list[Finding] = []
     rows = np.arange(len(log))
     empty = log.empty_rows() if len(log) else np.zeros(0, dtype=bool)
@@ -34,23 +34,23 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], Work]:
     t = log.t[rows]
     steps = np.diff(t)
     step = float(np.clip(np.median(steps), 1e-9, 1e9)) if steps.size else 0.0
-    pieces = tuple(segments(t)) if len(t) else ()
+    between_gaps = tuple(segments(t)) if len(t) else ()
     chosen = log.rows(rows)
     # As in a Run: what is recorded on change is filled in, latencies that are known are taken out.
     channels = {name: chosen.aligned(name, values, []) for name, values in chosen.channels.items()} if len(t) else {}
-    work = _with_speed(Work(log, robot, rows, t, step, pieces, channels), found)
+    work = _with_speed(LogUnderCheck(log, robot, rows, t, step, between_gaps, channels), found)
     return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
 
 
-def _with_speed(work: Work, found: list[Finding]) -> Work:
+def _with_speed(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck:
     """Where angles of wheels were logged and no speed, the work with their differences as speed, which is said."""
     angle = work.get("wheel_angle")
     if angle is None or work.get("wheel_speed") is not None or len(work) < MIN_ROWS:
         return work
     speed = np.full(angle.shape, np.nan)
-    for piece in work.pieces:
-        if piece.stop - piece.start > 2:
-            speed[piece] = np.gradient(angle[piece], work.t[piece], axis=0)
+    for segment in work.segments:
+        if segment.stop - segment.start > 2:
+            speed[segment] = np.gradient(angle[segment], work.t[segment], axis=0)
     found.append(Finding(
         "speed_from_angle", NOTE, "", "no speed of wheels was logged: w1, .. are differences of the angles a1, ..", "",
         (), 0, {},
@@ -122,8 +122,8 @@ def _repeated(log: Log, rows: NDArray[np.int64], again: NDArray[np.bool_]) -> li
     ]  # fmt: skip
 
 
-def _gaps(work: Work) -> list[Finding]:
-    cuts = [piece.start for piece in work.pieces[1:]]
+def _gaps(work: LogUnderCheck) -> list[Finding]:
+    cuts = [segment.start for segment in work.segments[1:]]
     if not cuts:
         return []
     lengths = np.array([work.t[k] - work.t[k - 1] for k in cuts])
@@ -141,7 +141,7 @@ def _gaps(work: Work) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _jitter(work: Work) -> list[Finding]:
+def _jitter(work: LogUnderCheck) -> list[Finding]:
     steps = np.diff(work.t)
     if len(steps) < MIN_ROWS or work.step <= 0.0:
         return []
@@ -161,7 +161,7 @@ def _jitter(work: Work) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _unit(work: Work) -> list[Finding]:
+def _unit(work: LogUnderCheck) -> list[Finding]:
     if len(work) < MIN_ROWS or SHORTEST_STEP <= work.step <= LONGEST_STEP:
         return []
     likely = "ms, us or ticks read as seconds" if work.step > LONGEST_STEP else "seconds read as ms or us"
@@ -174,7 +174,7 @@ def _unit(work: Work) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _few(work: Work) -> list[Finding]:
+def _few(work: LogUnderCheck) -> list[Finding]:
     if len(work) >= MIN_ROWS:
         return []
     return [
@@ -203,5 +203,5 @@ def between(last: tuple[float, int] | None, block: Log, rate: float) -> tuple[li
         return _repeated(pair, np.arange(2), np.array([False, True])), here
     if step * rate <= GAP:
         return [], here
-    pieces = (slice(0, 1), slice(1, 2))
-    return _gaps(Work(pair, None, np.arange(2), pair.t, 1.0 / rate, pieces, {})), here
+    apart = (slice(0, 1), slice(1, 2))
+    return _gaps(LogUnderCheck(pair, None, np.arange(2), pair.t, 1.0 / rate, apart, {})), here

@@ -12,8 +12,8 @@ from omnidyn.identification.shape_residual import between_axes
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import FITTED, HELD_OUT, Validation, coloured
 from omnidyn.logs.steady_table import AXES
-from omnidyn.model.first_guess import GUESS
-from omnidyn.model.keys import unit
+from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
+from omnidyn.model.robot import GUESS
 
 NUMBER_HEAD = ("number", "value", "std error", "95 % interval", "unit", "")
 DIFFERENCE_HEAD = ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "")
@@ -23,8 +23,8 @@ LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
 SHOWN = 6
 # Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
-GOES_WITH_TORQUE = ("motor.emf_constant_Vs_rad", "motor.gear_ratio")
-FREEABLE = ("motor.torque_constant_Nm_A", "motor.resistance_ohm", "body.inertia_kg_m2")
+GOES_WITH_TORQUE = (EMF, "motor.gear_ratio")
+FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
 
 
 def number_rows(fit: OutputErrorEstimate) -> list[tuple[str, ...]]:
@@ -86,7 +86,7 @@ def verdict_advice(verdicts: Sequence[Verdict]) -> list[str]:
 
 def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
     for name, bound in fit.lower_bound.items():
-        axis = AXES[int(name[-2])] if name[-1:] == "]" else name
+        axis = _axis(name) or name
         yield f"drive {axis} harder than {bound:.3g} {unit(name)}: it never moved, so its friction is only bounded"
     for name in fit.unidentifiable:
         yield f"{name} cannot be told from these logs: {_remedy(name)}"
@@ -95,16 +95,22 @@ def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
 
 
 def _remedy(name: str) -> str:
-    if name.startswith("friction.axes."):
-        return f"drive {AXES[int(name[-2])]} both ways, at several speeds"
+    if name in BOX:
+        return f"drive {_axis(name)} both ways, at several speeds"
     return "fix it (--fix), or record what depends on it: currents, or another load"
+
+
+def _axis(name: str) -> str:
+    """The axis along which a number acts, "" for one of no axis."""
+    key = find_key(name)
+    return "" if key is None or key.axis is None else AXES[key.axis]
 
 
 def _guesses(fit: OutputErrorEstimate, validation: Validation | None) -> Iterator[str]:
     """What the robot file only guesses, where the model misses something: no friction makes up for a wrong motor."""
     guessed = [
         key for key, prior in fit.robot.priors.items()
-        if prior.source == GUESS and key not in fit.value and key.startswith(("motor.", "body."))
+        if prior.origin == GUESS and key not in fit.value and Key.parse(key).part in ("motor", "body")
     ]  # fmt: skip
     if FREEABLE[0] in fit.value:
         guessed = [key for key in guessed if key not in GOES_WITH_TORQUE]

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.problem.nuisances import DEAD, FADE, GAIN, LATENCY, TILT
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
 from omnidyn.identification.output_error.problem.primitives import primitives
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.logs.segments import segments
 from omnidyn.logs.steady_table import AXES
+from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import GAINS, Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -43,7 +44,8 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
     read = record(run, fit.robot, loop=any(Key.parse(key).name in GAINS for key in fit.value))
     if read.set_point is not None:
         return _set_points_as_fitted(run, read.set_point, values)
-    voltage = at_motors(read.voltage, run.t, values) + pushing(fit.robot, values)
+    driver = Driver(**{name: values[name] for name in Driver._fields if name in values})
+    voltage = at_motors(read.voltage, read.share, driver)[0] + pushing(fit.robot, values)
     late = {name: values.get(f"{LATENCY}.{name}", 0.0) for name in LATE}
     if not any(late.values()):
         return run.replace(voltage=voltage, duty=None, supply=None)
@@ -95,12 +97,6 @@ def _set_points_as_fitted(run: Run, set_point: FloatArray, values: Mapping[str, 
         wheel_speed_command=moved, **shifted,
         warnings=(*run.warnings, f"channels were moved back by the fitted latency of {main:.4g} s"),
     )  # fmt: skip
-
-
-def at_motors(voltage: FloatArray, t: FloatArray, values: Mapping[str, float]) -> FloatArray:
-    """(|u| - dead_band)+ sgn u, times the gain, less the fade; t [s] (rows,), voltage [V] (rows, wheels)."""
-    left = values.get(GAIN, 1.0) * (1.0 - values.get(FADE, 0.0) * (t - t[0]) / (float(t[-1] - t[0]) or 1.0))
-    return left[:, None] * np.sign(voltage) * np.maximum(np.abs(voltage) - values.get(DEAD, 0.0), 0.0)
 
 
 def mean_before(t: FloatArray, voltage: FloatArray, late: float, before: float = 1.0) -> FloatArray:

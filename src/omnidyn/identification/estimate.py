@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.document import Document, Part, Points, Table, interval_cell
 from omnidyn.model.keys import unit
-from omnidyn.model.robot import Prior, Robot
+from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
 
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
@@ -34,7 +34,7 @@ class Correlation:
 class Estimate:
     """What data say about a robot. Parameters are named by their key in the robot file: "friction.axes.viscous[0]".
 
-    robot: with the fitted numbers; its priors hold std and source, so that its file tells where they come from.
+    robot: with the fitted numbers; its priors hold std, source and origin, so that its file tells where they come from.
     value, std, ci95: name -> estimate, standard error, 95 % interval (low, high), in the unit of the key.
     correlation: between the estimates. degrees_of_freedom: name -> rows minus parameters behind that number.
     at_bound: names of what a bound holds (a friction that came out negative). std is then that of the free fit.
@@ -56,22 +56,26 @@ class Estimate:
 
     def summary(self) -> str:
         """The estimate as a plain table, for reading. ASCII only."""
-        lines = [f"{self.robot.name}: {self.method}", f"data: {self.data}", "", *self._table()]
-        lines += [f"{name} is at least {bound:.4g} {unit(name)}" for name, bound in self.lower_bound.items()]
-        for warning in self.warnings:
-            lines += textwrap.wrap(f"warning: {warning}", 100, subsequent_indent="  ")
-        return "\n".join(line.encode("ascii", "backslashreplace").decode() for line in lines) + "\n"
+        return self.document().to_text() + "\n"
 
-    def _table(self) -> list[str]:
-        width = max([len(name) for name in self.value] + [len("parameter")])
-        rows = [f"{'parameter':{width}}  {'value':>10}  {'std error':>10}  {'95 % interval':>24}  unit"]
+    def document(self) -> Document:
+        """What the estimate says."""
+        return Document(self._parts(), self.to_dict(), self.warnings, ascii=True)
+
+    def _parts(self) -> list[Part]:
+        """Its words and its table, in the order of reading."""
+        bounds = [f"{name} is at least {bound:.4g} {unit(name)}" for name, bound in self.lower_bound.items()]
+        head = [f"{self.robot.name}: {self.method}", f"data: {self.data}", ""]
+        return [*head, self._table(), *bounds, Points(self.warnings, "warning:")]
+
+    def _table(self) -> Table:
+        rows = []
         for name, value in self.value.items():
-            low, high = self.ci95[name]
-            interval = f"{f'[{low:.4g}, {high:.4g}]':>24}"
             mark = "  at bound" if name in self.at_bound else ""
-            row = f"{name:{width}}  {value:10.4g}  {self.std[name]:10.3g}  {interval}  {unit(name)}{mark}"
-            rows.append(row.rstrip())
-        return rows
+            interval = interval_cell(self.ci95[name])
+            rows.append((name, f"{value:.4g}", f"{self.std[name]:.3g}", interval, unit(name) + mark))
+        head = ("parameter", "value", "std error", "95 % interval", "unit")
+        return Table(head, rows, "<>>><", least=(0, 10, 10, 24))
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it: no NaN, no infinity (null instead); the robot as the text of its file."""
@@ -101,10 +105,10 @@ class Estimate:
 
 
 def identified(std: float | None, source: str) -> Prior:
-    """The prior of an identified number: its standard error, where it is one, and "identified: SOURCE"."""
-    text = "".join(c if c.isprintable() else " " for c in f"identified: {source}")[:SOURCE_LENGTH]
+    """The prior of an identified number: its standard error, where it is one, and from what it was identified."""
+    text = "".join(c if c.isprintable() else " " for c in source)[:SOURCE_LENGTH]
     known = std is not None and 0.0 < std <= 1e9
-    return Prior(std=float(std) if known else None, source=text)  # type: ignore[arg-type]
+    return Prior(std=float(std) if known else None, source=text, origin=IDENTIFIED)  # type: ignore[arg-type]
 
 
 def finite_or_none(value: float) -> float | None:

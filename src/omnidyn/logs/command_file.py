@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.logs.readers.any_table import read_any
+from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.run_file import columns_of, refuse_other_units
 from omnidyn.logs.table.table import Table
 
@@ -79,7 +79,7 @@ def _read(
 ) -> HeldCommands:
     if duration is not None and not (0.0 < duration < np.inf):
         raise InputError("cannot simulate for that long", got=duration, expected="a duration above 0 s")
-    table = read_any(path)
+    table = read_table(path)
     kind = next((kind for kind in kinds if _numbered(table, kind)), kinds[0])
     _check_columns(table, kind, wheels)
     if len(table) > max_steps:

@@ -1,9 +1,9 @@
 """Steady windows of a run, and one point per window: what the steady-state identification is made from.
 
-A window lies between two gaps, within a stretch over which the commands stand still. Its start-up is cut off where the
-standard error of what remains is least: MSER, K. P. White, Simulation 69, 323 (1997), here for all measured channels at
-once; an end that differs (the robot brakes) is cut off in the same way. Where no command comes in steps, windows of
-fixed length are taken instead. A window whose second half differs from its first is not steady and left out.
+A window lies between two gaps, within a hold: a stretch over which the commands stand still. Its start-up is cut off
+where the standard error of what remains is least: MSER, K. P. White, Simulation 69, 323 (1997), here for all measured
+channels at once; an end that differs (the robot brakes) is cut off in the same way. Where no command comes in steps,
+windows of fixed length are taken instead. A window whose second half differs from its first is not steady and left out.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MIN_ROWS, MIN_DURATION = 12, 0.4  # [s]
 WINDOW = 0.5  # [s] length where no command comes in steps
 SAME_COMMAND = 0.01  # of the largest command: a change by less is none
 STEPWISE = 0.05  # a command that changes in more than this share of the rows does not come in steps
-START_SHARE, END_SHARE = 0.5, 0.25  # at most so much of a stretch is cut off
+START_SHARE, END_SHARE = 0.5, 0.25  # at most so much of a hold is cut off
 SAFETY = 3  # times what MSER cuts: it leaves a transient as large as the noise of one window, which many do not average
 DEAD_SHARE = 0.05  # of what the speeds tell: an angle that turns less is dead
 DRIFT_ERRORS, DRIFT_SHARE = 4.0, 0.1  # halves that differ by more than both are not steady
@@ -43,7 +43,7 @@ class Plateau:
     rows: where it stands in the run. start, end: its times [s]. mean, std: channel of Run -> robust mean and its
     standard error, SI, shape (columns,) or (); of wheel_speed, and of twist where only a pose was logged, from
     differences over the window. speed_from: where wheel_speed comes from, "" where there is none.
-    hold: number of the stretch of one command in its run; a gap may cut one into several windows. count: rows used.
+    hold: number of its hold in the run; a gap may cut one into several windows. count: rows used.
     """
 
     rows: slice
@@ -70,22 +70,22 @@ class Plateau:
 def find_plateaus(run: Run, *, start: float | None = None, end: float | None = None) -> tuple[Plateau, ...]:
     """The steady windows of a run, in order, one point each.
 
-    start, end: instead of looking for steady rows, take these shares of each stretch of one command (0.4 and 0.95:
+    start, end: instead of looking for steady rows, take these shares of each hold (0.4 and 0.95:
     from 40 % to 95 % of its rows). Returns no window where none is long enough and steady.
     Raises InputError when only one of the two is given, or when they are not 0 <= start < end <= 1.
     """
     fixed = _fixed(start, end)
-    angle, pieces, found = live_angle(run), segments(run.t), []
-    for number, hold in enumerate(stretches(run)):
-        for piece in _between_gaps(pieces, _share(hold, *fixed) if fixed else hold):
-            rows = piece if fixed else _settled(run, piece, angle)
+    angle, run_segments, found = live_angle(run), segments(run.t), []
+    for number, hold in enumerate(holds(run)):
+        for segment in _between_gaps(run_segments, _share(hold, *fixed) if fixed else hold):
+            rows = segment if fixed else _settled(run, segment, angle)
             if rows is not None and _long_enough(run, rows) and (fixed or _is_steady(run, rows, angle)):
                 found.append(replace(_plateau(run, rows, angle), hold=number))
     return tuple(found)
 
 
 def pool(plateaus: Sequence[Plateau]) -> tuple[Plateau, ...]:
-    """One point per stretch of one command: the windows of a run between which a gap lies, averaged by their rows."""
+    """One point per hold: the windows of a run between which a gap lies, averaged by their rows."""
     holds: dict[int, list[Plateau]] = {}
     for each in plateaus:
         holds.setdefault(each.hold, []).append(each)
@@ -136,22 +136,22 @@ def live_angle(run: Run) -> FloatArray | None:
     return None if (turned < DEAD_SHARE * told).any() else run.wheel_angle
 
 
-def stretches(run: Run) -> list[slice]:
-    """Pieces of a run over which the commands that come in steps stand still, in order; a gap may lie in one.
+def holds(run: Run) -> list[slice]:
+    """The stretches of a run over which the commands that come in steps stand still, in order; a gap may lie in one.
 
-    Where no command comes in steps: pieces of `WINDOW` seconds between gaps.
+    Where no command comes in steps: windows of `WINDOW` seconds between gaps.
     """
     changes = _changes(run)
     if changes is None:
-        return [window for piece in segments(run.t) for window in _cut(run.t, piece)]
+        return [window for segment in segments(run.t) for window in _cut(run.t, segment)]
     cuts = np.flatnonzero(changes)
     return [slice(int(a), int(b)) for a, b in zip([0, *cuts], [*cuts, len(run)], strict=True) if b > a]
 
 
-def _between_gaps(pieces: Sequence[slice], hold: slice) -> list[slice]:
-    """A stretch cut at the gaps of the run, which lie between its `pieces`."""
-    cut = [slice(max(p.start, hold.start), min(p.stop, hold.stop)) for p in pieces]
-    return [piece for piece in cut if piece.stop > piece.start]
+def _between_gaps(run_segments: Sequence[slice], hold: slice) -> list[slice]:
+    """A hold cut at the gaps of the run."""
+    cut = [slice(max(p.start, hold.start), min(p.stop, hold.stop)) for p in run_segments]
+    return [segment for segment in cut if segment.stop > segment.start]
 
 
 def _changes(run: Run) -> NDArray[np.bool_] | None:
@@ -171,10 +171,10 @@ def _changes(run: Run) -> NDArray[np.bool_] | None:
     return changed if known else None
 
 
-def _cut(t: FloatArray, piece: slice) -> list[slice]:
-    """A piece in windows of fixed length."""
-    number = ((t[piece] - t[piece.start]) // WINDOW).astype(int)
-    edges = piece.start + np.flatnonzero(np.diff(number, prepend=-1, append=number[-1] + 1))
+def _cut(t: FloatArray, segment: slice) -> list[slice]:
+    """A segment in windows of fixed length."""
+    number = ((t[segment] - t[segment.start]) // WINDOW).astype(int)
+    edges = segment.start + np.flatnonzero(np.diff(number, prepend=-1, append=number[-1] + 1))
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 
 
@@ -186,9 +186,9 @@ def _fixed(start: float | None, end: float | None) -> tuple[float, float] | None
     return start, end
 
 
-def _share(stretch: slice, start: float, end: float) -> slice:
-    n = stretch.stop - stretch.start
-    return slice(stretch.start + int(start * n), stretch.start + int(end * n))
+def _share(hold: slice, start: float, end: float) -> slice:
+    n = hold.stop - hold.start
+    return slice(hold.start + int(start * n), hold.start + int(end * n))
 
 
 def _long_enough(run: Run, rows: slice) -> bool:
@@ -214,14 +214,14 @@ def _responses(run: Run, rows: slice, angle: FloatArray | None) -> FloatArray:
     return np.clip((table[:, moving] - middle[moving]) / spread[moving], -5.0, 5.0)
 
 
-def _settled(run: Run, stretch: slice, angle: FloatArray | None) -> slice | None:
-    """The stretch without its start-up, and without an end that differs."""
-    if not _long_enough(run, stretch):
+def _settled(run: Run, hold: slice, angle: FloatArray | None) -> slice | None:
+    """The hold without its start-up, and without an end that differs."""
+    if not _long_enough(run, hold):
         return None
-    scores = _responses(run, stretch, angle)
+    scores = _responses(run, hold, angle)
     first = min(SAFETY * _truncation(scores, START_SHARE), int(START_SHARE * len(scores)))
     last = min(SAFETY * _truncation(scores[first:][::-1], END_SHARE), int(END_SHARE * len(scores)))
-    return slice(stretch.start + first, stretch.stop - last)
+    return slice(hold.start + first, hold.stop - last)
 
 
 def _truncation(scores: FloatArray, share: float) -> int:

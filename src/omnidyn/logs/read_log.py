@@ -18,9 +18,10 @@ from omnidyn.logs.column import MOTOR_SIDE, Column
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel, load_map, parse_column
 from omnidyn.logs.log import Log
-from omnidyn.logs.readers.any_table import iter_tables, read_any
+from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.table.table import ROWS, Table
-from omnidyn.logs.table.text import Progress
+from omnidyn.logs.table.text_file import Progress
+from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
@@ -83,7 +84,7 @@ def read_log(
 def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None) -> Log:
     """Read a log as it was recorded: in SI, by channel, time not yet trusted. Raises InputError."""
     options = options or LogOptions()
-    table = with_joined_stamp(read_any(path, header=options.header, skip_bad_rows=options.skip_bad_rows))
+    table = with_joined_stamp(read_table(path, header=options.header, skip_bad_rows=options.skip_bad_rows))
     return log_from_table(table, map_columns(table, robot, options), robot, options)
 
 
@@ -121,7 +122,7 @@ def _delayed(columns: ColumnMap, latency: Mapping[str, float]) -> ColumnMap:
 def log_from_table(
     table: Table, columns: ColumnMap, robot: Robot | None, options: LogOptions, clock: Clock | None = None
 ) -> Log:
-    """The Log of a table under a map; `clock` has seen the pieces before this one.
+    """The Log of a table under a map; `clock` has seen the blocks before this one.
 
     Raises InputError for text where numbers are needed, and for a robot with another number of wheels.
     """
@@ -153,7 +154,7 @@ def log_from_table(
     if any(column.side == MOTOR_SIDE for column in columns.columns.values()) and robot is None:
         notes.append("speeds and angles are those of the motor shaft: no robot is given, so no gear is known")
     if "pose" in channels:
-        channels["pose"][:, 2] = _unwrapped(channels["pose"][:, 2])
+        channels["pose"][:, 2] = unwrapped(channels["pose"][:, 2])
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
     t = (clock or Clock()).times(table, columns.columns[TIME], notes)
@@ -168,14 +169,6 @@ def _bare(unit: str) -> str:
 
 def _gear(robot: Robot | None, wheel: int) -> float:
     return 1.0 if robot is None else float(per_wheel(robot.motor.gear_ratio, robot.wheels.count)[wheel])
-
-
-def _unwrapped(heading: FloatArray) -> FloatArray:
-    """Heading without jumps of a turn; missing values stay missing."""
-    known = np.isfinite(heading)
-    unwrapped = heading.copy()
-    unwrapped[known] = np.unwrap(heading[known])
-    return unwrapped
 
 
 def _signed(log: Log, robot: Robot | None) -> Log:
@@ -213,9 +206,9 @@ def iter_logs(
     path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None, *,
     rows: int = ROWS, progress: Progress | None = None,
 ) -> Iterator[Log]:  # fmt: skip
-    """The pieces of a log too long for memory, at most `rows` rows each, all under the map of the first.
+    """The blocks of a log too long for memory, at most `rows` rows each, all under the map of the first.
 
-    progress(bytes_done, bytes_total) is called now and then. Time counts from the first piece. Raises InputError.
+    progress(bytes_done, bytes_total) is called now and then. Time counts from the first block. Raises InputError.
     """
     options, columns, clock = options or LogOptions(), None, Clock()
     how = {"header": options.header, "skip_bad_rows": options.skip_bad_rows}

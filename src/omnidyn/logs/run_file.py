@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
 from omnidyn.logs.channels import components, si_suffix
-from omnidyn.logs.readers.any_table import read_any
 from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
+from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
 from omnidyn.run import CHANNELS, SCALAR, Run
 from omnidyn.units import DUTY, known_unit, parse_unit
@@ -110,9 +110,9 @@ def read_run(path: str | os.PathLike) -> Run:
 
     The order of the columns does not matter, a channel needs all of its columns, a blank cell is NaN. `source` of the
     Run is the path, its `warnings` say what the reader had to decide.
-    Raises InputError for any other column or unit, a missing or decreasing time, and all that `read_any` refuses.
+    Raises InputError for any other column or unit, a missing or decreasing time, and all that `read_table` refuses.
     """
-    table = read_any(path)
+    table = read_table(path)
     wheels = _wheel_count(table.names)
     known = {channel: columns_of(channel, wheels) for channel in CHANNELS}
     table.check_names(["t_s"], [name for names in known.values() for name in names])

@@ -9,7 +9,7 @@ GAP = 3.5  # a step so many times the usual one is a gap: three samples or more 
 
 
 def segments(t: NDArray[np.float64], gap: float = GAP) -> list[slice]:
-    """The pieces of a log between its gaps, in order. t [s], shape (n,), increasing.
+    """The segments of a log, which lie between its gaps, in order. t [s], shape (n,), increasing.
 
     A gap is a step longer than `gap` times the median step, and than twice the step that 95 % of all stay below:
     a log on change has long steps without a gap.

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.logs.table.table import Table, read_table
+from omnidyn.logs.readers.read_table import read_table
+from omnidyn.logs.table.table import Table
 
 FloatArray = NDArray[np.float64]
 

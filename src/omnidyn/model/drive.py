@@ -35,6 +35,11 @@ class Drive(Value):
         Annotated[float, number(0.1, 1e6)] | None, Field(alias="rate_Hz", description="of the speed loop")
     ] = None
 
+    @property
+    def coasts(self) -> bool:
+        """Whether a duty of 0 opens the motor."""
+        return self.kind == DUTY and self.off == COAST
+
     @model_validator(mode="after")
     def _complete(self) -> Drive:
         if self.kind == SPEED and (self.rate is None or (self.kp == 0.0 and self.ki == 0.0)):

@@ -10,21 +10,19 @@ overrules it at once. What is known, by stall force per mass, friction per weigh
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 
-from omnidyn.model.drive import Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.keys import EMF, FRICTION, TORQUE, Key, all_keys
 from omnidyn.model.motor import Motor
-from omnidyn.model.robot import Body, Prior, Robot
-from omnidyn.model.value import keys_of
+from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Prior, Robot
 from omnidyn.model.wheels import PerWheel, Wheels
 
-GIVEN, GUESS = "given", "guess"
 DIRECTION, AXES = "direction", "axes"
+GEAR = "motor.gear_ratio"
 GRAVITY = 9.81  # [m/s^2]
 
 TOP_SPEED = 1.0  # [m/s] that the robot reaches at the voltage limit, friction included
@@ -43,8 +41,8 @@ SPREAD = {
     "motor.emf_constant_Vs_rad": 0.5,
     "motor.gear_ratio": 0.5,
     "motor.voltage_limit_V": 0.5,
-    "friction.": 1.0,
 }
+FRICTION_SPREAD = 1.0
 LIKE_SPREAD = 0.3  # of what is taken over from another robot
 EXACT = ("wheels.azimuth_deg", "wheels.roller_angle_deg")  # a drawing, not a measurement
 
@@ -100,18 +98,17 @@ def first_guess(
     )  # fmt: skip
     given = {"body.mass_kg"} | ({"motor.voltage_limit_V"} if voltage_limit is not None else set())
     priors = {}
-    for key, value in numbers_of(robot):
-        table = key.partition("[")[0]
-        if table in given or table.startswith("wheels."):
-            priors[table] = Prior(source=GIVEN)
+    for key in map(Key.parse, all_keys(robot)):
+        if key.name in given or key.part == "wheels":
+            priors[key.name] = Prior(origin=GIVEN)
         else:
-            spread = next(share for start, share in SPREAD.items() if key.startswith(start))
-            priors[key] = Prior(std=_round(spread * value), source=GUESS)
+            spread = SPREAD.get(key.name, FRICTION_SPREAD)
+            priors[str(key)] = Prior(std=_round(spread * key.get(robot)), origin=GUESS)
     return robot.replace(priors=priors)
 
 
 def with_gear(robot: Robot, gear_ratio: float, source: str) -> Robot:
-    """The robot with another gear ratio and the same wheels under the same voltage: K l stays what it was."""
+    """The robot with a gear ratio that was measured, and the same wheels under the same voltage: K l stays."""
     share = float(np.mean(robot.motor.gear_ratio)) / gear_ratio
     motor = robot.motor.replace(
         gear_ratio=gear_ratio,
@@ -119,12 +116,12 @@ def with_gear(robot: Robot, gear_ratio: float, source: str) -> Robot:
         emf_constant=_times(robot.motor.emf_constant, share),
     )
     spreads = {
-        key: Prior(std=_round(prior.std * share), source=prior.source)
+        key: prior.replace(std=_round(prior.std * share))
         for key, prior in robot.priors.items()
-        if key.startswith(("motor.torque_constant", "motor.emf_constant")) and prior.std is not None
+        if Key.parse(key).name in (TORQUE, EMF) and prior.std is not None
     }
-    priors = {key: prior for key, prior in robot.priors.items() if not key.startswith("motor.gear_ratio")}
-    return robot.replace(motor=motor, priors=priors | spreads | {"motor.gear_ratio": Prior(source=source)})
+    priors = {key: prior for key, prior in robot.priors.items() if Key.parse(key).name != GEAR}
+    return robot.replace(motor=motor, priors=priors | spreads | {GEAR: Prior(source=source, origin=MEASURED)})
 
 
 def default_prior(key: str, value: Any) -> Prior:
@@ -201,18 +198,18 @@ def like(
 
 def _priors_like(robot: Robot, preset: Robot, given: Collection[str]) -> dict[str, Prior]:
     """Source and spread of every number: at least 30 %, more where the preset is less certain than that."""
-    before, priors = dict(numbers_of(preset)), {}
-    for key, value in numbers_of(robot.replace(priors=preset.priors)):
-        table = key.partition("[")[0]
-        if table in given:
-            priors[table] = Prior(source=GIVEN)
-        elif table in EXACT:
-            priors[table] = Prior(source=f"like {preset.name}")
+    there, priors, taken = all_keys(preset), {}, Prior(source=f"like {preset.name}", origin=IMPORTED)
+    for text in all_keys(robot.replace(priors=preset.priors)):
+        key = Key.parse(text)
+        if key.name in given:
+            priors[key.name] = Prior(origin=GIVEN)
+        elif key.name in EXACT:
+            priors[key.name] = taken
         else:
-            known = preset.priors.get(key) or preset.priors.get(table) or Prior()
-            scale = abs(value / before[key]) if before.get(key) else 1.0
-            std = max(LIKE_SPREAD * abs(value), (known.std or 0.0) * scale)
-            priors[key] = Prior(std=_round(std) if std > 0.0 else None, source=f"like {preset.name}")
+            known = preset.priors.get(text) or preset.priors.get(key.name) or Prior()
+            value, before = key.get(robot), key.get(preset) if text in there else 0.0
+            std = max(LIKE_SPREAD * abs(value), (known.std or 0.0) * (abs(value / before) if before else 1.0))
+            priors[text] = taken.replace(std=_round(std) if std > 0.0 else None)
     return priors
 
 
@@ -248,45 +245,15 @@ def _times(value: Any, factor: float | tuple[float, ...]) -> Any:
     return _round(value * factor, 6)
 
 
-def numbers_of(robot: Robot) -> Iterator[tuple[str, float]]:
-    """(key of the robot file, value) of every number that its file writes: "friction.direction.coulomb[0]", 15.7."""
-    for table in ("body", "wheels", "motor", "drive", "friction"):
-        yield from _numbers(table, getattr(robot, table), tuple(robot.priors))
-
-
-def _numbers(path: str, value: BaseModel, told: tuple[str, ...]) -> Iterator[tuple[str, float]]:
-    for name, field in keys_of(type(value), []).items():
-        key, content = f"{path}.{name}", getattr(value, field)
-        if isinstance(content, BaseModel):
-            if content != type(value).model_fields[field].default or any(each.startswith(f"{key}.") for each in told):
-                yield from _numbers(key, content, told)
-        elif content == type(value).model_fields[field].default and not any(
-            each == key or each.startswith(f"{key}[") for each in told
-        ):
-            continue
-        elif isinstance(content, tuple):
-            yield from ((f"{key}[{k}]", one) for k, one in enumerate(content))
-        elif isinstance(content, float):
-            yield key, content
-
-
 def guessed(robot: Robot) -> list[str]:
     """What of a robot is a guess, as short names: ["inertia", "resistance", ...]; all friction is one word."""
-    keys = [key for key, prior in robot.priors.items() if prior.source == GUESS]
-    names = [_PLAIN.get(key, "friction" if key.startswith("friction.") else key) for key in keys]
-    return list(dict.fromkeys(names))
-
-
-_PLAIN = {
-    f"{table}.{field.alias or name}": name.replace("_", " ")
-    for table, model in (("body", Body), ("motor", Motor), ("drive", Drive))
-    for name, field in model.model_fields.items()
-}
+    keys = [Key.parse(key) for key, prior in robot.priors.items() if prior.origin == GUESS]
+    return list(dict.fromkeys(FRICTION if key.level else key.words for key in keys))
 
 
 def reasons(robot: Robot) -> list[tuple[str, str]]:
     """(key, why) of every guess of `first_guess`, in the order of the file."""
-    keys = dict.fromkeys(key.partition("[")[0] for key, prior in robot.priors.items() if prior.source == GUESS)
+    keys = dict.fromkeys(Key.parse(key).name for key, prior in robot.priors.items() if prior.origin == GUESS)
     return [(key, WHY[key]) for key in keys if key in WHY]
 
 

@@ -5,6 +5,8 @@ Axes are x forward, y left, yaw counter-clockwise (REP-103), which are the paper
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -29,3 +31,11 @@ def world_to_body(heading: ArrayLike) -> NDArray[np.float64]:
     `heading` [rad], shape (*batch,). Returns shape (*batch, 3, 3).
     """
     return np.swapaxes(body_to_world(heading), -1, -2)
+
+
+def unwrapped(angle: NDArray[np.float64], period: float = 2.0 * math.pi) -> NDArray[np.float64]:
+    """The angle without its jumps by a period, same unit. Shape (rows,); what is missing (NaN) stays missing."""
+    known = np.isfinite(angle)
+    smooth = angle.copy()
+    smooth[known] = np.unwrap(angle[known], period=period)
+    return smooth

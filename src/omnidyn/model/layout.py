@@ -5,7 +5,7 @@ An element is where dry friction acts on one scalar speed: rows 0..2 are the bod
 the direction of travel acts on (v_x, v_y) as a whole.
 """
 
-AXES, YAW = 3, 2  # the first rows are the body axes; the row of yaw
+N_AXES, YAW = 3, 2  # the first rows are the body axes; the row of yaw
 
 # Body: entries of a vector. The first are the robot's, the rest belong to the problem being solved.
 MASS, LENGTH, TURNING = 0, 1, 2  # M [kg]; rho [m]; M/rho where the body frame turns, else 0
@@ -19,7 +19,8 @@ BODY_SIZE = 17
 GX, GY, GZ, VISCOUS = 0, 1, 2, 3  # local speed = g . x; [N s/m]
 SLIDE, HOLD = 4, 6  # Coulomb and breakaway level [N]: against forward motion, and (+1) against backward motion
 ACTIVE = 8  # 1 when the element can stick
-GAIN, EMF, RESISTANCE, INDUCTANCE, DROP, LIMIT, EFFICIENCY = 9, 10, 11, 12, 13, 14, 15  # of a wheel's motor
+THRUST, EMF = 9, 10  # of a motor, at the rim of its wheel: force per ampere [N/A]; back-EMF [V s/m]
+RESISTANCE, INDUCTANCE, DROP, LIMIT, EFFICIENCY = 11, 12, 13, 14, 15  # of a motor and its gear
 SIGN = 16  # 1 and -1 slide forward and backward, 0 stuck, 2 no dry friction
 VOLTAGE, BOUND, NOW, CURRENT = 17, 18, 19, 20  # applied [V]; current limit in force [A]; i* and i at the solution [A]
 LOSS, FOUND, BEFORE = 21, 23, 24  # gear loss at rest [N], forward and (+1) backward; marks of the solver

@@ -107,9 +107,3 @@ def no_load_speed(motor: Motor, voltage: ArrayLike) -> NDArray[np.float64]:
     voltage = np.asarray(voltage, dtype=float)
     count = voltage.shape[-1]
     return voltage / (per_wheel(motor.emf_constant, count) * per_wheel(motor.gear_ratio, count))
-
-
-def clip_voltage(motor: Motor, voltage: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Voltage [V] kept within the limit of the driver, symmetric about zero. Shape (*batch, wheels)."""
-    limit = per_wheel(motor.voltage_limit, voltage.shape[-1])
-    return np.clip(voltage, -limit, limit)

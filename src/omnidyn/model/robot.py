@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -28,13 +28,24 @@ class Body(Value):
     rotating_frame: Annotated[Flag, Field(description="terms M omega v of a turning body")] = False
 
 
+Origin = Literal["guess", "given", "datasheet", "measured", "identified", "imported"]
+"""Where a number comes from. given: by whoever wrote the file; imported: from another robot or another file."""
+
+GUESS: Origin = "guess"
+GIVEN: Origin = "given"
+MEASURED: Origin = "measured"
+IDENTIFIED: Origin = "identified"
+IMPORTED: Origin = "imported"
+
+
 class Prior(Value):
-    """What is known about one number: its standard deviation and where it comes from."""
+    """What is known about one number: its standard deviation, and where it comes from, in words and as a value."""
 
     std: Annotated[
         Annotated[float, number(0.0, 1e9, above=True)] | None, Field(description="standard deviation, same unit")
     ] = None
     source: Text = ""
+    origin: Annotated[Origin, Field(description="where it comes from")] = GIVEN
 
 
 class Robot(Value):

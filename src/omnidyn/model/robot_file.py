@@ -12,7 +12,8 @@ from pydantic import BaseModel, ValidationError
 
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.files import read_text, write_atomic
-from omnidyn.model.robot import SCHEMA, Prior, Robot
+from omnidyn.model.keys import TABLES, is_told
+from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, SCHEMA, Origin, Prior, Robot
 from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 
 PRESETS = Path(__file__).parent / "presets"
@@ -83,7 +84,7 @@ def robot_from_dict(document: dict[str, Any]) -> Robot:
     priors: dict[str, Prior] = {}
     plain = _without_priors(document, (), priors)
     if "priors" in plain:  # a field of Robot, not a key of the file
-        raise InputError("unknown key", got="priors", expected="{ value, std, source } at the number itself")
+        raise InputError("unknown key", got="priors", expected="{ value, std, source, origin } at the number itself")
     try:
         return Robot.model_validate({**plain, "priors": priors}, by_alias=True, by_name=False)
     except ValidationError as error:
@@ -91,7 +92,7 @@ def robot_from_dict(document: dict[str, Any]) -> Robot:
 
 
 def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Prior]) -> Any:
-    """The same tree with every { value, std, source } replaced by its value; what else it says goes to `priors`."""
+    """The same tree with every { value, std, source, origin } replaced by its value; its rest goes to `priors`."""
     dotted = ".".join(str(part) for part in path if not isinstance(part, int))
     if dotted in PENDING:
         raise UnsupportedError(
@@ -103,7 +104,7 @@ def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Pr
     if isinstance(node, dict) and "value" in node and table_at(Robot, path) is None:
         known = {key: value for key, value in node.items() if key != "value"}
         try:
-            priors[_dotted(path)] = Prior(**known)
+            priors[_dotted(path)] = Prior(**{"origin": _origin_in(known.get("source")), **known})
         except InputError as error:
             raise error.at(key_path(path)) from None
         return node["value"]
@@ -112,6 +113,13 @@ def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Pr
     if isinstance(node, list):
         return [_without_priors(value, (*path, index), priors) for index, value in enumerate(node)]
     return node
+
+
+def _origin_in(source: Any) -> Origin:
+    """What the words of a source say in a file that gives no origin, as none did before there were origins."""
+    words = source if isinstance(source, str) else ""
+    found: tuple[Origin, ...] = (GUESS, IDENTIFIED)
+    return next((origin for origin in found if words == origin or words.startswith(f"{origin}:")), GIVEN)
 
 
 def _dotted(path: tuple[str | int, ...]) -> str:
@@ -131,8 +139,7 @@ def robot_to_toml(robot: Robot) -> str:
     head = [f"schema = {SCHEMA}", f"name = {toml_literal(robot.name)}"]
     if robot.source:
         head.append(f"source = {toml_literal(robot.source)}")
-    parts = ("body", "wheels", "motor", "drive", "friction")
-    tables = [_table(name, getattr(robot, name), robot.priors) for name in parts]
+    tables = [_table(name, getattr(robot, name), robot.priors) for name in TABLES]
     return "\n".join(head) + "\n" + "".join(tables)
 
 
@@ -142,8 +149,7 @@ def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
     for key, field in keys_of(type(value), []).items():
         content = getattr(value, field)
         path, default = f"{name}.{key}", type(value).model_fields[field].default
-        told = any(known == path or known.startswith((f"{path}[", f"{path}.")) for known in priors)
-        if content == default and not told and field != "rotating_frame":
+        if content == default and not is_told(path, priors) and field != "rotating_frame":
             continue
         if isinstance(content, BaseModel):
             inner += _table(path, content, priors)
@@ -164,6 +170,7 @@ def _with_prior(content: Any, path: str, priors: dict[str, Prior]) -> str:
         parts.append(f"std = {toml_literal(prior.std)}")
     if prior.source:
         parts.append(f"source = {toml_literal(prior.source)}")
+    parts.append(f"origin = {toml_literal(prior.origin)}")
     return "{ " + ", ".join(parts) + " }"
 
 

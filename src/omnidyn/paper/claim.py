@@ -30,6 +30,11 @@ class Verdict(StrEnum):
     CORRECTED = "reproduced after a correction"
     NOT_REPRODUCED = "cannot be reproduced"
 
+    @property
+    def short(self) -> str:
+        """The verdict in a word: yes, mended or no."""
+        return {Verdict.REPRODUCED: "yes", Verdict.CORRECTED: "mended", Verdict.NOT_REPRODUCED: "no"}[self]
+
 
 @dataclass(frozen=True)
 class Claim:

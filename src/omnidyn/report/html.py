@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from omnidyn.document import Points, Table
 from omnidyn.report.style import Picture
 
 STYLE = (Path(__file__).parent / "page.css").read_text("utf-8")
@@ -22,6 +23,18 @@ class Section:
     key: str
     title: str
     content: str
+
+
+def section(key: str, title: str, *parts: Table | Points | Picture, none: str = "") -> Section:
+    """A part of the page with tables, lists and pictures; `none` stands there where they hold nothing."""
+    content = "".join(map(_content, parts))
+    return Section(key, title, content or (paragraph(none) if none else ""))
+
+
+def _content(part: Table | Points | Picture) -> str:
+    if isinstance(part, Picture):
+        return figure(part)
+    return table(part.head, part.rows) if isinstance(part, Table) else bullets(part.words)
 
 
 def page(

@@ -7,18 +7,14 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from omnidyn.paper.claim import Claim, Verdict
+from omnidyn.paper.claims import Claim, Verdict, verdict_counts
 from omnidyn.report.html import STYLE, Section, figure, page
 from omnidyn.report.style import Picture
 
-__all__ = ["MARKS", "STYLE", "render_page"]
+__all__ = ["SIGNS", "STYLE", "render_page"]
 
-# Colour, word and sign: a reader who cannot see one has the others.
-MARKS = {
-    Verdict.REPRODUCED: ("yes", "\N{CHECK MARK}"),
-    Verdict.CORRECTED: ("mended", "\N{ALMOST EQUAL TO}"),
-    Verdict.NOT_REPRODUCED: ("no", "\N{MULTIPLICATION X}"),
-}
+# Beside the colour, which is that of the short word: a reader who cannot see one has the other, and the words.
+SIGNS = {"yes": "\N{CHECK MARK}", "mended": "\N{ALMOST EQUAL TO}", "no": "\N{MULTIPLICATION X}"}
 
 
 def render_page(
@@ -32,16 +28,14 @@ def render_page(
 
 
 def _counts(claims: Sequence[Claim]) -> str:
-    parts = []
-    for verdict in Verdict:
-        number = sum(claim.verdict == verdict for claim in claims)
-        parts.append(f"<li>{_badge(verdict)} <b>{number}</b></li>")
-    return f'<ul class="counts">{"".join(parts)}</ul>'
+    counts = verdict_counts(claims)
+    parts = "".join(f"<li>{_badge(verdict)} <b>{number}</b></li>" for verdict, number in counts.items())
+    return f'<ul class="counts">{parts}</ul>'
 
 
 def _badge(verdict: Verdict) -> str:
-    colour, sign = MARKS[verdict]
-    return f'<span class="badge {colour}"><span aria-hidden="true">{sign}</span> {escape(verdict.value)}</span>'
+    sign = SIGNS[verdict.short]
+    return f'<span class="badge {verdict.short}"><span aria-hidden="true">{sign}</span> {escape(verdict.value)}</span>'
 
 
 def _table(claims: Sequence[Claim]) -> str:

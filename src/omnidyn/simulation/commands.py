@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.model.drive import COAST, DUTY, SPEED
-from omnidyn.model.motor import clip_voltage
+from omnidyn.model.actuation import clip_voltage, voltage_of_duty
+from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 
@@ -84,9 +84,9 @@ def _from_duty(robot: Robot, rows: FloatArray, steps: FloatArray, supply: ArrayL
         raise InputError("cannot use this supply", got=supply, expected=f"positive volts, one or {len(rows)}")
     battery = np.broadcast_to(battery, (len(rows),))
     duty = np.clip(rows, -1.0, 1.0)
-    applied = duty * battery[:, None]
+    applied = voltage_of_duty(duty, battery)
     held = clip_voltage(robot.motor, applied)
-    coasts = (duty == 0.0) if robot.drive.off == COAST and robot.drive.kind == DUTY else None
+    coasts = (duty == 0.0) if robot.drive.coasts else None
     warnings = _clipped("duty", rows, duty) + _clipped("voltage", applied, held)
     return Commands(steps, held, open_circuit=coasts, duty=duty, supply=battery, warnings=warnings)
 

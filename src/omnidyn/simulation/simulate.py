@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
-from omnidyn.model.layout import AXES, LENGTH
+from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
@@ -102,7 +102,7 @@ def implicit_run(robot: Robot, given: Commands, voltage: FloatArray, outcome: Ou
     how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
     stopped, rows = capped(outcome), len(outcome.iterations)
     doubts = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
-    twists = outcome.state[:, :AXES] / [1.0, 1.0, plant(robot).body[LENGTH]]
+    twists = outcome.state[:, :N_AXES] / [1.0, 1.0, plant(robot).body[LENGTH]]
     return as_run(robot, given, voltage, twists, outcome.pose, outcome, how, doubts)
 
 
@@ -124,7 +124,7 @@ def as_run(
     t = np.arange(len(dt) + 1) * dt[0] if np.all(dt == dt[0]) else np.concatenate([[0.0], np.cumsum(dt)])
     held, turning = _with_last(voltage), wheel_speed(robot.wheels, twists)
     if outcome is not None:  # a wheel that sticks is at rest, to the last bit
-        turning[outcome.state[:, SIGNS + AXES : SIGNS + AXES + n] == 0.0] = 0.0
+        turning[outcome.state[:, SIGNS + N_AXES : SIGNS + N_AXES + n] == 0.0] = 0.0
     if currents is not None:
         current = currents
     elif outcome is not None and robot.motor.electrical == DYNAMIC:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.layout import AXES, GX, GY, GZ
+from omnidyn.model.layout import GX, GY, GZ, N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.release import SIGNS
 from omnidyn.simulation.commands import loop_gains
@@ -77,7 +77,7 @@ def close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick,
         if not tick[k]:
             voltage[k, w] = voltage[k - 1, w]
             continue
-        e = AXES + w
+        e = N_AXES + w
         error = command[k, w] - seen_speed(element, e, state, radius[w], state[SIGNS + e] != 0.0)
         takes, side = tick_branch(kp[w], ki[w], limit[w], period, error, total[w])
         voltage[k, w], total[w] = tick_answer(kp[w], ki[w], limit[w], period, error, total[w], takes, side)

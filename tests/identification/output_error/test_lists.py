@@ -85,7 +85,7 @@ def test_a_prior_of_four_resistances(four_wheel):
     assert abs(fit.value[first] - 1.6) < 4.0 * fit.std[first]
     assert RESISTANCE not in fit.robot.priors
     assert [fit.robot.priors[f"{RESISTANCE}[{wheel}]"] for wheel in range(1, 4)] == [SHEET] * 3
-    assert fit.robot.priors[first].source.startswith("identified")
+    assert fit.robot.priors[first].origin == "identified"
     assert Key.parse(first).get(fit.robot) == fit.value[first]
 
 

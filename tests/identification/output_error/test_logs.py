@@ -188,7 +188,8 @@ def test_what_is_written_can_be_read_and_says_where_it_comes_from(axebot, clean,
     fit = fit_output_error(noisy(clean, 19).replace(source="yard.csv"), axebot, start="rest")
     robot = load_robot(save_robot(fit.robot, tmp_path / "fit.toml"))
     assert robot.friction == fit.robot.friction
-    assert robot.priors[BOX[0]].source.startswith("identified: output error, yard.csv")
+    assert robot.priors[BOX[0]].origin == "identified"
+    assert robot.priors[BOX[0]].source.startswith("output error, yard.csv")
     assert robot.priors[BOX[0]].std == pytest.approx(fit.std[BOX[0]])
     assert "friction.axes.viscous[0]" in fit.summary()
     assert fit.to_dict()["covariance"] == "white"

@@ -125,7 +125,8 @@ def test_the_robot_carries_the_numbers_their_errors_and_their_origin(robot, tmp_
         key, index = name.removeprefix("friction.axes.").rstrip("]").split("[")
         assert getattr(back.friction.axes, key)[int(index)] == value
         assert back.priors[name].std == fit.std[name]
-        assert back.priors[name].source.startswith("identified: steady state, table1.csv, 12 points, sha256 ")
+        assert back.priors[name].origin == "identified"
+        assert back.priors[name].source.startswith("steady state, table1.csv, 12 points, sha256 ")
     assert back.priors["friction.axes.breakaway[0]"].std is None
     assert "lower bound from rest" in back.priors["friction.axes.breakaway[0]"].source
     assert back.motor == robot.motor

@@ -165,7 +165,7 @@ def test_a_prior_of_a_whole_list_goes_to_its_items():
     robot = ROBOT.replace(priors={"friction.axes.coulomb": Prior(std=0.2, source="datasheet")})
     fit = fit_steady_state(robot, line())
     assert fit.robot.priors["friction.axes.coulomb[1]"] == Prior(std=0.2, source="datasheet")
-    assert fit.robot.priors["friction.axes.coulomb[0]"].source.startswith("identified")
+    assert fit.robot.priors["friction.axes.coulomb[0]"].origin == "identified"
     assert parse_robot(robot_to_toml(fit.robot)) == fit.robot
 
 

@@ -9,7 +9,7 @@ from omnidyn.identification.steady.operating_points import force_points
 from omnidyn.identification.steady.shape_fit import fit_shape
 from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.identification.steady.study import identify_steady
-from omnidyn.identification.steady.study_table import study_summary, study_to_dict
+from omnidyn.identification.steady.study_table import study_document
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
@@ -83,7 +83,8 @@ def test_the_robot_that_comes_back_has_the_friction_with_its_std_and_survives_it
     assert back.friction.axes.coulomb == (0.0, 0.0, 0.0)
     prior = back.priors["friction.direction.coulomb[0]"]
     assert prior.std == study.estimate.std["friction.direction.coulomb[0]"]
-    assert prior.source.startswith("identified: steady state, 24 runs, 24 steady points")
+    assert prior.origin == "identified"
+    assert prior.source.startswith("steady state, 24 runs, 24 steady points")
 
 
 def test_yaw_friction_that_was_not_measured_stays_and_is_named():
@@ -159,7 +160,7 @@ def test_groups_of_which_only_one_turns_are_compared_in_what_both_tell(turns):
     assert [each.key for each in study.differences] == list(straight)
     for each in study.differences:
         assert each.values == (study.estimates["first"].value[each.key], study.estimates["second"].value[each.key])
-    study_summary(study)
+    study_document(study).to_text()
 
 
 def test_internal_forces_of_four_wheels_are_told():
@@ -203,14 +204,15 @@ def test_the_speed_that_was_used_is_stated():
     for speed, words in (("set", "set speed"), ("wheel", "speed of the wheels")):
         study = identify_steady(noisy("disc"), AXEBOT, speed=speed)
         assert words in study.estimate.method
-        assert words in study_summary(study)
+        assert words in study_document(study).to_text()
 
 
 def test_the_summary_and_the_dictionary_hold_all_of_it():
     import json
 
     study = identify_steady(noisy("disc"), AXEBOT)
-    text, record = study_summary(study), study_to_dict(study)
+    told = study_document(study)
+    text, record = told.to_text(), told.data
     json.dumps(record)
     assert text.isascii()
     assert record["shape"] == "disc"

@@ -9,7 +9,7 @@ from omnidyn.logs.column import Column
 from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.logs.columns.mapping import ColumnMap, load_map, map_to_toml, parse_column, save_map
 from omnidyn.logs.columns.names import read_name
-from omnidyn.logs.table.table import read_table
+from omnidyn.logs.readers.read_table import read_table
 from omnidyn.units import parse_unit
 
 ROWS = 20

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, MissingExtraError
-from omnidyn.logs.readers.any_table import iter_tables, read_any
 from omnidyn.logs.readers.parquet import parquet_bytes
+from omnidyn.logs.readers.read_table import iter_tables, read_table
 
 pa = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -28,7 +28,7 @@ def write(tmp_path):
 
 
 def column(path, name="v"):
-    return read_any(path).numbers(name, missing=True).tolist()
+    return read_table(path).numbers(name, missing=True).tolist()
 
 
 UTC = datetime.UTC
@@ -63,7 +63,7 @@ def test_every_kind_of_column(write, array, expected):
 
 def test_words_are_words(write):
     path = write({"axis": ["x", "yaw", None], "mode": pa.array(["a", "b", "a"]).dictionary_encode()})
-    table = read_any(path)
+    table = read_table(path)
     assert table.text("axis") == ("x", "yaw", "")
     assert table.text("mode") == ("a", "b", "a")
 
@@ -74,7 +74,7 @@ def test_units_come_from_metadata_brackets_and_kinds(write):
         pa.field("u1 [V]", pa.float64()),
         pa.field("t", pa.timestamp("us")),
     ]
-    table = read_any(write({"w1": [1.0], "u1 [V]": [2.0], "t": [0]}, schema=pa.schema(fields)))
+    table = read_table(write({"w1": [1.0], "u1 [V]": [2.0], "t": [0]}, schema=pa.schema(fields)))
     assert table.names == ("w1", "u1", "t")
     assert dict(table.units) == {"w1": "rpm", "u1": "V", "t": "s"}
     assert dict(table.titles) == {"w1": "Wheel 1"}
@@ -82,22 +82,22 @@ def test_units_come_from_metadata_brackets_and_kinds(write):
 
 
 def test_rounded_whole_numbers_are_noted(write):
-    assert read_any(write({"n": [2**53 + 1]})).notes == ("n: whole numbers beyond 2^53 were rounded",)
+    assert read_table(write({"n": [2**53 + 1]})).notes == ("n: whole numbers beyond 2^53 were rounded",)
 
 
 def test_rows_are_counted_from_1_and_the_hash_is_that_of_the_file(write):
     import hashlib
 
     path = write({"v": [1.0, 2.0]})
-    table = read_any(path)
+    table = read_table(path)
     assert table.lines.tolist() == [1, 2]
     assert table.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def test_the_name_does_not_matter_and_is_noted(write, tmp_path):  # 37
-    assert read_any(write({"v": [1.0]}, "log.csv")).notes == ("the file holds Parquet, though its name ends in .csv",)
+    assert read_table(write({"v": [1.0]}, "log.csv")).notes == ("the file holds Parquet, though its name ends in .csv",)
     (tmp_path / "text.parquet").write_text("t,u\n0,1\n")
-    assert read_any(tmp_path / "text.parquet").notes == ("the file holds text, though its name ends in .parquet",)
+    assert read_table(tmp_path / "text.parquet").notes == ("the file holds text, though its name ends in .parquet",)
 
 
 @pytest.mark.parametrize("rows, group", [(1, 2), (3, 2), (7, 100), (1000, 4)])
@@ -109,7 +109,7 @@ def test_pieces_joined_are_the_whole(write, rows, group):
     assert np.concatenate([piece.numbers("v") for piece in pieces]).tolist() == values.tolist()
     assert np.concatenate([piece.lines for piece in pieces]).tolist() == list(range(1, 21))
     assert sum((piece.text("word") for piece in pieces), ()) == tuple(f"w{k}" for k in range(20))
-    assert pieces[-1].sha256 == read_any(path).sha256
+    assert pieces[-1].sha256 == read_table(path).sha256
 
 
 @pytest.mark.parametrize(
@@ -130,11 +130,11 @@ def test_pieces_joined_are_the_whole(write, rows, group):
 )
 def test_it_refuses_by_name(write, columns, words):
     with pytest.raises(InputError, match=words):
-        read_any(write(columns))
+        read_table(write(columns))
 
 
 def test_infinite_rows_can_be_left_out(write):
-    table = read_any(write({"v": [1.0, -np.inf, 3.0], "word": ["a", "b", "c"]}), skip_bad_rows=True)
+    table = read_table(write({"v": [1.0, -np.inf, 3.0], "word": ["a", "b", "c"]}), skip_bad_rows=True)
     assert table.numbers("v").tolist() == [1.0, 3.0]
     assert table.text("word") == ("a", "c")
     assert table.notes == ("1 row was left out for an infinite number (line 2)",)
@@ -145,7 +145,7 @@ def test_a_truncated_file_is_refused(write, keep):  # 35
     path = write({"v": np.arange(1000.0)})
     path.write_bytes(path.read_bytes()[:keep])
     with pytest.raises(InputError, match=r"log\.parquet: the Parquet file is damaged or cut short; .*copy or write it"):
-        read_any(path)
+        read_table(path)
 
 
 def test_damage_inside_is_refused_and_nothing_else_leaves(write):
@@ -163,14 +163,14 @@ def test_without_pyarrow_it_says_what_to_install(write, monkeypatch):
     with pytest.raises(
         MissingExtraError, match=r'log\.parquet: Parquet files need pyarrow; pip install "omnidyn\[logs\]"'
     ):
-        read_any(path)
+        read_table(path)
 
 
 def test_max_bytes_counts_the_numbers(write):
     path = write({"v": np.zeros(100_000)})
     assert path.stat().st_size < 100_000
     with pytest.raises(InputError, match=r"the file is too large; .*iter_tables"):
-        read_any(path, max_bytes=100_000)
+        read_table(path, max_bytes=100_000)
     assert sum(map(len, iter_tables(path, 1000))) == 100_000
 
 
@@ -178,9 +178,9 @@ BOMB_READER = """
 import resource, sys
 import pyarrow.parquet
 from omnidyn.errors import InputError
-from omnidyn.logs.readers.any_table import iter_tables, read_any
+from omnidyn.logs.readers.read_table import iter_tables, read_table
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-for read in (read_any, lambda path: list(iter_tables(path))):
+for read in (read_table, lambda path: list(iter_tables(path))):
     try:
         read(sys.argv[1])
     except InputError as error:
@@ -223,4 +223,4 @@ def test_an_index_beyond_its_dictionary_is_refused(write):
     assert content.count(packed) >= 1
     path.write_bytes(content.replace(packed, b"\xff" * len(packed)))
     with pytest.raises(InputError, match=r"damaged or cut short; got .*out of bounds"):
-        read_any(path)
+        read_table(path)

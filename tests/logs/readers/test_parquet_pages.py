@@ -9,8 +9,8 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.logs.readers import parquet_pages
-from omnidyn.logs.readers.any_table import read_any
 from omnidyn.logs.readers.parquet_pages import declared_bytes, page_header
+from omnidyn.logs.readers.read_table import read_table
 
 pa = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -98,14 +98,14 @@ def test_a_page_that_claims_gigabytes_is_refused(tmp_path, which, words):
     middle = len(grown) // 2
     path.write_bytes(grown[:middle] + grown[middle + cut :])
     with pytest.raises(InputError, match=words):
-        read_any(path)
+        read_table(path)
 
 
 EVERY_BYTE = """
 import io, sys
 import pyarrow as pa, pyarrow.parquet
 from omnidyn.errors import OmnidynError
-from omnidyn.logs.readers.any_table import read_any
+from omnidyn.logs.readers.read_table import read_table
 sink = io.BytesIO()
 pyarrow.parquet.write_table(pa.table({"v": [1.0, None, 3.0], "w": ["a", "b", "a"]}), sink, store_schema=False)
 content = sink.getvalue()
@@ -115,7 +115,7 @@ for place in range(footer, len(content)):
         with open(sys.argv[1], "wb") as file:
             file.write(content[:place] + bytes([byte]) + content[place + 1 :])
         try:
-            read_any(sys.argv[1])
+            read_table(sys.argv[1])
         except OmnidynError:
             pass
 print("alive")

@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.command_file import read_voltages
-from omnidyn.logs.readers.any_table import iter_tables, read_any
+from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.run_file import read_run
 from omnidyn.logs.steady_table import read_steady_table
-from omnidyn.logs.table.table import read_table
 from omnidyn.model.robot_file import load_robot
 
 STEADY = (
@@ -119,7 +118,7 @@ SPACED = b'# a log\r\n  t "w 1"\tstate [x]\r\n 0  1.5 go\r\n0.1\t2,5  "all well"
 )
 def test_read_any_and_its_pieces(path, content, rows, header, skip):
     path.write_bytes(content)
-    table, error = outcome(partial(read_any, path, header=header, skip_bad_rows=skip))
+    table, error = outcome(partial(read_table, path, header=header, skip_bad_rows=skip))
     pieces, refused = outcome(lambda: list(iter_tables(path, rows, header=header, skip_bad_rows=skip)))
     assert (error is None) == (refused is None)
     assert error is not None or sum(map(len, pieces)) == len(table)
@@ -149,7 +148,7 @@ def test_read_any_of_parquet(path, parquet_seed, edits, cut):
     for place, byte in edits:
         content[min(int(place * len(content)), len(content) - 1)] = byte
     path.write_bytes(content[: max(4, int(cut * len(content)))] if cut < 0.2 else content)
-    table, error = outcome(read_any, path)
+    table, error = outcome(read_table, path)
     assert error or set(table.columns) == set(table.names)
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from omnidyn.cli.identify_logs import is_steady_table
 from omnidyn.errors import InputError
+from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.table.spaced import NOTE, cells, is_spaced, tabbed
-from omnidyn.logs.table.table import iter_text, read_table
 
 VALUES = {"t": [0.0, 0.1, 0.2], "w1": [1.0, -2.5, 3e-3], "u": [0.0, 6.0, -6.0]}
 
@@ -65,7 +65,7 @@ def test_what_numpy_writes_comes_back_bitwise(write):
     path = write(text.getvalue())
     table = read_table(path)
     assert np.array_equal(np.stack([table.columns[name] for name in ("t", "a", "b", "c")], axis=1), values)
-    pieces = list(iter_text(path, rows=7))
+    pieces = list(iter_tables(path, rows=7))
     assert np.array_equal(np.concatenate([piece.columns["b"] for piece in pieces]), values[:, 2])
     assert NOTE in pieces[-1].notes
 

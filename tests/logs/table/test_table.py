@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.logs.table.table import iter_text, read_table
+from omnidyn.logs.readers.read_table import iter_tables, read_table
+from omnidyn.logs.readers.reader import Options
+from omnidyn.logs.readers.text import text_tables
 
 
 def numbers(path, missing=False):
@@ -72,7 +74,7 @@ def test_a_point_between_thousands_is_found_in_pieces(write, rows):
     with pytest.raises(
         InputError, match=r"table\.csv:202, column n: a point in a number is ambiguous; got -1\.000 among"
     ):
-        list(iter_text(path, rows))
+        list(iter_tables(path, rows))
 
 
 def test_three_digits_after_every_point_are_decimal_and_noted(write):
@@ -85,7 +87,7 @@ def test_three_digits_after_every_point_are_decimal_and_noted(write):
 def test_one_certain_point_settles_all(write, rows):
     """0.5 can be nothing else, and no table has two kinds of points."""
     path = write("t;n\n0;950\n10;1.050\n20;7\n30;0.5\n")
-    tables = list(iter_text(path, rows))
+    tables = list(iter_tables(path, rows))
     assert np.concatenate([each.numbers("n") for each in tables]).tolist() == [950.0, 1.05, 7.0, 0.5]
     assert tables[-1].notes == ("columns are separated by a semicolon",)
 
@@ -367,7 +369,7 @@ def test_nothing_left_is_refused(write):
             "t u\n0 1 2\n",
             r"cannot tell what separates the columns; got 0 1 2; expected comma, semicolon or tab .*between spaces",
         ),
-        (b"PAR1\x00\x01", r"this is not a text file; got a Parquet file"),  # 37
+        (b"PAR1\x00\x01", r"the Parquet file is damaged or cut short; got .*smaller than the minimum"),  # 37
         (b"PK\x03\x04\x00", r"this is not a text file; got a zip archive"),  # 37
         (b"t,u\n1,\x00\n", r"this is not a text file; got zero bytes in it; .*lost its power leaves them: tr -d"),
         (b"t,u\n1,2\n" + bytes(3_000_000) + b"2,3\n", r"this is not a text file; got zero bytes in it"),
@@ -461,6 +463,11 @@ def test_a_million_rows_take_seconds(write, separator, limit):
     assert time.process_time() - start < limit
     assert table.numbers("a")[-1] == 999.999
     assert table.numbers("b")[:4].tolist() == [-3.25, -2.25, -1.25, -0.25]
+
+
+def test_the_reader_of_text_refuses_another_format_by_its_name(write):
+    with pytest.raises(InputError, match="this is not a text file; got a Parquet file"):  # 37
+        list(text_tables(write(b"PAR1\x00\x01"), 10, Options()))
 
 
 MEGABYTE = 2**20

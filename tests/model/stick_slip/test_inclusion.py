@@ -13,14 +13,12 @@ import pytest
 from scipy.optimize import linprog, lsq_linear, minimize
 
 from omnidyn.model.layout import (
-    AXES,
     BOUND,
     CURRENT,
     DROP,
     EFFICIENCY,
     ELLIPSE,
     EMF,
-    GAIN,
     GOAL,
     GX,
     GZ,
@@ -30,6 +28,7 @@ from omnidyn.model.layout import (
     INDUCTANCE,
     LENGTH,
     MASS,
+    N_AXES,
     NOW,
     PUSH,
     RESISTANCE,
@@ -38,6 +37,7 @@ from omnidyn.model.layout import (
     SLIDE_X,
     SLIDE_Y,
     TAU,
+    THRUST,
     TURNING,
     VISCOUS,
     VOLTAGE,
@@ -45,7 +45,7 @@ from omnidyn.model.layout import (
 from omnidyn.model.stick_slip.inclusion import CAP, solve
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import put, start_state
-from omnidyn.model.stick_slip.workspace import scratch
+from omnidyn.model.stick_slip.workspace import workspace
 from tests.support.mixed_robots import random_robot
 
 PROBLEMS = 25  # for each of the 100 robots
@@ -70,7 +70,7 @@ def problem(seed, turning=True):
     body[PUSH : PUSH + 3] = random.normal(size=3) * (random.random() < 0.2)
     if not turning:
         body[TURNING] = 0.0
-    wheels = element[AXES:]
+    wheels = element[N_AXES:]
     wheels[:, VOLTAGE] = np.round(random.uniform(-6.0, 6.0) * random.normal(size=p.wheels), 3).clip(-6.0, 6.0)
     wheels[:, VOLTAGE] *= random.random(p.wheels) < 0.8
     wheels[:, NOW] = random.normal(size=p.wheels)
@@ -94,7 +94,7 @@ def force(e, tau, speed, sign, wheel):
     if wheel:
         i = current(e, tau, speed)
         factor = 1.0 if i * sign == 0.0 else (e[EFFICIENCY] if i * sign > 0.0 else 1.0 / e[EFFICIENCY])
-        total += e[GAIN] * i * factor
+        total += e[THRUST] * i * factor
     return total
 
 
@@ -106,7 +106,7 @@ def residual_and_sets(p, x):
     rest -= turn * np.array([x[2] * x[1], -x[2] * x[0], 0.0])
     rows, low, high = [], [], []
     for k, e in enumerate(p.element):
-        g, sign, wheel = e[GX : GZ + 1], e[SIGN], k >= AXES
+        g, sign, wheel = e[GX : GZ + 1], e[SIGN], k >= N_AXES
         dry = e[HOLD] > 0.0 or e[HOLD + 1] > 0.0 or (wheel and e[EFFICIENCY] < 1.0)
         assert (sign == 2.0) == (not dry)
         if sign == 0.0 and dry:
@@ -154,7 +154,7 @@ def faults(p, x, count):
         "hit its cap": count >= CAP,
         "stuck, but moves": (np.abs(speeds[sign == 0.0]) > 4e-16 * size[sign == 0.0]).any(),
         "a sign against its speed": (speeds * sign <= 0.0)[np.abs(sign) == 1.0].any(),
-        "an axis stuck, but not 0.0": (x[sign[:AXES] == 0.0] != 0.0).any(),
+        "an axis stuck, but not 0.0": (x[sign[:N_AXES] == 0.0] != 0.0).any(),
         "an ellipse stuck, but not 0.0": p.body[ELLIPSE] == 0.0 and (x[:2] != 0.0).any(),
         "forces out of balance": distance(p, x) > 1e-6 + 1e-11 * inertia,
     }
@@ -167,9 +167,9 @@ def test_solutions_satisfy_the_law(part):
     per_part, wrong = ROBOTS * PROBLEMS // 10, {}
     for seed in range(part * per_part, (part + 1) * per_part):
         p, x = problem(seed)
-        COUNTS.append(solve(p.body, p.element, x, scratch()))
+        COUNTS.append(solve(p.body, p.element, x, workspace()))
         found = faults(p, x, COUNTS[-1])
-        for e in p.element[AXES:]:
+        for e in p.element[N_AXES:]:
             speed = e[GX : GZ + 1] @ x if e[SIGN] != 0.0 else 0.0
             if abs(e[CURRENT] - current(e, p.body[TAU], speed)) > 1e-12 * (1.0 + abs(e[CURRENT])):
                 found.append("another current")
@@ -201,7 +201,7 @@ def potential(p, x):
     for k, e in enumerate(p.element):
         speed = e[GX : GZ + 1] @ x
         cuts = [0.0, speed]
-        if k >= AXES:
+        if k >= N_AXES:
             below, top = e[INDUCTANCE] + tau * e[RESISTANCE], min(e[BOUND], 1e9)
             for flux in (-tau * e[DROP] - below * top, -tau * e[DROP], tau * e[DROP], tau * e[DROP] + below * top):
                 cut = (e[VOLTAGE] + (e[INDUCTANCE] * e[NOW] - flux) / tau) / e[EMF]
@@ -209,7 +209,7 @@ def potential(p, x):
         cuts = sorted(cuts, reverse=bool(speed < 0.0))
         for a, b in pairwise(cuts):
             points = 0.5 * (a + b) + 0.5 * (b - a) * nodes
-            values = [force(e, tau, s, np.sign(speed), k >= AXES) for s in points]
+            values = [force(e, tau, s, np.sign(speed), k >= N_AXES) for s in points]
             total -= 0.5 * (b - a) * (weights @ values)
     return total
 
@@ -220,7 +220,7 @@ def test_the_solution_is_the_minimum_of_the_potential(seed):
     random = np.random.default_rng(seed)
     for draw in range(3):
         p, x = problem(seed * PROBLEMS + draw, turning=False)
-        solve(p.body, p.element, x, scratch())
+        solve(p.body, p.element, x, workspace())
         least = potential(p, x)
         for scale in 10.0 ** np.arange(-7.0, 1.0):
             for change in scale * random.normal(size=(8, 3)):
@@ -238,13 +238,13 @@ def test_the_first_guess_does_not_matter(seed):
     random = np.random.default_rng(seed)
     p, x = problem(seed)
     base = p.copy()
-    solve(p.body, p.element, x, scratch())
+    solve(p.body, p.element, x, workspace())
     for _ in range(20):
         q, y = base.copy(), random.normal(size=3)
         state = start_state(q, y / [1.0, 1.0, q.body[LENGTH]], np.zeros(q.wheels))
         put(q.body, q.element, state)
         y = state[:3].copy()
-        solve(q.body, q.element, y, scratch())
+        solve(q.body, q.element, y, workspace())
         np.testing.assert_allclose(y, x, rtol=1e-10, atol=1e-13)
         np.testing.assert_array_equal(y == 0.0, x == 0.0)
         np.testing.assert_array_equal(q.element[:, SIGN], p.element[:, SIGN])

@@ -1,6 +1,7 @@
 """`exact_step` as GPU code: in single precision it must hold no double and no branch. No GPU is needed."""
 
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,17 +10,23 @@ from omnidyn.simulation.exact.step import exact_step
 
 @pytest.fixture(scope="module")
 def ptx_of():
-    """Compiles exact_step to PTX for one type; skips where the packages of the extra `cuda` are absent."""
+    """Compiles exact_step to PTX for one type; skips where the packages of the extra `cuda` are absent.
+
+    numba-cuda asks the card of this machine what to compile the parts of a function for; here it need not have one.
+    """
     pytest.importorskip("numba_cuda", reason="numba-cuda is not installed (extra `cuda`, Linux and Windows)")
     from numba import cuda, types
 
     def compile_(name):
         kind = getattr(types, name)
-        text, result = cuda.compile(exact_step, kind(*[kind] * 7), cc=(9, 0), device=True, output="ptx")
+        text, result = cuda.compile(exact_step.py_func, kind(*[kind] * 7), cc=(9, 0), device=True, output="ptx")
         assert result == kind
         return text
 
-    return compile_
+    card = SimpleNamespace(compute_capability=(9, 0))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("numba.cuda.dispatcher.get_current_device", lambda: card)
+        yield compile_
 
 
 def count(pattern, text):

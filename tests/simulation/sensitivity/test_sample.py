@@ -1,12 +1,12 @@
-"""Looks at a run between its rows, against runs that have a row there, and against differences of such runs."""
+"""Samples of a run between its rows, against runs that have a row there, and against differences of such runs."""
 
 import numpy as np
 import pytest
 
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.keys import Key
-from omnidyn.simulation.sensitivity.directions import derivatives
-from omnidyn.simulation.sensitivity.late_sample import Direction, sights
+from omnidyn.simulation.sensitivity.derivatives import derivatives
+from omnidyn.simulation.sensitivity.late_sample import Direction, late_samples
 from omnidyn.simulation.sensitivity.stage import EPS
 from omnidyn.simulation.simulate import simulate
 
@@ -47,7 +47,7 @@ def ways(robot):
 def test_between_the_rows(robot):
     """Values, rates and derivatives at t - late; NaN outside the run."""
     voltage = program(120)
-    seen, capped = sights(robot, np.arange(121) * 0.01, voltage, ways(robot), np.zeros(3), LATE, 1e-7)
+    seen, capped = late_samples(robot, np.arange(121) * 0.01, voltage, ways(robot), np.zeros(3), LATE, 1e-7)
     assert capped == 0
     for own, late in zip(seen, LATE, strict=True):
         twist, heading = at(robot, voltage, 0.01, late)
@@ -61,7 +61,7 @@ def test_between_the_rows(robot):
         for k, key in enumerate(KEYS):
             value, width = Key.parse(key).get(robot), 1e-4
             up, down = (at(Key.parse(key).set(robot, value * (1 + s * width)), voltage, 0.01, late) for s in (1, -1))
-            for found, ends in ((own.twist_by[:, k], (up[0], down[0])), (own.heading_by[:, k], (up[1], down[1]))):
+            for found, ends in ((own.dtwist[:, k], (up[0], down[0])), (own.dheading[:, k], (up[1], down[1]))):
                 slope = (ends[0] - ends[1]) / (2.0 * width)
                 size = np.nanmax(np.abs(slope), axis=0)
                 assert (np.nanmax(np.abs(found - slope), axis=0) <= 2e-5 * np.max(size) + 1e-6).all(), key
@@ -73,7 +73,7 @@ def test_a_look_between_fixed_steps_is_of_second_order(robot):
     for refine in (1, 2):
         voltage, dt = np.repeat(program(60), refine, axis=0), 0.01 / refine
         t = np.arange(len(voltage) + 1) * dt
-        seen, _ = sights(robot, t, voltage, [], np.zeros(3), (0.0, 0.37 * dt), None)
+        seen, _ = late_samples(robot, t, voltage, [], np.zeros(3), (0.0, 0.37 * dt), None)
         own = [seen[0].twist[20 * refine :], seen[1].twist[20 * refine :]]
         true = [at(robot, voltage, dt, late)[0][20 * refine :] for late in (0.0, 0.37 * dt)]
         errors.append([np.abs(a - b).max() for a, b in zip(own, true, strict=True)])

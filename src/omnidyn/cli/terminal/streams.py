@@ -13,6 +13,9 @@ from typing import Any
 import typer
 
 MIN_WIDTH, WIDTH_WITHOUT_TERMINAL = 20, 110
+COLOURS = {
+    "fatal": "red", "warn": "yellow", "note": "white", "yes": "green", "mended": "yellow", "no": "red",
+}  # fmt: skip
 
 # What a terminal that knows ASCII only gets to see.
 _PLAIN = {
@@ -89,12 +92,12 @@ def width() -> int:
     return max(MIN_WIDTH, shutil.get_terminal_size((WIDTH_WITHOUT_TERMINAL, 24)).columns)
 
 
-def coloured(text: str, colour: str) -> str:
-    """The text in a colour, where stdout is a terminal that wants colours."""
+def painted(word: str, tone: str) -> str:
+    """The word in the colour of its tone, where stdout is a terminal that wants colours."""
     wanted = (
         sys.stdout is not None
         and sys.stdout.isatty()
         and not os.environ.get("NO_COLOR")
         and os.environ.get("TERM") != "dumb"
     )
-    return typer.style(text, fg=colour) if wanted else text
+    return typer.style(word, fg=COLOURS[tone]) if wanted and tone else word

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import NOTE, WARN, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import electric_speed, emf, ground, ohmic, volts, wheels_twist
-from omnidyn.findings.signal.robust import Slope, clusters, ratio, smooth, windowed
+from omnidyn.findings.signal.robust import Slope, central_rate, clusters, ratio, smooth, windowed
+from omnidyn.model.frames import unwrapped
 
 FloatArray = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ class Pair(NamedTuple):
     where: str
 
 
-def check_lag(work: Work) -> tuple[list[Finding], Work]:
+def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on lag between channels that are redundant; what follows a command is dynamics and no lag."""
     found: list[Finding] = []
     if len(work) < 3 * MIN_ROWS or work.step <= 0.0:
@@ -47,7 +48,7 @@ def check_lag(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _finding(work: Work, pair: Pair, line: Slope) -> Finding:
+def _finding(work: LogUnderCheck, pair: Pair, line: Slope) -> Finding:
     late, early = (pair.late, pair.against) if line.value > 0.0 else (pair.against, pair.late)
     rows, ms = abs(line.value), abs(line.value) * work.step * 1e3
     half = rows < WARN_FROM
@@ -60,7 +61,7 @@ def _finding(work: Work, pair: Pair, line: Slope) -> Finding:
     )  # fmt: skip
 
 
-def _pairs(work: Work) -> Iterator[Pair]:
+def _pairs(work: LogUnderCheck) -> Iterator[Pair]:
     """What can be compared; `late` is the channel whose lag is positive."""
     speed = work.full("wheel_speed")
     seen = ground(work)
@@ -75,15 +76,11 @@ def _pairs(work: Work) -> Iterator[Pair]:
         yield from _of_motors(work, speed)
     pose, twist = work.get("pose"), work.get("twist")
     if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
-        heading = pose[:, 2].copy()
-        good = np.isfinite(heading)
-        heading[good] = np.unwrap(heading[good])
-        rate = np.full(len(heading), np.nan)
-        rate[1:-1] = (heading[2:] - heading[:-2]) / (work.t[2:] - work.t[:-2])
+        rate = central_rate(unwrapped(pose[:, 2]), work.t, 1)
         yield Pair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
 
 
-def _of_motors(work: Work, speed: FloatArray) -> Iterator[Pair]:
+def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[Pair]:
     """u = R i + K l w: late voltage, current or speed, each against the two others."""
     voltage, current = volts(work), work.full("current")
     if voltage is None or current is None or electric_speed(work) is None:
@@ -95,7 +92,7 @@ def _of_motors(work: Work, speed: FloatArray) -> Iterator[Pair]:
     yield Pair("current", f"{names} and wheel_speed", lost, voltage - counter, "current")
 
 
-def lag(work: Work, y: FloatArray, x: FloatArray) -> Slope | None:
+def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
     """Rows by which y is later than x, with its error; None where the two do not share motion enough to tell.
 
     A whole number of rows first, by the least residual; then the rest from the residual's part along the slope of x,
@@ -107,10 +104,10 @@ def lag(work: Work, y: FloatArray, x: FloatArray) -> Slope | None:
     n = len(y)
     inside = slice(FARTHEST + 4, n - FARTHEST - 4)
     good = np.asarray(np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1))
-    for piece in work.pieces[1:]:
-        if piece.start > n:
+    for segment in work.segments[1:]:
+        if segment.start > n:
             break
-        good[max(0, piece.start - FARTHEST - 4) : piece.start + FARTHEST + 4] = False
+        good[max(0, segment.start - FARTHEST - 4) : segment.start + FARTHEST + 4] = False
     keep = good[inside]
     if keep.sum() < MIN_ROWS:
         return None

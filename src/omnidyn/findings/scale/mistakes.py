@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, WARN, Finding
-from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import BEYOND, beyond_stall, emf, stall_current, volts
-from omnidyn.findings.signal.robust import slope, smooth, windowed
+from omnidyn.findings.signal.robust import central_rate, slope, smooth, windowed
 from omnidyn.logs.channels import components
+from omnidyn.model.frames import unwrapped
 from omnidyn.units import DEGREE, TURN
 
 FloatArray = NDArray[np.float64]
@@ -42,7 +43,7 @@ def unit_finding(where: str, words: str, factor: float) -> Finding:
     )  # fmt: skip
 
 
-def own_derivatives(work: Work) -> list[Finding]:
+def own_derivatives(work: LogUnderCheck) -> list[Finding]:
     """Position and speed of the same thing: their ratio is 1, or a unit is wrong."""
     found = []
     for name, against, rate, speed, units in _pairs(work):
@@ -82,31 +83,20 @@ def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
     return float(abs(a @ b) / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
 
 
-def _pairs(work: Work) -> Iterator[tuple[str, str, FloatArray, FloatArray, dict[str, float]]]:
+def _pairs(work: LogUnderCheck) -> Iterator[tuple[str, str, FloatArray, FloatArray, dict[str, float]]]:
     """(speed, position, derivative of the position, speed smoothed alike, units of the speed)."""
     half = max(1, round(0.05 / work.step)) if work.step > 0.0 else 1
     pose, twist = work.get("pose"), work.get("twist")
     if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
-        heading = np.where(np.isfinite(pose[:, 2]), pose[:, 2], np.nan)
-        yield "omega", "heading", _rate(heading, work.t, half, TURN), smooth(twist[:, 2], 2 * half + 1), TURN_UNITS
+        rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
+        yield "omega", "heading", rate, smooth(twist[:, 2], 2 * half + 1), TURN_UNITS
     angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
     if angle is not None and speed is not None and angle.shape == speed.shape:
         for name, a, w in zip(components("wheel_speed", speed.shape[1]), angle.T, speed.T, strict=True):
-            yield name, name.replace("w", "a"), _rate(a, work.t, half), smooth(w, 2 * half + 1), TURN_UNITS
+            yield name, name.replace("w", "a"), central_rate(a, work.t, half), smooth(w, 2 * half + 1), TURN_UNITS
 
 
-def _rate(values: FloatArray, t: FloatArray, half: int, period: float = 0.0) -> FloatArray:
-    out = np.full(len(values), np.nan)
-    if period:
-        good = np.isfinite(values)
-        values = values.copy()
-        values[good] = np.unwrap(values[good], period=period)
-    if len(values) > 2 * half:
-        out[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
-    return out
-
-
-def current_unit(work: Work) -> tuple[list[Finding], Work]:
+def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Currents in the wrong unit, by what voltage and speed leave for R i, or by the largest a motor can draw."""
     current, voltage, robot = work.full("current"), volts(work), work.geometry
     if current is None or robot is None:
@@ -132,7 +122,7 @@ def current_unit(work: Work) -> tuple[list[Finding], Work]:
     return [], work
 
 
-def duty_as_voltage(work: Work) -> tuple[list[Finding], Work]:
+def duty_as_voltage(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """A voltage that never leaves -1..1 while the speeds want more, or that counts to 255; it is left out then."""
     voltage, robot = work.get("voltage"), work.geometry
     if voltage is None or robot is None:
@@ -155,7 +145,7 @@ def duty_as_voltage(work: Work) -> tuple[list[Finding], Work]:
     return [unit_finding(names, words, high / limit)], work.replace(voltage=None)
 
 
-def emf_alone(work: Work) -> tuple[list[Finding], Work]:
+def emf_alone(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Without floor and current: speeds that no motor reaches at these voltages."""
     speed, voltage = work.full("wheel_speed"), volts(work)
     counter = None if speed is None else emf(work, speed)

@@ -17,7 +17,7 @@ from omnidyn.findings.scale.mistakes import (
     unit_finding,
     unit_of,
 )
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import Ground, electric_speed, expected_wheel_speed, ground, wheels_twist
 from omnidyn.findings.signal.robust import Slope, quantum, slope, smooth
 from omnidyn.logs.channels import components
@@ -42,7 +42,7 @@ class Scales(NamedTuple):
     electric: Slope | None
 
 
-def check_scale(work: Work) -> tuple[list[Finding], Work]:
+def check_scale(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on units and scales; the work with the wheel speeds put right."""
     if len(work) < MIN_ROWS:
         return [], work
@@ -53,12 +53,12 @@ def check_scale(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def check_dead_wheels(work: Work) -> tuple[list[Finding], Work]:
+def check_dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on wheels whose speed is noise only; a flat line was found before."""
     return ([], work) if len(work) < MIN_ROWS else _dead_wheels(_without_stand_in(work))
 
 
-def _without_stand_in(work: Work) -> Work:
+def _without_stand_in(work: LogUnderCheck) -> LogUnderCheck:
     """The work without the speed that stands in for a dead wheel, where another wheel does not do what it should.
 
     Its column was exchanged with the dead one, and nothing can be said of a robot of which two wheels are not known.
@@ -67,17 +67,17 @@ def _without_stand_in(work: Work) -> Work:
     if dead is None or expected is None:
         return work
     speed = work.channels["wheel_speed"]
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     own, told = smooth(speed, width), smooth(expected[1], width)
     good = np.isfinite(own).all(axis=1) & np.isfinite(told).all(axis=1)
     cross = (own[good] * told[good]).sum(axis=0)
     alike = cross / np.sqrt((own[good] ** 2).sum(axis=0) * (told[good] ** 2).sum(axis=0))
     if (np.delete(alike, dead) > FOLLOWS).all():
         return work
-    return work.masked("wheel_speed", dead, np.ones(len(work), dtype=bool)).knowing(dead_wheel=None)
+    return work.masked("wheel_speed", dead, work.everywhere).knowing(dead_wheel=None)
 
 
-def scales(work: Work) -> Scales | None:
+def scales(work: LogUnderCheck) -> Scales | None:
     """The slopes of what is known of the speeds; None without wheel speeds or a robot."""
     speed = work.full("wheel_speed")
     if speed is None or work.geometry is None:
@@ -94,7 +94,9 @@ def scales(work: Work) -> Scales | None:
     return Scales(linear, yaw, electric)
 
 
-def _against_floor(work: Work, seen: Ground, speed: FloatArray, ids, count: int) -> tuple[Slope | None, Slope | None]:
+def _against_floor(
+    work: LogUnderCheck, seen: Ground, speed: FloatArray, ids, count: int
+) -> tuple[Slope | None, Slope | None]:
     own = wheels_twist(work, speed, seen.width)
     if own is None:
         return None, None
@@ -110,7 +112,7 @@ def _against_floor(work: Work, seen: Ground, speed: FloatArray, ids, count: int)
     return linear, yaw
 
 
-def _speeds(work: Work) -> tuple[list[Finding], Work]:
+def _speeds(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """The one scale of all wheel speeds, judged by floor and motors together."""
     these = scales(work)
     if these is None:
@@ -141,7 +143,7 @@ def _speeds(work: Work) -> tuple[list[Finding], Work]:
     return _ratio_findings(work, these, floor, electric, names)
 
 
-def _against(work: Work, floor: Slope) -> list[Finding]:
+def _against(work: LogUnderCheck, floor: Slope) -> list[Finding]:
     """A motion over the floor that goes the other way, or not at all."""
     seen = ground(work)
     if seen is None:
@@ -177,8 +179,8 @@ def _joined(lines: list[Slope]) -> Slope | None:
 
 
 def _ratio_findings(
-    work: Work, these: Scales, floor: Slope | None, electric: Slope | None, names: str
-) -> tuple[list[Finding], Work]:
+    work: LogUnderCheck, these: Scales, floor: Slope | None, electric: Slope | None, names: str
+) -> tuple[list[Finding], LogUnderCheck]:
     off_floor = floor is not None and floor.differs(1.0, LEAST)
     off_motor = electric is not None and electric.differs(1.0, LEAST)
     numbers = {}
@@ -274,7 +276,7 @@ def _motor_constants(
     )  # fmt: skip
 
 
-def _dead_wheels(work: Work) -> tuple[list[Finding], Work]:
+def _dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """A wheel whose speed is noise only, while floor or motor says that it turns."""
     found: list[Finding] = []
     line = _wheel_lines(work)
@@ -289,13 +291,13 @@ def _dead_wheels(work: Work) -> tuple[list[Finding], Work]:
             found.append(Finding(
                 "dead", FATAL, name, f"{name} is noise about 0, while {source} says that the wheel turns",
                 "look at its encoder, its cable and its column; leave it out otherwise",
-                work.lines(np.ones(len(work), dtype=bool)), len(work), {"slope": a.value, "error": a.error},
+                work.lines(work.everywhere), len(work), {"slope": a.value, "error": a.error},
             ))  # fmt: skip
-            work = work.masked("wheel_speed", k, np.ones(len(work), dtype=bool))
+            work = work.masked("wheel_speed", k, work.everywhere)
     return found, work
 
 
-def _told_to_rest(work: Work, k: int) -> bool:
+def _told_to_rest(work: LogUnderCheck, k: int) -> bool:
     """Whether a wheel is commanded to stand while others turn."""
     command = work.get("wheel_speed_command")
     if command is None:
@@ -304,7 +306,7 @@ def _told_to_rest(work: Work, k: int) -> bool:
     return bool(sizes[k] < 0.25 * sizes.max())
 
 
-def _wheel_lines(work: Work) -> tuple[str, list[Slope], list[float]] | None:
+def _wheel_lines(work: LogUnderCheck) -> tuple[str, list[Slope], list[float]] | None:
     """(source, slope of each wheel's speed on what it should be, how much that moves)."""
     speed, expected = work.get("wheel_speed"), expected_wheel_speed(work)
     if speed is None or expected is None or expected[1].shape != speed.shape or work.geometry is None:
@@ -318,7 +320,7 @@ def _wheel_lines(work: Work) -> tuple[str, list[Slope], list[float]] | None:
     return expected[0], slopes, sizes
 
 
-def _single_wheels(work: Work) -> tuple[list[Finding], Work]:
+def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """One wheel that differs from the others: its own radius, gear or counter."""
     line = _wheel_lines(work) if work.known.get("dead_wheel") is None else None
     if line is None or (work.known.get("floor_ratio") is None and not line[0].startswith("voltage")):

@@ -1,10 +1,10 @@
-"""Work: a log being checked. Each family of checks gets it, says what it found, and hands on what is left to trust.
+"""The log under check: each family of checks gets it, says what it found, and hands on what is left to trust.
 
-The contract of a family, a function `family(work) -> tuple[list[Finding], Work]`:
+The contract of a family, a function `family(work) -> tuple[list[Finding], LogUnderCheck]`:
 
 1. It says only what the log itself shows; thresholds come from the noise found in the log.
 2. It never raises for what a log may hold: no channel, no row, NaN anywhere.
-3. It returns the work with the fault mended (columns put right, a scale taken out) or masked (NaN), so that a later
+3. It returns the log with the fault mended (columns put right, a scale taken out) or masked (NaN), so that a later
    family does not report the consequences of a fault as faults of their own.
 4. It does not change arrays in place.
 """
@@ -33,11 +33,11 @@ MIN_ROWS = 40  # below that nothing is said from statistics
 
 
 @dataclass(frozen=True, eq=False)
-class Work:
+class LogUnderCheck:
     """A log in order of time.
 
     log: as recorded. robot: or None. rows: index into the log of each row kept, increasing in time. t [s], step: the
-    usual one [s]. pieces: between the gaps. channels: as in Log, what is not to be trusted is NaN.
+    usual one [s]. segments: the rows between two gaps. channels: as in Log, what is not to be trusted is NaN.
     known: facts that families pass on, such as "ground_ratio".
     """
 
@@ -46,7 +46,7 @@ class Work:
     rows: NDArray[np.int64]
     t: FloatArray
     step: float
-    pieces: tuple[slice, ...]
+    segments: tuple[slice, ...]
     channels: Mapping[str, FloatArray]
     known: Mapping[str, Any] = field(default_factory=dict)
 
@@ -93,6 +93,15 @@ class Work:
         """(window of each row, number of windows)."""
         return clusters(len(self), self.step, seconds)
 
+    def width(self, seconds: float) -> int:
+        """Rows of a mean over so many seconds: odd, three at least."""
+        return max(3, round(seconds / self.step) | 1) if self.step > 0.0 else 3
+
+    @property
+    def everywhere(self) -> NDArray[np.bool_]:
+        """True in every row."""
+        return np.ones(len(self), dtype=bool)
+
     def noise(self, component: str, values: FloatArray) -> float:
         """Noise of one component: what its neighbours scatter by, at least what its quantisation makes."""
         cache: dict[str, float] = self.known.get("noise", {})
@@ -100,17 +109,17 @@ class Work:
             cache[component] = max(white_noise(values), quantum(values) / np.sqrt(12.0))
         return cache[component]
 
-    def replace(self, **channels: FloatArray | None) -> Work:
-        """The work with some channels changed, or taken out where None."""
+    def replace(self, **channels: FloatArray | None) -> LogUnderCheck:
+        """The log with some channels changed, or taken out where None."""
         changed = {**self.channels, **channels}
         return replace(self, channels={name: values for name, values in changed.items() if values is not None})
 
-    def knowing(self, **facts: Any) -> Work:
-        """The work with more facts known."""
+    def knowing(self, **facts: Any) -> LogUnderCheck:
+        """The log with more facts known."""
         return replace(self, known={**self.known, **facts})
 
-    def masked(self, channel: str, column: int, bad: NDArray[np.bool_]) -> Work:
-        """The work without the values of one component where `bad` holds."""
+    def masked(self, channel: str, column: int, bad: NDArray[np.bool_]) -> LogUnderCheck:
+        """The log without the values of one component where `bad` holds."""
         if not bad.any():
             return self
         values = self.channels[channel].copy()

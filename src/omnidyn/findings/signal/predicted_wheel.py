@@ -1,4 +1,4 @@
-"""What a wheel did, as learned from all other columns of the same log: no robot, unit or sign is needed for it."""
+"""What a wheel did, predicted from all other columns of the same log: no robot, unit or sign is needed for it."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import ground
 
 FloatArray = NDArray[np.float64]
 
-FOLDS = 10  # pieces of the log; each is predicted by what the others taught
+FOLDS = 10  # of the log; each is predicted by what the others taught
 MEMORY = (0.05, 0.15, 0.5)  # [s] over which a robot forgets what its motors were given
 ROWS_PER_COLUMN = 20  # fewer teach nothing
 
 
-class Learner:
+class WheelPredictor:
     """Predicts the speed of a wheel linearly from the other wheels, the floor, currents and what drives the motors.
 
-    Every piece of the log is predicted by coefficients from the other pieces, so that a stretch under suspicion and
-    all others are predicted alike.
+    Every fold of the log is predicted by coefficients from the other folds, so that a stretch under suspicion and all
+    others are predicted alike.
     """
 
-    def __init__(self, work: Work) -> None:
+    def __init__(self, work: LogUnderCheck) -> None:
         self.work = work
 
     @cached_property
@@ -45,7 +45,7 @@ class Learner:
     def wheel_speed(self, k: int, without: NDArray[np.bool_]) -> FloatArray:
         """Speed of wheel k by the other columns, shape (rows,); NaN where they do not tell.
 
-        Nothing is learned from the rows `without`.
+        Nothing is taken from the rows `without`.
         """
         speed = self.work.channels["wheel_speed"]
         x = np.hstack([self._shared, np.delete(speed, k, axis=1)])
@@ -57,12 +57,12 @@ class Learner:
             return out
         x = x / np.maximum(np.abs(x[told]).max(axis=0), 1e-300)
         edges = np.linspace(0, len(x), FOLDS + 1).astype(int)
-        pieces = [slice(a, b) for a, b in pairwise(edges)]
-        grams, sides = zip(*(_normal(x[p][taught[p]], speed[p, k][taught[p]]) for p in pieces), strict=True)
+        folds = [slice(a, b) for a, b in pairwise(edges)]
+        grams, sides = zip(*(_normal(x[p][taught[p]], speed[p, k][taught[p]]) for p in folds), strict=True)
         gram, side = sum(grams), sum(sides)
         least = 1e-9 * np.trace(gram) * np.eye(x.shape[1])
-        for piece, own, of_own in zip(pieces, grams, sides, strict=True):
-            out[piece] = x[piece] @ np.linalg.solve(gram - own + least, side - of_own)
+        for fold, own, of_own in zip(folds, grams, sides, strict=True):
+            out[fold] = x[fold] @ np.linalg.solve(gram - own + least, side - of_own)
         return np.where(told, out, np.nan)
 
 

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.findings.signal.log_under_check import Work
-from omnidyn.findings.signal.robust import smooth
-from omnidyn.model.frames import world_to_body
+from omnidyn.findings.signal.log_under_check import LogUnderCheck
+from omnidyn.findings.signal.robust import central_rate, smooth
+from omnidyn.model.actuation import asked_voltage
+from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.model.motor import back_emf, no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed, wheel_speed
@@ -37,7 +38,7 @@ class Ground(NamedTuple):
         return [k for k in range(3) if np.isfinite(self.twist[:, k]).any()]
 
 
-def ground(work: Work) -> Ground | None:
+def ground(work: LogUnderCheck) -> Ground | None:
     """The twist as measured, else from the pose, axis by axis; None where neither was recorded."""
     twist, pose = work.get("twist"), work.get("pose")
     if twist is not None:
@@ -47,40 +48,25 @@ def ground(work: Work) -> Ground | None:
     return Ground("pose", *pose_twist(work, pose))
 
 
-def pose_twist(work: Work, pose: FloatArray) -> tuple[FloatArray, int]:
+def pose_twist(work: LogUnderCheck, pose: FloatArray) -> tuple[FloatArray, int]:
     """(twist of the body from differences of the pose, shape (rows, 3); rows over which each is a mean)."""
-    heading = _unwrapped(pose[:, 2])
-    rate = _difference(heading, work.t, max(1, round(0.5 * POSE_WINDOW / work.step)))
+    heading = unwrapped(pose[:, 2])
+    rate = central_rate(heading, work.t, max(1, round(0.5 * POSE_WINDOW / work.step)))
     turning = np.nanquantile(np.abs(rate), 0.95) if np.isfinite(rate).any() else 0.0
     seconds = min(POSE_WINDOW, POSE_TURN / turning) if turning > 0.0 else POSE_WINDOW
     half = max(1, round(0.5 * seconds / work.step))
     twist = np.full((len(pose), 3), np.nan)
-    twist[:, 2] = _difference(heading, work.t, half)
+    twist[:, 2] = central_rate(heading, work.t, half)
     if np.isfinite(heading).any() and np.isfinite(pose[:, :2]).any():
-        speed = np.column_stack([_difference(pose[:, k], work.t, half) for k in range(2)])
+        speed = np.column_stack([central_rate(pose[:, k], work.t, half) for k in range(2)])
         turn = world_to_body(smooth(heading, 2 * half + 1))
         twist[:, :2] = np.einsum("kij,kj->ki", turn[:, :2, :2], speed)
-    for piece in work.pieces[1:]:
-        twist[max(0, piece.start - half) : piece.start + half] = np.nan
+    for segment in work.segments[1:]:
+        twist[max(0, segment.start - half) : segment.start + half] = np.nan
     return twist, 2 * half + 1
 
 
-def _unwrapped(heading: FloatArray) -> FloatArray:
-    """Heading without its jumps by a turn; NaN stays."""
-    good = np.isfinite(heading)
-    out = heading.copy()
-    out[good] = np.unwrap(heading[good])
-    return out
-
-
-def _difference(values: FloatArray, t: FloatArray, half: int) -> FloatArray:
-    out = np.full(len(values), np.nan)
-    if len(values) > 2 * half:
-        out[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
-    return out
-
-
-def wheels_twist(work: Work, speed: FloatArray, width: int = 1) -> FloatArray | None:
+def wheels_twist(work: LogUnderCheck, speed: FloatArray, width: int = 1) -> FloatArray | None:
     """Twist of the robot from its wheels, smoothed over `width` rows. Shape (rows, 3); None without a robot."""
     robot = work.geometry
     if robot is None or speed.shape[1] != robot.wheels.count:
@@ -88,22 +74,13 @@ def wheels_twist(work: Work, speed: FloatArray, width: int = 1) -> FloatArray | 
     return twist_from_wheel_speed(robot.wheels, smooth(speed, width))
 
 
-def volts(work: Work) -> FloatArray | None:
+def volts(work: LogUnderCheck) -> FloatArray | None:
     """Voltage of the motors: as logged, else duty times the supply (logged, or of the robot file)."""
-    voltage, duty = work.get("voltage"), work.get("duty")
-    if voltage is not None:
-        return voltage
-    if duty is None:
-        return None
-    supply = work.get("supply")
-    if supply is not None:
-        return duty * supply[:, None]
-    if work.geometry is not None and work.geometry.drive.supply is not None:
-        return duty * work.geometry.drive.supply
-    return None
+    nominal = work.geometry.drive.supply if work.geometry is not None else None
+    return asked_voltage(work.get("voltage"), work.get("duty"), work.get("supply"), nominal)
 
 
-def ohmic(work: Work, current: FloatArray) -> FloatArray | None:
+def ohmic(work: LogUnderCheck, current: FloatArray) -> FloatArray | None:
     """Voltage lost in the windings, R i and the drop of brushes and driver [V]; None without a robot."""
     robot = work.geometry
     if robot is None:
@@ -124,7 +101,7 @@ def beyond_stall(robot: Robot, current: FloatArray) -> float:
     return float(np.nanquantile(np.abs(current), 0.95)) / stall_current(robot)
 
 
-def electric_speed(work: Work) -> FloatArray | None:
+def electric_speed(work: LogUnderCheck) -> FloatArray | None:
     """Wheel speed that voltage and current imply, (u - R i - drop)/(K l) [rad/s]; None where one is missing."""
     voltage, current, robot = volts(work), work.get("current"), work.geometry
     if voltage is None or current is None or robot is None or work.log.current_unsigned:
@@ -135,12 +112,12 @@ def electric_speed(work: Work) -> FloatArray | None:
     return None if lost is None else no_load_speed(robot.motor, voltage - lost)
 
 
-def emf(work: Work, speed: FloatArray) -> FloatArray | None:
+def emf(work: LogUnderCheck, speed: FloatArray) -> FloatArray | None:
     """Back-EMF at a wheel speed [V]; None without a robot."""
     return None if work.geometry is None else back_emf(work.geometry.motor, speed)
 
 
-def expected_wheel_speed(work: Work, without: str = "") -> tuple[str, FloatArray] | None:
+def expected_wheel_speed(work: LogUnderCheck, without: str = "") -> tuple[str, FloatArray] | None:
     """(what says so, wheel speed by it, shape (rows, wheels)), from the most exact source there is."""
     robot, seen = work.geometry, ground(work)
     if robot is not None and seen is not None and len(seen.axes) == 3:

@@ -31,8 +31,8 @@ def sample(values: FloatArray) -> FloatArray:
     n = len(values)
     if n <= SAMPLE:
         return values
-    pieces, length = 8, SAMPLE // 8
-    starts = np.linspace(0, n - length, pieces).astype(int)
+    parts, length = 8, SAMPLE // 8
+    starts = np.linspace(0, n - length, parts).astype(int)
     return np.concatenate([values[a : a + length] for a in starts])
 
 
@@ -154,3 +154,11 @@ def smooth(values: FloatArray, width: int) -> FloatArray:
     low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
     with np.errstate(invalid="ignore", divide="ignore"):
         return (total[high] - total[low]) / (number[high] - number[low])
+
+
+def central_rate(values: FloatArray, t: FloatArray, half: int) -> FloatArray:
+    """Rate over `half` rows to either side [unit/s]. Shapes (rows,); NaN at the ends."""
+    rate = np.full(len(values), np.nan)
+    if len(values) > 2 * half:
+        rate[half:-half] = (values[2 * half :] - values[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
+    return rate

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.logs.channels import place
 from omnidyn.logs.column import MOTOR_SIDE
 from omnidyn.logs.log import MAX_MISSING
@@ -17,11 +17,11 @@ CODES = frozenset((999, 9999, 99999, 999999, 32767, 32768, 65535, 2147483647, 21
 FAR = 3.0  # times all other values: what stands for no value lies so far out
 WRAPS = (2.0**16, 2.0**32)  # a negative number of two or four bytes, read as unsigned, is so much too large
 EITHER = 0.01  # of the rows on either side of 0
-Changed = tuple[list[Finding], Work, FloatArray]  # the findings, the work and the component without the fault
+Changed = tuple[list[Finding], LogUnderCheck, FloatArray]  # the findings, the work and the component without the fault
 SIGNED = ("current", "wheel_speed", "voltage", "duty", "twist")
 
 
-def check_codes(work: Work) -> tuple[list[Finding], Work]:
+def check_codes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on such cells; they are put right, or masked."""
     found: list[Finding] = []
     if len(work) < MIN_ROWS:
@@ -34,7 +34,7 @@ def check_codes(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _wrapped(work: Work, channel: str, component: str, values: FloatArray) -> Changed:
+def _wrapped(work: LogUnderCheck, channel: str, component: str, values: FloatArray) -> Changed:
     """Values about 0 and values just below 2^16 (or 2^32), and nothing between."""
     size = _cell_size(work, component)
     cells = values / size
@@ -57,7 +57,7 @@ def _wrapped(work: Work, channel: str, component: str, values: FloatArray) -> Ch
     return [finding], _changed(work, channel, component, right), right
 
 
-def _placeholder(work: Work, channel: str, component: str, values: FloatArray) -> Changed:
+def _placeholder(work: LogUnderCheck, channel: str, component: str, values: FloatArray) -> Changed:
     """One number such as -999 or 65535 in some rows, far beyond everything else of its channel."""
     cells = values / _cell_size(work, component)
     size = np.abs(cells)
@@ -78,13 +78,13 @@ def _placeholder(work: Work, channel: str, component: str, values: FloatArray) -
     return [finding], _changed(work, channel, component, kept), kept
 
 
-def _changed(work: Work, channel: str, component: str, values: FloatArray) -> Work:
+def _changed(work: LogUnderCheck, channel: str, component: str, values: FloatArray) -> LogUnderCheck:
     whole = work.channels[channel].copy()
     (whole if whole.ndim == 1 else whole[:, place(component)[1]])[:] = values  # type: ignore[index]
     return work.replace(**{channel: whole})
 
 
-def _cell_size(work: Work, component: str) -> float:
+def _cell_size(work: LogUnderCheck, component: str) -> float:
     """What one of the file's units is in SI, the gear included."""
     column = work.log.columns.columns.get(component)
     if column is None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import WARN, Finding
-from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, sample, spread
 from omnidyn.logs.channels import place
 from omnidyn.logs.log import ON_CHANGE
@@ -18,7 +18,7 @@ MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
 SPIKE = 10.0  # a single value so many times the noise away from both its neighbours
 
 
-def check_spikes(work: Work) -> tuple[list[Finding], Work]:
+def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Single values (or two) far away from both neighbours, which agree with each other."""
     found = []
     changed = _changed(work)
@@ -43,7 +43,7 @@ def check_spikes(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _changed(work: Work) -> NDArray[np.int64]:
+def _changed(work: LogUnderCheck) -> NDArray[np.int64]:
     """How often a command has changed up to each row."""
     changed = np.zeros(len(work), dtype=bool)
     for channel in INPUTS:
@@ -84,7 +84,7 @@ def _isolated(values: FloatArray) -> NDArray[np.bool_]:
     return bad
 
 
-def recorded(work: Work, channel: str, k: int) -> NDArray[np.int64]:
+def recorded(work: LogUnderCheck, channel: str, k: int) -> NDArray[np.int64]:
     """Rows in which a component was recorded; those between are no measurements where it is recorded on change."""
     logged = work.log.channels.get(channel)
     if logged is None:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from omnidyn.findings.finding import WARN, Finding
-from omnidyn.findings.signal.log_under_check import INPUTS, SENSORS, Work
-from omnidyn.findings.signal.predicted_wheel import Learner
+from omnidyn.findings.signal.log_under_check import INPUTS, SENSORS, LogUnderCheck
+from omnidyn.findings.signal.predicted_wheel import WheelPredictor
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.findings.signal.robust import quantum, smooth
 from omnidyn.logs.channels import place
@@ -30,9 +30,9 @@ TOGETHER = 0.8  # of the rows of a stretch: so many repeats of all others say th
 RESOLVES = 0.1  # of the top speed: a reference as exact as this would have seen a change that matters
 
 
-def check_stuck(work: Work) -> tuple[list[Finding], Work]:
+def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Stretches in which a sensor repeats one value to the last digit while it should not."""
-    found, learner = [], Learner(work)
+    found, predictor = [], WheelPredictor(work)
     expected = expected_wheel_speed(work, without="wheel_speed")
     for channel in SENSORS:
         # The longest repeat first: a wheel that sticks is no witness against the others.
@@ -42,7 +42,7 @@ def check_stuck(work: Work) -> tuple[list[Finding], Work]:
             judge = _Judge(work, values, repeats)
             judge.steady = _Steady(work, channel, k).during
             if channel == "wheel_speed":
-                judge.learn = partial(learner.wheel_speed, k)
+                judge.predict = partial(predictor.wheel_speed, k)
             if channel == "wheel_speed" and expected is not None and k < expected[1].shape[1]:
                 judge.expected = _Away(values, expected[1][:, k])
                 judge.measured = expected[0] in MEASUREMENTS
@@ -59,7 +59,7 @@ def check_stuck(work: Work) -> tuple[list[Finding], Work]:
                 {"longest_s": float(longest), "share": float(bad.mean())},
             ))  # fmt: skip
             work = work.masked(channel, k, bad)
-            learner = Learner(work)
+            predictor = WheelPredictor(work)
     return found, work
 
 
@@ -76,25 +76,25 @@ def _longest(values: FloatArray, repeats: NDArray[np.int64]) -> int:
 class _Judge:
     """Which of the repeats of one channel are too long for chance, or go on while something else changes."""
 
-    learn: Callable[[NDArray[np.bool_]], FloatArray] | None = None  # the channel by all others
+    predict: Callable[[NDArray[np.bool_]], FloatArray] | None = None  # the channel by all others
     expected: _Away | None = None
     steady: Callable[[int, int], bool] | None = None  # whether nothing in the log changes, commands least of all
     measured = False  # expected is what the wheel did; a command it follows later, or, at rest, not at all
 
-    def __init__(self, work: Work, values: FloatArray, repeats: NDArray[np.int64]) -> None:
+    def __init__(self, work: LogUnderCheck, values: FloatArray, repeats: NDArray[np.int64]) -> None:
         self.values, self.repeats, self.slow = values, repeats, max(10, round(FOLLOWS / work.step))
         self.lengths = repeats[:, 1] - repeats[:, 0]
         self.long = self.lengths >= LONG
         self.moving = values[repeats[:, 0]] != 0.0
 
     @cached_property
-    def learned(self) -> _Walk | None:
+    def predicted(self) -> _Walk | None:
         """How far what all other columns say walks away."""
-        return None if self.learn is None else _Walk(self.values, self.learn(self.repeated), self.repeated)
+        return None if self.predict is None else _Walk(self.values, self.predict(self.repeated), self.repeated)
 
     @cached_property
     def repeated(self) -> NDArray[np.bool_]:
-        """Rows in repeats that are asked about: nothing is learned from them."""
+        """Rows in repeats that are asked about: nothing is taken from them."""
         edges = np.zeros(len(self.values) + 1, dtype=np.int64)
         asked = self.repeats[self.lengths >= max(LONG, self.slow // 2)]
         np.add.at(edges, asked[:, 0], 1)
@@ -125,7 +125,7 @@ class _Judge:
         if length <= 3 * usual or unlikely >= IMPOSSIBLE or (self.steady is not None and self.steady(a, b)):
             return False
         # Where the others say that the wheel kept its speed, the noise that the rest of the log has counts for less.
-        return unlikely < IMPOSSIBLE**2 or self.learned is None or not self.learned.stays(a, b)
+        return unlikely < IMPOSSIBLE**2 or self.predicted is None or not self.predicted.stays(a, b)
 
     @cached_property
     def _rare(self) -> float:
@@ -158,15 +158,15 @@ class _Judge:
         asked = length >= (self.slow // 2 if self.measured else self.slow) and (self.measured or turning)
         if self.expected is not None and asked and self.expected.during(a, b):
             return True
-        if not turning or 2 * length < self.slow or self.learned is None:
+        if not turning or 2 * length < self.slow or self.predicted is None:
             return False
-        return self.learned.during(a, b)
+        return self.predicted.during(a, b)
 
 
 class _Steady:
     """Whether commands stand still and all wheels repeat their speed together: a steady run seen in coarse steps."""
 
-    def __init__(self, work: Work, channel: str, k: int) -> None:
+    def __init__(self, work: LogUnderCheck, channel: str, k: int) -> None:
         self.inputs = [np.nan_to_num(values) for name in INPUTS if (values := work.get(name)) is not None]
         columns = [values for name, values in work.columns(channel) if place(name)[1] != k]  # type: ignore[index]
         self.others = [np.diff(values) == 0.0 for values in columns]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.findings.signal.robust import quantum, smooth, white_noise
 from omnidyn.findings.values.codes import check_codes
@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 SAME = 0.03  # a scale so near 1 is 1, within what noise makes of it
 
 
-def check_values(work: Work) -> tuple[list[Finding], Work]:
+def check_values(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """All findings on single channels; what sticks or spikes is masked, what is dead taken out."""
     found = _missing(work)
     if len(work) < MIN_ROWS:
@@ -36,7 +36,7 @@ def check_values(work: Work) -> tuple[list[Finding], Work]:
     return found, _with_dead_wheel(work, found)
 
 
-def _with_dead_wheel(work: Work, found: list[Finding]) -> Work:
+def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck:
     """The speed of one dead wheel as the other channels say it, on the scale of the other wheels.
 
     Else it hides what is wrong with them: neither floor nor circuit can be held against a robot with a wheel missing.
@@ -46,7 +46,7 @@ def _with_dead_wheel(work: Work, found: list[Finding]) -> Work:
     if len(dead) != 1 or expected is None or expected[0] not in MEASUREMENTS or expected[1].shape[1] != work.wheels:
         return work
     speed = work.channels["wheel_speed"].copy()
-    width = max(3, round(0.2 / work.step) | 1)  # noise of what tells the speed would make it look larger
+    width = work.width(0.2)  # noise of what tells the speed would make it look larger
     own, told = np.delete(smooth(speed, width), dead, axis=1), np.delete(smooth(expected[1], width), dead, axis=1)
     known = np.isfinite(own) & np.isfinite(told)
     size, turned = float((told[known] ** 2).sum()), float((own[known] ** 2).sum())
@@ -57,7 +57,7 @@ def _with_dead_wheel(work: Work, found: list[Finding]) -> Work:
     return work.replace(wheel_speed=speed).knowing(dead_wheel=dead[0])
 
 
-def _missing(work: Work) -> list[Finding]:
+def _missing(work: LogUnderCheck) -> list[Finding]:
     found = []
     for channel in work.channels:
         for component, values in work.columns(channel):
@@ -73,7 +73,7 @@ def _missing(work: Work) -> list[Finding]:
     return found
 
 
-def _quantised(work: Work) -> list[Finding]:
+def _quantised(work: LogUnderCheck) -> list[Finding]:
     """Steps of a sensor that matter: 2 % of what it usually reads, or more; sensors of one step in one finding."""
     found: list[Finding] = []
     command = work.get("wheel_speed_command")
@@ -106,10 +106,10 @@ def _quantised(work: Work) -> list[Finding]:
 
 
 def _reads_zero(
-    work: Work, component: str, values: FloatArray, step: float, source: str, reference: FloatArray
+    work: LogUnderCheck, component: str, values: FloatArray, step: float, source: str, reference: FloatArray
 ) -> list[Finding]:
     """A wheel slower than its encoder can say."""
-    width = max(3, round(0.1 / work.step) | 1)
+    width = work.width(0.1)
     # What lies between two measurements is no measurement, and a mean over such rows no better than they are.
     own = _told(work, source)
     turning = np.abs(smooth(reference, width))
@@ -126,7 +126,7 @@ def _reads_zero(
     )]  # fmt: skip
 
 
-def _unit_words(work: Work, component: str, step: float) -> str:
+def _unit_words(work: LogUnderCheck, component: str, step: float) -> str:
     """The step as it stands in the file, where its unit is another."""
     column = work.log.columns.columns.get(component)
     si = {"c": "A", "w": "rad/s", "t": "in SI"}[place(component)[0][0]]  # type: ignore[index]
@@ -139,7 +139,7 @@ def _unit_words(work: Work, component: str, step: float) -> str:
     return si if abs(size - 1.0) < 1e-9 else f"{si} ({step / size:.4g} {unit.text} in column {column.name})"
 
 
-def _constant(work: Work) -> tuple[list[Finding], Work]:
+def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Channels that never change, while something says they should."""
     found = []
     for channel in work.channels:
@@ -155,13 +155,13 @@ def _constant(work: Work) -> tuple[list[Finding], Work]:
                     "dead", FATAL if channel not in ("pose", "twist_command", "wheel_speed_command") else WARN,
                     component, f"{component} is {np.nanmax(values):.4g} in every row, while {reason}",
                     "look at its sensor, its cable and its column; leave it out otherwise",
-                    work.lines(np.ones(len(work), dtype=bool)), len(work), {"value": float(np.nanmax(values))},
+                    work.lines(work.everywhere), len(work), {"value": float(np.nanmax(values))},
                 ))  # fmt: skip
-                work = work.masked(channel, k, np.ones(len(work), dtype=bool))
+                work = work.masked(channel, k, work.everywhere)
     return found, work
 
 
-def _should_move(work: Work, channel: str, k: int, all_flat: bool) -> str:
+def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> str:
     """Why a constant component should change: what else moves. Empty where nothing says so."""
     if channel in ("voltage", "duty"):
         current, speed = work.get("current"), work.get("wheel_speed")
@@ -189,14 +189,14 @@ def _should_move(work: Work, channel: str, k: int, all_flat: bool) -> str:
             return "omega says it turns"
         if speed is None or robot is None:
             return ""
-        own = smooth(twist_from_wheel_speed(robot.wheels, speed), max(3, round(0.3 / work.step) | 1))
+        own = smooth(twist_from_wheel_speed(robot.wheels, speed), work.width(0.3))
         turning = spread_of_motion(own[:, 2]) * float(np.mean(robot.wheels.robot_radius))
         if turning > 0.3 * max(spread_of_motion(own[:, 0]), spread_of_motion(own[:, 1])):
             return "the wheels say that the robot turns: the heading was not recorded, or the wheels ran in the air"
     return ""
 
 
-def _wheel_reason(work: Work, channel: str, k: int) -> str:
+def _wheel_reason(work: LogUnderCheck, channel: str, k: int) -> str:
     expected = expected_wheel_speed(work, without=channel)
     if expected is None or k >= expected[1].shape[1]:
         return ""
@@ -213,7 +213,7 @@ def spread_of_motion(values: FloatArray) -> float:
     return float(np.quantile(np.abs(values), 0.95)) if values.size else 0.0
 
 
-def _wheel_moves(work: Work, k: int) -> bool:
+def _wheel_moves(work: LogUnderCheck, k: int) -> bool:
     speed = work.get("wheel_speed")
     return speed is not None and k < speed.shape[1] and _moves(speed[:, k])
 
@@ -224,7 +224,7 @@ def _moves(values: FloatArray) -> bool:
     return spread_of_motion(values) > 5.0 * noise and float(np.nanstd(values)) > 0.0
 
 
-def _told(work: Work, source: str) -> NDArray[np.int64]:
+def _told(work: LogUnderCheck, source: str) -> NDArray[np.int64]:
     """Rows in which what tells the speed of a wheel was recorded."""
     if source not in MEASUREMENTS:
         return np.arange(len(work))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, Finding
-from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.findings.wiring.frame import commands_agree
@@ -26,13 +26,13 @@ Moments = tuple[FloatArray, FloatArray, FloatArray]  # sums of v v', v w', w w'
 SEEN_BY = (0.0, 0.3, 0.15, 0.01)
 
 
-def by_floor(work: Work) -> tuple[str, Answer] | None:
+def by_floor(work: LogUnderCheck) -> tuple[str, Answer] | None:
     """What is wrong between wheels and floor; wheels that turn as the firmware tells them are wired as it thinks."""
     answer = next(filter(None, (_within(work, seconds) for seconds in WINDOWS)), None)
     return None if answer is not None and answer[0] == "wheels" and commands_agree(work) else answer
 
 
-def _within(work: Work, seconds: float) -> tuple[str, Answer] | None:
+def _within(work: LogUnderCheck, seconds: float) -> tuple[str, Answer] | None:
     """("wheels" or "axes", what is wrong), from the motion over the floor and the wheels' own redundancy."""
     speed, robot = work.full("wheel_speed"), work.geometry
     if speed is None or robot is None:
@@ -67,7 +67,7 @@ def _within(work: Work, seconds: float) -> tuple[str, Answer] | None:
     return _simpler(work, answer, turned)
 
 
-def _simpler(work: Work, answer: Answer | None, turned: Answer | None) -> tuple[str, Answer] | None:
+def _simpler(work: LogUnderCheck, answer: Answer | None, turned: Answer | None) -> tuple[str, Answer] | None:
     """Wheels or axes: what explains much more, else what needs fewer changes.
 
     One axis of the floor turned about is rarer than two motors exchanged, which may look the same.
@@ -81,7 +81,7 @@ def _simpler(work: Work, answer: Answer | None, turned: Answer | None) -> tuple[
     return "wheels", answer
 
 
-def _twist_of(work: Work, unit: FloatArray) -> FloatArray:
+def _twist_of(work: LogUnderCheck, unit: FloatArray) -> FloatArray:
     twist = wheels_twist(work, unit[None])
     assert twist is not None
     return twist[0]
@@ -123,14 +123,14 @@ def _by_axes(rows: FloatArray, moments: Moments, axes: list[int], total: float) 
     return choose(tried, np.array(costs), total, 0.5)  # so few are tried that chance is no matter
 
 
-def _axes_names(work: Work) -> tuple[str, tuple[str, ...]]:
+def _axes_names(work: LogUnderCheck) -> tuple[str, tuple[str, ...]]:
     seen = ground(work)
     assert seen is not None
     names = components("twist", 0) if seen.name == "twist" else ("x", "y", "heading")
     return seen.name, tuple(names[k] for k in seen.axes)
 
 
-def axes_finding(work: Work, answer: Answer) -> Finding:
+def axes_finding(work: LogUnderCheck, answer: Answer) -> Finding:
     """Fatal: axes of what was measured over the floor are exchanged, or have the opposite sign."""
     channel, names = _axes_names(work)
     wrong = answer.best.touched(names)
@@ -146,7 +146,7 @@ def axes_finding(work: Work, answer: Answer) -> Finding:
     )  # fmt: skip
 
 
-def mended_axes(work: Work, wiring: Wiring) -> Work:
+def mended_axes(work: LogUnderCheck, wiring: Wiring) -> LogUnderCheck:
     """The log with these axes put right; NaN where a pose cannot be."""
     seen = ground(work)
     assert seen is not None
@@ -161,7 +161,7 @@ def mended_axes(work: Work, wiring: Wiring) -> Work:
     return work.replace(**{seen.name: values})
 
 
-def wheels_finding(work: Work, answer: Answer, blamed: str) -> Finding:
+def wheels_finding(work: LogUnderCheck, answer: Answer, blamed: str) -> Finding:
     """Fatal: wheel speeds in another order, or of the opposite sign, than floor or commands say."""
     seen = ground(work)
     against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import WARN, Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import pose_twist, wheels_twist
 from omnidyn.findings.wiring.orders import means
 from omnidyn.model.wheels import wheel_speed
@@ -14,7 +14,7 @@ from omnidyn.model.wheels import wheel_speed
 FloatArray = NDArray[np.float64]
 
 
-def check_frame(work: Work, left: float) -> tuple[list[Finding], Work]:
+def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnderCheck]:
     """A pose whose x and y belong to another frame than its heading: turned, or mirrored as a picture from above is.
 
     left: what the best other wiring of the wheels leaves unexplained.
@@ -69,7 +69,7 @@ def _unlike(plain: float) -> Finding:
     )  # fmt: skip
 
 
-def commands_agree(work: Work) -> bool:
+def commands_agree(work: LogUnderCheck) -> bool:
     """Whether the wheels turn as the commanded twist says: then they are wired as the firmware thinks."""
     orders, speed, robot = work.full("twist_command"), work.full("wheel_speed"), work.geometry
     if orders is None or speed is None or robot is None:
@@ -79,7 +79,7 @@ def commands_agree(work: Work) -> bool:
     return bool(size > 0.0 and (wanted * turned).sum() > 0.9 * size)
 
 
-def _turns_say(work: Work, mirror: float) -> bool:
+def _turns_say(work: LogUnderCheck, mirror: float) -> bool:
     """Whether the robot turns enough to see that its wheels are right about yaw, whatever they are about x and y."""
     speed, pose = work.full("wheel_speed"), work.full("pose")
     if speed is None or pose is None:

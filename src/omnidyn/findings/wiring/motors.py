@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import FATAL, Finding
-from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import emf, ohmic, volts
 from omnidyn.findings.wiring.orders import Answer, Wiring, choose, code_of, means, rivals_of, wirings
 from omnidyn.logs.channels import components
@@ -19,7 +19,7 @@ HOLDS = 0.25  # of the voltage: where more is left of it under every wiring, a s
 EXACT = 0.004  # of the voltage: what less is left of it is the noise of an exact relation
 
 
-def motor_known(work: Work) -> bool:
+def motor_known(work: LogUnderCheck) -> bool:
     """Whether voltage or current is there to say which motor a speed belongs to."""
     return work.full("wheel_speed") is not None and (
         work.full("voltage") is not None or work.full("duty") is not None or work.full("current") is not None
@@ -33,7 +33,7 @@ class Circuit(NamedTuple):
     wrong: tuple[str, Answer] | None = None
 
 
-def by_drive(work: Work) -> tuple[str, Answer] | None:
+def by_drive(work: LogUnderCheck) -> tuple[str, Answer] | None:
     """(channel that is wired wrongly, how), from the likeness of voltage or duty and speed."""
     for channel in ("voltage", "duty"):
         if work.full(channel) is not None:
@@ -42,7 +42,7 @@ def by_drive(work: Work) -> tuple[str, Answer] | None:
     return None
 
 
-def by_circuit(work: Work) -> Circuit:
+def by_circuit(work: LogUnderCheck) -> Circuit:
     """What u - R i - K l w says, which is 0 for the right wiring."""
     voltage, current, speed = volts(work), work.full("current"), work.full("wheel_speed")
     robot = work.geometry
@@ -81,7 +81,7 @@ def _by_scaled_speed(tried: list[Wiring], left: FloatArray, e: FloatArray, total
     return Circuit(True, None if answer is None else ("wheel_speed", answer))
 
 
-def by_likeness(work: Work, channel: str) -> Answer | None:
+def by_likeness(work: LogUnderCheck, channel: str) -> Answer | None:
     """Order and signs under which a drive channel and the speed of the same wheel look alike."""
     driven, speed = work.full(channel), work.full("wheel_speed")
     if driven is None or speed is None or driven.shape != speed.shape:
@@ -101,7 +101,7 @@ def by_likeness(work: Work, channel: str) -> Answer | None:
     return answer if answer is not None and (answer.logged - answer.left) * n > 1.0 else None
 
 
-def motor_finding(work: Work, channel: str, answer: Answer) -> Finding:
+def motor_finding(work: LogUnderCheck, channel: str, answer: Answer) -> Finding:
     """Fatal: columns of one channel of the motors are exchanged, or have the opposite sign."""
     names = components(channel, work.wheels)
     wrong = answer.best.touched(names)

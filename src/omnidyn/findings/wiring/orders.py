@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.findings.signal.log_under_check import Work
+from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.robust import windowed
 
 FloatArray = NDArray[np.float64]
@@ -104,7 +104,7 @@ def choose(
     return Answer(best, len(rivals), rivals[0] if rivals else None, float(costs[alike[0]]) / total, logged / total)
 
 
-def means(work: Work, *channels: FloatArray, seconds: float = WINDOWS[0]) -> list[FloatArray]:
+def means(work: LogUnderCheck, *channels: FloatArray, seconds: float = WINDOWS[0]) -> list[FloatArray]:
     """Means over short windows, rows without all channels left out. Shapes (windows, columns)."""
     ids, count = work.windows(seconds)
     table = np.column_stack(channels)

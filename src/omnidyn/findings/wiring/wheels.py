@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.findings.finding import Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Work
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.wiring.floor import axes_finding, by_floor, mended_axes, wheels_finding
 from omnidyn.findings.wiring.frame import check_frame
 from omnidyn.findings.wiring.motors import by_circuit, by_drive, by_likeness, motor_finding, motor_known
@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 MOTOR = ("voltage", "duty", "current", "wheel_angle", "wheel_speed", "wheel_speed_command")
 
 
-def check_wiring(work: Work) -> tuple[list[Finding], Work]:
+def check_wiring(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on order and sign of the columns of motors and axes; the work with them put right."""
     if len(work) < MIN_ROWS or work.wheels < 1:
         return [], work
@@ -55,7 +55,7 @@ def check_wiring(work: Work) -> tuple[list[Finding], Work]:
     return found, work
 
 
-def _mended(work: Work, channels: tuple[str, ...], wiring: Wiring) -> Work:
+def _mended(work: LogUnderCheck, channels: tuple[str, ...], wiring: Wiring) -> LogUnderCheck:
     for channel in channels:
         values = work.channels.get(channel)
         if values is not None:

@@ -17,7 +17,8 @@ from omnidyn.identification.output_error.engines.exact import Weighting, march_p
 from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, Slopes
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
-from omnidyn.model.layout import AXES, YAW
+from omnidyn.model.actuation import Driver
+from omnidyn.model.layout import N_AXES, YAW
 
 FloatArray = NDArray[np.float64]
 
@@ -63,18 +64,19 @@ class MotorEngine:
         problem, columns, count = self.problem, piece.record.columns, len(self.problem.parameters)
         width, room = len(columns), padded(used_by(piece, count))
         law, by_law, drive, by_drive = step_numbers(values, problem.where(BAND), room)
-        speed_map, travel_map = np.zeros((width, AXES)), np.zeros((width, PATH))
+        speed_map, travel_map = np.zeros((width, N_AXES)), np.zeros((width, PATH))
         speed_map[:, YAW] = [column == SPEED for column in columns]
         travel_map[:, YAW] = [column == ANGLE for column in columns]
         late = [problem.where(f"{LATENCY}.{name}") for name, _ in columns]
         at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
         physics = Physics(
-            law, drive, np.zeros(AXES), speed_map, travel_map, np.zeros(width), np.full(width, -1),
-            np.array([values[k] if k >= 0 else 0.0 for k in late]), np.array([1.0, 0.0, 0.0]), bool(travel_map.any()),
+            law, drive, np.zeros(N_AXES), speed_map, travel_map, np.zeros(width), np.full(width, -1),
+            np.array([values[k] if k >= 0 else 0.0 for k in late]), Driver(), bool(travel_map.any()),
         )  # fmt: skip
         slopes = Slopes(
-            by_law, by_drive, np.zeros((AXES, room)), np.zeros((width, AXES, room)), np.zeros((width, PATH, room)),
-            np.zeros((width, room)), True, np.zeros(width, bool), np.array(late), np.full(3, -1), at[:AXES], at[AXES:],
+            by_law, by_drive, np.zeros((N_AXES, room)), np.zeros((width, N_AXES, room)), np.zeros((width, PATH, room)),
+            np.zeros((width, room)), True, np.zeros(width, bool), np.array(late), np.full(3, -1),
+            at[:N_AXES], at[N_AXES:],
         )  # fmt: skip
         return physics, slopes, np.arange(width + 1)
 
@@ -86,10 +88,10 @@ def step_numbers(values: FloatArray, at_band: int, room: int) -> tuple[FloatArra
     """
     slope, lag, band = float(values[0]), float(values[1]), float(values[at_band]) if at_band >= 0 else 0.0
     rate, gain = 1.0 / lag, 1.0 / (slope * lag)
-    law, drive = np.zeros((3, AXES)), np.zeros((AXES, 1))
+    law, drive = np.zeros((3, N_AXES)), np.zeros((N_AXES, 1))
     law[0] = 1.0
     law[:, YAW], drive[YAW] = (rate, band * gain, band * gain), gain
-    by_law, by_drive = np.zeros((2, AXES, room)), np.zeros((AXES, 1, room))
+    by_law, by_drive = np.zeros((2, N_AXES, room)), np.zeros((N_AXES, 1, room))
     by_law[0, YAW, 1] = -rate / lag
     by_drive[YAW, 0, :2] = -gain / slope, -gain / lag
     by_law[1, YAW] = band * by_drive[YAW, 0]

@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
 from omnidyn.logs.resolved import unresolved_rows
-from omnidyn.model.layout import AXES, YAW
+from omnidyn.model.layout import N_AXES, YAW
 
 FloatArray = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ def motor_problem(records: Sequence[Record], dead_band: bool, latency: bool) -> 
 
 
 def _piece(record: Record, first: int, last: int, latency: bool) -> Piece:
-    start, offset = np.zeros(AXES), np.zeros(len(record.columns))
+    start, offset = np.zeros(N_AXES), np.zeros(len(record.columns))
     for c, name in enumerate(record.columns):
         column = record.outputs[first : last + 1, c]
         known = column[np.isfinite(column)]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from omnidyn.document import Part, Points, interval_cell
 from omnidyn.identification.estimate import Estimate, finite_or_none
 
 
@@ -39,16 +39,14 @@ class OutputErrorEstimate(Estimate):
     iterations: int = 0
     converged: bool = True
 
-    def summary(self) -> str:
-        """The estimate as a plain table, for reading. ASCII only."""
-        lines = [super().summary()]
-        for name, nuisance in self.nuisances.items():
-            low, high = nuisance.ci95
-            lines.append(f"{name}: {nuisance.value:.4g} [{low:.4g}, {high:.4g}] {nuisance.unit}".rstrip())
-        lines += [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
-        for words in self.blind:
-            lines += textwrap.wrap(f"not shown by the data: {words}", 100, subsequent_indent="  ")
-        return "\n".join(line.rstrip("\n") for line in lines) + "\n"
+    def _parts(self) -> list[Part]:
+        """The numbers of the log, the noise and what the data do not show, after the rest."""
+        logs = [
+            f"{name}: {own.value:.4g} {interval_cell(own.ci95)} {own.unit}".rstrip()
+            for name, own in self.nuisances.items()
+        ]
+        noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
+        return [*super()._parts(), *logs, *noise, Points(self.blind, "not shown by the data:")]
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it."""

@@ -12,7 +12,7 @@ from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.motion import Motion, motion
 from omnidyn.identification.output_error.problem.nuisances import (
@@ -50,7 +50,7 @@ from omnidyn.logs.steady_table import AXES
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.keys import BOX, COULOMB, FRICTION, GAINS, VISCOUS, Key, expand, friction_keys, unit
 from omnidyn.model.motor import DYNAMIC
-from omnidyn.model.robot import Robot
+from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
 
@@ -63,7 +63,6 @@ CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
-IDENTIFIED = "identified:"  # how the source of a number begins that an earlier fit has written
 
 
 @dataclass(frozen=True)
@@ -101,16 +100,17 @@ def fit_output_error(
     """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
 
     runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
-    free: keys of the robot file, such as "body.mass_kg"; by default the friction that the robot has. fixed: taken out.
-    The EMF constant follows the torque constant unless both are free. Breakaway follows coulomb, or stays as
-    the robot has it; "friction.axes.breakaway[0]" among the free keys asks for its interval, without "[0]" for all.
+    free: keys of the robot file, such as "body.mass_kg"; "friction", the default, is what the robot has of it, a list
+    stands for its entries. fixed: taken out. The EMF constant follows the torque constant, wheel by wheel, unless both
+    are free. Breakaway follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" among the free keys
+    asks for its interval.
     nuisances: what the log does to the model: "latency" (or "latency.twist"), "gain", "dead_band", "fade", "tilt"
     (or "tilt.x", "tilt.y", "tilt.yaw"). By default latency and dead band, and the gain where the supply is only
     nominal, as far as the logs determine them; a warning says what else would fit the logs better. () for none.
     start: "rest", "free", or "auto": at rest where that shows.
     use_priors: a std in the robot file counts as a Gaussian prior of what is free, and what has one is free too. Off by
-    default: a std that an earlier fit wrote from the same log would count the log twice; such ones ("identified: ...")
-    are never used.
+    default: a std that an earlier fit wrote from the same log would count the log twice; such ones (origin
+    "identified") are never used.
     outputs: of "twist", "wheel_speed", "current", "pose" (or of "heading", "position"), "wheel_angle"; by default all
     that the log has, but for what is computed from another one: that would count the same data twice.
     tick_rad: of the encoders behind wheel angles [rad]; by default found in the log. Their likelihood is that of
@@ -199,7 +199,7 @@ def _solve(
         watch.doing("looking for a start")
         solver = Solver(problem, ExactEngine(problem), nu)
         return solver, solver.minimise(first_point(solver, records), watch=watch)
-    fine = Solver(problem, TangentEngine(problem, FINE), nu, CLOSE)
+    fine = Solver(problem, ImplicitEngine(problem, FINE), nu, CLOSE)
     return fine, fine.minimise(coarse_point(problem, nu, watch), watch=watch)
 
 
@@ -213,11 +213,11 @@ def loss_words(loss: str) -> str:
     return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
 
 
-def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | TangentEngine | LoopEngine:
+def make_engine(problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
     """The engine of the robot and its logs; tol [m/s]: of the implicit one, None for a step a row."""
     if looped([piece.record for piece in problem.pieces]):
         return LoopEngine(problem, tol)
-    return ExactEngine(problem) if is_exact(problem.robot) else TangentEngine(problem, tol)
+    return ExactEngine(problem) if is_exact(problem.robot) else ImplicitEngine(problem, tol)
 
 
 def loop_options(given: Options, found: Motion, records: Sequence[Record], robot: Robot) -> Options:
@@ -387,6 +387,6 @@ def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
     """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry."""
     found = {}
     for name, prior in robot.priors.items():
-        if prior.std is not None and not prior.source.startswith(IDENTIFIED):
+        if prior.std is not None and prior.origin != IDENTIFIED:
             found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
     return found

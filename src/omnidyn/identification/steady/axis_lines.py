@@ -12,6 +12,7 @@ from omnidyn.identification.steady.points import driven_axes
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.friction import Friction
+from omnidyn.model.keys import DIRECTION, WHEELS, Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -49,8 +50,4 @@ def steady_table(robot: Robot, points: ForcePoints, source: str = "") -> SteadyT
 
 
 def _without_other_friction(robot: Robot) -> dict:
-    return {
-        key: prior
-        for key, prior in robot.priors.items()
-        if not key.startswith(("friction.direction", "friction.wheels"))
-    }
+    return {key: prior for key, prior in robot.priors.items() if Key.parse(key).table not in (DIRECTION, WHEELS)}

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
+from omnidyn.model.actuation import asked_voltage
 from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.motor import settled_current, traction
 from omnidyn.model.robot import Robot
@@ -159,13 +160,13 @@ def _with_voltage(run: Run, robot: Robot) -> Run:
     """The run with the voltage that a duty of the supply makes, where no voltage was logged."""
     if run.voltage is not None or run.duty is None:
         return run
-    supply = robot.drive.supply if run.supply is None else run.supply[:, None]
-    if supply is None:
+    voltage = asked_voltage(None, run.duty, run.supply, robot.drive.supply)
+    if voltage is None:
         raise InputError(
             "a duty needs the voltage of the supply", got="neither logged nor in the robot file",
             expected="a column supply, or [drive] supply_V", where=run.source,
         )  # fmt: skip
-    return run.replace(voltage=run.duty * supply)
+    return run.replace(voltage=voltage)
 
 
 def _point(run: Run, robot: Robot, each: Plateau, speed: str, origin: str) -> dict[str, FloatArray]:

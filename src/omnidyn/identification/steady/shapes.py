@@ -15,20 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.identification.steady.operating_points import ForcePoints
-from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.friction import Friction
+from omnidyn.model.keys import AXES, DIRECTION, WHEELS, Key, expand
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import rim_speed, sin_cos_deg
 
 FloatArray = NDArray[np.float64]
 Columns = Callable[[Robot, ForcePoints], FloatArray]
 
-AXES, DIRECTION, WHEELS = "friction.axes", "friction.direction", "friction.wheels"
 VISCOUS = "+viscous"
 
 
@@ -207,17 +206,8 @@ SHAPES = _shapes()
 
 def friction_of(shape: Shape, robot: Robot, level: dict[str, float]) -> Friction:
     """The friction of a robot file with these levels (key -> level, none negative), and no other."""
-    axes: dict[str, Any] = {"coulomb": [0.0] * 3, "viscous": [0.0] * 3}
-    tables: dict[str, dict[str, Any]] = {AXES: axes, DIRECTION: {}, WHEELS: {}}
-    count = {AXES: 3, DIRECTION: 2, WHEELS: robot.wheels.count}
-    for key, value in level.items():
-        table, _, name = key.rpartition(".")
-        name, _, index = name.rstrip("]").partition("[")
-        if index:
-            tables[table].setdefault(name, [0.0] * count[table])[int(index)] = value
-        else:
-            tables[table][name] = [value, value] if (table, name) == (DIRECTION, "coulomb") else value
-    return Friction(
-        axes=AxesFriction(**axes), direction=DirectionFriction(**tables[DIRECTION]),
-        wheels=WheelFriction(**tables[WHEELS]),
-    )  # fmt: skip
+    found = robot.replace(friction=Friction())
+    for name, value in level.items():
+        for key in expand(name, found):  # a disc has one level for both its entries
+            found = Key.parse(key).set(found, value, checked=False)
+    return Friction(**found.friction.model_dump())

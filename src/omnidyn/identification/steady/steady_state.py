@@ -21,7 +21,7 @@ from omnidyn.identification.steady.doubts import ORIGIN, about_line, about_point
 from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.friction import AxesFriction
-from omnidyn.model.keys import unit
+from omnidyn.model.keys import unit, with_priors
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]
@@ -217,11 +217,8 @@ def _estimate(robot: Robot, friction: AxesFriction, found: _Findings, method: st
             ci95[name] = (float(line.ci95[k, 0]), float(line.ci95[k, 1]))
             degrees[name] = line.degrees_of_freedom
             at_bound += [name] if line.at_bound[k] else []
-    fitted = robot.replace(
-        friction=robot.friction.replace(axes=friction), priors=_priors(robot, friction, std, found, data)
-    )
     return Estimate(
-        robot=fitted,
+        robot=_robot(robot, friction, std, found, data),
         value=value,
         std=std,
         ci95=ci95,
@@ -235,19 +232,13 @@ def _estimate(robot: Robot, friction: AxesFriction, found: _Findings, method: st
     )
 
 
-def _priors(robot: Robot, friction: AxesFriction, std: dict[str, float], found: _Findings, data: str) -> dict:
-    """The robot's priors with the fitted numbers in them. What is known of a list as a whole goes to its items."""
-    priors = dict(robot.priors)
-    for key in ("viscous", "coulomb", "breakaway"):
-        whole = priors.pop(f"friction.axes.{key}", None)
-        if whole is not None:
-            priors.update({f"friction.axes.{key}[{axis}]": whole for axis in range(len(AXES))})
-    for name, deviation in std.items():
-        priors[name] = identified(deviation, f"steady state, {data}")
+def _robot(robot: Robot, friction: AxesFriction, std: dict[str, float], found: _Findings, data: str) -> Robot:
+    """The robot with this friction, and where its numbers come from."""
+    known = {name: identified(deviation, f"steady state, {data}") for name, deviation in std.items()}
     for axis, bound in found.bounds.items():
         if friction.breakaway is not None and friction.breakaway[axis] == bound:
-            priors[_breakaway(axis)] = identified(None, f"lower bound from rest, {data}")
-    return priors
+            known[_breakaway(axis)] = identified(None, f"lower bound from rest, {data}")
+    return with_priors(robot.replace(friction=robot.friction.replace(axes=friction)), known)
 
 
 def _correlation(lines: dict[int, Line]) -> Correlation:

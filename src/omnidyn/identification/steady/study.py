@@ -21,9 +21,10 @@ from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import AUTO, ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.operating_points import WHEEL, ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
-from omnidyn.identification.steady.shapes import AXES, DIRECTION, SHAPES, VISCOUS, friction_of
+from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
 from omnidyn.model.friction import Friction
+from omnidyn.model.keys import AXES, DIRECTION, Key
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.run import Run
 from omnidyn.statistics import t_quantile
@@ -194,7 +195,7 @@ def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: boo
 
 
 def _priors(robot: Robot, std: dict[str, float], kept: dict[str, float], data: str) -> dict[str, Prior]:
-    priors = {key: prior for key, prior in robot.priors.items() if not key.startswith("friction.") or key in kept}
+    priors = {key: prior for key, prior in robot.priors.items() if not Key.parse(key).level or key in kept}
     return priors | {key: identified(deviation, f"steady state, {data}") for key, deviation in std.items()}
 
 

@@ -1,4 +1,4 @@
-"""A steady-state study as text for people and as dictionaries for machines."""
+"""What a steady-state study says: its tables and words, and its values for machines."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from omnidyn.document import WIDTH, Document, Points, Table, interval_cell
 from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
-from omnidyn.identification.steady.study_words import FORCES, label
-from omnidyn.model.keys import unit
-
-WIDTH = 100
+from omnidyn.identification.steady.study_words import FORCES
+from omnidyn.model.keys import Key
 
 
 def table_text(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -28,29 +27,23 @@ def table_text(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     return lines
 
 
-def study_summary(study: SteadyStudy) -> str:
-    """The study as plain text: what was used, the shapes, the levels, what it says and what is doubtful."""
+def study_document(study: SteadyStudy) -> Document:
+    """The study: what was used, the shapes, the levels, what it says and what is doubtful."""
     points = study.points
-    lines = [
+    doubts = [
+        words if group == "all" else f"{group}: {words}"
+        for group, estimate in study.estimates.items() for words in estimate.warnings
+    ]  # fmt: skip
+    parts = [
         f"{study.robot.name}: steady state from logs; forces from {FORCES[points.force_from]}; friction over the "
         f"{SPEEDS[points.speed_from]}",
-        "",
-        *table_text(TRAVEL_HEAD, travel_rows(study)),
-        "",
-        *table_text(SHAPE_HEAD, shape_rows(study)),
-        "",
-        *table_text(LEVEL_HEAD, level_rows(study)),
-        "",
-    ]
-    for words in study.statements:
-        lines += bullet("-", words)
-    for head, several in (("warning:", study.warnings), ("next:", study.advice)):
-        for words in several:
-            lines += bullet(head, words)
-    for group, estimate in study.estimates.items():
-        for words in estimate.warnings:
-            lines += bullet("warning:", words if group == "all" else f"{group}: {words}")
-    return "\n".join(lines) + "\n"
+        "", _travel_table(study), "", _shape_table(study), "", _level_table(study), "",
+        Points(study.statements, name="statements"),
+        Points(study.warnings, "warning:", "warnings"),
+        Points(study.advice, "next:", "next"),
+        Points(doubts, "warning:", "doubts"),
+    ]  # fmt: skip
+    return Document(parts, _data(study), study.warnings)
 
 
 def bullet(head: str, words: str) -> list[str]:
@@ -58,23 +51,20 @@ def bullet(head: str, words: str) -> list[str]:
     return textwrap.wrap(f"{head} {words}", WIDTH, subsequent_indent="  ")
 
 
-TRAVEL_HEAD = ("group", "runs", "points", "rows", "speed m/s", "along travel N", "+-", "scatter N")
-SHAPE_HEAD = ("shape", "levels", "left-out error N", "+-", "along N", "behind best N", "+-", "")
-LEVEL_HEAD = ("group", "level", "value", "std error", "95 % interval", "unit")
-
-
-def travel_rows(study: SteadyStudy) -> list[list[str]]:
+def _travel_table(study: SteadyStudy) -> Table:
     """What was used, and the force along travel, a row per group."""
-    return [
-        [
+    rows = [
+        (
             group, f"{each.runs}", f"{each.points}", f"{each.rows}", f"{each.slow:.3g} .. {each.fast:.3g}",
             f"{each.mean:.2f}", f"{each.std:.2f}", f"{each.deviation:.2f}",
-        ]
+        )
         for group, each in study.travel.items()
     ]  # fmt: skip
+    head = ("group", "runs", "points", "rows", "speed m/s", "along travel N", "+-", "scatter N")
+    return Table(head, rows, name="travel")
 
 
-def shape_rows(study: SteadyStudy) -> list[list[str]]:
+def _shape_table(study: SteadyStudy) -> Table:
     """The shapes compared, best first."""
     rows = []
     for score in study.choice.scores:
@@ -84,28 +74,26 @@ def shape_rows(study: SteadyStudy) -> list[list[str]]:
         marks += ["a level below 0"] if score.at_bound else []
         best = score.behind == 0.0 and score.behind_std == 0.0
         behind, error = ("", "") if best else (f"{score.behind:.2f}", f"{score.behind_std:.2f}")
-        rows.append(
-            [
-                score.name, f"{score.levels}", f"{score.loo:.2f}", f"{score.loo_std:.2f}", f"{score.along:.2f}", behind,
-                error, ", ".join(marks),
-            ]
-        )  # fmt: skip
-    return rows
+        rows.append((
+            score.name, f"{score.levels}", f"{score.loo:.2f}", f"{score.loo_std:.2f}", f"{score.along:.2f}", behind,
+            error, ", ".join(marks),
+        ))  # fmt: skip
+    head = ("shape", "levels", "left-out error N", "+-", "along N", "behind best N", "+-", "")
+    return Table(head, rows, name="shapes")
 
 
-def level_rows(study: SteadyStudy) -> list[list[str]]:
+def _level_table(study: SteadyStudy) -> Table:
     """The levels of the chosen shape, a row per group and level."""
     rows = []
     for group, estimate in study.estimates.items():
         for key, value in estimate.value.items():
-            low, high = estimate.ci95[key]
-            mark = " at bound" if key in estimate.at_bound else ""
-            interval = f"[{low:.4g}, {high:.4g}]"
-            rows.append([group, label(key), f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, unit(key) + mark])
-    return rows
+            mark, interval = " at bound" if key in estimate.at_bound else "", interval_cell(estimate.ci95[key])
+            name = Key.parse(key)
+            rows.append((group, name.symbol, f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, name.unit + mark))
+    return Table(("group", "level", "value", "std error", "95 % interval", "unit"), rows, name="levels")
 
 
-def study_to_dict(study: SteadyStudy) -> dict[str, Any]:
+def _data(study: SteadyStudy) -> dict[str, Any]:
     """The study as JSON can hold it."""
     return {
         "force_from": study.points.force_from,

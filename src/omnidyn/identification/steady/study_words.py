@@ -10,7 +10,7 @@ from omnidyn.identification.steady.choice import APART, ShapeChoice, ShapeScore
 from omnidyn.identification.steady.operating_points import CURRENT, SPEEDS, ForcePoints
 from omnidyn.identification.steady.shape_fit import ShapeFit
 from omnidyn.identification.steady.study_parts import Difference, Viscous
-from omnidyn.model.keys import unit
+from omnidyn.model.keys import Key, unit
 
 FORCES = {"current": "motor currents, eqs (7)-(10)", "voltage": "voltage and speed, eq (11)"}
 LOW_WEIGHT = 0.5
@@ -32,17 +32,6 @@ def data(points: ForcePoints, group: str) -> str:
     runs = len(set(points.run.tolist()))
     name = "" if group == "all" else f"{group}: "
     return f"{name}{runs} runs, {len(points)} steady points, {int(points.rows.sum())} rows"
-
-
-def label(key: str) -> str:
-    """A level as people call it: Cx, Cy, B."""
-    place, _, name = key.rpartition(".")
-    name, _, index = name.rstrip("]").partition("[")
-    letter = {"coulomb": "C", "viscous": "B", "yaw_coulomb": "C yaw", "yaw_viscous": "B yaw"}.get(name, name)
-    at = " at the wheels" if place.endswith("wheels") else ""
-    if not index:
-        return letter + at
-    return f"{letter} of wheel {int(index) + 1}" if at else f"{letter}{'xyw'[int(index)]}"
 
 
 def statements(
@@ -96,7 +85,8 @@ def _about_comparison(choice: ShapeChoice) -> list[str]:
 
 
 def _about_viscous(group: str, level: Viscous, chosen: str, matters: float) -> str:
-    name, measure = label(level.key), unit(level.key)
+    key = Key.parse(level.key)
+    name, measure = key.symbol, key.unit
     interval = f"{name} = {level.value:.3g} +- {level.std:.2g} {measure}, 95 % [{level.low:.3g}, {level.high:.3g}]"
     speeds = f"from {level.slow:.3g} to {level.fast:.3g} m/s"
     if not level.seen:
@@ -114,7 +104,8 @@ def _about_viscous(group: str, level: Viscous, chosen: str, matters: float) -> s
 
 
 def _about_difference(each: Difference) -> str:
-    name, measure = label(each.key), unit(each.key)
+    key = Key.parse(each.key)
+    name, measure = key.symbol, key.unit
     pair = f"{each.first} {each.values[0]:.4g}, {each.second} {each.values[1]:.4g} {measure}"
     span = f"{each.difference:+.3g} [{each.low:.3g}, {each.high:.3g}] {measure}"
     verdict = "differs" if each.differs else "no difference seen"

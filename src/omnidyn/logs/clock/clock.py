@@ -26,7 +26,7 @@ _WITH_POINTS = re.compile(rf"(\d{{1,2}})\.(\d{{1,2}})\.(\d{{4}})[ T]+{_TIME}", r
 
 
 class Clock:
-    """Reads the times of a log, piece after piece; what is taken off the first piece is taken off all."""
+    """Reads the times of a log, block after block; what is taken off the first block is taken off all."""
 
     def __init__(self) -> None:
         self._start: float | datetime | None = None

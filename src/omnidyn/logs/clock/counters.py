@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
+from omnidyn.model.frames import unwrapped
 from omnidyn.units import TURN, parse_unit
 
 FloatArray = NDArray[np.float64]
@@ -36,9 +37,7 @@ def unrolled(counts: FloatArray, unit: str, where: str) -> tuple[FloatArray, flo
             got=f"steps of {usual:.4g}", expected=f"steps below {FAST * period:.4g}",
             remedy="log faster, or log the speed", where=where,
         )  # fmt: skip
-    smooth = counts.copy()
-    smooth[known] = np.unwrap(counts[known], period=period)
-    return smooth, period
+    return unwrapped(counts, period), period
 
 
 def _period(readings: FloatArray, steps: FloatArray, unit: str) -> float | None:

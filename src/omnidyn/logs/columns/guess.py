@@ -18,7 +18,7 @@ from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import unit_of
 from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, is_numeric, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, quantity_of
-from omnidyn.logs.columns.names import Words, read_name
+from omnidyn.logs.columns.names import NameParts, read_name
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MAX_WHEELS, per_wheel, wheel_speed
@@ -94,7 +94,7 @@ def _wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> Numbers:
     return {key: number for key, number in numbers.items() if 0 < number <= MAX_WHEELS}
 
 
-def _numbered_kind(name: Words, unit: Unit | None) -> str | None:
+def _numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
     """The letter of a component of a wheel, None where the words do not say. A unit outweighs a word."""
     if name.number is None:
         return None
@@ -160,7 +160,7 @@ def _doubt_letters(names: list[str], found: Guess) -> None:
         found.doubts += [Doubt(name, f"u{parts[name].number}", why, ()) for name in mine]
 
 
-def _is_letter_v(name: Words) -> bool:
+def _is_letter_v(name: NameParts) -> bool:
     return name.number is not None and name.unit is None and name.roles == {words.LINEAR}
 
 
@@ -182,7 +182,7 @@ def _component_of(name: str, unit: Unit | None, numbers: Numbers) -> str | None:
     return exact or _component(parts, unit, numbers)
 
 
-def _component(name: Words, unit: Unit | None, numbers: Numbers) -> str | None:
+def _component(name: NameParts, unit: Unit | None, numbers: Numbers) -> str | None:
     """The component that the words of a name say, None where they say none or too many."""
     if words.OTHER in name.roles and not (name.number is not None and (unit or name.unit)):
         return None
@@ -198,7 +198,7 @@ def _component(name: Words, unit: Unit | None, numbers: Numbers) -> str | None:
     return _body_component(name, unit or name.unit, command)
 
 
-def _body_component(name: Words, unit: Unit | None, command: str) -> str | None:
+def _body_component(name: NameParts, unit: Unit | None, command: str) -> str | None:
     roles = name.roles
     if roles & {words.CURRENT, words.VOLTAGE, words.DUTY, words.TIME, words.MOTOR}:
         return None
@@ -224,7 +224,7 @@ def _body_component(name: Words, unit: Unit | None, command: str) -> str | None:
     return "heading" if roles == {words.ANGLE} and unit is not None and unit.quantity == "angle" else None
 
 
-def _enter(name: str, component: str, unit: Unit, parts: Words, found: Guess) -> None:
+def _enter(name: str, component: str, unit: Unit, parts: NameParts, found: Guess) -> None:
     """Take a column, where its unit measures what the component is."""
     wanted = quantity_of(component)
     if unit.quantity == DUTY_UNIT and wanted == VOLTAGE_UNIT and component != "supply":

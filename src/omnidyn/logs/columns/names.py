@@ -44,7 +44,7 @@ _ROLE |= {"vx": "vx", "vy": "vy", "vn": "vy"}
 _SHORT = ("x", "y", "z", "v", "b", "w", "m", "u", "i")  # single letters that compounds such as "vbx" are made of
 
 
-class Words(NamedTuple):
+class NameParts(NamedTuple):
     """A name taken apart: roles of its words, the number of the wheel or None, the unit in it or None."""
 
     roles: frozenset[str]
@@ -53,7 +53,7 @@ class Words(NamedTuple):
 
 
 @lru_cache(4096)
-def read_name(name: str) -> Words:
+def read_name(name: str) -> NameParts:
     """The words of a column's name. A word that is not known counts as "other"."""
     stem, unit = _split_unit(name.strip().replace("v_n", "vn"))
     stem, unit = (stem, unit) if unit is not None else _unit_inside(stem)
@@ -61,7 +61,7 @@ def read_name(name: str) -> Words:
     words = re.findall(r"[^\W\d_]+", spread)
     unit = unit or next((known_unit(part) for word in words for part in _parts(word) if part in _SAYS_ITS_UNIT), None)
     roles = {role for word in words for role in _roles(word)}
-    return Words(frozenset(roles), _number(spread), unit)
+    return NameParts(frozenset(roles), _number(spread), unit)
 
 
 _SAYS_ITS_UNIT = ("rpm", "dps", "millis", "micros")  # a quantity and its unit in one word: rpm1, motor2Rpm, millis

@@ -11,18 +11,18 @@ import hashlib
 import io
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from omnidyn.errors import InputError, MissingExtraError
-from omnidyn.files import default_max_bytes, open_regular, too_large
+from omnidyn.files import open_regular, too_large
 from omnidyn.logs.readers.parquet_pages import declared_bytes
+from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.table.header import MAX_COLUMNS, check_name, split_units
 from omnidyn.logs.table.rows import INFINITE, Column, FloatArray, column_of, refuse_infinite, skip_note
-from omnidyn.logs.table.table import MAX_CELLS, ROWS, Table, join
-from omnidyn.logs.table.text import BLOCK_BYTES, TOO_LARGE_REMEDY, Progress
+from omnidyn.logs.table.table import MAX_CELLS, Table
+from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
 
 MAX_EXPANSION, MIN_EXPANDED_BYTES = 200, 64 * 2**20
 MAX_THRIFT_STRING, MAX_THRIFT_ITEMS = 16 * 2**20, 10**6
@@ -47,33 +47,6 @@ def import_pyarrow(where: str = "") -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-def read_parquet(
-    path: str | os.PathLike,
-    *,
-    skip_bad_rows: bool = False,
-    max_bytes: int | None = None,
-    progress: Progress | None = None,
-) -> Table:
-    """Read a Parquet file; its rows are numbered from 1 in `Table.lines`. Options as those of `read_table`.
-
-    Raises InputError for a file that is damaged, has nested columns, or whose rows take more than `max_bytes`, or 200
-    times the size of the file and more than 64 MB; MissingExtraError without pyarrow.
-    """
-    limit = default_max_bytes() if max_bytes is None else max_bytes
-    return join(_tables(path, ROWS, skip_bad_rows, limit, progress), limit)
-
-
-def iter_parquet(
-    path: str | os.PathLike,
-    rows: int = ROWS,
-    *,
-    skip_bad_rows: bool = False,
-    progress: Progress | None = None,
-) -> Iterator[Table]:
-    """The tables of a Parquet file of any size, at most `rows` rows each; joined they are what `read_parquet` reads."""
-    return _tables(path, rows, skip_bad_rows, None, progress)
-
-
 def parquet_bytes(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -> bytes:
     """Columns of floats as a Parquet file, to the last bit: NaN stays NaN and is no null.
 
@@ -94,12 +67,12 @@ def parquet_bytes(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -
 # ---- reading -------------------------------------------------------------------------------------------
 
 
-def _tables(
-    path: str | os.PathLike, rows: int, skip: bool, max_bytes: int | None, progress: Progress | None
-) -> Iterator[Table]:
-    """The tables one after the other; the last one has the hash of the file and all notes."""
-    if rows < 1:
-        raise InputError("no rows in a piece", got=rows, expected="1 or more")
+def parquet_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+    """The tables of a Parquet file, its rows numbered from 1 in `Table.lines`; see the contract.
+
+    Raises InputError for a file that is damaged, has nested columns, or whose rows take more than `max_bytes`, or 200
+    times the size of the file and more than 64 MB; MissingExtraError without pyarrow.
+    """
     source = str(path)
     pyarrow, parquet = import_pyarrow(source)
     with open_regular(path) as stream:
@@ -107,21 +80,22 @@ def _tables(
         with _damage(pyarrow, source):
             file, columns = _opened(pyarrow, parquet, stream, source)
             pages = declared_bytes(stream)
-        _check_size(file.metadata, pages, len(columns.names), size, max_bytes, source)
-        reader = _Rows(columns, source, skip)
-        waiting: Table | None = None
+        _check_size(file.metadata, pages, len(columns.names), size, options.max_bytes, source)
+        reader = _Rows(columns, source, options.skip_bad_rows)
+
+        def table(values: dict[str, Column], lines: Any, sha256: str = "") -> Table:
+            return Table(columns.names, values, lines, columns.units, source, sha256, reader.notes, columns.titles)
+
         for done, batch in _batches(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
             with _damage(pyarrow, source):
                 values, lines = reader.read(batch, done)
-            if progress is not None:
-                progress(size * (done + batch.num_rows) // max(1, file.metadata.num_rows), size)
-            if len(lines) and waiting is not None:
-                yield waiting
-            if len(lines):
-                waiting = Table(columns.names, values, lines, columns.units, source, "", reader.notes, columns.titles)
-    if waiting is None:
-        raise InputError("no rows", got="0 samples", expected="at least one row", where=source)
-    yield replace(waiting, sha256=digest, notes=reader.notes)
+            if options.progress is not None:
+                options.progress(size * (done + batch.num_rows) // max(1, file.metadata.num_rows), size)
+            yield table(values, lines)
+    yield table({}, np.zeros(0, dtype=np.int64), digest)
+
+
+PARQUET = Reader("parquet", "Parquet", SUFFIXES, parquet_tables)
 
 
 def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[Any, _Columns]:
@@ -155,7 +129,7 @@ def _check_size(metadata: Any, pages: int, columns: int, size: int, max_bytes: i
 
 
 def _batches(pyarrow: Any, file: Any, rows: int, source: str) -> Iterator[tuple[int, Any]]:
-    """Pieces of the file, and how many rows stand before each."""
+    """Blocks of the file, and how many rows stand before each."""
     done = 0
     with _damage(pyarrow, source):
         batches = iter(file.iter_batches(batch_size=rows, use_threads=False))
@@ -328,7 +302,7 @@ def _seconds(array: Any) -> FloatArray:
 
 
 def _words(array: Any, before: bool) -> Column:
-    """Words, or the numbers that are all they hold, as in a CSV file; words where an earlier piece held some."""
+    """Words, or the numbers that are all they hold, as in a CSV file; words where an earlier block held some."""
     if hasattr(array, "dictionary"):
         known = [word or "" for word in array.dictionary.to_pylist()]
         cells = ["" if k is None else known[k] for k in array.indices.to_pylist()]

@@ -1,5 +1,5 @@
-"""Tables of numbers in a text file, strictly read.
+"""Tables of numbers, and what it takes to read one from text.
 
-text (lines in pieces), dialect (separator, cells, numbers), spaced (columns between blanks), decimals (a decimal
-comma), header (names, units), rows (cells to numbers), table (all of it).
+table (the value), text_file (lines in blocks), dialect (separator, cells, numbers), spaced (columns between blanks),
+header (names, units), rows (cells to numbers), decimals (what a point means where a comma may be decimal).
 """

@@ -19,7 +19,7 @@ THOUSAND = 1000
 
 
 class Points:
-    """What the points of one table mean, from its rows in order, given in pieces.
+    """What the points of one table mean, from its rows in order, given in blocks.
 
     names: of the columns. source: the path.
     """

@@ -23,7 +23,7 @@ HEAD_ROWS = 3  # at most so many lines above the first row: titles, units, names
 _SEPARATOR_LINE = re.compile(r"sep=([,;\t])")  # Excel's own first line
 
 
-class Line(NamedTuple):
+class FileLine(NamedTuple):
     """A line of the file, counted from 1."""
 
     number: int
@@ -62,7 +62,7 @@ def find_layout(lines: Sequence[str], source: str, header: bool = True) -> Layou
     `header` False: there are no names, the columns are called c1, c2, ...
     Raises InputError when there is no header, or one that cannot be used.
     """
-    kept = [Line(k + 1, line) for k, line in enumerate(lines) if line.strip() and not dialect.is_comment(line)]
+    kept = [FileLine(k + 1, line) for k, line in enumerate(lines) if line.strip() and not dialect.is_comment(line)]
     told = _SEPARATOR_LINE.fullmatch(kept[0].text.strip()) if kept else None
     kept = kept[1:] if told else kept
     if not kept:
@@ -90,7 +90,7 @@ def _has_number(line: str) -> bool:
     return any(dialect.looks_like_number(cell.strip(' "')) for cell in re.split(r"[,;\t]", line))
 
 
-def _without_header(kept: list[Line], separator: str, source: str) -> Layout:
+def _without_header(kept: list[FileLine], separator: str, source: str) -> Layout:
     texts = [line.text for line in kept]
     separator = separator or dialect.find_separator(texts[0], texts, f"{source}:{kept[0].number}")
     ending = _other_ending(texts[:SAMPLE_ROWS], separator)
@@ -106,10 +106,12 @@ def _numbered(count: int) -> tuple[str, ...]:
     return tuple(f"c{k + 1}" for k in range(count))
 
 
-def _commented_header(lines: Sequence[str], row: Line) -> list[Line]:
+def _commented_header(lines: Sequence[str], row: FileLine) -> list[FileLine]:
     """Names, or names and units, that stand as comments right above the first row (`numpy.savetxt` puts them there)."""
-    above = [Line(k + 1, line) for k, line in enumerate(lines[: row.number - 1]) if line.strip()][-2:]
-    comments = [Line(line.number, line.text.lstrip()[1:].strip()) for line in above if dialect.is_comment(line.text)]
+    above = [FileLine(k + 1, line) for k, line in enumerate(lines[: row.number - 1]) if line.strip()][-2:]
+    comments = [
+        FileLine(line.number, line.text.lstrip()[1:].strip()) for line in above if dialect.is_comment(line.text)
+    ]
     if not comments or comments[-1].number != above[-1].number:
         return []
     for separator in SEPARATORS:
@@ -127,14 +129,14 @@ def _are_names(cells: Sequence[str]) -> bool:
     return all(cells) and len(set(cells)) == len(cells) and not any(map(dialect.looks_like_number, cells))
 
 
-def _layout(kept: list[Line], commented: int, separator: str, source: str) -> Layout:
+def _layout(kept: list[FileLine], commented: int, separator: str, source: str) -> Layout:
     """The layout of a file whose first line that counts is a header; the first `commented` of them were comments."""
     where = f"{source}:{kept[0].number}"
     rows = [line.text for line in kept[max(1, commented) :]]
     separator = separator or dialect.find_separator(kept[0].text, rows, where)
     ending = _other_ending(rows[HEAD_ROWS if len(rows) > 2 * HEAD_ROWS else 0 :][:SAMPLE_ROWS], separator)
     if ending:
-        kept = [Line(line.number, line.text.rstrip().removesuffix(ending)) for line in kept]
+        kept = [FileLine(line.number, line.text.rstrip().removesuffix(ending)) for line in kept]
     head = _head(kept[: commented or HEAD_ROWS + 1], separator, source)
     body = kept[len(head.lines) :]
     if not body:
@@ -150,7 +152,7 @@ def _layout(kept: list[Line], commented: int, separator: str, source: str) -> La
 class _Head(NamedTuple):
     """The lines above the first row, their cells, and which of them are the names, the units and the titles."""
 
-    lines: list[Line]
+    lines: list[FileLine]
     cells: list[list[str]]
     names: int = 0
     units: int | None = None
@@ -160,7 +162,7 @@ class _Head(NamedTuple):
         return [] if which is None else self.cells[which]
 
 
-def _head(first: list[Line], separator: str, source: str) -> _Head:
+def _head(first: list[FileLine], separator: str, source: str) -> _Head:
     """Which of the first lines are the head: a line of names, one of units, and with both, one of titles."""
     cells = [dialect.split_cells(first[0].text, separator, f"{source}:{first[0].number}")]
     cells += [_cells_or_row(line.text, separator) for line in first[1:]]
@@ -188,7 +190,7 @@ def _trimmed(cells: list[str]) -> list[str]:
     return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
 
-def _names(head: _Head, separator: str, body: list[Line], source: str) -> list[str]:
+def _names(head: _Head, separator: str, body: list[FileLine], source: str) -> list[str]:
     """The column names: one each, none blank, none a number, none twice. A blank last one has no column below it."""
     line, names = head.lines[head.names], head.cells[head.names]
     where = f"{source}:{line.number}"
@@ -261,7 +263,7 @@ def _units(names: list[str], head: _Head, where: str) -> tuple[list[str], dict[s
     return plain, units
 
 
-def _with_ending(layout: Layout, rows: list[Line], other: str) -> Layout:
+def _with_ending(layout: Layout, rows: list[FileLine], other: str) -> Layout:
     """The layout with what stands at the end of its rows and means nothing: its own separator, or another."""
     count = len(layout.names)
     own = [dialect.counts(row.text, layout.separator) for row in rows]

@@ -1,4 +1,4 @@
-"""Lines of text into columns of numbers, piece after piece; a piece more or less never changes a number.
+"""Lines of text into columns of numbers, block after block; a block more or less never changes a number.
 
 Plain numbers go through NumPy's own parser. Where it stumbles, every cell is looked at: that finds what is wrong and
 where, and reads words, quotes and odd blanks. Both give the same numbers (a test holds them against each other).
@@ -30,11 +30,11 @@ COMMA_NOTE = "numbers have a decimal comma"
 
 
 class RowParser:
-    """Reads the rows of one file in order, given to it in pieces.
+    """Reads the rows of one file in order, given to it in blocks.
 
     layout: of the file. skip: leave out bad rows instead of refusing the file; `skipped` counts them, by reason, with
     their lines. sample: the first rows, which then say what columns hold numbers.
-    What a piece shows holds for all later ones: whether numbers have a decimal comma, and which columns hold words.
+    What a block shows holds for all later ones: whether numbers have a decimal comma, and which columns hold words.
     """
 
     def __init__(self, layout: Layout, source: str, skip: bool = False, sample: Sequence[str] = ()):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from omnidyn.model.layout import AXES, HOLD, SLIDE, VISCOUS
+from omnidyn.model.layout import HOLD, N_AXES, SLIDE, VISCOUS
 from omnidyn.model.value import Levels, Value, per_axis_number
 
 
@@ -44,10 +44,10 @@ class AxesFriction(Value):
         """Add the levels of the three axes; see FrictionLaw."""
         viscous, coulomb, breakaway = self.levels
         units = np.array([1.0, 1.0, length])
-        element[:AXES, VISCOUS] += viscous / units**2
+        element[:N_AXES, VISCOUS] += viscous / units**2
         for side in range(2):
-            element[:AXES, SLIDE + side] += coulomb / units
-            element[:AXES, HOLD + side] += breakaway / units
+            element[:N_AXES, SLIDE + side] += coulomb / units
+            element[:N_AXES, HOLD + side] += breakaway / units
 
     def sliding_wrench(self, twist: ArrayLike) -> NDArray[np.float64]:
         """-(B v + C sgn v) of the axes that move; 0 for an axis at rest. Shape (*batch, 3)."""

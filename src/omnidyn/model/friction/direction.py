@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
-from omnidyn.model.layout import AXES, HOLD, HOLD_X, HOLD_Y, SLIDE, SLIDE_X, SLIDE_Y, VISCOUS, YAW
+from omnidyn.model.layout import HOLD, HOLD_X, HOLD_Y, N_AXES, SLIDE, SLIDE_X, SLIDE_Y, VISCOUS, YAW
 from omnidyn.model.value import Value, number, to_list
 
 Level = Annotated[float, number(0.0, 1e6)]
@@ -42,7 +42,7 @@ class DirectionFriction(Value):
         body[[SLIDE_X, SLIDE_Y]] += self.coulomb
         body[[HOLD_X, HOLD_Y]] += self.coulomb if self.breakaway is None else self.breakaway
         yaw_hold = self.yaw_coulomb if self.yaw_breakaway is None else self.yaw_breakaway
-        element[:AXES, VISCOUS] += [self.viscous, self.viscous, self.yaw_viscous / length**2]
+        element[:N_AXES, VISCOUS] += [self.viscous, self.viscous, self.yaw_viscous / length**2]
         element[YAW, SLIDE : SLIDE + 2] += self.yaw_coulomb / length
         element[YAW, HOLD : HOLD + 2] += yaw_hold / length
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from omnidyn.model.layout import AXES, HOLD, SLIDE, VISCOUS
+from omnidyn.model.layout import HOLD, N_AXES, SLIDE, VISCOUS
 from omnidyn.model.value import PerWheel, Value, per_wheel_number
 
 Level = Annotated[PerWheel, per_wheel_number(0.0, 1e6)]
@@ -50,7 +50,7 @@ class WheelFriction(Value):
 
     def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
         """Add the levels of each wheel, forward and backward; see FrictionLaw."""
-        wheels = element[AXES:]
+        wheels = element[N_AXES:]
         levels = {
             VISCOUS: self.viscous,
             SLIDE: self.coulomb,

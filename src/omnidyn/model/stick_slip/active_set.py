@@ -1,7 +1,7 @@
-"""The face of what is stuck: the velocities that it allows, moving onto it, and Newton's step within it.
+"""The active set, what is stuck: the velocities that it allows, moving onto them, and Newton's step within them.
 
-A face is a linear subspace: g . x = 0 for every stuck element, v_x = v_y = 0 while the ellipse is stuck. It stands in
-the scratch array as Gauss-Jordan rows (what is forbidden) and as a basis B (what is allowed).
+They are a linear subspace: g . x = 0 for every stuck element, v_x = v_y = 0 while the ellipse is stuck. It stands in
+the workspace as Gauss-Jordan rows (what is forbidden) and as a basis B (what is allowed).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ FLAT = 1e-10  # a relative size that is rounding: an element does not move along
 
 @part
 def _forbid(s, rank, g0, g1, g2):
-    """Add a stuck direction to the Gauss-Jordan rows of the face. Returns the new rank."""
+    """Add a stuck direction to the Gauss-Jordan rows. Returns the new rank."""
     row = s[SPARE]
     row[0], row[1], row[2] = g0, g1, g2
     size = max(abs(g0), abs(g1), abs(g2))
@@ -43,7 +43,7 @@ def _forbid(s, rank, g0, g1, g2):
 
 
 @part
-def face(body, element, s):
+def find_active_set(body, element, s):
     """The velocities that the stuck elements allow: s[BASIS + i], i < k. Returns rank = 3 - k.
 
     Pivot components follow from the free ones, so that a stuck axis is exactly 0.
@@ -78,7 +78,7 @@ def moves_along(g0, g1, g2, d0, d1, d2):
 
 @part
 def absorb(body, element, s, rank):
-    """Elements that cannot move on this face are stuck too, the ellipse included. Returns whether any was not yet."""
+    """What these velocities cannot move is stuck too, the ellipse included. Returns whether any element was not yet."""
     changed = False
     for e in range(len(element)):
         if element[e, SIGN] == 1.0 or element[e, SIGN] == -1.0:
@@ -98,8 +98,8 @@ def absorb(body, element, s, rank):
 
 
 @part
-def onto_face(x, s, rank):
-    """Move x onto the face, in place."""
+def onto_active_set(x, s, rank):
+    """Move x to velocities that the active set allows, in place."""
     for j in range(rank):
         x[int(s[PIVOT, j])] = 0.0
     for j in range(rank):
@@ -111,7 +111,7 @@ def onto_face(x, s, rank):
 
 @part
 def newton_direction(s, rank):
-    """d = B z with (B' J B) z = -B' r: Newton's step within the face. Returns the largest |B' r|."""
+    """d = B z with (B' J B) z = -B' r: Newton's step within the active set. Returns the largest |B' r|."""
     k, largest = 3 - rank, 0.0
     for i in range(k):
         for j in range(k):

@@ -57,7 +57,7 @@ def _both_ways(body, element, s, d0, d1, d2, found):
 
 @part
 def _normal(body, element, s, u0, u1, u2, e, found):
-    """Try the cross product of u and the direction of element e, both ways."""
+    """Try the cross product of u and the direction of element e, both directions."""
     v0, v1, v2 = element[e, GX], element[e, GY], element[e, GZ]
     return _both_ways(body, element, s, u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0, found)
 
@@ -138,7 +138,7 @@ def _ellipse_worst(body, element, s, rank):
 def worst_direction(body, element, s, rank):
     """phi of the direction in which the stuck elements hold least, in s[WORST]; 0 when they hold.
 
-    `rank`: dimension of what they forbid; s[BASIS] is the velocity that a face of rank 2 still allows.
+    `rank`: dimension of what they forbid; s[BASIS] is the velocity that an active set of rank 2 still allows.
     """
     if body[ELLIPSE] == 0.0:
         return _ellipse_worst(body, element, s, rank)

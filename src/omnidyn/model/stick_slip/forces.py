@@ -1,6 +1,6 @@
 """What acts on a robot that moves with x: motors, friction of what slides, the turning frame. Residual and Jacobian.
 
-x = (v_x, v_y, rho omega); the problem stands in the tables of a Plant (layout.py), the result in the scratch array.
+x = (v_x, v_y, rho omega); the problem stands in the tables of a Plant (layout.py), the result in the workspace array.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
-    AXES,
     BOUND,
     BRANCH,
     CURRENT,
@@ -17,7 +16,6 @@ from omnidyn.model.layout import (
     EFFICIENCY,
     ELLIPSE,
     EMF,
-    GAIN,
     GOAL,
     GX,
     GY,
@@ -28,6 +26,7 @@ from omnidyn.model.layout import (
     INDUCTANCE,
     LOSS,
     MASS,
+    N_AXES,
     NOW,
     OPEN,
     PUSH,
@@ -37,6 +36,7 @@ from omnidyn.model.layout import (
     SLIDE_X,
     SLIDE_Y,
     TAU,
+    THRUST,
     TURNING,
     VISCOUS,
     VOLTAGE,
@@ -80,6 +80,30 @@ def winding(speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
 
 
 @part
+def motor_branch(element, e, speed, tau):
+    """`winding_branch` of the motor of element e."""
+    return winding_branch(
+        speed, element[e, VOLTAGE], element[e, NOW], tau, element[e, EMF], element[e, RESISTANCE],
+        element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
+    )  # fmt: skip
+
+
+@part
+def motor_current(element, e, branch, speed, tau):
+    """`winding_answer` of the motor of element e."""
+    return winding_answer(
+        branch, speed, element[e, VOLTAGE], element[e, NOW], tau, element[e, EMF], element[e, RESISTANCE],
+        element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
+    )  # fmt: skip
+
+
+@part
+def current_at_rest(element, e, tau):
+    """Current [A] of the motor of element e while its wheel stands still."""
+    return motor_current(element, e, motor_branch(element, e, 0.0, tau), 0.0, tau)[0]
+
+
+@part
 def gear(i, sign, gain, efficiency):
     """Force per ampere behind a gear: eta while the motor drives (i s > 0), 1/eta while it is driven, 1 at rest."""
     if sign * i > 0.0:
@@ -92,14 +116,11 @@ def gear(i, sign, gain, efficiency):
 @part
 def set_losses(body, element):
     """What each gear takes at rest from a motion forward and backward [N]: dry friction with a level ~ |i|."""
-    for e in range(AXES, len(element)):
+    for e in range(N_AXES, len(element)):
         element[e, LOSS] = element[e, LOSS + 1] = 0.0
         if element[e, EFFICIENCY] != 1.0:
-            i = winding(
-                0.0, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
-                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
-            )[0]  # fmt: skip
-            gain, efficiency = element[e, GAIN], element[e, EFFICIENCY]
+            i = current_at_rest(element, e, body[TAU])
+            gain, efficiency = element[e, THRUST], element[e, EFFICIENCY]
             element[e, LOSS] = i * (gain - gear(i, 1.0, gain, efficiency))
             element[e, LOSS + 1] = i * (gear(i, -1.0, gain, efficiency) - gain)
 
@@ -110,12 +131,9 @@ def forces_at_work(body, element):
     total = abs(body[PUSH]) + abs(body[PUSH + 1]) + abs(body[PUSH + 2]) + body[HOLD_X] + body[HOLD_Y]
     for e in range(len(element)):
         total += max(element[e, HOLD], element[e, HOLD + 1])
-        if e >= AXES:
-            i = winding(
-                0.0, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
-                element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
-            )[0]  # fmt: skip
-            total += abs(i) * element[e, GAIN] / element[e, EFFICIENCY]
+        if e >= N_AXES:
+            i = current_at_rest(element, e, body[TAU])
+            total += abs(i) * element[e, THRUST] / element[e, EFFICIENCY]
     return total
 
 
@@ -138,19 +156,13 @@ def residual(body, element, x, s):
             force -= element[e, SLIDE]
         elif sign == -1.0:
             force += element[e, SLIDE + 1]
-        if e >= AXES:
+        if e >= N_AXES:
             branch = element[e, BRANCH]
             if branch == OPEN:
-                branch = winding_branch(
-                    speed, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF], element[e, RESISTANCE],
-                    element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
-                )  # fmt: skip
-            i, di = winding_answer(
-                branch, speed, element[e, VOLTAGE], element[e, NOW], body[TAU], element[e, EMF],
-                element[e, RESISTANCE], element[e, INDUCTANCE], element[e, DROP], element[e, BOUND],
-            )  # fmt: skip
+                branch = motor_branch(element, e, speed, body[TAU])
+            i, di = motor_current(element, e, branch, speed, body[TAU])
             side = i if element[e, BRANCH] == OPEN else branch
-            gain = element[e, GAIN] if sign == 2.0 else gear(side, sign, element[e, GAIN], element[e, EFFICIENCY])
+            gain = element[e, THRUST] if sign == 2.0 else gear(side, sign, element[e, THRUST], element[e, EFFICIENCY])
             element[e, CURRENT] = i
             force, slope = force + gain * i, slope + gain * di
         r0, r1, r2 = r0 - force * g0, r1 - force * g1, r2 - force * g2

@@ -6,12 +6,12 @@ x = (v_x, v_y, rho omega); F: motors, viscous friction, turning frame; N_e: the 
 at rest and the slide level in motion; E: the potential sqrt(Cx^2 vx^2 + Cy^2 vy^2) of the ellipse. A stage of an
 implicit step is such a problem; with tau = 1, x* = 0 and speeds frozen its solution is the acceleration.
 
-Method: all kinks g_e . x = 0 pass through the origin, so space falls into cells (signs of the elements) and faces
-(some stuck). Newton within a face; on the way, stop at a kink that holds, pass one that gives way; at the optimum of
-a face ask whether the stuck elements can hold (can_hold.py), and if not, release along the direction that they cannot.
-A stuck element's speed is exactly 0: it is a flag, not a small number.
+Method: all kinks g_e . x = 0 pass through the origin, so space falls into cells (signs of the elements) and their
+faces (an active set: some stuck). Newton within one; on the way, stop at a kink that holds, pass one that gives way; at
+its optimum ask whether the stuck elements can hold (can_hold.py), and if not, release along the direction that they
+cannot. A stuck element's speed is exactly 0: it is a flag, not a small number.
 
-The problem stands in a Plant (plant.py names its entries): `body` and `element`. `s` is the scratch of `scratch()`.
+The problem stands in a Plant (plant.py names its entries): `body` and `element`. `s` is the workspace of `workspace()`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,14 @@ from omnidyn.model.layout import (
     SLIDE_Y,
     TAU,
 )
-from omnidyn.model.stick_slip.active_set import FLAT, absorb, face, moves_along, newton_direction, onto_face
+from omnidyn.model.stick_slip.active_set import (
+    FLAT,
+    absorb,
+    find_active_set,
+    moves_along,
+    newton_direction,
+    onto_active_set,
+)
 from omnidyn.model.stick_slip.can_hold import worst_direction
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses
 from omnidyn.model.stick_slip.workspace import JACOBIAN, NEWTON, RESIDUAL, TRIAL, WORST
@@ -247,7 +254,7 @@ def _release(body, element, x, s, slope):
 
 @part
 def solve(body, element, x, s):
-    """Solve the inclusion in place, from a first guess x on the face of the signs. Returns the number of iterations.
+    """Solve the inclusion in place, from a first guess x that has the signs. Returns the number of iterations.
 
     The currents at the solution stand in CURRENT. A return of CAP means that the last digits are not there: say so.
     """
@@ -260,10 +267,10 @@ def solve(body, element, x, s):
             _rest(body, element, x)
             stale = True
         if stale:
-            rank = face(body, element, s)
+            rank = find_active_set(body, element, s)
             while rank > 0 and absorb(body, element, s, rank):
-                rank = face(body, element, s)
-            onto_face(x, s, rank)
+                rank = find_active_set(body, element, s)
+            onto_active_set(x, s, rank)
             stale = known = False
         if not known:
             residual(body, element, x, s)
@@ -272,7 +279,7 @@ def solve(body, element, x, s):
             if found < -tight:
                 _release(body, element, x, s, found)
             elif not _stop_contradictions(element, x):
-                onto_face(x, s, rank)
+                onto_active_set(x, s, rank)
                 return iteration
             stale = True
         else:

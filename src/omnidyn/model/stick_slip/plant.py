@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from omnidyn.model.layout import (
     ACTIVE,
-    AXES,
     BODY_SIZE,
     BOUND,
     DROP,
@@ -17,7 +16,6 @@ from omnidyn.model.layout import (
     ELEMENT_SIZE,
     ELLIPSE,
     EMF,
-    GAIN,
     GX,
     GZ,
     HOLD,
@@ -27,8 +25,10 @@ from omnidyn.model.layout import (
     LIMIT,
     MASS,
     MEMORY,
+    N_AXES,
     RESISTANCE,
     SIGN,
+    THRUST,
     TURNING,
     VISCOUS,
 )
@@ -48,7 +48,7 @@ class Plant(NamedTuple):
     @property
     def wheels(self) -> int:
         """Number of wheels."""
-        return len(self.element) - AXES
+        return len(self.element) - N_AXES
 
     def copy(self) -> Plant:
         """The same numbers in arrays of their own."""
@@ -58,17 +58,17 @@ class Plant(NamedTuple):
 def plant(robot: Robot) -> Plant:
     """The numbers of a robot, all friction put together; everything that can stick is stuck."""
     length = float(np.sqrt(robot.body.inertia / robot.body.mass))
-    body, element = np.zeros(BODY_SIZE), np.zeros((AXES + robot.wheels.count, ELEMENT_SIZE))
+    body, element = np.zeros(BODY_SIZE), np.zeros((N_AXES + robot.wheels.count, ELEMENT_SIZE))
     body[[MASS, LENGTH]] = robot.body.mass, length
     body[TURNING] = robot.body.mass / length if robot.body.rotating_frame else 0.0
-    element[:AXES, GX : GZ + 1] = np.eye(AXES)
-    element[AXES:, GX : GZ + 1] = robot.wheels.wrench_matrix.T * [1.0, 1.0, 1.0 / length]
-    _fill_motors(robot, element[AXES:])
+    element[:N_AXES, GX : GZ + 1] = np.eye(N_AXES)
+    element[N_AXES:, GX : GZ + 1] = robot.wheels.wrench_matrix.T * [1.0, 1.0, 1.0 / length]
+    _fill_motors(robot, element[N_AXES:])
     for law in robot.friction.laws:
         law.add_to(body, element, length)
     body[ELLIPSE] = 0.0 if body[HOLD_X] > 0.0 else 2.0
     element[:, ACTIVE] = (element[:, HOLD] > 0.0) | (element[:, HOLD + 1] > 0.0)
-    element[AXES:, ACTIVE] += element[AXES:, EFFICIENCY] < 1.0  # a lossy gear holds too
+    element[N_AXES:, ACTIVE] += element[N_AXES:, EFFICIENCY] < 1.0  # a lossy gear holds too
     element[:, SIGN] = np.where(element[:, ACTIVE] > 0.0, 0.0, 2.0)
     body[MEMORY], body[MEMORY + 1] = _memory(body[MASS], element, True), _memory(body[MASS], element, False)
     return Plant(body, element)
@@ -76,9 +76,9 @@ def plant(robot: Robot) -> Plant:
 
 def _memory(mass: float, element: FloatArray, driven: bool) -> float:
     """M over the least eigenvalue of sum_e g g^T (b + K E/R), plus the longest L/R of a motor [s]."""
-    motors, damping = element[AXES:], element[:, VISCOUS].copy()
+    motors, damping = element[N_AXES:], element[:, VISCOUS].copy()
     if driven:
-        damping[AXES:] += motors[:, GAIN] * motors[:, EMF] / motors[:, RESISTANCE]
+        damping[N_AXES:] += motors[:, THRUST] * motors[:, EMF] / motors[:, RESISTANCE]
     g = element[:, GX : GZ + 1]
     least = np.linalg.eigvalsh((g.T * damping) @ g)[0]
     return float(mass / max(least, 1e-9 * mass) + (motors[:, INDUCTANCE] / motors[:, RESISTANCE]).max())
@@ -92,7 +92,7 @@ def _fill_motors(robot: Robot, element: FloatArray) -> None:
     element[:, RESISTANCE], element[:, DROP] = per_wheel(motor.resistance, n), per_wheel(motor.voltage_drop, n)
     element[:, LIMIT] = element[:, BOUND] = per_wheel(no_limit, n)
     element[:, EFFICIENCY] = per_wheel(motor.gear_efficiency, n)
-    element[:, GAIN] = at_rim * per_wheel(motor.torque_constant, n)
+    element[:, THRUST] = at_rim * per_wheel(motor.torque_constant, n)
     element[:, EMF] = at_rim * per_wheel(motor.emf_constant, n)
     if motor.electrical == DYNAMIC:
         element[:, INDUCTANCE] = per_wheel(motor.inductance or 0.0, n)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import (
-    AXES,
     BOUND,
     DROP,
     ELLIPSE,
@@ -23,6 +22,7 @@ from omnidyn.model.layout import (
     GZ,
     INDUCTANCE,
     LENGTH,
+    N_AXES,
     NOW,
     PUSH,
     RESISTANCE,
@@ -35,7 +35,7 @@ from omnidyn.model.layout import (
 from omnidyn.model.stick_slip.forces import residual, winding
 from omnidyn.model.stick_slip.inclusion import solve
 from omnidyn.model.stick_slip.plant import Plant
-from omnidyn.model.stick_slip.workspace import RESIDUAL, scratch
+from omnidyn.model.stick_slip.workspace import RESIDUAL, workspace
 
 FloatArray = NDArray[np.float64]
 SIGNS = 3  # where the signs begin in a state
@@ -53,6 +53,12 @@ def with_given_currents(plant: Plant) -> Plant:
     bare.element[:, [VISCOUS, EMF, RESISTANCE, DROP, VOLTAGE]] = 0.0
     bare.element[:, INDUCTANCE], bare.element[:, BOUND] = 1.0, np.inf
     return bare
+
+
+@part
+def current_entry(e, m):
+    """Where the current of element e stands in a state of m elements."""
+    return SIGNS + 1 + m + e - N_AXES
 
 
 @part
@@ -104,11 +110,11 @@ def moving_states(plant: Plant, twists: FloatArray) -> FloatArray:
 def settle_currents(element, state):
     """Put into a state the currents that its voltages and speeds give at once, where windings have no inductance."""
     m = len(element)
-    for e in range(AXES, m):
+    for e in range(N_AXES, m):
         if element[e, INDUCTANCE] == 0.0:
             g0, g1, g2 = element[e, GX], element[e, GY], element[e, GZ]
             speed = g0 * state[0] + g1 * state[1] + g2 * state[2] if state[SIGNS + e] != 0.0 else 0.0
-            state[SIGNS + 1 + m + e - AXES] = winding(
+            state[current_entry(e, m)] = winding(
                 speed, element[e, VOLTAGE], 0.0, 1.0, element[e, EMF], element[e, RESISTANCE], 0.0, element[e, DROP],
                 element[e, BOUND],
             )[0]  # fmt: skip
@@ -120,9 +126,9 @@ def _smooth_force(body, element, bare_body, bare_element, s, state):
     m = len(element)
     for e in range(m):
         bare_element[e, VISCOUS] = element[e, VISCOUS]
-        if e >= AXES:
+        if e >= N_AXES:
             stuck = state[SIGNS + e] == 0.0
-            bare_element[e, NOW] = 0.0 if stuck else state[SIGNS + 1 + m + e - AXES]
+            bare_element[e, NOW] = 0.0 if stuck else state[current_entry(e, m)]
     bare_body[TURNING] = body[TURNING]
     for a in range(3):
         bare_body[GOAL + a], bare_body[PUSH + a] = state[a], body[PUSH + a]
@@ -145,9 +151,9 @@ def settle(body, element, bare_body, bare_element, s, state, acceleration):
     for e in range(m):
         bare_element[e, VISCOUS] = 0.0
         bare_element[e, SIGN] = 0.0 if state[SIGNS + e] == 0.0 else 2.0
-        if e >= AXES:
+        if e >= N_AXES:
             stuck = state[SIGNS + e] == 0.0
-            bare_element[e, NOW] = state[SIGNS + 1 + m + e - AXES] if stuck else 0.0
+            bare_element[e, NOW] = state[current_entry(e, m)] if stuck else 0.0
     bare_body[ELLIPSE] = 0.0 if state[SIGNS + m] == 0.0 else 2.0
     for a in range(3):
         acceleration[a] = bare_body[GOAL + a] = 0.0
@@ -163,8 +169,8 @@ def settle(body, element, bare_body, bare_element, s, state, acceleration):
 @kernel
 def _accelerations(body, element, bare_body, bare_element, s, states, voltage, out):
     for k in range(len(states)):
-        for e in range(AXES, len(element)):
-            element[e, VOLTAGE] = voltage[k, e - AXES]
+        for e in range(N_AXES, len(element)):
+            element[e, VOLTAGE] = voltage[k, e - N_AXES]
         settle(body, element, bare_body, bare_element, s, states[k], out[k])
 
 
@@ -174,5 +180,5 @@ def accelerations(plant: Plant, states: FloatArray, voltage: FloatArray) -> Floa
     The signs in `states` are changed in place to those of what gives way.
     """
     out = np.zeros((len(states), 3))
-    _accelerations(*plant.copy(), *with_given_currents(plant), scratch(), states, voltage, out)
+    _accelerations(*plant.copy(), *with_given_currents(plant), workspace(), states, voltage, out)
     return out

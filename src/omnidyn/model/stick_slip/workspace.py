@@ -1,4 +1,4 @@
-"""The scratch array of the solvers: rows of four numbers, named here, so that no solve allocates anything."""
+"""The workspace array of the solvers: rows of four numbers, named here, so that no solve allocates anything."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ BASIS, ROW, JACOBIAN, MATRIX = 6, 9, 12, 15  # three rows each
 PIVOT, ROWS = 18, 19
 
 
-def scratch() -> NDArray[np.float64]:
-    """A fresh scratch array."""
+def workspace() -> NDArray[np.float64]:
+    """A fresh workspace array."""
     return np.zeros((ROWS, 4))
 
 

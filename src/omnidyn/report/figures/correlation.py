@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.identification.estimate import Correlation
+from omnidyn.logs.steady_table import AXES
+from omnidyn.model.keys import find_key
 from omnidyn.report.style import INK, WIDTH, Picture, look, new_figure, picture
 
 MOST = 16
@@ -46,8 +48,9 @@ def draw_correlation(correlation: Correlation) -> Picture:
 
 def _short(name: str) -> str:
     """A key without what all keys share: "friction.axes.viscous[0]" is "viscous x"."""
-    head, _, last = name.rpartition(".") if not name.startswith("latency") else ("", "", name)
-    word, bracket, index = last.partition("[")
-    if head == "friction.axes" and bracket:
-        return f"{word} {('x', 'y', 'yaw')[int(index[0])]}"
-    return last.replace("_", " ")
+    key = find_key(name)
+    if key is None:
+        return name.replace("_", " ")
+    if key.axis is not None and key.index is not None:
+        return f"{key.field} {AXES[key.axis]}"
+    return str(key).removeprefix(f"{key.table}.").replace("_", " ")

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from omnidyn.identification.steady.operating_points import SPEEDS, ForcePoints
 from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.identification.steady.study import SteadyStudy
+from omnidyn.model.keys import Key
+from omnidyn.model.layout import YAW
 from omnidyn.report.style import (
     BLUE,
     GREEN,
@@ -169,7 +171,7 @@ def _curve(study: SteadyStudy, group: str, name: str, own: ForcePoints) -> tuple
         traction=np.zeros((len(way), own.traction.shape[1])), direction=way, group=(group,) * len(way),
         run=empty.astype(np.int64), rows=empty.astype(np.int64),
     )  # fmt: skip
-    turning = any(".yaw_" in key or key == "friction.axes.coulomb[2]" for key in fit.keys)
+    turning = any(Key.parse(key).axis == YAW for key in fit.keys)
     return way, SHAPES[name].force(study.robot, points, turning, fit.level)
 
 

@@ -17,7 +17,7 @@ from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import StateSpace, discretise, is_decoupled, state_space
-from omnidyn.simulation.exact import step as formula
+from omnidyn.simulation.exact.step import exact_step, pieces, speed_within, turned_within
 from omnidyn.simulation.pose import put_next_pose, rotated
 
 FloatArray = NDArray[np.float64]
@@ -29,9 +29,6 @@ PIECE = 0.4
 SPIN_UP = 3.0  # weight of the yaw acceleration among the rates
 SETTLED = 40.0  # a t beyond which e^(-a t) is below the last bit
 MAX_TURN_PER_STEP = 1e5  # [rad]: more would be minutes of quadrature for one row
-
-_step, _pieces = part(formula.exact_step), part(formula.pieces)
-_speed_within, _turned_within = part(formula.speed_within), part(formula.turned_within)
 
 
 def why_not_exact(robot: Robot) -> list[str]:
@@ -111,7 +108,7 @@ def _twists(drive, phi, which, rate, coulomb, breakaway, start):
         speed, a, c, s = start[axis], rate[axis], coulomb[axis], breakaway[axis]
         out[0, axis] = speed
         for k in range(len(drive)):
-            speed = _step(speed, drive[k, axis], c, s, a, phi[which[k], axis], 0.0)
+            speed = exact_step(speed, drive[k, axis], c, s, a, phi[which[k], axis], 0.0)
             out[k + 1, axis] = speed
     return out
 
@@ -154,8 +151,8 @@ def _displacement(start, event, before, after, rate, left, right, nodes, weights
     for node in range(len(nodes)):
         t = left + (right - left) * nodes[node]
         for axis in range(3):
-            now[axis] = _speed_within(t, start[axis], event[axis], before[axis], after[axis], rate[axis])
-        turned = _turned_within(t, start[2], now[2], event[2], before[2], after[2], rate[2])
+            now[axis] = speed_within(t, start[axis], event[axis], before[axis], after[axis], rate[axis])
+        turned = turned_within(t, start[2], now[2], event[2], before[2], after[2], rate[2])
         dx, dy = rotated(turned, now[0], now[1])
         x += (right - left) * weights[node] * dx
         y += (right - left) * weights[node] * dy
@@ -185,7 +182,7 @@ def _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, start, no
     for k in range(len(drive)):
         dt, moving = steps[which[k]], False
         for axis in range(3):
-            event[axis], before[axis], after[axis] = _pieces(
+            event[axis], before[axis], after[axis] = pieces(
                 twists[k, axis], drive[k, axis], coulomb[axis], breakaway[axis], rate[axis], phi[which[k], axis], dt
             )
             moving |= (twists[k, axis] != 0.0) | (before[axis] != 0.0)
@@ -193,6 +190,6 @@ def _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, start, no
             out[k + 1, i] = out[k, i]
         if moving:
             x, y = _travel(twists[k], twists[k + 1], event, before, after, rate, dt, nodes, weights)
-            turn = _turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2])
+            turn = turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2])
             lost = put_next_pose(out, k, x, y, turn, lost)
     return out

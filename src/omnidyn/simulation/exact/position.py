@@ -15,17 +15,15 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.simulation.exact import step as formula
 from omnidyn.simulation.exact.march import NODES, WEIGHTS, next_cut, turning
 from omnidyn.simulation.exact.slopes import hold_slopes, step_slopes, travel_slopes
+from omnidyn.simulation.exact.step import pieces as pieces_of
 from omnidyn.simulation.pose import rotated
 
 X, Y = 0, 1  # rows of `place`
 VALUE, BY_SPEED, BY_DRIVE, BY_COULOMB, BY_RATE, PLACE_SIZE = 0, 1, 4, 7, 10, 13  # its columns: 3 each, one per axis
 EVENT, BEFORE, AFTER = 0, 1, 2  # rows of `pieces`
 _NODES, _WEIGHTS = tuple(NODES.tolist()), tuple(WEIGHTS.tolist())
-
-_pieces = part(formula.pieces)
 
 
 @part
@@ -40,7 +38,7 @@ def put_displacement(place, pieces, speed, drive, law, dt):
     moving = False
     for axis in range(3):
         rate, phi = law[0, axis], -math.expm1(-law[0, axis] * dt) / law[0, axis]
-        event, before, after = _pieces(speed[axis], drive[axis], law[1, axis], law[2, axis], rate, phi, dt)
+        event, before, after = pieces_of(speed[axis], drive[axis], law[1, axis], law[2, axis], rate, phi, dt)
         pieces[EVENT, axis], pieces[BEFORE, axis], pieces[AFTER, axis] = event, before, after
         moving |= (speed[axis] != 0.0) | (before != 0.0)
     if not moving:

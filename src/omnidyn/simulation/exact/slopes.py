@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
+from omnidyn.simulation.exact.step import course, crossing_time
 
 SHORT = 1e-2  # a h below which the closed forms lose digits to cancellation and a series takes over
 
@@ -42,20 +43,15 @@ def step_slopes(speed, drive, coulomb, breakaway, rate, phi, dphi):
 
     Arguments as for `exact_step`; dphi = d phi/da [s^2] from `hold_slopes`. Units of the derivatives: 1, s, s, m.
     """
-    mirrored = (speed < 0.0) | ((speed == 0.0) & (drive < 0.0))
-    x = abs(speed)
-    q = -drive if mirrored else drive
-    if (x == 0.0) & (q <= breakaway):
+    mirrored, x, q, slid, rests, crosses, reverses = course(speed, drive, coulomb, breakaway, rate, phi, 0.0)
+    if rests | (crosses & (not reverses)):
         return 0.0, 0.0, 0.0, 0.0, 0.0
     decay = 1.0 - rate * phi
     ddecay = -(phi + rate * dphi)
-    slid = x + phi * (q - coulomb - rate * x)
-    if (slid >= 0.0) | (q >= coulomb):
+    if not crosses:
         value = slid if slid > 0.0 else 0.0
         by_coulomb, by_rate = -phi, dphi * (q - coulomb) + ddecay * x
         by_speed, by_drive = decay, phi
-    elif q >= -breakaway:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
     else:
         divisor = coulomb - q
         inner = phi - (x - phi * rate * x) / divisor
@@ -90,23 +86,21 @@ def travel_slopes(speed, drive, coulomb, breakaway, rate, dt, phi, dphi, psi, dp
     phi, dphi, psi, dpsi from `hold_slopes`. Source: integrals of the pieces of step.py; ds/dt = 0 at the event,
     where the speed is 0, so that its time adds no derivative of its own.
     """
-    mirrored = (speed < 0.0) | ((speed == 0.0) & (drive < 0.0))
-    x = abs(speed)
-    q = -drive if mirrored else drive
-    if (x == 0.0) & (q <= breakaway):
+    mirrored, x, q, _, rests, crosses, reverses = course(speed, drive, coulomb, breakaway, rate, phi, 0.0)
+    if rests:
         return 0.0, 0.0, 0.0, 0.0, 0.0
-    if (q >= coulomb) | (x + phi * (q - coulomb - rate * x) >= 0.0):
+    if not crosses:
         way = x * phi + (q - coulomb) * psi
         by_speed, by_drive, by_coulomb = phi, psi, -psi
         by_rate = x * dphi + (q - coulomb) * dpsi
     else:
         divisor = coulomb - q
-        event = min(dt, math.log1p(rate * x / divisor) / rate)
+        event = crossing_time(x, q, coulomb, rate, dt)
         phi1, dphi1, psi1, dpsi1 = hold_slopes(rate, event)
         way = x * phi1 - divisor * psi1
         by_speed, by_drive, by_coulomb = phi1, psi1, -psi1
         by_rate = x * dphi1 - divisor * dpsi1
-        if q < -breakaway:
+        if reverses:
             _, _, psi2, dpsi2 = hold_slopes(rate, dt - event)
             phi2 = (dt - event) - rate * psi2
             after = q + coulomb

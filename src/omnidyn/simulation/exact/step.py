@@ -10,6 +10,7 @@ All divided by mass or inertia. Seen in the direction of motion: x = |v|, q = +-
     else                                  reverses: x1 = (q + c) (phi - e x/(c - q)),  e = e^(-a h) = 1 - a phi
 
 In the last line the time of the crossing, t* = log(1 + a x/(c - q))/a, has cancelled out: no exp, no log per step.
+`course` alone tells these apart, for the step, for its path (here) and for what an argument changes (slopes.py).
 
 The style compiles well everywhere: conditional expressions, & and |, a typed `zero` instead of a literal (a literal
 makes float32 code compute in float64), no early return, no divisor that can be 0 in any lane, taken or not.
@@ -19,45 +20,63 @@ from __future__ import annotations
 
 import math
 
+from omnidyn.compiled.kernel import part
 
-def exact_step(speed, drive, coulomb, breakaway, rate, phi, zero):
-    """Speed after a step. All arguments are numbers of one floating type; `zero` is 0 in that type.
 
-    speed v [m/s]; drive g [m/s^2]; coulomb c and breakaway S >= c >= 0 [m/s^2]; rate a > 0 [1/s]; phi [s].
-    For yaw read rad for m. Source: closed form of eqs (4)-(6), written out above.
+@part
+def course(speed, drive, coulomb, breakaway, rate, phi, zero):
+    """(whether seen mirrored, x, q, x1 of a slide, whether it rests, crosses 0, and goes on beyond). See `exact_step`.
+
+    What crosses 0 and does not go on has stopped. What rests may seem to cross, too.
     """
     mirrored = (speed < zero) | ((speed == zero) & (drive < zero))
     x = abs(speed)
     q = -drive if mirrored else drive
     slid = x + phi * (q - coulomb - rate * x)
     crosses = (slid < zero) & (q < coulomb)
+    return mirrored, x, q, slid, (x == zero) & (q <= breakaway), crosses, crosses & (q < -breakaway)
+
+
+@part
+def exact_step(speed, drive, coulomb, breakaway, rate, phi, zero):
+    """Speed after a step. All arguments are numbers of one floating type; `zero` is 0 in that type.
+
+    speed v [m/s]; drive g [m/s^2]; coulomb c and breakaway S >= c >= 0 [m/s^2]; rate a > 0 [1/s]; phi [s].
+    For yaw read rad for m. Source: closed form of eqs (4)-(6), written out above.
+    """
+    mirrored, x, q, slid, rests, crosses, reverses = course(speed, drive, coulomb, breakaway, rate, phi, zero)
     divisor = coulomb - q if crosses else coulomb + breakaway + phi  # never 0, in either lane
     reversed_ = (q + coulomb) * (phi - (x - phi * rate * x) / divisor)
-    reversed_ = reversed_ if q < -breakaway else zero
+    reversed_ = reversed_ if reverses else zero
     result = reversed_ if crosses else (slid if slid > zero else zero)
-    result = zero if (x == zero) & (q <= breakaway) else result
+    result = zero if rests else result
     return -result if mirrored & (result != zero) else result  # rest is 0, never -0
 
 
+@part
+def crossing_time(x, q, coulomb, rate, dt):
+    """t* [s] of a step of length dt that crosses 0."""
+    return min(dt, math.log1p(rate * x / (coulomb - q)) / rate)
+
+
+@part
 def pieces(speed, drive, coulomb, breakaway, rate, phi, dt):
     """A step as two pieces of constant friction: (time of the event, or dt; f before it; f after it).
 
     Within a piece dv/dt = -a v + f. The event is the instant v reaches 0; f = 0 with v = 0 means rest.
-    Same arguments as `exact_step`, and the same test of whether the axis crosses 0; dt [s].
+    Same arguments as `exact_step`; dt [s].
     """
-    mirrored = (speed < 0.0) | ((speed == 0.0) & (drive < 0.0))
-    x = abs(speed)
-    q = -drive if mirrored else drive
-    if (x == 0.0) & (q <= breakaway):
+    mirrored, x, q, _, rests, crosses, reverses = course(speed, drive, coulomb, breakaway, rate, phi, 0.0)
+    if rests:
         return dt, 0.0, 0.0
     before = -(q - coulomb) if mirrored else q - coulomb
-    if (q >= coulomb) | (x + phi * (q - coulomb - rate * x) >= 0.0):
+    if not crosses:
         return dt, before, 0.0
-    event = min(dt, math.log1p(rate * x / (coulomb - q)) / rate)
-    after = q + coulomb if q < -breakaway else 0.0
-    return event, before, (-after if mirrored else after)
+    after = q + coulomb if reverses else 0.0
+    return crossing_time(x, q, coulomb, rate, dt), before, (-after if mirrored else after)
 
 
+@part
 def speed_within(t, speed, event, before, after, rate):
     """Speed at time t [s] inside a step that starts at `speed`; the other arguments from `pieces`."""
     if t <= event:
@@ -65,6 +84,7 @@ def speed_within(t, speed, event, before, after, rate):
     return -math.expm1(-rate * (t - event)) * after / rate
 
 
+@part
 def turned_within(t, speed, now, event, before, after, rate):
     """Integral of the speed from the start of the step to t, `now` the speed at t: (v0 - v + f t)/a, piece by piece.
 

@@ -16,25 +16,25 @@ from numpy.typing import NDArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import (
-    AXES,
     BOUND,
     DROP,
     EFFICIENCY,
-    GAIN,
     INDUCTANCE,
     LENGTH,
     MASS,
     MEMORY,
+    N_AXES,
     NOW,
     RESISTANCE,
     TAU,
+    THRUST,
     VOLTAGE,
 )
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
 from omnidyn.model.stick_slip.plant import Plant
-from omnidyn.model.stick_slip.release import SIGNS, put, settle, sticks, with_given_currents
-from omnidyn.model.stick_slip.workspace import copy_row, scratch
+from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, settle, sticks, with_given_currents
+from omnidyn.model.stick_slip.workspace import copy_row, workspace
 from omnidyn.simulation.implicit.step import GAMMA, step
 from omnidyn.simulation.speed_loop import Loop, close_loop
 
@@ -86,7 +86,7 @@ def run_implicit(
     plant, bare, out, spare = plant.copy(), with_given_currents(plant), begun(len(dt), state, pose), room(state)
     most = (MOST[0] + MOST[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
     row = _march(
-        *plant, *bare, scratch(), spare, voltage, bound, dt, *loop, tol, most, out.pose, out.state, out.iterations,
+        *plant, *bare, workspace(), spare, voltage, bound, dt, *loop, tol, most, out.pose, out.state, out.iterations,
         out.steps,
     )  # fmt: skip
     if row < len(dt):
@@ -135,10 +135,10 @@ def _error(body, element, one, two):
     """Estimated error of `two`, half steps against one whole step, in m/s."""
     worst = max(abs(two[0] - one[0]), abs(two[1] - one[1]))
     worst = max(worst, YAW_SHARE * abs(two[2] - one[2]) / body[LENGTH])
-    first = SIGNS + 1 + len(element)
-    for e in range(AXES, len(element)):
+    first = current_entry(N_AXES, len(element))
+    for e in range(N_AXES, len(element)):
         if element[e, INDUCTANCE] > 0.0:
-            worst = max(worst, CURRENT_SHARE * abs(two[first + e - AXES] - one[first + e - AXES]))
+            worst = max(worst, CURRENT_SHARE * abs(two[first + e - N_AXES] - one[first + e - N_AXES]))
     return worst / 3.0
 
 
@@ -147,8 +147,8 @@ def _unresolved(body, element, state, h):
     """A bound of how far a start, a stop or a reversal inside a step of length h can lead astray [m/s]."""
     put(body, element, state)
     body[TAU] = h
-    for e in range(AXES, len(element)):
-        element[e, NOW] = state[SIGNS + 1 + len(element) + e - AXES]
+    for e in range(N_AXES, len(element)):
+        element[e, NOW] = state[current_entry(e, len(element))]
     return 2.0 * h * forces_at_work(body, element) / body[MASS] * max(1.0, YAW_SHARE / body[LENGTH])
 
 
@@ -159,11 +159,11 @@ def _reverses(body, element, a, b, h):
     A voltage drop bends such a current by 2 V_d/L. In the first gamma/2 of a step doubling is blind to the bend: every
     first stage ends behind it. The current, wrong by 2 h V_d/L, goes on pushing for L/R.
     """
-    worst, first = 0.0, SIGNS + 1 + len(element)
-    for e in range(AXES, len(element)):
-        i, j = a[first + e - AXES], b[first + e - AXES]
+    worst, first = 0.0, current_entry(N_AXES, len(element))
+    for e in range(N_AXES, len(element)):
+        i, j = a[first + e - N_AXES], b[first + e - N_AXES]
         if element[e, DROP] > 0.0 and element[e, INDUCTANCE] > 0.0 and i * j <= 0.0 and i != j:
-            push = element[e, GAIN] / element[e, EFFICIENCY] / element[e, RESISTANCE] / body[MASS]
+            push = element[e, THRUST] / element[e, EFFICIENCY] / element[e, RESISTANCE] / body[MASS]
             each = push * max(1.0, YAW_SHARE / body[LENGTH]) + CURRENT_SHARE / element[e, INDUCTANCE]
             worst = max(worst, 2.0 * h * element[e, DROP] * each)
     return worst
@@ -175,9 +175,9 @@ def _share(body, element, state, tol):
 
     A motor at its limit, or without current under its voltage drop, makes nothing fade.
     """
-    memory, first = body[MEMORY], SIGNS + 1 + len(element)
-    for e in range(AXES, len(element)):
-        i = abs(state[first + e - AXES])
+    memory, first = body[MEMORY], current_entry(N_AXES, len(element))
+    for e in range(N_AXES, len(element)):
+        i = abs(state[first + e - N_AXES])
         if i >= element[e, BOUND] or (i == 0.0 and element[e, DROP] > 0.0):
             memory = body[MEMORY + 1]
     return tol / min(max(memory, FORGETS[0]), FORGETS[1])
@@ -249,7 +249,7 @@ def _march(
         if len(command) > 0:
             close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total)
         for w in range(voltage.shape[1]):
-            element[AXES + w, VOLTAGE], element[AXES + w, BOUND] = voltage[k, w], bound[k, w]
+            element[N_AXES + w, VOLTAGE], element[N_AXES + w, BOUND] = voltage[k, w], bound[k, w]
         if tol > 0.0:
             h = _row(body, element, bare_body, bare_element, s, spare, state, dt[k], tol, most, h, pose, counts)
             most -= counts[1]

@@ -14,7 +14,6 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
-    AXES,
     CURRENT,
     ELLIPSE,
     GOAL,
@@ -23,6 +22,7 @@ from omnidyn.model.layout import (
     HOLD_Y,
     INDUCTANCE,
     MASS,
+    N_AXES,
     NOW,
     RESISTANCE,
     SIGN,
@@ -33,7 +33,7 @@ from omnidyn.model.layout import (
 )
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import solve
-from omnidyn.model.stick_slip.release import SIGNS, put, take
+from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, take
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 BACK = (1.0 - GAMMA) / GAMMA
@@ -46,8 +46,8 @@ def _aim(body, element, start, end, back):
     m = len(element)
     for a in range(3):
         body[GOAL + a] = start[a] + back * (end[a] - start[a])
-    for e in range(AXES, m):
-        i = start[SIGNS + 1 + m + e - AXES]
+    for e in range(N_AXES, m):
+        i = start[current_entry(e, m)]
         element[e, NOW] = i + back * (element[e, CURRENT] - i) if back != 0.0 else i
 
 
@@ -101,7 +101,7 @@ def _torn_loose(body, element, start):
     m, stiff, released = len(element), False, start[SIGNS + len(element)] == 0.0 and body[ELLIPSE] == 1.0
     for e in range(m):
         released |= start[SIGNS + e] == 0.0 and element[e, SIGN] != 0.0
-        if e >= AXES and element[e, INDUCTANCE] > 0.0:
+        if e >= N_AXES and element[e, INDUCTANCE] > 0.0:
             stiff |= body[TAU] * element[e, RESISTANCE] > STIFF * element[e, INDUCTANCE]
     return stiff and released
 
@@ -145,8 +145,8 @@ def last_stage(body, element, s, start, end, h):
         _begin(body, element, start, end, h)
         count, back = max(count, _stage(body, element, s, start, end)), 0.0
     take(body, element, end)
-    for e in range(AXES, m):
-        end[SIGNS + 1 + m + e - AXES] = element[e, CURRENT]
+    for e in range(N_AXES, m):
+        end[current_entry(e, m)] = element[e, CURRENT]
     return count, back
 
 

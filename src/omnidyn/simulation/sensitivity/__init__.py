@@ -1,5 +1,6 @@
 """Derivatives of a run with respect to numbers of the robot file, by the implicit function theorem.
 
-directions (what is derived by what; the door), stage (one implicit step), events (stops, reversals, releases), march
-(a run), loop (through the firmware's speed loop), sample and late_sample (a run as a log shows it).
+derivatives is the door. Then directions (what is derived by), stage (one implicit step), events (stops, reversals,
+releases), sample (a run between its rows), march (a run), loop (through the firmware's speed loop); late_sample (a run
+as a log shows it).
 """

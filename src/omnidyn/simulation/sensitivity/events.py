@@ -6,7 +6,6 @@ import numpy as np
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
-    AXES,
     BOUND,
     BRANCH,
     CURRENT,
@@ -22,6 +21,7 @@ from omnidyn.model.layout import (
     HOLD_Y,
     INDUCTANCE,
     MASS,
+    N_AXES,
     NOW,
     OPEN,
     PUSH,
@@ -30,14 +30,15 @@ from omnidyn.model.layout import (
     TAU,
     VOLTAGE,
 )
-from omnidyn.model.stick_slip.active_set import face, newton_direction
+from omnidyn.model.stick_slip.active_set import find_active_set, newton_direction
 from omnidyn.model.stick_slip.can_hold import worst_direction
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses, winding
-from omnidyn.model.stick_slip.release import SIGNS, put, settle, sticks
+from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, settle, sticks
 from omnidyn.model.stick_slip.workspace import NEWTON, WORST, copy_row, copy_table
 from omnidyn.simulation.implicit.march import SHORTEST
 from omnidyn.simulation.implicit.step import step
-from omnidyn.simulation.sensitivity.stage import EPS, stage_tangent, step_tangent
+from omnidyn.simulation.sensitivity.directions import EPS
+from omnidyn.simulation.sensitivity.stage import stage_derivatives, step_with_derivatives
 
 DELAY = 1e-7  # [s] time step of differences in time
 NEAR = 2.0**-16  # of a half step: how near the instant is found at which a current meets its limit or 0
@@ -53,8 +54,8 @@ def _at_instant(body, element, state, x, delay):
     body[TAU] = delay
     for a in range(3):
         body[GOAL + a] = x[a]
-    for e in range(AXES, m):
-        element[e, NOW] = state[SIGNS + 1 + m + e - AXES]
+    for e in range(N_AXES, m):
+        element[e, NOW] = state[current_entry(e, m)]
 
 
 @part
@@ -62,7 +63,7 @@ def _acceleration(body, element, s, state, x, out):
     """Acceleration at x [m/s^2] with the signs that the plant has: what is stuck stays."""
     _at_instant(body, element, state, x, SHORTEST)
     residual(body, element, x, s)
-    newton_direction(s, face(body, element, s))
+    newton_direction(s, find_active_set(body, element, s))
     for a in range(3):
         out[a] = s[NEWTON, a] / SHORTEST
 
@@ -77,7 +78,7 @@ def differ(a, b, m):
 
 
 @part
-def _leap(body, element, s, ways, start, end, h, gained, d):
+def _leap(body, element, s, along, start, end, h, gained, d):
     """Derivatives d, in place, over a short step in which something stops, reverses or is released.
 
     `start` and `end`: states whose signs are those of the next moment; gained: acceleration at the end. The instant
@@ -85,24 +86,24 @@ def _leap(body, element, s, ways, start, end, h, gained, d):
     dt = -(g . dx + dg . x)/(g . f-); a release is where the gap phi of what is stuck reaches 0; a stop is left to the
     stage at the end.
     """
-    m, before, after = len(element), ways.point[2], ways.point[3]
+    m, before, after = len(element), along.point[2], along.point[3]
     put(body, element, start)
     _acceleration(body, element, s, start, start, before)
-    _release_shift(body, element, s, ways, start, end, before, after, d)
+    _release_shift(body, element, s, along, start, end, before, after, d)
     for e in range(m):
         if start[SIGNS + e] * end[SIGNS + e] == -1.0:
             element[e, SIGN] = end[SIGNS + e]
             _acceleration(body, element, s, start, end, after)
-            _reverse(element[e, GX : GZ + 1], ways.arm[e], start, before, after, d)
+            _reverse(element[e, GX : GZ + 1], along.arm[e], start, before, after, d)
     crosses = start[SIGNS + m] == 1.0 and end[SIGNS + m] == 1.0 and (start[0] != 0.0 or start[1] != 0.0)
     if crosses and start[0] * end[0] + start[1] * end[1] <= 0.0:
         after[0], after[1] = start[0], start[1]  # along its line
-        _reverse(after, ways.arm[0], start, before, gained, d)
+        _reverse(after, along.arm[0], start, before, gained, d)
     put(body, element, end)
     if body[ELLIPSE] != 1.0 or end[0] != 0.0 or end[1] != 0.0:
         _at_instant(body, element, start, start, h)
-        copy_table(ways.aim, d)
-        stage_tangent(body, element, s, ways, end, ways.aim, d)
+        copy_table(along.aim, d)
+        stage_derivatives(body, element, s, along, end, along.aim, d)
 
 
 @part
@@ -124,7 +125,7 @@ def _reverse(g, arms, start, before, after, d):
 
 
 @part
-def _release_shift(body, element, s, ways, start, end, before, after, d):
+def _release_shift(body, element, s, along, start, end, before, after, d):
     """What a release between two states does to d; `before` becomes the acceleration after it."""
     m, some, jump = len(element), False, 0.0
     for e in range(m + 1):
@@ -140,12 +141,13 @@ def _release_shift(body, element, s, ways, start, end, before, after, d):
     for c in range(3):
         jump = max(jump, abs(before[c] - after[c]))
     force = forces_at_work(body, element)
-    if jump * body[MASS] > 1e-6 * force and _weakest(body, element, ways, start, force):
-        later = _later(body, element, ways, start, before)
+    if jump * body[MASS] > 1e-6 * force and _weakest(body, element, along, start, force):
+        later = _later(body, element, along, start, before)
         there = 0.0 < abs(later) < np.inf
         for k in range(len(d) if there else 0):
-            up = _gap(ways.body[2 * k], ways.element[2 * k], ways, start, d[k], EPS)
-            shift = -(up - _gap(ways.body[2 * k + 1], ways.element[2 * k + 1], ways, start, d[k], -EPS)) / (2.0 * EPS)
+            up = _gap(along.body[2 * k], along.element[2 * k], along, start, d[k], EPS)
+            down = _gap(along.body[2 * k + 1], along.element[2 * k + 1], along, start, d[k], -EPS)
+            shift = -(up - down) / (2.0 * EPS)
             for c in range(3):
                 d[k, c] += (before[c] - after[c]) * shift / later
     for c in range(3):
@@ -153,12 +155,20 @@ def _release_shift(body, element, s, ways, start, end, before, after, d):
 
 
 @part
-def _weakest(body, element, ways, start, force):
-    """Direction in which the stuck elements of `start` give way, times a small force, into ways.point[4].
+def _least_gap(body, element, s, x):
+    """phi, at x, of the direction in which the stuck elements hold least; see `worst_direction`."""
+    set_losses(body, element)
+    residual(body, element, x, s)
+    return worst_direction(body, element, s, find_active_set(body, element, s))
+
+
+@part
+def _weakest(body, element, along, start, force):
+    """Direction in which the stuck elements of `start` give way, times a small force, into along.point[4].
 
     Found with levels that are a little too low. False where they hold all the same: there is no such direction.
     """
-    b, el, s, push = ways.body[-1], ways.element[-1], ways.scratch[0], ways.point[4]
+    b, el, s, push = along.body[-1], along.element[-1], along.workspace[0], along.point[4]
     copy_row(b, body)
     copy_table(el, element)
     put(b, el, start)
@@ -166,53 +176,49 @@ def _weakest(body, element, ways, start, force):
     for e in range(len(el)):
         el[e, HOLD], el[e, HOLD + 1] = el[e, HOLD] * (1.0 - MARGIN), el[e, HOLD + 1] * (1.0 - MARGIN)
     _at_instant(b, el, start, start, SHORTEST)
-    set_losses(b, el)
-    residual(b, el, start, s)
-    found = worst_direction(b, el, s, face(b, el, s))
+    found = _least_gap(b, el, s, start)
     for a in range(3):
         push[a] = MARGIN * force * s[WORST, a]
     return found < 0.0
 
 
 @part
-def _gap(body, element, ways, start, d, eps):
-    """phi of what is stuck in `start`, at the state changed by eps d, under the additional push ways.point[4] [N]."""
-    m, s, point = len(element), ways.scratch[0], ways.point[0]
+def _gap(body, element, along, start, d, eps):
+    """phi of what is stuck in `start`, at the state changed by eps d, under the additional push along.point[4] [N]."""
+    m, s, point = len(element), along.workspace[0], along.point[0]
     put(body, element, start)
     for a in range(3):
         point[a] = start[a] + eps * d[a]
     _at_instant(body, element, start, point, SHORTEST)
     for a in range(3):
-        body[PUSH + a] = ways.point[4, a]
-    for w in range(m - AXES):
-        element[AXES + w, NOW] += eps * d[3 + w]
-        element[AXES + w, BRANCH] = OPEN
-    set_losses(body, element)
-    residual(body, element, point, s)
-    found = worst_direction(body, element, s, face(body, element, s))
+        body[PUSH + a] = along.point[4, a]
+    for w in range(m - N_AXES):
+        element[N_AXES + w, NOW] += eps * d[3 + w]
+        element[N_AXES + w, BRANCH] = OPEN
+    found = _least_gap(body, element, s, point)
     for a in range(3):
         body[PUSH + a] = 0.0
     return found
 
 
 @part
-def _later(body, element, ways, start, acceleration):
+def _later(body, element, along, start, acceleration):
     """Time derivative of phi while what is stuck in `start` still holds."""
-    b, el, rate, m = ways.body[-1], ways.element[-1], ways.aim[0], len(element)
+    b, el, rate, m = along.body[-1], along.element[-1], along.aim[0], len(element)
     copy_row(b, body)
     copy_table(el, element)
     put(b, el, start)
-    for w in range(3 + m - AXES):
+    for w in range(3 + m - N_AXES):
         rate[w] = acceleration[w] if w < 3 else 0.0
     for side in range(2):  # a stage back in time, too: the currents' slope to second order
         delay = DELAY * (1 - 2 * side)
         _at_instant(b, el, start, start, delay)
-        residual(b, el, start, ways.scratch[0])
-        for w in range(m - AXES):
-            if el[AXES + w, INDUCTANCE] > 0.0:
-                rate[3 + w] += 0.5 * (el[AXES + w, CURRENT] - el[AXES + w, NOW]) / delay
-    up = _gap(b, el, ways, start, rate, DELAY)
-    return (up - _gap(b, el, ways, start, rate, -DELAY)) / (2.0 * DELAY)
+        residual(b, el, start, along.workspace[0])
+        for w in range(m - N_AXES):
+            if el[N_AXES + w, INDUCTANCE] > 0.0:
+                rate[3 + w] += 0.5 * (el[N_AXES + w, CURRENT] - el[N_AXES + w, NOW]) / delay
+    up = _gap(b, el, along, start, rate, DELAY)
+    return (up - _gap(b, el, along, start, rate, -DELAY)) / (2.0 * DELAY)
 
 
 @part
@@ -221,9 +227,9 @@ def bends(element, a, b):
 
     The derivative bends there.
     """
-    first = SIGNS + 1 + len(element)
-    for w in range(len(element) - AXES):
-        i, j, row = a[first + w], b[first + w], element[AXES + w]
+    first = current_entry(N_AXES, len(element))
+    for w in range(len(element) - N_AXES):
+        i, j, row = a[first + w], b[first + w], element[N_AXES + w]
         if (abs(i) >= row[BOUND]) != (abs(j) >= row[BOUND]):
             return True
         if (np.sign(i) != np.sign(j)) & ((row[DROP] > 0.0) | (row[EFFICIENCY] != 1.0)):
@@ -252,14 +258,15 @@ def _reach(body, element, s, first, last, middle, left, near):
 
 
 @part
-def _pass_zero(element, ways, start, end, first, last, at_end, d):
+def _pass_zero(element, along, start, end, first, last, at_end, d):
     """Currents of windings that pass through 0 against a voltage drop: d+ = d- i'+ / i'-, each once in a half step.
 
-    start, end: of the half step; first, last: of a piece of it, whose derivatives before it are ways.kept.
+    start, end: of the half step; first, last: of a piece of it, whose derivatives before it are along.kept.
     """
     m = len(element)
-    for w in range(m - AXES):
-        j, e, row = SIGNS + 1 + m + w, AXES + w, element[AXES + w]
+    for w in range(m - N_AXES):
+        e, row = N_AXES + w, element[N_AXES + w]
+        j = current_entry(e, m)
         side = np.sign(start[j])
         if row[INDUCTANCE] == 0.0 or row[DROP] == 0.0 or side == 0.0 or np.sign(end[j]) == side:
             continue
@@ -272,7 +279,7 @@ def _pass_zero(element, ways, start, end, first, last, at_end, d):
         if after != 0.0:
             ratio = after / (_soon(row, speed, little, tau) - little)
             for k in range(len(d)):
-                d[k, 3 + w] = ways.kept[k, 3 + w] * ratio
+                d[k, 3 + w] = along.kept[k, 3 + w] * ratio
 
 
 @part
@@ -284,35 +291,35 @@ def _soon(row, speed, now, tau):
 
 
 @part
-def half_tangent(body, element, bare_body, bare_element, s, ways, start, end, middle, h, d0, d1):
+def half_derivatives(body, element, bare_body, bare_element, s, along, start, end, middle, h, d0, d1):
     """Derivatives over a half step that has been accepted.
 
     A reversal often comes to rest for one step and is released by the next: `settle` says what holds and what does not.
     """
-    first, last, m = ways.state[0], ways.state[1], len(element)
+    first, last, m = along.state[0], along.state[1], len(element)
     copy_row(first, start)
     copy_row(last, end)
     copy_table(d1, d0)
     if sticks(start, m):
-        settle(body, element, bare_body, bare_element, s, first, ways.gained)
+        settle(body, element, bare_body, bare_element, s, first, along.gained)
     if sticks(end, m):
-        settle(body, element, bare_body, bare_element, s, last, ways.gained)
+        settle(body, element, bare_body, bare_element, s, last, along.gained)
     if differ(start, end, m) or differ(start, first, m) or differ(end, last, m):
         if not sticks(end, m):
-            settle(body, element, bare_body, bare_element, s, last, ways.gained)
-        _leap(body, element, s, ways, first, last, h, ways.gained, d1)
+            settle(body, element, bare_body, bare_element, s, last, along.gained)
+        _leap(body, element, s, along, first, last, h, along.gained, d1)
         return
     if not bends(element, start, end):
-        step_tangent(body, element, s, ways, start, last, middle, h, d1, d1)
+        step_with_derivatives(body, element, s, along, start, last, middle, h, d1, d1)
         return
     copy_row(first, start)
     left = h
     for piece in range(PIECES):
         length = _reach(body, element, s, first, last, middle, left, NEAR * h) if piece < PIECES - 1 else left
         left = left - length if length < left else 0.0
-        copy_table(ways.kept, d1)
-        step_tangent(body, element, s, ways, first, last, middle, length, d1, d1)
-        _pass_zero(element, ways, start, end, first, last, left == 0.0, d1)
+        copy_table(along.kept, d1)
+        step_with_derivatives(body, element, s, along, first, last, middle, length, d1, d1)
+        _pass_zero(element, along, start, end, first, last, left == 0.0, d1)
         if left == 0.0:
             return
         copy_row(first, last)

@@ -13,22 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.compiled.kernel import kernel, part
-from omnidyn.model.layout import AXES, BOUND, LENGTH, LIMIT, VOLTAGE
-from omnidyn.model.robot import Robot
-from omnidyn.model.stick_slip.plant import Plant
-from omnidyn.model.stick_slip.release import SIGNS, with_given_currents
-from omnidyn.model.stick_slip.workspace import copy_row, copy_table, scratch
+from omnidyn.model.layout import BOUND, LENGTH, LIMIT, N_AXES, VOLTAGE
+from omnidyn.model.stick_slip.release import SIGNS, start_state, with_given_currents
+from omnidyn.model.stick_slip.workspace import copy_row, copy_table, workspace
 from omnidyn.simulation.commands import Commands, loop_gains, on_ticks
 from omnidyn.simulation.implicit.march import SIMPSON, STAGES, Outcome, advance_pose, begun, room
-from omnidyn.simulation.sensitivity.march import advance_pose_tangent, row_tangent
-from omnidyn.simulation.sensitivity.sample import Looks, looks
-from omnidyn.simulation.sensitivity.stage import EPS, Ways, step_tangent
+from omnidyn.simulation.sensitivity.directions import EPS, Directions, Prepared
+from omnidyn.simulation.sensitivity.march import pose_derivatives, row_with_derivatives
+from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
+from omnidyn.simulation.sensitivity.stage import step_with_derivatives
+from omnidyn.simulation.simulate import current_bounds
 from omnidyn.simulation.speed_loop import close_loop, loop_of, seen_speed, tick_answer, tick_branch
 
 FloatArray = NDArray[np.float64]
 
 
-class LoopWays(NamedTuple):
+class LoopDirections(NamedTuple):
     """The loop a little up (2k) and down (2k + 1) each of the K parameters, and what the loop remembers."""
 
     gain: FloatArray  # (2 K, 4, n) kp, ki, limit, radius
@@ -36,69 +36,69 @@ class LoopWays(NamedTuple):
     sum: FloatArray  # (K, n) derivative of the integral
     voltage: FloatArray  # (K, n) derivative of the voltage now
     state: FloatArray  # (size of a state,) at the last tick
-    slope: FloatArray  # (K, 3 + n) derivative there
+    dstate: FloatArray  # (K, 3 + n) derivative there
     total: FloatArray  # (2, n) integral before this tick, and at the last one
 
 
 class LoopRun(NamedTuple):
-    """Row 0 is the start. voltage: after the tick of a row, the last one repeats."""
+    """Row 0 is the start. voltage: after the tick of a row, the last one repeats. d...: derivatives of them."""
 
     outcome: Outcome
-    state: FloatArray  # (rows + 1, K, 3 + n)
-    pose: FloatArray  # (rows + 1, K, 3)
+    dstate: FloatArray  # (rows + 1, K, 3 + n)
+    dpose: FloatArray  # (rows + 1, K, 3)
     voltage: FloatArray  # (rows, n)
-    by_key: FloatArray  # (K, rows, n) derivative of the voltage
-    seen: Looks  # none
+    dvoltage: FloatArray  # (K, rows, n)
+    seen: Samples  # none
 
 
-def run_tangent_loop(
-    robots: list[Robot], robot: Robot, numbers: Plant, ways: Ways, given: Commands, rates: FloatArray,
-    bound: FloatArray, start: tuple[FloatArray, FloatArray], first: FloatArray, tol: float, settled: float,
-    travels: bool,
+def run_loop_with_derivatives(
+    ready: Prepared, along: Directions, given: Commands, start: tuple[FloatArray, FloatArray], first: FloatArray,
+    tol: float, settled: float, travels: bool,
 ) -> LoopRun:  # fmt: skip
-    """The run of set points, with derivatives; see `tangent.derivatives`.
+    """The run of set points, with derivatives; see `derivatives`.
 
-    robots: up and down each key; rates: derivatives of the set points, shape (K, rows, n); bound (n,): current limits
-    [A]; start: state and pose. settled: a run whose state and derivatives change by less than this from tick to tick
-    [m/s, A, V] stays as it is until the next command; 0: never. travels: whether the pose is wanted.
+    along.voltage: derivatives of the set points; start: twist and pose; first (K, 3 + n): derivatives of the state
+    there. settled: a run whose state and derivatives change by less than this from tick to tick [m/s, A, V] stays as it
+    is until the next command; 0: never. travels: whether the pose is wanted.
     """
+    robot, numbers = ready.robot, ready.numbers
     dt, _, tick, keep = on_ticks(robot, given)
     assert given.set_point is not None
     count, n, rows = len(first), numbers.wheels, len(given.dt)
+    state, bound = start_state(numbers, start[0], np.zeros(n)), current_bounds(robot, given, 1)[0]
     loop = loop_of(robot, np.ascontiguousarray(given.set_point), tick)
-    gain = np.array([loop_gains(r) for r in robots]).reshape(-1, 4, n)
-    extra = LoopWays(
-        gain, rates, np.zeros((count, n)), np.zeros((count, n)), np.zeros(len(start[0])), np.zeros_like(first),
+    gain = np.array([loop_gains(r) for r in ready.robots]).reshape(-1, 4, n)
+    extra = LoopDirections(
+        gain, along.voltage, np.zeros((count, n)), np.zeros((count, n)), np.zeros(len(state)), np.zeros_like(first),
         np.zeros((2, n)),
     )  # fmt: skip
-    out = begun(rows, start[0], start[1])
     found = LoopRun(
-        out, np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, count, 3)), np.zeros((rows, n)),
-        np.zeros((count, rows, n)), looks(np.zeros(1), np.zeros(0), 3, count),
+        begun(rows, state, start[1]), np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, count, 3)),
+        np.zeros((rows, n)), np.zeros((count, rows, n)), NO_SAMPLES,
     )  # fmt: skip
-    found.state[0] = first
+    found.dstate[0] = first
     march_loop(
-        *numbers.copy(), *with_given_currents(numbers), scratch(), room(start[0]), ways, loop, extra, bound, dt,
+        *numbers.copy(), *with_given_currents(numbers), workspace(), room(state), along, loop, extra, bound, dt,
         keep.astype(np.int64), tol, settled, travels, found,
     )  # fmt: skip
     return found
 
 
 @part
-def _tick_tangent(element, ways, loop, extra, state, d, row, w):
+def _tick_derivatives(element, along, loop, extra, state, d, row, w):
     """Derivatives of the voltage and the integral of wheel w; extra.total[0] is the integral before the tick."""
-    e, moves = AXES + w, state[SIGNS + AXES + w] != 0.0
+    e, moves = N_AXES + w, state[SIGNS + N_AXES + w] != 0.0
     error = loop.command[row, w] - seen_speed(element, e, state, loop.radius[w], moves)
     total, period = extra.total[0, w], loop.period
     takes, side = tick_branch(loop.kp[w], loop.ki[w], loop.limit[w], period, error, total)
-    point = ways.point[0]
+    point = along.point[0]
     for k in range(len(d)):
         volts, integral = 0.0, 0.0
         for up in range(2):
             sign, g = 1.0 - 2.0 * up, extra.gain[2 * k + up]
             for a in range(3):
                 point[a] = state[a] + sign * EPS * d[k, a]
-            seen = seen_speed(ways.element[2 * k + up], e, point, g[3, w], moves)
+            seen = seen_speed(along.element[2 * k + up], e, point, g[3, w], moves)
             own = loop.command[row, w] + sign * EPS * extra.command[k, row, w] - seen
             before = total + sign * EPS * extra.sum[k, w]
             u, after = tick_answer(g[0, w], g[1, w], g[2, w], period, own, before, takes, side)
@@ -107,13 +107,13 @@ def _tick_tangent(element, ways, loop, extra, state, d, row, w):
 
 
 @part
-def _tick(element, ways, loop, extra, state, d, row, voltage, flag):
+def _tick(element, along, loop, extra, state, d, row, voltage, flag):
     """One tick, or none, of all wheels, with derivatives; voltage (1, n), flag (1,) and command (1, n) of this tick."""
     if not flag[0]:
         return
     copy_row(extra.total[0], loop.sum)
     for w in range(len(loop.kp)):
-        _tick_tangent(element, ways, loop, extra, state, d, row, w)
+        _tick_derivatives(element, along, loop, extra, state, d, row, w)
     close_loop(
         element, state, 0, voltage, loop.kp, loop.ki, loop.limit, loop.radius, loop.command[row : row + 1], flag,
         loop.period, loop.sum,
@@ -129,8 +129,8 @@ def _as_before(loop, extra, state, d, settled):
         extra.state[j] = state[j]
     for k in range(d.shape[0]):
         for j in range(d.shape[1]):
-            change = max(change, abs(d[k, j] - extra.slope[k, j]))
-            extra.slope[k, j] = d[k, j]
+            change = max(change, abs(d[k, j] - extra.dstate[k, j]))
+            extra.dstate[k, j] = d[k, j]
     for w in range(len(loop.sum)):
         change = max(change, abs(loop.sum[w] - extra.total[1, w]))
         extra.total[1, w] = loop.sum[w]
@@ -138,26 +138,26 @@ def _as_before(loop, extra, state, d, settled):
 
 
 @part
-def _apply(element, ways, extra, voltage, bound):
+def _apply(element, along, extra, voltage, bound):
     """Voltages, their derivatives and the current limits into the plants."""
     for w in range(len(bound)):
-        e = AXES + w
+        e = N_AXES + w
         element[e, VOLTAGE], element[e, BOUND] = voltage[0, w], bound[w]
         for j in range(2 * len(extra.sum)):
-            ways.element[j, e, BOUND] = ways.element[j, e, LIMIT]
+            along.element[j, e, BOUND] = along.element[j, e, LIMIT]
         for k in range(len(extra.sum)):
-            ways.element[2 * k, e, VOLTAGE] = voltage[0, w] + EPS * extra.voltage[k, w]
-            ways.element[2 * k + 1, e, VOLTAGE] = voltage[0, w] - EPS * extra.voltage[k, w]
+            along.element[2 * k, e, VOLTAGE] = voltage[0, w] + EPS * extra.voltage[k, w]
+            along.element[2 * k + 1, e, VOLTAGE] = voltage[0, w] - EPS * extra.voltage[k, w]
 
 
 @kernel
 def march_loop(
-    body, element, bare_body, bare_element, s, spare, ways, loop, extra, bound, dt, keep, tol, settled, travels, found
+    body, element, bare_body, bare_element, s, spare, along, loop, extra, bound, dt, keep, tol, settled, travels, found
 ):
-    """All rows, cut at the ticks; what is at keep[i] goes to row i. See run_tangent_loop."""
+    """All rows, cut at the ticks; what is at keep[i] goes to row i. See run_loop_with_derivatives."""
     out = found.outcome
     state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
-    d, dnext, dpose, h = found.state[0].copy(), found.state[0].copy(), found.pose[0].copy(), dt[0]
+    d, dnext, dpose, h = found.dstate[0].copy(), found.dstate[0].copy(), found.dpose[0].copy(), dt[0]
     voltage, row, still = np.zeros((1, len(bound))), 0, False
     for j in range(len(dt)):
         if j == keep[row + 1]:
@@ -168,33 +168,33 @@ def march_loop(
             still = still and not changed
         if loop.tick[j] and not still:
             still = settled > 0.0 and j > keep[row] and _as_before(loop, extra, state, d, settled)
-            _tick(element, ways, loop, extra, state, d, row, voltage, loop.tick[j : j + 1])
+            _tick(element, along, loop, extra, state, d, row, voltage, loop.tick[j : j + 1])
         if j == keep[row]:
             copy_row(found.voltage[row], voltage[0])
             for k in range(len(d)):
-                copy_row(found.by_key[k, row], extra.voltage[k])
+                copy_row(found.dvoltage[k, row], extra.voltage[k])
         if not still:
-            _apply(element, ways, extra, voltage, bound)
+            _apply(element, along, extra, voltage, bound)
             counts[0] = counts[1] = 0
             if tol > 0.0:
-                h = row_tangent(
-                    body, element, bare_body, bare_element, s, spare, ways, state, dt[j], tol, h, pose, d, dnext,
+                h = row_with_derivatives(
+                    body, element, bare_body, bare_element, s, spare, along, state, dt[j], tol, h, pose, d, dnext,
                     dpose, counts, True, found.seen, 0.0,
                 )  # fmt: skip
             else:
-                counts[0] = step_tangent(body, element, s, ways, state, spare[2], spare[3], dt[j], d, dnext)
+                counts[0] = step_with_derivatives(body, element, s, along, state, spare[2], spare[3], dt[j], d, dnext)
                 counts[1] = 1
-                advance_pose_tangent(ways, pose, dpose, state, spare[3], spare[2], d, ways.middle, dnext, dt[j], STAGES)
+                pose_derivatives(along, pose, dpose, state, spare[3], spare[2], d, along.middle, dnext, dt[j], STAGES)
                 advance_pose(pose, state, spare[3], spare[2], body[LENGTH], dt[j], STAGES)
                 copy_row(state, spare[2])
                 copy_table(d, dnext)
             out.iterations[row] = max(out.iterations[row], counts[0])
             out.steps[row] += counts[1]
         elif travels:
-            advance_pose_tangent(ways, pose, dpose, state, state, state, d, d, d, dt[j], SIMPSON)
+            pose_derivatives(along, pose, dpose, state, state, state, d, d, d, dt[j], SIMPSON)
             advance_pose(pose, state, state, state, body[LENGTH], dt[j], SIMPSON)
         if j + 1 == keep[row + 1]:
             copy_row(out.state[row + 1], state)
             copy_row(out.pose[row + 1], pose)
-            copy_table(found.state[row + 1], d)
-            copy_table(found.pose[row + 1], dpose)
+            copy_table(found.dstate[row + 1], d)
+            copy_table(found.dpose[row + 1], dpose)

@@ -7,25 +7,26 @@ import math
 import numpy as np
 
 from omnidyn.compiled.kernel import kernel, part
-from omnidyn.model.layout import AXES, BOUND, LENGTH, LIMIT, VOLTAGE
-from omnidyn.model.stick_slip.release import SIGNS, settle, sticks
+from omnidyn.model.layout import BOUND, LENGTH, LIMIT, N_AXES, VOLTAGE
+from omnidyn.model.stick_slip.release import current_entry, settle, sticks
 from omnidyn.model.stick_slip.workspace import copy_row, copy_table
 from omnidyn.simulation.implicit.march import SIMPSON, STAGES, advance_pose, find_step
 from omnidyn.simulation.implicit.step import GAMMA
-from omnidyn.simulation.sensitivity.events import bends, differ, half_tangent
-from omnidyn.simulation.sensitivity.sample import look, turn_tangent
-from omnidyn.simulation.sensitivity.stage import EPS, step_tangent
+from omnidyn.simulation.sensitivity.directions import EPS
+from omnidyn.simulation.sensitivity.events import bends, differ, half_derivatives
+from omnidyn.simulation.sensitivity.sample import take_samples, turn_derivatives
+from omnidyn.simulation.sensitivity.stage import step_with_derivatives
 
 
 @part
-def advance_pose_tangent(ways, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
+def pose_derivatives(along, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
     """Derivatives of the pose over a step, in place: differences of the path from the origin, turned by the heading.
 
     From the origin, because a difference of what is small beside the pose is lost in rounding.
     """
-    place, a, b, c = ways.point[0], ways.point[1], ways.point[2], ways.point[3]
+    place, a, b, c = along.point[0], along.point[1], along.point[2], along.point[3]
     place[:] = 0.0
-    advance_pose(place, x0, xm, x1, ways.body[-1, LENGTH], h, rule)
+    advance_pose(place, x0, xm, x1, along.body[-1, LENGTH], h, rule)
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     x, y = cos * place[0] - sin * place[1], sin * place[0] + cos * place[1]
     for k in range(len(dpose)):
@@ -34,10 +35,10 @@ def advance_pose_tangent(ways, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
             for j in range(3):
                 a[j], b[j], c[j] = x0[j] + eps * d0[k, j], xm[j] + eps * dm[k, j], x1[j] + eps * d1[k, j]
             place[:] = 0.0
-            advance_pose(place, a, b, c, ways.body[2 * k + side, LENGTH], h, rule)
+            advance_pose(place, a, b, c, along.body[2 * k + side, LENGTH], h, rule)
             for j in range(3):
-                ways.scratch[side, 0, j] = place[j] / (2.0 * EPS)
-        up, down = ways.scratch[0, 0], ways.scratch[1, 0]
+                along.workspace[side, 0, j] = place[j] / (2.0 * EPS)
+        up, down = along.workspace[0, 0], along.workspace[1, 0]
         dx, dy, turn = up[0] - down[0], up[1] - down[1], up[2] - down[2]
         dpose[k, 0] += cos * dx - sin * dy - dpose[k, 2] * y
         dpose[k, 1] += sin * dx + cos * dy + dpose[k, 2] * x
@@ -47,7 +48,7 @@ def advance_pose_tangent(ways, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
 @part
 def _middle_currents(start, middle, end, m):
     """Into `middle`, which holds x of stage 1 alone, currents on the line from the start to the end."""
-    for j in range(SIGNS + 1 + m, len(start)):
+    for j in range(current_entry(N_AXES, m), len(start)):
         middle[j] = start[j] + GAMMA * (end[j] - start[j])
 
 
@@ -60,13 +61,13 @@ def _is_smooth(element, start, one, middle, two, settled, m):
 
 
 @part
-def row_tangent(
-    body, element, bare_body, bare_element, s, spare, ways, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
+def row_with_derivatives(
+    body, element, bare_body, bare_element, s, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
     seen, end,
 ):  # fmt: skip
     """`implicit._row` with derivatives: the half steps that count are done again with theirs.
 
-    kept: whether the derivatives are kept by row, position included. Where they are only looked at, those of the step
+    kept: whether the derivatives are kept by row, position included. Where they are only sampled, those of the step
     as a whole do where it is smooth: they are within the tolerance too. end: of the row [s].
     """
     one, middle, two, inner, settled, m, left = spare[0], spare[1], spare[2], spare[3], spare[4], len(element), dt
@@ -75,37 +76,37 @@ def row_tangent(
         taken, h = find_step(body, element, s, spare, state, h, left, dt, tol, counts)
         copy_row(settled, two)
         if sticks(settled, m):
-            counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, settled, ways.gained))
-        node, half, dhalf = 0.5, 0.5 * taken, ways.half
+            counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, settled, along.gained))
+        node, half, dhalf = 0.5, 0.5 * taken, along.half
         if not kept and _is_smooth(element, state, one, middle, two, settled, m):
-            step_tangent(body, element, s, ways, state, one, inner, taken, d, dnext)
-            node, dhalf = GAMMA, ways.middle
+            step_with_derivatives(body, element, s, along, state, one, inner, taken, d, dnext)
+            node, dhalf = GAMMA, along.middle
         else:
-            half_tangent(body, element, bare_body, bare_element, s, ways, state, middle, inner, half, d, ways.half)
-            half_tangent(body, element, bare_body, bare_element, s, ways, middle, two, inner, half, ways.half, dnext)
-        look(seen, ways, end - left, taken, m, state, middle, two, 0.5, pose, d, dhalf, dnext, node, dpose)
+            half_derivatives(body, element, bare_body, bare_element, s, along, state, middle, inner, half, d, dhalf)
+            half_derivatives(body, element, bare_body, bare_element, s, along, middle, two, inner, half, dhalf, dnext)
+        take_samples(seen, along, end - left, taken, m, state, middle, two, 0.5, pose, d, dhalf, dnext, node, dpose)
         if kept:
-            advance_pose_tangent(ways, pose, dpose, state, middle, two, d, ways.half, dnext, taken, SIMPSON)
+            pose_derivatives(along, pose, dpose, state, middle, two, d, along.half, dnext, taken, SIMPSON)
         else:
-            turn_tangent(ways, dpose, state, middle, two, d, dhalf, dnext, taken, node, SIMPSON)
+            turn_derivatives(along, dpose, state, middle, two, d, dhalf, dnext, taken, node, SIMPSON)
         advance_pose(pose, state, middle, two, body[LENGTH], taken, SIMPSON)
         copy_row(state, settled)
-        copy_table(d, dnext)  # half_tangent has moved d past a release that settle finds here
+        copy_table(d, dnext)  # half_derivatives has moved d past a release that settle finds here
         left = left - taken if taken < left else 0.0
     return h
 
 
 @part
-def _fixed(body, element, s, spare, ways, state, dt, pose, d, dnext, dpose, kept, seen, begin):
+def _fixed(body, element, s, spare, along, state, dt, pose, d, dnext, dpose, kept, seen, begin):
     """One fixed step with derivatives. Returns the iterations."""
     middle, end, m = spare[3], spare[2], len(element)
-    count = step_tangent(body, element, s, ways, state, end, middle, dt, d, dnext)
+    count = step_with_derivatives(body, element, s, along, state, end, middle, dt, d, dnext)
     _middle_currents(state, middle, end, m)
-    look(seen, ways, begin, dt, m, state, middle, end, GAMMA, pose, d, ways.middle, dnext, GAMMA, dpose)
+    take_samples(seen, along, begin, dt, m, state, middle, end, GAMMA, pose, d, along.middle, dnext, GAMMA, dpose)
     if kept:
-        advance_pose_tangent(ways, pose, dpose, state, middle, end, d, ways.middle, dnext, dt, STAGES)
+        pose_derivatives(along, pose, dpose, state, middle, end, d, along.middle, dnext, dt, STAGES)
     else:
-        turn_tangent(ways, dpose, state, middle, end, d, ways.middle, dnext, dt, GAMMA, STAGES)
+        turn_derivatives(along, dpose, state, middle, end, d, along.middle, dnext, dt, GAMMA, STAGES)
     advance_pose(pose, state, middle, end, body[LENGTH], dt, STAGES)
     copy_row(state, end)
     copy_table(d, dnext)
@@ -113,37 +114,37 @@ def _fixed(body, element, s, spare, ways, state, dt, pose, d, dnext, dpose, kept
 
 
 @part
-def apply_row(element, ways, voltage, bound, r):
+def apply_row(element, along, voltage, bound, r):
     """Apply the voltages and current limits of row r, and to the plants of each parameter what they change to."""
     for w in range(voltage.shape[1]):
-        e = AXES + w
+        e = N_AXES + w
         element[e, VOLTAGE], element[e, BOUND] = voltage[r, w], bound[r, w]
-        for j in range(len(ways.element) - 1):
-            ways.element[j, e, BOUND] = ways.element[j, e, LIMIT] if bound[r, w] > 0.0 else 0.0
-        for k in range(len(ways.voltage)):
-            ways.element[2 * k, e, VOLTAGE] = voltage[r, w] + EPS * ways.voltage[k, r, w]
-            ways.element[2 * k + 1, e, VOLTAGE] = voltage[r, w] - EPS * ways.voltage[k, r, w]
+        for j in range(len(along.element) - 1):
+            along.element[j, e, BOUND] = along.element[j, e, LIMIT] if bound[r, w] > 0.0 else 0.0
+        for k in range(len(along.voltage)):
+            along.element[2 * k, e, VOLTAGE] = voltage[r, w] + EPS * along.voltage[k, r, w]
+            along.element[2 * k + 1, e, VOLTAGE] = voltage[r, w] - EPS * along.voltage[k, r, w]
 
 
 @kernel
-def march_tangent(
-    body, element, bare_body, bare_element, s, spare, ways, voltage, bound, dt, tol, poses, states, iterations, steps,
+def march_with_derivatives(
+    body, element, bare_body, bare_element, s, spare, along, voltage, bound, dt, tol, poses, states, iterations, steps,
     first, ds, dposes, seen,
 ):  # fmt: skip
-    """All rows; see run_tangent. ds and dposes may be empty: the derivatives then are where they were looked at."""
+    """All rows; see run_with_derivatives. ds and dposes may be empty: the derivatives then are in `seen`."""
     state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(3, np.int64)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
     kept, begin = len(ds) > 0, 0.0
     for r in range(len(dt)):
         counts[0] = counts[1] = 0
-        apply_row(element, ways, voltage, bound, r)
+        apply_row(element, along, voltage, bound, r)
         if tol > 0.0:
-            h = row_tangent(
-                body, element, bare_body, bare_element, s, spare, ways, state, dt[r], tol, h, pose, d, dnext, dpose,
+            h = row_with_derivatives(
+                body, element, bare_body, bare_element, s, spare, along, state, dt[r], tol, h, pose, d, dnext, dpose,
                 counts, kept, seen, begin + dt[r],
             )  # fmt: skip
         else:
-            counts[0] = _fixed(body, element, s, spare, ways, state, dt[r], pose, d, dnext, dpose, kept, seen, begin)
+            counts[0] = _fixed(body, element, s, spare, along, state, dt[r], pose, d, dnext, dpose, kept, seen, begin)
             counts[1] = 1
         begin += dt[r]
         iterations[r], steps[r] = counts[0], counts[1]

@@ -1,7 +1,7 @@
 """One implicit step and how it changes with the parameters, by the implicit function theorem.
 
-A stage finds x on the face of what is stuck (A x = 0, B spans the face) with B' R(x, x*, i*, parameter) = 0. With P a
-right inverse of A and J = dR/dx, a change of a parameter changes the face, and
+A stage finds x within its active set (A x = 0 of what is stuck, B spans the rest) with B' R(x, x*, i*, parameter) = 0.
+With P a right inverse of A and J = dR/dx, a change of a parameter changes A and B, and
 
     dx = -P dA x + B z,   (B' J B) z = -B' (dR - J P dA x - dA' P' R),   dR at fixed x, with x* and i* changed too
 
@@ -12,68 +12,37 @@ and a current limit or a voltage drop within the reach of the difference is not 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
-
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
-    AXES,
-    BOUND,
     BRANCH,
     CURRENT,
-    DROP,
     EFFICIENCY,
     ELLIPSE,
     EMF,
-    GAIN,
     GOAL,
     GX,
     GZ,
     INDUCTANCE,
+    N_AXES,
     NOW,
     PUSH,
-    RESISTANCE,
     SIGN,
     TAU,
-    VOLTAGE,
+    THRUST,
 )
-from omnidyn.model.stick_slip.active_set import FLAT, face, newton_direction
-from omnidyn.model.stick_slip.forces import gear, residual, winding_answer, winding_branch
+from omnidyn.model.stick_slip.active_set import FLAT, find_active_set, newton_direction
+from omnidyn.model.stick_slip.forces import gear, motor_branch, motor_current, residual
 from omnidyn.model.stick_slip.workspace import JACOBIAN, NEWTON, RESIDUAL
 from omnidyn.simulation.implicit.step import first_stage, last_stage
-
-FloatArray = NDArray[np.float64]
-EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10; all kinks are on their branch
-
-
-class Ways(NamedTuple):
-    """Plants a little up (2k) and down (2k + 1) each of the K parameters, and room to work in."""
-
-    body: FloatArray  # (2 K, BODY_SIZE)
-    element: FloatArray  # (2 K, elements, ELEMENT_SIZE)
-    arm: FloatArray  # (elements, K, 3) derivative of the directions g_e
-    voltage: FloatArray  # (K, rows, n) derivative of the applied voltage
-    scratch: FloatArray  # (2, ...) two scratch arrays
-    lift: FloatArray  # (3, 6) rows of the elimination: stuck direction, and what it is made of
-    held: NDArray[np.int64]  # (2, 3) which elements span what is stuck; pivots
-    point: FloatArray  # (5, 3) points, accelerations
-    aim: FloatArray  # (K, 3 + n) derivative of x* and i*
-    middle: FloatArray  # (K, 3 + n) derivative at stage 1
-    half: FloatArray  # (K, 3 + n) derivative after the first half step
-    state: FloatArray  # (2, size of a state)
-    gained: FloatArray  # (3,) acceleration
-    carry: FloatArray  # (3, n) di/di*, the force per ampere of i*, and the branch of the current
-    kept: FloatArray  # (K, 3 + n) derivative before a piece of a half step
+from omnidyn.simulation.sensitivity.directions import EPS
 
 
 @part
-def _hold(ways, rank, e, g0, g1, g2):
+def _hold(along, rank, e, g0, g1, g2):
     """Add a stuck direction to the elimination [A | I] unless it depends on those before. Returns the new rank."""
     if rank == 3:
         return rank
-    rows, pivots, row = ways.lift, ways.held[1], ways.lift[rank]
+    rows, pivots, row = along.lift, along.held[1], along.lift[rank]
     row[:] = 0.0
     row[0], row[1], row[2], row[3 + rank] = g0, g1, g2, 1.0
     for j in range(rank):
@@ -93,90 +62,85 @@ def _hold(ways, rank, e, g0, g1, g2):
         factor = rows[j, p]
         for c in range(6):
             rows[j, c] -= factor * row[c]
-    ways.held[0, rank], pivots[rank] = e, p
+    along.held[0, rank], pivots[rank] = e, p
     return rank + 1
 
 
 @part
-def _holders(body, element, ways):
+def _holders(body, element, along):
     """Elements that span what is stuck, body axes first so that their zeros stay exact. Returns the rank."""
     rank = 0
     if body[ELLIPSE] == 0.0:
-        rank = _hold(ways, rank, 0, 1.0, 0.0, 0.0)
-        rank = _hold(ways, rank, 1, 0.0, 1.0, 0.0)
+        rank = _hold(along, rank, 0, 1.0, 0.0, 0.0)
+        rank = _hold(along, rank, 1, 0.0, 1.0, 0.0)
     for e in range(len(element)):
         if element[e, SIGN] == 0.0:
-            rank = _hold(ways, rank, e, element[e, GX], element[e, GX + 1], element[e, GZ])
+            rank = _hold(along, rank, e, element[e, GX], element[e, GX + 1], element[e, GZ])
     return rank
 
 
 @part
-def _same_problem(body, element, ways, k, aim):
+def _same_problem(body, element, along, k, aim):
     """Give the two plants of parameter k the stage at hand: signs, branches, i*, and x* with its derivative `aim`."""
     for side in range(2):
-        b, el, eps = ways.body[2 * k + side], ways.element[2 * k + side], EPS * (1 - 2 * side)
+        b, el, eps = along.body[2 * k + side], along.element[2 * k + side], EPS * (1 - 2 * side)
         b[TAU], b[ELLIPSE] = body[TAU], body[ELLIPSE]
         for a in range(3):
             b[GOAL + a], b[PUSH + a] = body[GOAL + a] + eps * aim[a], body[PUSH + a]
         for e in range(len(element)):
             el[e, SIGN] = element[e, SIGN]
             el[e, NOW] = element[e, NOW]
-            if e >= AXES:
-                el[e, BRANCH] = ways.carry[2, e - AXES]
+            if e >= N_AXES:
+                el[e, BRANCH] = along.carry[2, e - N_AXES]
 
 
 @part
-def _carry(body, element, ways, x):
-    """Into ways.carry: di/di* of a stage, the force that goes with it, by the slope of `winding`, and its branch.
+def _carry(body, element, along, x):
+    """Into along.carry: di/di* of a stage, the force that goes with it, by the slope of `winding`, and its branch.
 
     Not by differences: i* may be nearer to 0 or to the limit than they reach.
     """
-    for e in range(AXES, len(element)):
-        row, w = element[e], e - AXES
+    for e in range(N_AXES, len(element)):
+        row, w = element[e], e - N_AXES
         speed = row[GX] * x[0] + row[GX + 1] * x[1] + row[GZ] * x[2] if row[SIGN] != 0.0 else 0.0
-        branch = winding_branch(
-            speed, row[VOLTAGE], row[NOW], body[TAU], row[EMF], row[RESISTANCE], row[INDUCTANCE], row[DROP], row[BOUND]
-        )
-        i, slope = winding_answer(
-            branch, speed, row[VOLTAGE], row[NOW], body[TAU], row[EMF], row[RESISTANCE], row[INDUCTANCE], row[DROP],
-            row[BOUND],
-        )  # fmt: skip
-        gain = row[GAIN] if row[SIGN] == 2.0 else gear(i, row[SIGN], row[GAIN], row[EFFICIENCY])
-        ways.carry[0, w] = -slope * row[INDUCTANCE] / (body[TAU] * row[EMF])
-        ways.carry[1, w], ways.carry[2, w] = gain * ways.carry[0, w], branch
+        branch = motor_branch(element, e, speed, body[TAU])
+        i, slope = motor_current(element, e, branch, speed, body[TAU])
+        gain = row[THRUST] if row[SIGN] == 2.0 else gear(i, row[SIGN], row[THRUST], row[EFFICIENCY])
+        along.carry[0, w] = -slope * row[INDUCTANCE] / (body[TAU] * row[EMF])
+        along.carry[1, w], along.carry[2, w] = gain * along.carry[0, w], branch
 
 
 @part
-def _face_shift(ways, k, rank, x, r0, r1, r2, shift, force):
+def _active_set_shift(along, k, rank, x, r0, r1, r2, shift, force):
     """-P dA x into `shift`, -dA' P' R into `force`."""
     for a in range(3):
         shift[a] = force[a] = 0.0
     for c in range(rank):
-        arm = ways.arm[ways.held[0, c], k]
+        arm = along.arm[along.held[0, c], k]
         moved, carried = arm[0] * x[0] + arm[1] * x[1] + arm[2] * x[2], 0.0
         for j in range(rank):
-            p = ways.held[1, j]
-            shift[p] -= ways.lift[j, 3 + c] * moved
-            carried += ways.lift[j, 3 + c] * (r0 if p == 0 else (r1 if p == 1 else r2))
+            p = along.held[1, j]
+            shift[p] -= along.lift[j, 3 + c] * moved
+            carried += along.lift[j, 3 + c] * (r0 if p == 0 else (r1 if p == 1 else r2))
         for a in range(3):
             force[a] -= arm[a] * carried
 
 
 @part
-def stage_tangent(body, element, s, ways, x, aim, out):
+def stage_derivatives(body, element, s, along, x, aim, out):
     """Derivatives (K, 3 + n) of a stage solved at x, for the derivatives `aim` of x* and i*."""
     residual(body, element, x, s)
-    rank, holders = face(body, element, s), _holders(body, element, ways)
+    rank, holders = find_active_set(body, element, s), _holders(body, element, along)
     r0, r1, r2 = s[RESIDUAL, 0], s[RESIDUAL, 1], s[RESIDUAL, 2]
-    _carry(body, element, ways, x)
-    up, down, shift, force = ways.scratch[0], ways.scratch[1], ways.point[0], ways.point[1]
+    _carry(body, element, along, x)
+    up, down, shift, force = along.workspace[0], along.workspace[1], along.point[0], along.point[1]
     for k in range(len(out)):
-        _same_problem(body, element, ways, k, aim[k])
-        residual(ways.body[2 * k], ways.element[2 * k], x, up)
-        residual(ways.body[2 * k + 1], ways.element[2 * k + 1], x, down)
-        _face_shift(ways, k, holders, x, r0, r1, r2, shift, force)
-        for e in range(AXES, len(element)):
-            pull = ways.carry[1, e - AXES] * aim[k, 3 + e - AXES]
+        _same_problem(body, element, along, k, aim[k])
+        residual(along.body[2 * k], along.element[2 * k], x, up)
+        residual(along.body[2 * k + 1], along.element[2 * k + 1], x, down)
+        _active_set_shift(along, k, holders, x, r0, r1, r2, shift, force)
+        for e in range(N_AXES, len(element)):
+            pull = along.carry[1, e - N_AXES] * aim[k, 3 + e - N_AXES]
             for a in range(3):
                 force[a] -= pull * element[e, GX + a]
         for a in range(3):
@@ -187,38 +151,38 @@ def stage_tangent(body, element, s, ways, x, aim, out):
         newton_direction(s, rank)
         for a in range(3):
             out[k, a] = shift[a] + s[NEWTON, a]
-        _current_tangent(element, ways, k, x, aim[k], out[k])
+        _current_derivatives(element, along, k, x, aim[k], out[k])
 
 
 @part
-def _current_tangent(element, ways, k, x, aim, out):
+def _current_derivatives(element, along, k, x, aim, out):
     """Derivative of the currents at the solution; of windings with inductance only: the others follow at once."""
     some = False
-    for e in range(AXES, len(element)):
+    for e in range(N_AXES, len(element)):
         some |= element[e, INDUCTANCE] > 0.0
     if not some:
         return
-    point = ways.point[0]
+    point = along.point[0]
     for side in range(2):
         for a in range(3):
             point[a] = x[a] + EPS * (1 - 2 * side) * out[a]
-        residual(ways.body[2 * k + side], ways.element[2 * k + side], point, ways.scratch[side])
-    for e in range(AXES, len(element)):
-        change = ways.element[2 * k, e, CURRENT] - ways.element[2 * k + 1, e, CURRENT]
-        out[3 + e - AXES] = change / (2.0 * EPS) + ways.carry[0, e - AXES] * aim[3 + e - AXES]
+        residual(along.body[2 * k + side], along.element[2 * k + side], point, along.workspace[side])
+    for e in range(N_AXES, len(element)):
+        change = along.element[2 * k, e, CURRENT] - along.element[2 * k + 1, e, CURRENT]
+        out[3 + e - N_AXES] = change / (2.0 * EPS) + along.carry[0, e - N_AXES] * aim[3 + e - N_AXES]
 
 
 @part
-def step_tangent(body, element, s, ways, start, end, middle, h, d0, d1):
-    """`implicit_step.step` with derivatives: d0 at its start; ways.middle at stage 1 and d1 at its end are filled.
+def step_with_derivatives(body, element, s, along, start, end, middle, h, d0, d1):
+    """`implicit_step.step` with derivatives: d0 at its start; along.middle at stage 1 and d1 at its end are filled.
 
     d1 may be d0.
     """
     first = first_stage(body, element, s, start, end, middle, h)
-    stage_tangent(body, element, s, ways, end, d0, ways.middle)
+    stage_derivatives(body, element, s, along, end, d0, along.middle)
     last, back = last_stage(body, element, s, start, end, h)
     for k in range(len(d0)):
         for j in range(d0.shape[1]):
-            ways.aim[k, j] = d0[k, j] + back * (ways.middle[k, j] - d0[k, j])
-    stage_tangent(body, element, s, ways, end, ways.aim, d1)
+            along.aim[k, j] = d0[k, j] + back * (along.middle[k, j] - d0[k, j])
+    stage_derivatives(body, element, s, along, end, along.aim, d1)
     return max(first, last)

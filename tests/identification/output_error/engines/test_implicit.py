@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.fit import Options, fit_output_error, make_problem
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Point
@@ -66,7 +66,7 @@ def test_what_the_second_engine_does_not_know(ellipse, log):
     problem = make_problem([record(log, ellipse)], ellipse, Options(free=tuple(TRUTH), start="rest"))
     unknown = replace(problem, parameters=(*problem.parameters, Parameter("slip", 0.0, 0.0, 1.0)))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got slip.*leave it out"):
-        TangentEngine(unknown)
+        ImplicitEngine(unknown)
     placed = log.replace(pose=np.zeros((len(log), 3)))
     with pytest.raises(UnsupportedError, match=r"by the exact engine only; got position.*leave it out of the outputs"):
         fit_output_error(placed, ellipse, outputs=["twist", "position"], start="rest", nuisances=())
@@ -140,7 +140,7 @@ def test_every_slope_against_differences_of_simulated_logs(ellipse):
     given = Options(tuple(keys), nuisances=("gain", "dead_band", "fade", "latency"), start="free")
     problem = make_problem([record(run, ellipse)], ellipse, given)
     piece = replace(problem.pieces[0], margin=np.zeros(10))
-    engine = TangentEngine(replace(problem, pieces=(piece,)), 1e-8)
+    engine = ImplicitEngine(replace(problem, pieces=(piece,)), 1e-8)
     point = Point(np.array([values[name] for name in problem.names]), (np.concatenate([START, np.zeros(10)]),))
     residual, slopes, at = engine.residuals(point)[0]
     share = np.arange(40) / 40

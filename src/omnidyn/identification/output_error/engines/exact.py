@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.identification.output_error.engines.actuation import driver_of
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march import (
     FINAL,
@@ -34,15 +35,16 @@ from omnidyn.identification.output_error.kernel.march_axis import (
 )
 from omnidyn.identification.output_error.problem.primitives import Mapping, Primitives
 from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums, Point, Problem
+from omnidyn.model.actuation import at_motors
 from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.frames import body_to_world
-from omnidyn.model.layout import AXES
+from omnidyn.model.layout import N_AXES
 from omnidyn.simulation.exact.position import PLACE_SIZE
 
 FloatArray = NDArray[np.float64]
 
 VECTOR = 4  # rows of slopes are padded to a multiple
-LATE, GAIN, DEAD, FADE = "latency.", "gain", "dead_band", "fade"
+LATE = "latency."
 POSITION, HEADING = "position", ("heading", 0)
 TILT = ("tilt.x", "tilt.y", "tilt.yaw")
 
@@ -93,15 +95,11 @@ class ExactEngine:
         """Drive of the axes [N, N, N m] in every row of every piece but the last, shape (rows, 3)."""
         robot = self.mapping.robot_at(point.values[: self.problem.robot_count])
         matrix = self.mapping.at(point.values[: self.problem.robot_count])[0].drive * mass_matrix(robot)[:, None]
-        gain, dead, fade = (
-            point.values[k] if (k := self.problem.where(name)) >= 0 else plain
-            for name, plain in ((GAIN, 1.0), (DEAD, 0.0), (FADE, 0.0))
-        )
+        driver, _ = driver_of(self.problem, point.values)
         found = []
         for piece in self.problem.pieces:
-            u, t = piece.record.voltage[piece.first : piece.last], piece.record.t[piece.first : piece.last]
-            left = gain * (1.0 - fade * (t - piece.record.t[0]) / piece.record.span)
-            applied = left[:, None] * np.sign(u) * np.maximum(np.abs(u) - dead, 0.0)
+            rows = slice(piece.first, piece.last)
+            applied, _ = at_motors(piece.record.voltage[rows], piece.record.share[rows], driver)
             found.append(applied @ matrix.T + self._tilt(point.values))
         return found
 
@@ -136,11 +134,12 @@ class ExactEngine:
     ) -> PieceSums:
         """The sums of a piece, axis by axis."""
         record, count = piece.record, len(self.problem.parameters)
-        width = count + AXES + AXES
-        rows, grad, info = np.zeros((AXES, SIZE)), np.zeros((AXES, width)), np.zeros((AXES, width, width))
+        width = count + N_AXES + N_AXES
+        rows, grad, info = np.zeros((N_AXES, SIZE)), np.zeros((N_AXES, width)), np.zeros((N_AXES, width, width))
         blocks = _blocks(piece, weighting)
-        score, drift, scores = np.zeros((blocks, width)), np.zeros((blocks, AXES)), np.zeros((AXES, blocks, BY + 1))
-        for axis in range(AXES):
+        score, drift = np.zeros((blocks, width)), np.zeros((blocks, N_AXES))
+        scores = np.zeros((N_AXES, blocks, BY + 1))
+        for axis in range(N_AXES):
             march_axis(
                 record.t, record.voltage, record.outputs, axis, piece.first, piece.last, now.drive[axis],
                 now.rate[axis], now.coulomb[axis], now.hold[axis], state[axis], weighting.variance[axis], weighting.nu,
@@ -154,7 +153,7 @@ class ExactEngine:
                 score += scores[axis, :, :BY] @ slopes
                 drift[:, axis] = scores[axis, :, BY]
         number, square, loss, lag = (rows[:, what] for what in (NUMBER, SQUARE, LOSS, LAG))
-        return PieceSums(np.arange(AXES), number, square, loss, lag, grad, info, score, drift)
+        return PieceSums(np.arange(N_AXES), number, square, loss, lag, grad, info, score, drift)
 
     def _piece(
         self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, weighting: Weighting
@@ -175,15 +174,14 @@ class ExactEngine:
             out[..., :robot_count] = slope
             return out
 
-        facing = state[AXES + columns.index(HEADING)] if HEADING in columns else 0.0
+        facing = state[N_AXES + columns.index(HEADING)] if HEADING in columns else 0.0
         maps, slopes = _maps(columns, now, facing), _maps(columns, by, facing, (robot_count,))
         late = [problem.where(LATE + name) for name, _ in columns]
-        driver = [problem.where(name) for name in (GAIN, DEAD, FADE)]
-        fixed, tilt = (1.0, 0.0, 0.0), self._tilt(values)
+        (driver, at_driver), tilt = driver_of(problem, values), self._tilt(values)
         physics = Physics(
             np.stack([now.rate, now.coulomb, now.hold]), now.drive, now.per_force * tilt, maps[0], maps[1], maps[2],
             _wheel_of(columns), np.array([values[k] if k >= 0 else 0.0 for k in late]),
-            np.array([values[k] if k >= 0 else fixed[i] for i, k in enumerate(driver)]), bool(maps[1].any()),
+            driver, bool(maps[1].any()),
         )  # fmt: skip
         at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
         push, travel = wide(by.per_force * tilt[:, None]), wide(slopes[1])
@@ -192,11 +190,11 @@ class ExactEngine:
                 push[axis, k] = now.per_force[axis]
         for c, (name, i) in enumerate(columns):
             if name == POSITION:
-                travel[c, AXES:, at[AXES + columns.index(HEADING)]] = turned_by(facing)[i]
+                travel[c, N_AXES:, at[N_AXES + columns.index(HEADING)]] = turned_by(facing)[i]
         varies = np.array([bool(travel[c].any()) for c in range(width)])
         derivatives = Slopes(
             wide(np.stack([by.rate, by.coulomb])), wide(by.drive), push, wide(slopes[0]), travel, wide(slopes[2]),
-            not self.mapping.linear, varies, np.array(late), np.array(driver), at[:AXES], at[AXES:],
+            not self.mapping.linear, varies, np.array(late), np.array(at_driver), at[:N_AXES], at[N_AXES:],
         )  # fmt: skip
         starts = [c for c in range(width) if c == 0 or columns[c][0] != columns[c - 1][0]]
         return physics, derivatives, np.array([*starts, width])
@@ -221,7 +219,7 @@ def march_piece(
     count: of parameters. numbers: physics, their slopes (rows of `padded`), and the first column of each group, and C.
     """
     columns, used, (physics, slopes, groups) = piece.record.columns, used_by(piece, count), numbers
-    known, total = np.array([every.index(column) for column in columns]), count + AXES + len(columns)
+    known, total = np.array([every.index(column) for column in columns]), count + N_AXES + len(columns)
     counted = weighting.counted and any(piece.record.ticks)
     tick = np.array(piece.record.ticks) if counted else None
     share = np.ones(len(known)) if tick is None else information(weighting.variance[known], tick)[0]
@@ -232,7 +230,7 @@ def march_piece(
     )
     march(
         piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
-        float(piece.record.t[0]), piece.record.span, piece.margin, state[:AXES], state[AXES:], groups,
+        float(piece.record.t[0]), piece.record.span, piece.margin, state[:N_AXES], state[N_AXES:], groups,
         physics, slopes, loss, sums, tick, np.zeros((2, PLACE_SIZE)) if moves else None,
         np.zeros((3, 3)) if moves else None,
     )  # fmt: skip
@@ -249,19 +247,19 @@ def _maps(columns: Sequence[Column], now: Primitives, facing: float, more: tuple
 
     facing: heading at the start of the piece [rad].
     """
-    speed, travel = np.zeros((len(columns), AXES, *more)), np.zeros((len(columns), PATH, *more))
+    speed, travel = np.zeros((len(columns), N_AXES, *more)), np.zeros((len(columns), PATH, *more))
     volts = np.zeros((len(columns), *more))
     for c, (name, i) in enumerate(columns):
         if name == "wheel_speed":
             speed[c] = now.wheels[i]
         elif name == "wheel_angle":
-            travel[c, :AXES] = now.wheels[i]
+            travel[c, :N_AXES] = now.wheels[i]
         elif name == "current":
             speed[c], volts[c] = now.braking[i], now.per_volt[i]
         elif more:  # the twist and the pose themselves
             continue
         elif name == POSITION:
-            travel[c, AXES:] = body_to_world(facing)[i, : PATH - AXES]
+            travel[c, N_AXES:] = body_to_world(facing)[i, : PATH - N_AXES]
         else:
             (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
     return [speed, travel, volts]

@@ -1,7 +1,7 @@
 """The second engine of a fit: robots that the exact step cannot simulate, by the derivatives of the implicit engine.
 
 The same interface as exact.py, with arrays of the length of the log. A latency takes no steps of its own: the
-run is looked at between its rows (sensitivity/sample.py).
+run is sampled between its rows (sensitivity/sample.py).
 """
 
 from __future__ import annotations
@@ -12,27 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.actuation import through_driver
-from omnidyn.identification.output_error.engines.exact import DEAD, FADE, GAIN, LATE, Weighting
+from omnidyn.identification.output_error.engines.actuation import driver_of
+from omnidyn.identification.output_error.engines.exact import LATE, Weighting
 from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.problem.outputs import refuse_exact_only
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, PieceSums, Point, Problem
-from omnidyn.model.layout import AXES
-from omnidyn.model.motor import clip_voltage
+from omnidyn.model.actuation import Driver, at_motors, clip_voltage
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.sensitivity.directions import difference
-from omnidyn.simulation.sensitivity.late_sample import Direction, Sight, sights
-from omnidyn.simulation.sensitivity.stage import EPS
+from omnidyn.simulation.sensitivity.directions import EPS, difference
+from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, late_samples
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Found = tuple[FloatArray, FloatArray, IntArray]
 
-DRIVER = {GAIN: 1.0, DEAD: 0.0, FADE: 0.0}  # in the order of kernel/march.py, with what leaves the voltages as they are
 
-
-class TangentEngine:
+class ImplicitEngine:
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
     Raises UnsupportedError for nuisances and outputs that it does not know.
@@ -41,17 +38,17 @@ class TangentEngine:
     def __init__(self, problem: Problem, tol: float | None = None):
         self.problem, self.tol, self._columns = problem, tol, problem.columns
         nuisances = [p.name for p in problem.parameters[problem.robot_count :]]
-        other = [name for name in nuisances if not name.startswith(LATE) and name not in DRIVER]
+        other = [name for name in nuisances if not name.startswith(LATE) and name not in Driver._fields]
         if other:
             raise UnsupportedError(
                 "this robot is fitted by the implicit engine, which does not know all that is asked for",
-                got=", ".join(other), where=problem.robot.name, expected=f"nuisances: latency, {', '.join(DRIVER)}",
-                remedy="leave it out of the nuisances",
+                got=", ".join(other), expected=f"nuisances: latency, {', '.join(Driver._fields)}",
+                remedy="leave it out of the nuisances", where=problem.robot.name,
             )  # fmt: skip
         refuse_exact_only(problem.columns, problem.robot.name)
         self._known: dict[tuple[bytes, ...], list[Found]] = {}
 
-    def on(self, problem: Problem) -> TangentEngine:
+    def on(self, problem: Problem) -> ImplicitEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
         engine.problem, engine._columns, engine._known = problem, problem.columns, {}
@@ -75,7 +72,7 @@ class TangentEngine:
         for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True):
             columns = piece.record.columns
             known = np.array([self._columns.index(column) for column in columns])
-            found.append(added(*parts, weighting, known, len(self.problem.parameters) + AXES + len(columns)))
+            found.append(added(*parts, weighting, known, len(self.problem.parameters) + N_AXES + len(columns)))
         return found
 
     def residuals(self, point: Point) -> list[Found]:
@@ -113,10 +110,11 @@ class TangentEngine:
         where = [self.problem.where(LATE + name) for name, _ in record.columns]
         late = [float(values[k]) if k >= 0 else 0.0 for k in where]
         distinct = sorted(set(late))
-        seen, _ = sights(robot, t, voltage, directions, state[:AXES], distinct, self.tol)
+        seen, _ = late_samples(robot, t, voltage, directions, state[:N_AXES], distinct, self.tol)
         residual = np.empty(measured.shape)
         keys = len(at)
-        at += [*dict.fromkeys(k for k in where if k >= 0), *(count + AXES + np.flatnonzero(piece.free[AXES:]))]
+        offsets = count + N_AXES + np.flatnonzero(piece.free[N_AXES:])
+        at += [*dict.fromkeys(k for k in where if k >= 0), *offsets]
         slopes = np.zeros((*measured.shape, len(at)))
         shown: dict[tuple[str, float], tuple[FloatArray, FloatArray, FloatArray]] = {}
         for c, (name, i) in enumerate(record.columns):
@@ -124,51 +122,49 @@ class TangentEngine:
             if key not in shown:
                 shown[key] = _shown(seen[distinct.index(late[c])], name)
             value, pace, by = shown[key]
-            residual[c] = measured[c] - value[:, i] - state[AXES + c]
+            residual[c] = measured[c] - value[:, i] - state[N_AXES + c]
             residual[c][t - t[0] < piece.margin[c]] = np.nan
             np.multiply(by[:, :, i], factors, out=slopes[c, :, :keys])
             if where[c] >= 0:
                 slopes[c, :, at.index(where[c])] = -pace[:, i]
-            if piece.free[AXES + c]:
-                slopes[c, :, at.index(count + AXES + c)] = 1.0
+            if piece.free[N_AXES + c]:
+                slopes[c, :, at.index(count + N_AXES + c)] = 1.0
         return residual, slopes, np.array(at)
 
     def _directions(
         self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, values: FloatArray
     ) -> tuple[FloatArray, list[Direction], list[int], FloatArray]:
         """(voltages at the motors, directions, index of each among the slopes, what turns its derivative into that)."""
-        record, where, count = piece.record, self.problem.where, len(self.problem.parameters)
-        rows = slice(piece.first, piece.last)
+        record, count = piece.record, len(self.problem.parameters)
+        rows, (driver, where) = slice(piece.first, piece.last), driver_of(self.problem, values)
         at, directions = list(range(self.problem.robot_count)), []
         logged = clip_voltage(robot.motor, record.voltage[rows])
-        found = [where(name) for name in DRIVER]
-        numbers = [float(values[k]) if k >= 0 else plain for k, plain in zip(found, DRIVER.values(), strict=True)]
-        share = (record.t[rows] - record.t[0]) / record.span
-        voltage, by = through_driver(logged, share, *numbers)
+        share = record.share[rows]
+        voltage, by = at_motors(logged, share, driver)
         for p, (up, down) in zip(self._own, moved, strict=True):
             rate = None
             if up.motor.voltage_limit != down.motor.voltage_limit:
-                ends = [through_driver(clip_voltage(r.motor, logged), share, *numbers)[0] for r in (up, down)]
+                ends = [at_motors(clip_voltage(r.motor, logged), share, driver)[0] for r in (up, down)]
                 rate = difference(np.array(ends))[0]
             directions.append(Direction(p.name, up, down, rate))
-        for name, k, rate in zip(DRIVER, found, by, strict=True):
+        for name, k, rate in zip(Driver._fields, where, by, strict=True):
             if k >= 0:
                 directions.append(Direction(name, voltage=rate))
                 at.append(k)
-        for axis in np.flatnonzero(piece.free[:AXES]):
-            directions.append(Direction("start", start=np.eye(AXES)[axis]))
+        for axis in np.flatnonzero(piece.free[:N_AXES]):
+            directions.append(Direction("start", start=np.eye(N_AXES)[axis]))
             at.append(count + int(axis))
         factors = np.ones(len(at))
         factors[: self.problem.robot_count] = 1.0 / np.array(scales[: self.problem.robot_count])
         return voltage, directions, at, factors
 
 
-def _shown(seen: Sight, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _shown(seen: LateSample, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(value (rows, m), its time derivative (rows, m), its derivatives (rows, K, m)) of a channel of m columns."""
     if name == "wheel_speed":
         return seen.wheel_speeds()
     if name == "current":
         return seen.currents()
     if name == "heading":
-        return seen.heading[:, None], seen.twist[:, 2:], seen.heading_by[:, :, None]
-    return seen.twist, seen.pace, seen.twist_by
+        return seen.heading[:, None], seen.twist[:, 2:], seen.dheading[:, :, None]
+    return seen.twist, seen.pace, seen.dtwist

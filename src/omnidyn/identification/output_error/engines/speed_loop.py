@@ -18,13 +18,13 @@ from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.problem.outputs import refuse_exact_only
 from omnidyn.identification.output_error.problem.problem import Piece, PieceSums, Point, Problem
 from omnidyn.model.dynamics import acceleration, settled_currents
-from omnidyn.model.layout import AXES
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.simulation.commands import Commands
-from omnidyn.simulation.sensitivity.directions import Derivatives, Prepared, difference, differentiate, prepared
-from omnidyn.simulation.sensitivity.stage import EPS
+from omnidyn.simulation.sensitivity.derivatives import Derivatives, differentiate
+from omnidyn.simulation.sensitivity.directions import EPS, Prepared, difference, prepared
 
 FloatArray = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ class LoopEngine:
         grid = _grid(t, [*seen.values(), *after[:1]])
         found = self._run(ready, piece, t, grid)
         outputs = np.zeros((len(t), len(columns)))
-        slopes = np.zeros((len(t), len(columns), len(problem.parameters) + AXES + len(columns)))
+        slopes = np.zeros((len(t), len(columns), len(problem.parameters) + N_AXES + len(columns)))
         for k, times in seen.items():
             own = [c for c in range(len(columns)) if late[c] == k]
             begun, there = times >= t[0] - MEET, times <= grid[-1] + MEET
@@ -130,8 +130,8 @@ class LoopEngine:
                     slopes[used, c, k] = -_rate(robot, found, pace, name, i, at, grid, period * jumps)
         for c, (name, _) in enumerate(columns):
             if name == "heading":
-                outputs[:, c] += state[AXES + c]
-                slopes[:, c, len(problem.parameters) + AXES + c] = 1.0
+                outputs[:, c] += state[N_AXES + c]
+                slopes[:, c, len(problem.parameters) + N_AXES + c] = 1.0
         return outputs, np.clip(np.nan_to_num(slopes), -STEEPEST, STEEPEST)
 
     def _run(self, ready: Prepared, piece: Piece, t: FloatArray, grid: FloatArray) -> Derivatives:
@@ -180,7 +180,7 @@ def _column(robot: Robot, found: Derivatives, name: str, i: int, at: NDArray[np.
         return run.current[at, i], found.current[at, i]
     if name == "heading":
         return run.pose[at, 2], found.pose[at, 2]
-    turned = np.moveaxis(found.twist[at], 1, 2).reshape(-1, AXES)
+    turned = np.moveaxis(found.twist[at], 1, 2).reshape(-1, N_AXES)
     return _of_twist(robot, run.twist[at], name, i), _of_twist(robot, turned, name, i).reshape(len(at), -1)
 
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.identification.output_error.kernel.counts import count_terms
+from omnidyn.model.actuation import Driver, at_motor
 from omnidyn.simulation.exact.position import move_on, put_displacement
 from omnidyn.simulation.exact.slopes import acceleration_at_end, hold_slopes, step_slopes, travel_slopes
 from omnidyn.simulation.pose import rotated
@@ -31,7 +32,6 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-GAIN, DEAD, FADE = 0, 1, 2  # numbers of the driver
 PATH = 5  # integrals of the twist, then x and y of the displacement
 SAME = 1e-7  # times 1/a [s]: steps that differ by less share one exponential, to first order, which leaves 1e-15
 FINAL, KEEP, WAVES = 1, 2, 4  # what a march is for, beside the sums
@@ -53,7 +53,7 @@ class Physics(NamedTuple):
     input_map: FloatArray  # (C,) E
     input_wheel: IntArray  # (C,) w
     late: FloatArray  # (C,) latency [s]
-    driver: FloatArray  # (3,) gain, dead band [V], fade over the run
+    driver: Driver
     travels: bool  # whether Q has an entry
 
 
@@ -139,16 +139,6 @@ def terms_of(residual, variance, nu, c, tick, share, final):
 
 
 @part
-def driven(u, gain, dead):
-    """(voltage at the wheel, its derivative by gain, by the dead band): gain (|u| - dead)+ sgn u."""
-    size = abs(u) - dead
-    if size <= 0.0:
-        return 0.0, 0.0, 0.0
-    side = 1.0 if u > 0.0 else -1.0
-    return gain * size * side, size * side, -gain * side
-
-
-@part
 def held(cache, rates, dt):
     """Refresh `cache` (row 3: dt; rows 0..2: phi, dphi, psi, dpsi of the axes) for a step of dt."""
     off = dt - cache[3, 0]
@@ -199,13 +189,10 @@ def add_waves(waves, row, turns):
 
 
 @part
-def put_volts(volts, u, k, worn, driver):
-    """Row 0 of `volts`: at the wheels; rows 1 to 3: its derivatives by gain, dead band and fade."""
-    left = 1.0 - driver[FADE] * worn
+def put_volts(volts, u, k, share, driver):
+    """Row 0 of `volts`: at the wheels; rows 1 to 3: its derivatives by the numbers of the driver."""
     for w in range(volts.shape[1]):
-        whole, more, less = driven(u[k, w], driver[GAIN], driver[DEAD])
-        volts[0, w] = left * whole
-        volts[1 + GAIN, w], volts[1 + DEAD, w], volts[1 + FADE, w] = left * more, left * less, -worn * whole
+        volts[0, w], volts[1, w], volts[2, w], volts[3, w] = at_motor(u[k, w], share, driver)
 
 
 @part

@@ -21,13 +21,14 @@ from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twist
 from omnidyn.logs.steady_table import AXES
+from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.first_guess import GRAVITY
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]
 
-LATENCY, GAIN, DEAD, FADE, TILT = "latency", "gain", "dead_band", "fade", "tilt"
-NUISANCES = (LATENCY, GAIN, DEAD, FADE, TILT)
+LATENCY, TILT = "latency", "tilt"
+NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT)
 TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an unknown start
 EARLIEST, LATEST = -0.1, 0.3  # [s]
 SUPPLY_STD = 0.1  # of a nominal supply: a battery is full or it is not
@@ -55,9 +56,9 @@ def nuisance_parameters(wanted: Sequence[str], records: Sequence[Record], robot:
         elif name == GAIN:
             prior = (1.0, SUPPLY_STD) if any(record.supplied for record in records) else None
             found.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
-        elif name == DEAD:
+        elif name == DEAD_BAND:
             most = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
-            found.append(Parameter(DEAD, 0.0, 0.0, 0.5 * most))
+            found.append(Parameter(DEAD_BAND, 0.0, 0.0, 0.5 * most))
         elif name.partition(".")[0] == TILT:
             found += _tilts(name, robot)
         else:
@@ -88,7 +89,7 @@ def _tilts(name: str, robot: Robot) -> list[Parameter]:
 
 def automatic(records: Sequence[Record]) -> tuple[str, ...]:
     """The nuisances that a log of a real robot is likely to have, before it is asked whether it determines them."""
-    return (LATENCY, DEAD, GAIN) if any(record.supplied for record in records) else (LATENCY, DEAD)
+    return (LATENCY, DEAD_BAND, GAIN) if any(record.supplied for record in records) else (LATENCY, DEAD_BAND)
 
 
 def pieces(records: Sequence[Record], robot: Robot, start: str, late: bool) -> list[Piece]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.output_error.kernel.counts import find_tick
-from omnidyn.identification.output_error.problem.redundant import doubled
+from omnidyn.identification.output_error.problem.redundant import redundant
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -83,7 +83,7 @@ def _without_doubles(
     if not found.keys() & set(TRAVEL):
         return found, []
     notes = []
-    for name, source in doubled(run, robot).items():
+    for name, source in redundant(run, robot).items():
         if name not in found or source not in found:
             continue
         same = (

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.problem.outputs import outputs_of
 from omnidyn.logs.segments import segments
+from omnidyn.model.actuation import asked_voltage, clip_voltage
 from omnidyn.model.drive import SPEED
-from omnidyn.model.motor import clip_voltage
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
@@ -51,6 +51,11 @@ class Record:
     @property
     def span(self) -> float:
         return float(self.t[-1] - self.t[0]) or 1.0
+
+    @property
+    def share(self) -> FloatArray:
+        """How much of the run has gone by, 0 to 1. Shape (rows,)."""
+        return (self.t - self.t[0]) / self.span
 
 
 def record(
@@ -108,19 +113,16 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
             "the log has another number of wheels", got=run.wheels,
             expected=f"{robot.wheels.count}, as {robot.name} has", where=run.source,
         )  # fmt: skip
-    if run.voltage is not None:
-        return run.voltage, False, []
+    nominal = robot.drive.supply
+    voltage = asked_voltage(run.voltage, run.duty, run.supply, nominal)
+    if voltage is not None:
+        supplied = run.voltage is None and run.supply is None
+        return voltage, supplied, [f"the supply is not logged: its nominal {nominal:g} V is taken"] if supplied else []
     if run.duty is not None:
-        if run.supply is not None:
-            return run.duty * run.supply[:, None], False, []
-        nominal = robot.drive.supply
-        if nominal is None:
-            raise InputError(
-                "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
-                remedy="add supply_V to the robot file",
-            )  # fmt: skip
-        note = f"the supply is not logged: its nominal {nominal:g} V is taken"
-        return run.duty * nominal, True, [note]
+        raise InputError(
+            "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
+            remedy="add supply_V to the robot file",
+        )  # fmt: skip
     if run.wheel_speed_command is not None or run.twist_command is not None:
         raise UnsupportedError(
             "only set speeds are logged, and the robot has no speed loop to follow them", got=", ".join(run.channels),

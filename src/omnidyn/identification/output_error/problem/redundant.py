@@ -26,7 +26,7 @@ ENOUGH, LEAST = 50_000, 30  # rows looked at; windows needed
 TO_STD = MAD_TO_STD / np.sqrt(20.0)  # from the median size of third differences to the noise of a row
 
 
-def doubled(run: Run, robot: Robot) -> dict[str, str]:
+def redundant(run: Run, robot: Robot) -> dict[str, str]:
     """Outputs that say nothing beside another one: output -> the one that it is computed from, or that has it all."""
     found = {}
     t = run.t[:ENOUGH]

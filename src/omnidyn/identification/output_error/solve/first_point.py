@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import TangentEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
@@ -70,14 +70,14 @@ def coarse_point(problem: Problem, nu: float, watch: Onlooker) -> Point:
     """Near the best point, by one step a row; a long log is first fitted in part, of which `watch` hears only."""
     watch.doing("looking for a start")
     solver, short, own = (
-        Solver(problem, TangentEngine(problem), nu, NEAR),
+        Solver(problem, ImplicitEngine(problem), nu, NEAR),
         problem.shortened(FEW),
         moving_start(problem, nu),
     )
     if short is problem:
         return solver.minimise(own, watch=watch).state.point
     found = (
-        Solver(short, TangentEngine(short), nu, NEAR)
+        Solver(short, ImplicitEngine(short), nu, NEAR)
         .minimise(own, watch=watch.aside("a part of the log first"))
         .state.point
     )
@@ -88,7 +88,7 @@ def coarse_point(problem: Problem, nu: float, watch: Onlooker) -> Point:
 def moving_start(problem: Problem, nu: float) -> Point:
     """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes."""
     own, short = problem.start(), problem.shortened(FEW)
-    solver = Solver(short, TangentEngine(short), nu)
+    solver = Solver(short, ImplicitEngine(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
     return min(points, key=lambda point: solver.state(point).objective)

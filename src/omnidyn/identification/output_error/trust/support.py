@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.identification.output_error.problem.nuisances import DEAD, GAIN, LATENCY
+from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import final_weighting
+from omnidyn.model.actuation import DEAD_BAND, GAIN
 
 LATENCY_STD = 0.02  # [s] beyond which a log says nothing of its latency
 DEAD_SHARE = 0.1  # the same for a dead band, of the largest voltage
@@ -23,7 +24,7 @@ def supported(solver: Solver, solution: Solution, names: tuple[str, ...]) -> tup
     std = np.sqrt(np.diag(np.linalg.pinv(normal.information, hermitian=True)))
     blind = np.diag(normal.information) <= 0.0
     largest = max(float(np.nanmax(np.abs(piece.record.voltage))) for piece in solver.problem.pieces)
-    limits = {LATENCY: LATENCY_STD, DEAD: DEAD_SHARE * largest, GAIN: np.inf}
+    limits = {LATENCY: LATENCY_STD, DEAD_BAND: DEAD_SHARE * largest, GAIN: np.inf}
     kept = []
     for j, parameter in enumerate(solver.problem.parameters):
         kind = parameter.part

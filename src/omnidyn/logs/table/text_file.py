@@ -1,6 +1,6 @@
-"""The lines of a text file in pieces: any end of line, UTF-8, UTF-16 or Latin-1, hashed on the way.
+"""The lines of a text file, block by block: any end of line, UTF-8, UTF-16 or Latin-1, hashed on the way.
 
-Memory is bounded by the piece, never by the file. A line is UTF-8, or Latin-1 where it cannot be UTF-8.
+Memory is bounded by the block, never by the file. A line is UTF-8, or Latin-1 where it cannot be UTF-8.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TOO_LARGE_REMEDY = "cut it, allow more with --max-bytes, or read it in pieces wi
 Progress = Callable[[int, int], None]
 
 
-class Piece(NamedTuple):
+class TextBlock(NamedTuple):
     """Lines of a file, without their ends; `first` is the number of the first one, counted from 1."""
 
     first: int
@@ -30,7 +30,7 @@ class Piece(NamedTuple):
 
 
 class TextFile:
-    """A text file, read once, in order, by `pieces`. Afterwards `sha256` and `notes` are complete.
+    """A text file, read once, in order, by `blocks`. Afterwards `sha256` and `notes` are complete.
 
     progress(bytes_done, bytes_total) is called after every block. max_bytes: refuse a longer file.
     Raises InputError when the file is missing, no file, empty, too large or not text.
@@ -47,16 +47,16 @@ class TextFile:
         """Hexadecimal SHA-256 of what was read so far."""
         return self._hash.hexdigest()
 
-    def pieces(self, rows: int) -> Iterator[Piece]:
+    def blocks(self, rows: int) -> Iterator[TextBlock]:
         """All lines, at most `rows` of them at once."""
         first, pending = 1, []
         for block in self._whole_lines():
             pending += self._decoded(block, first + len(pending)).split("\n")
             while len(pending) > rows:
-                yield Piece(first, pending[:rows])
+                yield TextBlock(first, pending[:rows])
                 first, pending = first + rows, pending[rows:]
         if pending:
-            yield Piece(first, pending)
+            yield TextBlock(first, pending)
 
     def _whole_lines(self) -> Iterator[bytes]:
         """Blocks that end where a line ends, the last line end of each cut off."""

@@ -10,12 +10,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from omnidyn.errors import InputError
-from omnidyn.logs.readers.any_table import iter_tables, read_any
-from omnidyn.logs.table import text as text_file
+from omnidyn.logs.readers.read_table import iter_tables, read_table
+from omnidyn.logs.table import text_file
 
 
 def pieces_of(path, rows, **options):
-    """Names, columns and lines as `read_any` would have them, put together here, not by the package."""
+    """Names, columns and lines as `read_table` would have them, put together here, not by the package."""
     pieces = list(iter_tables(path, rows, **options))
     assert all(0 < len(piece) <= rows for piece in pieces)
     columns = {name: [cell for piece in pieces for cell in list(piece.columns[name])] for name in pieces[0].names}
@@ -30,7 +30,7 @@ def compare(path, rows, **options):
     """Both ways of reading a file: the same table, or the same error."""
     whole = error = None
     try:
-        whole = read_any(path, **options)
+        whole = read_table(path, **options)
     except InputError as refused:
         error = str(refused)
     if whole is None:
@@ -115,7 +115,7 @@ def test_a_block_may_end_inside_a_character(tmp_path, monkeypatch, encoding, blo
     monkeypatch.setattr(text_file, "BLOCK_BYTES", block)
     monkeypatch.setattr(text_file, "START_BYTES", 8)
     (tmp_path / "t.csv").write_bytes("t_s,µ [°/s]\r\n0,1\r\n# é\r\n1,2\r\n".encode(encoding))
-    table = read_any(tmp_path / "t.csv")
+    table = read_table(tmp_path / "t.csv")
     assert table.names == ("t_s", "µ")
     assert table.numbers("µ").tolist() == [1.0, 2.0]
     assert table.lines.tolist() == [2, 4]
@@ -165,7 +165,7 @@ def test_the_fast_and_the_careful_way_agree(tmp_path_factory, rows, separator, e
     outcomes = []
     for path in (plain, worded):
         try:
-            table = read_any(path)
+            table = read_table(path)
             outcomes.append([list(table.columns[name]) for name in "ab"])
         except InputError as error:
             outcomes.append(error.what)
@@ -235,7 +235,7 @@ def test_a_file_beyond_max_bytes_is_streamed_but_not_held(tmp_path):  # 36, 40
     path = tmp_path / "long.csv"
     path.write_text("t,u\n" + "1,2\n" * 1000)
     with pytest.raises(InputError, match=r"long\.csv: the file is too large; got more than 1000 bytes; .*iter_tables"):
-        read_any(path, max_bytes=1000)
+        read_table(path, max_bytes=1000)
     assert sum(map(len, iter_tables(path, 10))) == 1000
 
 
@@ -243,7 +243,7 @@ def test_numbers_beyond_max_bytes_are_not_held(tmp_path):  # 40: short cells bec
     path = tmp_path / "long.csv"
     path.write_bytes(b"a,b\n" + b"1,2\n" * 4_000_000)
     with pytest.raises(InputError, match="the file is too large; got more than 20000000 bytes"):
-        read_any(path, max_bytes=20_000_000)
+        read_table(path, max_bytes=20_000_000)
 
 
 def test_a_line_without_end_is_refused(tmp_path):
@@ -256,7 +256,7 @@ def test_a_line_without_end_is_refused(tmp_path):
 LIMITED = """
 import resource, sys
 import numpy as np
-from omnidyn.logs.readers.any_table import iter_tables
+from omnidyn.logs.readers.read_table import iter_tables
 if sys.argv[1].endswith("parquet"):
     import pyarrow.parquet
 pages = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()

@@ -1,0 +1,23 @@
+"""How a result is told: to people as text, to machines as values, with where they were written and made from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from omnidyn.cli.terminal.streams import painted, say, show, show_json
+from omnidyn.document import WIDTH, Document
+
+
+def as_json(document: Document, record: dict[str, Any], **written: Any) -> dict[str, Any]:
+    """The result for machines. record: its provenance; written: which files hold what."""
+    return {**document.data, **written, "provenance": record}
+
+
+def tell(document: Document, json: bool, record: dict[str, Any], *, width: int = WIDTH, **written: Any) -> None:
+    """The result, to stdout. What a reader of the JSON alone must know is said on stderr too."""
+    if json:
+        for warning in document.warnings:
+            say(f"omnidyn: warning: {warning}")
+        show_json(as_json(document, record, **written))
+    else:
+        show(document.to_text(width, painted))

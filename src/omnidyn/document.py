@@ -1,0 +1,128 @@
+"""Document: what a result says, said once: words, points and tables for people, plain values for machines.
+
+A result has one function that makes its Document. Text comes from here, JSON is its `data`, and report/html makes the
+same tables and points HTML.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+WIDTH = 100  # columns of text that knows no terminal
+GAP = "  "  # between two columns of a table
+TINY_CHANCE = 0.001
+
+Paint = Callable[[str, str], str]  # a word and its tone -> the word in the colour of that tone
+
+
+@dataclass(frozen=True)
+class Words:
+    """A paragraph. first, rest: what stands before its first line and before the others. tone: of what stands first."""
+
+    text: str
+    first: str = ""
+    rest: str = ""
+    tone: str = ""
+
+    def lines(self, width: int, paint: Paint) -> Iterator[str]:
+        """The paragraph, wrapped."""
+        wrapped = textwrap.wrap(self.text, width, initial_indent=self.first, subsequent_indent=self.rest)
+        sign = self.first.strip()
+        for k, line in enumerate(wrapped):
+            yield line.replace(sign, paint(sign, self.tone), 1) if sign and k == 0 else line
+
+
+@dataclass(frozen=True)
+class Points:
+    """Sentences, each a point of a list. mark: what stands before each in text, such as "-" or "warning:"."""
+
+    words: Sequence[str]
+    mark: str = "-"
+    name: str = ""
+
+    def lines(self, width: int, paint: Paint) -> Iterator[str]:
+        """The points, each wrapped."""
+        for words in self.words:
+            yield from Words(f"{self.mark} {words}", rest="  ").lines(width, paint)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells under a head. An empty head is not shown.
+
+    align: "<" (to the left) or ">" of each column; the last one is that of all further columns. least: the least width
+    of each column, where it has one.
+    """
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    align: str = "<>"
+    least: Sequence[int] = ()
+    name: str = ""
+
+    def lines(self, width: int, paint: Paint) -> Iterator[str]:
+        """Aligned columns, however wide that gets: a table is not wrapped."""
+        rows = [self.head, *self.rows] if self.head else self.rows
+        columns = max(map(len, rows), default=0)
+        least = (*self.least, *[0] * columns)
+        widths = [max(least[k], *(len(row[k]) for row in rows if k < len(row))) for k in range(columns)]
+        for row in rows:
+            cells = (f"{cell:{self._side(k)}{widths[k]}}" for k, cell in enumerate(row))
+            yield GAP.join(cells).rstrip()
+
+    def _side(self, column: int) -> str:
+        return self.align[min(column, len(self.align) - 1)]
+
+
+Part = str | Words | Points | Table  # plain text is a line as it stands
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a result says: its parts in the order in which text tells them, and its values as JSON can hold them.
+
+    warnings: what a reader of `data` alone must be told too. ascii: text has an escape for every other character.
+    """
+
+    parts: Sequence[Part]
+    data: Mapping[str, Any] = field(default_factory=dict)
+    warnings: Sequence[str] = ()
+    ascii: bool = False
+
+    def __getitem__(self, name: str) -> Points | Table:
+        """The points or the table of this name. Raises KeyError."""
+        for part in self.parts:
+            if isinstance(part, Points | Table) and part.name == name:
+                return part
+        raise KeyError(name)
+
+    def joined(self, *names: str) -> Points:
+        """The points of these names as one list."""
+        several = [part for part in map(self.__getitem__, names) if isinstance(part, Points)]
+        return Points([words for part in several for words in part.words])
+
+    def to_text(self, width: int = WIDTH, paint: Paint = lambda word, tone: word) -> str:
+        """The document for people, without a line break at its end. paint: how signs get their colours."""
+        lines: list[str] = []
+        for part in self.parts:
+            lines += [part] if isinstance(part, str) else part.lines(width, paint)
+        text = "\n".join(lines)
+        return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
+
+
+def cell(value: float | None, form: str) -> str:
+    """A number of a table; "-" where there is none."""
+    return "-" if value is None else f"{value:{form}}"
+
+
+def chance_cell(value: float | None) -> str:
+    """A p-value of a table; none is 0."""
+    return f"<{TINY_CHANCE:g}" if value is not None and value < TINY_CHANCE else cell(value, ".3f")
+
+
+def interval_cell(ends: tuple[float, float], form: str = ".4g") -> str:
+    """An interval of a table."""
+    return f"[{ends[0]:{form}}, {ends[1]:{form}}]"

@@ -1,0 +1,68 @@
+"""Tables from files of any kind that a reader takes, told by the content. A new format: a file, and a line here."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from omnidyn.errors import InputError
+from omnidyn.files import default_max_bytes, format_of
+from omnidyn.logs.readers.parquet import PARQUET
+from omnidyn.logs.readers.reader import Options, Reader, completed
+from omnidyn.logs.readers.text import TEXT
+from omnidyn.logs.table.table import ROWS, Table, join
+from omnidyn.logs.table.text_file import Progress
+
+READERS: tuple[Reader, ...] = (TEXT, PARQUET)  # what no other reads is text, or refused by name
+
+
+def read_table(
+    path: str | os.PathLike,
+    *,
+    header: bool = True,
+    skip_bad_rows: bool = False,
+    max_bytes: int | None = None,
+    progress: Progress | None = None,
+) -> Table:
+    """Read a table whole, whatever its format. A name that promises another format is noted.
+
+    header: False where a text file has none; the columns are then called c1, c2, ... skip_bad_rows: leave out rows
+    with another number of cells, a broken quote, an infinite number, or text where the column holds numbers; they are
+    counted in `notes`. max_bytes: of the file, and of its numbers; a quarter of the memory where it is not given.
+    progress(bytes_done, bytes_total) is called now and then.
+    Raises InputError for what cannot be read: `file:line, column NAME: what; got ...; expected ...; remedy`; other
+    formats are refused by name.
+    """
+    limit = default_max_bytes() if max_bytes is None else max_bytes
+    return join(_tables(path, ROWS, Options(header, skip_bad_rows, limit, progress)), limit)
+
+
+def iter_tables(
+    path: str | os.PathLike,
+    rows: int = ROWS,
+    *,
+    header: bool = True,
+    skip_bad_rows: bool = False,
+    progress: Progress | None = None,
+) -> Iterator[Table]:
+    """The tables of a file of any length, at most `rows` rows each; joined they are what `read_table` reads.
+
+    Only the last has the sha256 and all notes. A column that begins with numbers and goes on with words is numbers in
+    the first tables. Options and errors as those of `read_table`.
+    """
+    return _tables(path, rows, Options(header, skip_bad_rows, None, progress))
+
+
+def _tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+    if rows < 1:
+        raise InputError("no rows in a piece", got=rows, expected="1 or more")
+    kind, suffix = format_of(path), Path(path).suffix
+    reader = next((each for each in READERS if kind is not None and each.kind == kind.name), TEXT)
+    promised = next((each for each in READERS if suffix.lower() in each.suffixes), TEXT)
+    tables = completed(reader.tables(path, rows, options))
+    if promised is reader or not suffix:
+        return tables
+    note = f"the file holds {reader.word}, though its name ends in {suffix}"
+    return (replace(table, notes=(note, *table.notes)) for table in tables)

@@ -1,0 +1,108 @@
+"""Tables of numbers in a text file (CSV and its kin), strictly read: logs, voltage files, steady tables, runs.
+
+It takes a byte order mark, any end of line, comment lines (# or %), a header that stands in comments, a row of units
+under the header or a line of titles above it, separators comma, semicolon and tab, one at the end of every row too,
+runs of spaces where nothing else separates, and a decimal comma where it is unmistakable. What it had to decide stands
+in `Table.notes`.
+It refuses, with file, line and column, what other readers swallow: ragged rows, a missing header, a quote that is
+never closed, 1e400, 1_000, 0x10, #N/A, blank cells where a number is needed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from functools import partial
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.logs.readers.reader import Options, Reader
+from omnidyn.logs.table import dialect
+from omnidyn.logs.table.header import TABS_NOTE, Layout, find_layout
+from omnidyn.logs.table.rows import Column, RowParser
+from omnidyn.logs.table.spaced import NOTE, is_spaced, tabbed
+from omnidyn.logs.table.table import MAX_CELLS, ROWS, Table
+from omnidyn.logs.table.text_file import TextBlock, TextFile
+
+HEAD_ROWS = 100  # the first rows are looked at together to tell how a file is written
+MAX_HEAD_LINES = 100_000  # without a row, it is no table
+
+
+def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+    """The tables of a text file; see the head of this file for what is taken and refused, and the contract."""
+    file = TextFile(path, options.progress, options.max_bytes)
+    head, blocks = _head(file.blocks(rows))
+    spaced = is_spaced(head)
+    if spaced:
+        head, blocks = [tabbed(line) for line in head], _tabbed(blocks)
+    layout = find_layout(head, file.source, options.header)
+    if spaced:
+        notes = [NOTE if note == TABS_NOTE else note for note in layout.notes]
+        layout = replace(layout, notes=tuple(notes))
+    sample = _kept(TextBlock(1, head), layout.first)[0][: dialect.SAMPLE_ROWS]
+    parser = RowParser(layout, file.source, options.skip_bad_rows, sample)
+    most = max(1, min(rows, MAX_CELLS // len(layout.names)))
+
+    def table(columns: dict[str, Column], lines: NDArray[np.int64], sha256: str = "") -> Table:
+        notes = (*layout.notes, *file.notes, *parser.notes)
+        return Table(layout.names, columns, lines, layout.units, file.source, sha256, notes, layout.titles)
+
+    for block in _cut(blocks, most):
+        texts, lines = _kept(block, layout.first)
+        if texts:
+            later = partial(_texts_from, file, layout, block.first + len(block.lines), spaced)
+            yield table(*parser.parse(texts, lines, later))
+    yield table({}, np.zeros(0, dtype=np.int64), file.sha256)
+
+
+TEXT = Reader("", "text", (), text_tables)
+
+
+def _head(blocks: Iterator[TextBlock]) -> tuple[list[str], Iterator[TextBlock]]:
+    """The first lines of a file, enough to tell how it is written, and all its blocks."""
+    taken: list[TextBlock] = []
+    lines: list[str] = []
+    rows = 0
+    for block in blocks:
+        taken.append(block)
+        for line in block.lines:
+            lines.append(line)
+            rows += bool(line) and not _is_comment(line)
+            if rows > HEAD_ROWS:
+                return lines, chain(taken, blocks)
+        if len(lines) > MAX_HEAD_LINES:
+            break
+    return lines, chain(taken, blocks)
+
+
+def _cut(blocks: Iterable[TextBlock], rows: int) -> Iterator[TextBlock]:
+    for first, lines in blocks:
+        yield from (TextBlock(first + k, lines[k : k + rows]) for k in range(0, len(lines), rows))
+
+
+def _tabbed(blocks: Iterable[TextBlock]) -> Iterator[TextBlock]:
+    for first, lines in blocks:
+        yield TextBlock(first, [tabbed(line) if line else line for line in lines])
+
+
+def _kept(block: TextBlock, first: int) -> tuple[list[str], NDArray[np.int64]]:
+    """The rows in a block, without blank lines, comments and what stands above line `first`; and their lines."""
+    begin = max(0, first - block.first)
+    lines = block.lines[begin:]
+    kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not _is_comment(line)]
+    texts = lines if len(kept) == len(lines) else [lines[k] for k in kept]
+    return texts, np.array(kept, dtype=np.int64) + (block.first + begin)
+
+
+def _is_comment(line: str) -> bool:
+    return ("#" in line or "%" in line) and dialect.is_comment(line)
+
+
+def _texts_from(file: TextFile, layout: Layout, line: int, spaced: bool) -> Iterator[str]:
+    """The rows from a line on, read again from the file."""
+    blocks = TextFile(file.path).blocks(ROWS)
+    for block in _tabbed(blocks) if spaced else blocks:
+        yield from _kept(block, max(line, layout.first))[0]
