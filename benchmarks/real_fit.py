@@ -14,10 +14,11 @@ import numpy as np
 
 from benchmarks import real_loop, udea
 from benchmarks.table import Table, machine
+from omnidyn.identification.motors.between import MEAN
 from omnidyn.identification.motors.choice import choose_motor
-from omnidyn.identification.motors.fit import AUTO, MotorFit, fit_motor
-from omnidyn.identification.motors.log import MEAN
-from omnidyn.identification.motors.run import fit_rmse, run_motor
+from omnidyn.identification.motors.estimate import MotorEstimate
+from omnidyn.identification.motors.fit import AUTO, fit_motor
+from omnidyn.identification.motors.free_run import fit_rmse, run_motor
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -146,8 +147,8 @@ def _words(way: Mapping[str, Any]) -> str:
     return f"{way['between']}, {late}, {'with' if way['dead_band'] else 'without'} Coulomb"
 
 
-def _band(table: Table, fit: MotorFit) -> None:
-    late = sum(n.value for n in fit.nuisances.values())
+def _band(table: Table, fit: MotorEstimate) -> None:
+    late = sum(fit.late.values())
     table.add(
         "README 5.3", None, data="bench", what="... lag + latency", value=1e3 * (fit.value["lag"] + late), unit="ms"
     )

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.table import Table, machine
-from omnidyn.identification.motors.drive_line import DriveLine, fit_drive_lines
+from omnidyn.identification.motors.estimate import MotorEstimate
+from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.line import fit_line
 from omnidyn.identification.steady.operating_points import ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import fit_shape, rms_and_error
@@ -120,35 +121,36 @@ def _study(table: Table, robot: Robot, runs: dict[str, list[Run]], read: float) 
 
 
 def _motors(table: Table, data: Path) -> None:
-    free = fit_drive_lines(logs.robotino_motors(data), kind="current", steady=True)
-    for line, told in zip(free.lines, ("0.170", "0.142", "0.164", "0.159 +- 0.004"), strict=True):
+    free = identify_motors(logs.robotino_motors(data), kind="current", steady=True)
+    for line, told in zip(free.motors, ("0.170", "0.142", "0.164", "0.159 +- 0.004"), strict=True):
         _band(table, "free motors: Coulomb [A]", line, told, abs(line.value["dead_band"] - float(told[:5])) < 0.005)
-    slope = free.lines[-1]
+    slope = free.motors[-1]
     table.add(
         "0.3e-4", abs(slope.value["slope"] / 16.0 - 3.9e-4) < 0.3e-4, what="free motors: slope [A s/rad, motor]",
         where="all", ours=_pm(slope.value["slope"] / 16.0, slope.std["slope"] / 16.0), how="steady windows",
         **{"README or truth": "(3.9 +- 0.3)e-4"},
     )  # fmt: skip
-    stairs = fit_drive_lines(logs.udea_stairs(data)).lines[-1]
-    low, high = stairs.ci90["dead_band"]
+    stairs = identify_motors(logs.udea_stairs(data)).motors[-1]
+    low, high = np.quantile(stairs.draws["dead_band"], [0.05, 0.95])
+    gains = np.quantile(1.0 / stairs.draws["slope"], [0.15865, 0.84135])
     table.add(
         "covers 0", not stairs.dead_band_seen, what="stairs: dead zone [%]", where="all",
         ours=f"{stairs.value['dead_band']:.2f}, 90 % {low:.1f}..{high:.1f}", how="last two thirds of each step",
         **{"README or truth": "-1.75, 90 % -14..+4.8"},
     )  # fmt: skip
     table.add(
-        "0.073", abs(stairs.gain - 0.429) < 0.073, what="stairs: slope [(rad/s)/%]", where="all",
-        ours=_pm(stairs.gain, stairs.gain_std), how="", **{"README or truth": "0.429 +- 0.073"},
+        "0.073", abs(1.0 / stairs.value["slope"] - 0.429) < 0.073, what="stairs: slope [(rad/s)/%]", where="all",
+        ours=_pm(1.0 / stairs.value["slope"], 0.5 * np.ptp(gains)), how="", **{"README or truth": "0.429 +- 0.073"},
     )  # fmt: skip
     robot, run = logs.udea_turning(data)
-    turning = fit_drive_lines([run], speed="ground", robot=robot).lines[-1]
+    turning = identify_motors([run], speed="ground", robot=robot).motors[-1]
     _band(table, "turning: dead zone [%]", turning, "0.85 +- 0.54", abs(turning.value["dead_band"] - 0.85) < 0.54)
     table.add(
         "0.09", abs(turning.value["slope"] - 1.96) < 0.09, what="turning: slope [% s/rad]", where="all",
         ours=_pm(turning.value["slope"], turning.std["slope"]), how="speed from heading",
         **{"README or truth": "1.96 +- 0.09"},
     )  # fmt: skip
-    bench = fit_drive_lines(logs.odrive(data, ("step", "chirp"))).lines[0]
+    bench = identify_motors(logs.odrive(data, ("step", "chirp"))).motors[0]
     _band(table, "bench: Coulomb [V]", bench, "0.00035 +- 0.00024, none", not bench.dead_band_seen)
     turn = 2.0 * np.pi
     table.add(
@@ -158,13 +160,17 @@ def _motors(table: Table, data: Path) -> None:
     )  # fmt: skip
 
 
-def _band(table: Table, what: str, line: DriveLine, told: str, met: bool) -> None:
+def _band(table: Table, what: str, line: MotorEstimate, told: str, met: bool) -> None:
     low, high = line.ci95["dead_band"]
     table.add(
-        "", met, what=what, where=f"motor {line.motor}", how=f"{line.windows} windows",
+        "", met, what=what, where=f"motor {_of(line)}", how=f"{line.count} windows",
         ours=f"{_pm(line.value['dead_band'], line.std['dead_band'])}, 95 % {low:.3g}..{high:.3g}",
         **{"README or truth": told},
     )  # fmt: skip
+
+
+def _of(line: MotorEstimate) -> str:
+    return "all" if line.motor is None else str(line.motor + 1)
 
 
 def _simulated(table: Table) -> None:

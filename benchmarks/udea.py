@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
 from benchmarks.table import Table
+from omnidyn.identification.motors.between import HOLD, MEAN
 from omnidyn.identification.motors.choice import choose_motor
-from omnidyn.identification.motors.fit import MotorFit, fit_motor
-from omnidyn.identification.motors.log import HOLD, MEAN
-from omnidyn.identification.motors.run import run_motor
+from omnidyn.identification.motors.estimate import MotorEstimate
+from omnidyn.identification.motors.fit import fit_motor
+from omnidyn.identification.motors.free_run import run_motor
 from omnidyn.logs.read_log import read_log
 from omnidyn.run import Run
 from tests.support import real_logs as logs
@@ -43,12 +44,12 @@ def turning(table: Table) -> None:
         other = float(np.sqrt(np.mean(np.square(crossed))))
         table.add(f"<= {baseline}", other <= baseline, data="udea turning",
                   what=f"... halves, each by the other, {words}", value=other, unit="rad/s")  # fmt: skip
-        table.add("README 0.51", None, data="udea turning", what="... 1/slope", value=0.01 / whole.value["slope"],
-                  unit="(rad/s)/%", **{"+-": 0.01 * whole.std["slope"] / whole.value["slope"] ** 2})  # fmt: skip
+        table.add("README 0.51", None, data="udea turning", what="... 1/slope", value=1.0 / whole.value["slope"],
+                  unit="(rad/s)/%", **{"+-": whole.std["slope"] / whole.value["slope"] ** 2})  # fmt: skip
         if dead_band:
             table.add("README 0.85 +- 0.54", None, data="udea turning", what="... dead zone",
-                      value=100.0 * whole.value["dead_band"], unit="%",
-                      **{"+-": 100.0 * whole.std["dead_band"]})  # fmt: skip
+                      value=whole.value["dead_band"], unit="%",
+                      **{"+-": whole.std["dead_band"]})  # fmt: skip
         _turning_as_in_readme(table, run, whole, dead_band)
     chosen(table, parts)
 
@@ -65,7 +66,7 @@ def chosen(table: Table, parts: Sequence[Run]) -> None:
               value=value, unit="rad/s")  # fmt: skip
 
 
-def _turning_as_in_readme(table: Table, run: Run, fit: MotorFit, dead_band: bool) -> None:
+def _turning_as_in_readme(table: Table, run: Run, fit: MotorEstimate, dead_band: bool) -> None:
     """Measured w in the equation, no free run: u = slope w + dead zone sgn w + inertia dw/dt, means over 0.5 s.
 
     With Coulomb: the dead zone and the inertia (slope times lag); without: neither, as in the README. Beside our
@@ -73,10 +74,8 @@ def _turning_as_in_readme(table: Table, run: Run, fit: MotorFit, dead_band: bool
     """
     u, w, change = windows_of_turning(run)
     columns = np.stack([w, np.sign(w), change], axis=1) if dead_band else w[:, None]
-    slope = 100.0 * fit.value["slope"]
-    ours = (
-        np.array([slope, 100.0 * fit.value["dead_band"], slope * fit.value["lag"]]) if dead_band else np.array([slope])
-    )
+    names = ("slope", "dead_band", "inertia") if dead_band else ("slope",)
+    ours = np.array([fit.value[name] for name in names])
     theirs = np.linalg.lstsq(columns, u, rcond=None)[0]
     for words, numbers in (("our numbers", ours), ("README's regression, these windows", theirs)):
         left = u - columns @ numbers
@@ -111,7 +110,7 @@ def turning_run() -> Run:
     return Run(t=run.t, duty=run.duty.mean(axis=1, keepdims=True), wheel_angle=angle, source=run.source)
 
 
-def window_rmse(fit: MotorFit, runs: Sequence[Run], most_span: float = np.inf) -> float:
+def window_rmse(fit: MotorEstimate, runs: Sequence[Run], most_span: float = np.inf) -> float:
     """Root mean square over windows of 0.5 s of mean model speed minus measured one [rad/s].
 
     Measured: by the angle turned where it is logged, else the trimmed mean of the speed. most_span: windows in which
@@ -153,10 +152,10 @@ def drives(table: Table) -> None:
             other.append(window_rmse(fit, runs[3:], SPAN))
             if dead_band:
                 table.add("README 1.0, none visible", None, data="udea drives", what=f"dead zone, motor {motor + 1}",
-                          value=100.0 * fit.value["dead_band"], unit="%",
-                          **{"+-": 100.0 * fit.std["dead_band"]})  # fmt: skip
+                          value=fit.value["dead_band"], unit="%",
+                          **{"+-": fit.std["dead_band"]})  # fmt: skip
             table.add("README 0.32 to 0.33", None, data="udea drives", what=f"1/slope, motor {motor + 1}, {words}",
-                      value=0.01 / fit.value["slope"], unit="(rad/s)/%")  # fmt: skip
+                      value=1.0 / fit.value["slope"], unit="(rad/s)/%")  # fmt: skip
         for logs_, each in (("exp1..3", own), ("exp4, exp5", other)):
             table.add(f"README {DRIVES}, fitted to all", None, data="udea drives",
                       what=f"free run, rmse of w, {words}, {logs_}",
@@ -165,7 +164,7 @@ def drives(table: Table) -> None:
     _drives_chosen(table, runs)
 
 
-def drive_fit(runs: Sequence[Run], motor: int, dead_band: bool) -> MotorFit:
+def drive_fit(runs: Sequence[Run], motor: int, dead_band: bool) -> MotorEstimate:
     """One motor of the drives; Student's t, for the encoders have spikes."""
     return fit_motor(runs, motor, dead_band=dead_band, kind="duty", loss="student-t", between=HOLD)
 
@@ -179,7 +178,7 @@ def _drives_as_in_readme(table: Table, runs: Sequence[Run], dead_band: bool) -> 
         for run in runs:
             assert run.duty is not None
             for rows in windows(run, motor, SPAN):
-                u = float(run.duty[rows, motor].mean())
+                u = 100.0 * float(run.duty[rows, motor].mean())
                 errors.append(np.sign(u) * max(abs(u) - band, 0.0) / fit.value["slope"] - _measured(run, rows, motor))
     words = f"README's way {'with' if dead_band else 'without'} Coulomb, our numbers, exp1..5"
     table.add(f"README {DRIVES}", None, data="udea drives", what=f"{words}: rmse of w",
@@ -189,7 +188,7 @@ def _drives_as_in_readme(table: Table, runs: Sequence[Run], dead_band: bool) -> 
 def _drives_chosen(table: Table, runs: Sequence[Run]) -> None:
     """Clean: input and dead band of each motor chosen on exp1..3, each left out in turn; then exp4 and exp5, once."""
 
-    def score(fit: MotorFit, out: Sequence[Run]) -> float:
+    def score(fit: MotorEstimate, out: Sequence[Run]) -> float:
         return window_rmse(fit, out, SPAN)
 
     ways = [{"dead_band": band, "between": between} for band in (False, True) for between in (HOLD, MEAN)]

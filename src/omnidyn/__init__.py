@@ -27,11 +27,11 @@ _HOME = {
     "check": "omnidyn.findings.check",
     "compare": "omnidyn.comparison.compare",
     "dead_zone_map": "omnidyn.model.deadzone",
-    "fit_drive_lines": "omnidyn.identification.motors.drive_line",
     "fit_output_error": "omnidyn.identification.output_error.fit",
     "fit_steady_state": "omnidyn.identification.steady.steady_state",
     "identify": "omnidyn.identification.identify",
     "identify_groups": "omnidyn.identification.output_error.fit",
+    "identify_motors": "omnidyn.identification.motors.study",
     "identify_steady": "omnidyn.identification.steady.study",
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identify import identify
-    from omnidyn.identification.motors.drive_line import fit_drive_lines
+    from omnidyn.identification.motors.study import identify_motors
     from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
     from omnidyn.identification.steady.steady_state import fit_steady_state
     from omnidyn.identification.steady.study import identify_steady

@@ -281,7 +281,7 @@ def test_motors_by_output_error(call, tmp_path):
         assert abs(found["value"] - true) < 4.0 * found["std"] + 2e-3 * true  # and what Euler's steps are off by
     assert motor["without_dead_band"]["held_out_rmse_rad_s"] > motor["held_out_rmse_rad_s"]
     assert motor["dead_band_seen"]
-    assert "Motors from whole logs" in (tmp_path / "m.html").read_text("utf-8")
+    assert "Motors from logs" in (tmp_path / "m.html").read_text("utf-8")
 
 
 def test_an_interrupt_while_free_runs_are_compared_keeps_the_fit(call, tmp_path, monkeypatch):

@@ -180,8 +180,8 @@ def test_motors_need_no_robot(call, bench, tmp_path):
     code, out, _ = call(str(bench), "--what", "motors", "--json", "--report", str(report))
     assert code == 0
     first = json.loads(out)["motors"][0]
-    assert first["value"]["slope"] == pytest.approx(0.5, rel=0.02)
-    assert first["value"]["dead_band"] == pytest.approx(0.4, rel=0.05)
+    assert first["parameters"]["slope"]["value"] == pytest.approx(0.5, rel=0.02)
+    assert first["parameters"]["dead_band"]["value"] == pytest.approx(0.4, rel=0.05)
     assert first["dead_band_seen"] is True
     assert "What each motor needs to turn" in report.read_text("utf-8")
 
@@ -189,8 +189,23 @@ def test_motors_need_no_robot(call, bench, tmp_path):
 def test_motors_in_words(call, bench):
     code, out, err = call(str(bench), "--what", "motors", "-o", "x.toml")
     assert code == 0
-    assert "motor 1: slope 2 +-" in out
+    assert "motor 1: slope 0.50" in out
+    assert "V s/rad; dead band 0.4" in out
     assert "-o is not used" in err
+
+
+def test_motors_go_into_a_robot_file(call, bench, tmp_path):
+    """u = 0.5 w + 0.4 sgn w at two wheels of three: K_v = 0.5 V s/rad over the gear of 16, c = g 0.4 V."""
+    out = tmp_path / "fit.toml"
+    code, text, _ = call(str(bench), "--what", "motors", "--robot", "robotino", "-o", str(out), "--json")
+    assert code == 0
+    robot, told = load_robot(out), json.loads(text)["robot"]["numbers"]
+    key = "motor.emf_constant_Vs_rad[0]"
+    assert robot.motor.emf_constant[0] == told[key]["value"] == pytest.approx(0.5 / 16.0, rel=0.02)
+    assert robot.motor.emf_constant[2] == load_robot("robotino").motor.emf_constant
+    assert "bench.csv" in robot.priors[key].source
+    force = 0.5 / (5.95 * 0.04) * 0.4
+    assert robot.friction.wheels.coulomb == pytest.approx((force, force, 0.0), rel=0.05)
 
 
 @pytest.mark.parametrize("option", ["-o", "--report", "--save-map"])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from omnidyn.identification.motors.drive_line import fit_drive_lines
+from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.line import fit_line
 from omnidyn.identification.steady.operating_points import force_points
 from omnidyn.identification.steady.shape_fit import fit_shape, rms_and_error
@@ -134,40 +134,41 @@ def test_the_floors_differ_and_it_says_by_how_much(study):
 
 def test_free_motors(data):
     """README: |i| = 0.159+-0.004 + (3.9+-0.3)e-4 |w| at the motor; Coulomb 0.170, 0.142, 0.164 A."""
-    study = fit_drive_lines(logs.robotino_motors(data), kind="current", steady=True)
-    lines = {line.motor: line for line in study.lines}
-    assert lines["all"].value["dead_band"] == pytest.approx(0.159, abs=0.005)
-    assert lines["all"].value["slope"] / 16.0 == pytest.approx(3.9e-4, abs=0.3e-4)
-    for motor, coulomb in (("1", 0.170), ("2", 0.142), ("3", 0.164)):
+    study = identify_motors(logs.robotino_motors(data), kind="current", steady=True)
+    lines = {line.motor: line for line in study.motors}
+    assert lines[None].value["dead_band"] == pytest.approx(0.159, abs=0.005)
+    assert lines[None].value["slope"] / 16.0 == pytest.approx(3.9e-4, abs=0.3e-4)
+    for motor, coulomb in ((0, 0.170), (1, 0.142), (2, 0.164)):
         assert lines[motor].value["dead_band"] == pytest.approx(coulomb, abs=0.004)
         assert lines[motor].dead_band_seen
 
 
 def test_the_dead_zone_of_the_stairs_is_not_identifiable(data):
     """README: slope 0.429+-0.073 (rad/s)/%, zero crossing -1.75 %, 90 % -14..+4.8."""
-    study = fit_drive_lines(logs.udea_stairs(data))
-    line = study.lines[-1]
-    assert line.gain == pytest.approx(0.429, abs=0.073)
+    study = identify_motors(logs.udea_stairs(data))
+    line = study.motors[-1]
+    assert 1.0 / line.value["slope"] == pytest.approx(0.429, abs=0.073)
     assert -14.0 < line.value["dead_band"] < 4.8
-    assert line.ci90["dead_band"][0] < -1.75 < line.ci90["dead_band"][1]
-    assert not any(each.dead_band_seen for each in study.lines)
-    assert all("dead zone not identifiable here" in words for words in study.statements)
+    low, high = np.quantile(line.draws["dead_band"], [0.05, 0.95])
+    assert low < -1.75 < high
+    assert not any(each.dead_band_seen for each in study.motors)
+    assert all("dead band not identifiable here" in words for words in study.statements)
 
 
 def test_the_motors_of_a_robot_that_turns_on_the_spot(data):
     """README: u = (1.96+-0.09) w + (0.85+-0.54) sgn w, slope 0.51 (rad/s)/%; the speed from the heading."""
     robot, run = logs.udea_turning(data)
-    line = fit_drive_lines([run], speed="ground", robot=robot).lines[-1]
+    line = identify_motors([run], speed="ground", robot=robot).motors[-1]
     assert line.value["slope"] == pytest.approx(1.96, abs=0.09)
     assert line.value["dead_band"] == pytest.approx(0.85, abs=0.54)
     assert line.std["dead_band"] == pytest.approx(0.54, rel=0.3)
-    assert line.gain == pytest.approx(0.51, abs=0.03)
+    assert 1.0 / line.value["slope"] == pytest.approx(0.51, abs=0.03)
 
 
 def test_no_friction_is_invented_on_the_bench(data):
     """The negative control: Coulomb 0.35+-0.24 mV, that is none; 0.05509 V/(turn/s)."""
-    study = fit_drive_lines(logs.odrive(data, ("step", "chirp")))
-    (line,) = study.lines
+    study = identify_motors(logs.odrive(data, ("step", "chirp")))
+    (line,) = study.motors
     assert not line.dead_band_seen
     low, high = line.ci95["dead_band"]
     assert low <= 0.35e-3 <= high
@@ -176,5 +177,5 @@ def test_no_friction_is_invented_on_the_bench(data):
 
 
 def test_noise_whose_input_is_not_in_the_log_is_not_replayed(data):
-    windows = fit_drive_lines(logs.odrive(data, ("step", "chirp", "noise"))).windows
+    windows = identify_motors(logs.odrive(data, ("step", "chirp", "noise"))).windows
     assert windows.unresolved > 10

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.motors.drive_line import fit_drive_lines
+from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
-from omnidyn.report.figures.drive_lines import draw_drive_lines
+from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.figures.shapes import shape_pictures
-from omnidyn.report.steady_page import render_drives, render_study
+from omnidyn.report.motors_page import render_motors
+from omnidyn.report.steady_page import render_study
 from omnidyn.run import Run
 from tests.support.outputs import Reader
 from tests.support.steady_logs import clean_runs, robot_with, spoiled
@@ -31,7 +32,7 @@ def motors():
     t = np.arange(600) * 0.01
     speed = np.repeat([2.0, -3.0, 5.0, -6.0, 4.0, 1.0], 100)[:, None]
     angle = np.cumsum(np.vstack([[[0.0]], speed[:-1]]) * 0.01, axis=0)
-    return fit_drive_lines([Run(t=t, voltage=0.5 * speed + 0.4 * np.sign(speed), wheel_angle=angle)])
+    return identify_motors([Run(t=t, voltage=0.5 * speed + 0.4 * np.sign(speed), wheel_angle=angle)])
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def test_it_is_whole_and_every_id_is_there_once(page):
 
 
 def test_it_asks_for_nothing_from_outside_and_runs_nothing(page, motors):
-    for text in (page, render_drives(motors, RECORD)):
+    for text in (page, render_motors(motors, RECORD)):
         read = Reader(text)
         links = [*read.all("src"), *read.all("href")]
         assert links
@@ -75,7 +76,7 @@ def test_the_same_study_gives_the_same_page(study, page):
 
 
 def test_pictures_have_names_captions_and_both_formats(study, motors):
-    pictures = [*shape_pictures(study), draw_drive_lines(motors)]
+    pictures = [*shape_pictures(study), draw_motor_lines(motors.motors, motors.windows)]
     assert len({each.name for each in pictures}) == 4
     for each in pictures:
         assert each.caption.endswith(".")

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 
 from omnidyn.findings.finding import FATAL, WARN, Verdict
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.motors.fit import MotorFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.shape_residual import between_axes
 from omnidyn.identification.steady.study_parts import Difference
@@ -19,13 +18,10 @@ from omnidyn.model.robot import GUESS
 NUMBER_HEAD = ("number", "value", "std error", "95 % interval", "unit", "")
 DIFFERENCE_HEAD = ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "")
 VERDICT_HEAD = ("log", "rows", "length s", "rate Hz", "fatal", "to heed", "what")
-MOTOR_HEAD = ("motor", "dead band fitted", "slope", "+-", "dead band", "95 % interval", "lag ms", "unit", "rmse rad/s",
-              "held out rad/s")  # fmt: skip
 WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
 LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
 SHOWN = 6
-PAYS = 0.01  # share by which the error on held-out logs must fall for a number to pay
 # Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
 GOES_WITH_TORQUE = (EMF, "motor.gear_ratio")
 FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
@@ -61,34 +57,6 @@ def verdict_rows(verdicts: Sequence[Verdict]) -> list[tuple[str, ...]]:
         rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[FATAL]),
                      str(each.counts[WARN]), words or "fit for use"))  # fmt: skip
     return rows
-
-
-def motor_rows(found: Sequence[tuple[MotorFit, MotorFit, float, float]]) -> list[tuple[str, ...]]:
-    """(with a dead band, without, rmse on held-out logs of each) of every motor, as cells under MOTOR_HEAD."""
-    rows = []
-    for band, plain, held, held_plain in found:
-        for fit, words, out in ((band, "yes", held), (plain, "no", held_plain)):
-            seen = "dead_band" in fit.value
-            rows.append((
-                str(fit.motor + 1), words, f"{fit.value['slope']:.5g}", f"{fit.std['slope']:.2g}",
-                f"{fit.value['dead_band']:.3g}" if seen else "-", interval(fit.ci95["dead_band"]) if seen else "-",
-                f"{1e3 * fit.value['lag']:.3g}", f"{fit.unit}, s/rad", f"{fit.rmse:.4g}",
-                f"{out:.4g}" if math.isfinite(out) else "-",
-            ))  # fmt: skip
-    return rows
-
-
-def motor_words(found: Sequence[tuple[MotorFit, MotorFit, float, float]]) -> list[str]:
-    """What each motor's fit says: its statement, its doubts, and whether the dead band is any use on held-out logs."""
-    words = []
-    for band, _, held, held_plain in found:
-        words += [band.statement(), *(f"motor {band.motor + 1}: {each}" for each in band.doubts)]
-        if band.dead_band_seen and held > (1.0 - PAYS) * held_plain:
-            words.append(
-                f"motor {band.motor + 1}: held-out logs are met no better with the dead band (error {held:.4g} rad/s, "
-                f"{held_plain:.4g} without): it may stand for something else"
-            )
-    return words
 
 
 def interval(pair: tuple[float, float]) -> str:

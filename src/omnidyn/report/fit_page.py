@@ -8,18 +8,14 @@ from typing import Any
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.advice import (
     DIFFERENCE_HEAD,
-    MOTOR_HEAD,
     NUMBER_HEAD,
     VERDICT_HEAD,
     advice,
     difference_rows,
-    motor_rows,
-    motor_words,
     number_rows,
     verdict_advice,
     verdict_rows,
 )
-from omnidyn.identification.motors.fit import MotorFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import Validation, output_name
@@ -60,25 +56,6 @@ def render_fit(
         Section("next", "What to measure next", _next(fits, validations, verdicts)),
     ]
     return page(f"{robot}: identified from whole logs", introduction, sections, provenance)
-
-
-def render_motors(found: Sequence[tuple[MotorFit, MotorFit, float, float]], provenance: Mapping[str, Any]) -> str:
-    """The page of motors, as HTML: each with and without a dead band, with its rmse on held-out logs."""
-    introduction = (
-        "Slope, dead band and lag of each motor for which its free run under the logged input comes nearest to the "
-        "measured speed."
-    )
-    doubts = [f"motor {fit.motor + 1}: {name} is at its bound" for fit, *_ in found for name in fit.at_bound]
-    doubts += [
-        f"motor {fit.motor + 1}: the intervals allow for errors that have a memory" for fit, *_ in found
-        if fit.covariance == "sandwich"
-    ]  # fmt: skip
-    sections = [
-        Section("findings", "What the data say", bullets(motor_words(found))),
-        Section("numbers", "Numbers, with and without a dead band", table(MOTOR_HEAD, motor_rows(found))),
-        Section("doubts", "Doubts", bullets(doubts) or paragraph("None.")),
-    ]
-    return page("Motors from whole logs", introduction, sections, provenance)
 
 
 def _named(group: str, words: str, fits: Mapping[str, Any]) -> str:

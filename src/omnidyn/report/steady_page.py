@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from omnidyn.identification.motors.drive_line import DriveStudy
-from omnidyn.identification.motors.drive_table import DRIVE_HEAD, drive_rows
 from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.steady.study_words import FORCES
-from omnidyn.report.figures.drive_lines import draw_drive_lines
 from omnidyn.report.figures.shapes import shape_pictures
-from omnidyn.report.html import Section, bullets, figure, page, paragraph, section, table
+from omnidyn.report.html import page, section
 
 
 def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
@@ -34,19 +31,3 @@ def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
         section("next", "What to measure next", told["next"]),
     ]
     return page(f"{study.robot.name}: friction from logs", introduction, sections, provenance)
-
-
-def render_drives(study: DriveStudy, provenance: Mapping[str, Any]) -> str:
-    """The page of the lines of motors, as HTML."""
-    introduction = (
-        "What each motor needs to turn: slope, dead band and inertia, from windows in integral form: the integral of "
-        "the input is the slope times the angle turned, plus the dead band times the time it turned, plus the inertia "
-        "times the change of speed."
-    )
-    sections = [
-        Section("findings", "What the data say", bullets(study.statements)),
-        Section("lines", "Lines, with 95 % intervals", table(DRIVE_HEAD, drive_rows(study))),
-        Section("figures", "Figures", figure(draw_drive_lines(study))),
-        Section("doubts", "Doubts", bullets(study.warnings) or paragraph("None.")),
-    ]
-    return page("Motors from logs", introduction, sections, provenance)

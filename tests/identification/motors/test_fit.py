@@ -5,9 +5,9 @@ import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors.choice import WAYS, choose_motor
-from omnidyn.identification.motors.engine import MotorMapping
+from omnidyn.identification.motors.engine import step_numbers
 from omnidyn.identification.motors.fit import fit_motor
-from omnidyn.identification.motors.run import fit_rmse, run_motor
+from omnidyn.identification.motors.free_run import fit_rmse, run_motor
 from omnidyn.run import Run
 
 SLOPE, BAND, LAG = 0.5, 0.4, 0.05
@@ -123,9 +123,9 @@ def test_a_latency_is_found(clean):
     run = run_of(clean, BAND, 4)
     late = np.vstack([np.zeros((2, 1)), run.wheel_speed[:-2]])
     fit = fit_motor(run.replace(wheel_speed=late), latency=True, between="hold")
-    own = fit.nuisances["latency.wheel_speed"]
-    assert abs(own.value - 0.02) < 4.0 * own.std
-    assert own.std < 1e-3
+    value, std = fit.value["latency.wheel_speed"], fit.std["latency.wheel_speed"]
+    assert abs(value - 0.02) < 4.0 * std
+    assert std < 1e-3
 
 
 def test_a_free_run_on_another_log_is_as_good_as_its_noise(clean):
@@ -135,17 +135,17 @@ def test_a_free_run_on_another_log_is_as_good_as_its_noise(clean):
     assert np.abs(run_motor(fit, other)[0] - clean[BAND][1]).max() < 0.1  # the start is one noisy sample
 
 
-def test_derivatives_of_the_mapping():
+def test_derivatives_of_the_numbers_of_the_step():
     """Against central differences."""
-    mapping, values, h = MotorMapping(["slope", "lag", "dead_band"]), np.array([0.5, 0.05, 0.4]), 1e-6
-    now, by = mapping.at(values)
-    assert now.rate[2] == 20.0
-    assert now.drive[2, 0] == 40.0
-    assert now.coulomb[2] == pytest.approx(16.0)
+    values, h = np.array([0.5, 0.05, 0.4]), 1e-6
+    law, by_law, drive, by_drive = step_numbers(values, 2, 4)
+    assert law[0, 2] == 20.0
+    assert drive[2, 0] == 40.0
+    assert law[1, 2] == law[2, 2] == pytest.approx(16.0)
     for j in range(3):
         step = np.eye(3)[j] * h * values[j]
-        up, down = mapping.at(values + step)[0], mapping.at(values - step)[0]
-        for a, b, slope in zip(up.parts, down.parts, by.parts, strict=True):
+        up, down = step_numbers(values + step, 2, 4), step_numbers(values - step, 2, 4)
+        for a, b, slope in ((up[0][:2], down[0][:2], by_law), (up[2], down[2], by_drive)):
             assert (a - b) / (2.0 * h * values[j]) == pytest.approx(slope[..., j], rel=1e-6, abs=1e-5)
 
 
@@ -154,10 +154,10 @@ def test_what_cannot_be_used_is_refused(clean):
     with pytest.raises(InputError, match="no such motor; got 2; expected 1 to 1"):
         fit_motor(run, 1)
     with pytest.raises(
-        InputError, match="the logs have no input of this motor; got wheel_speed; expected voltage or duty"
+        InputError, match="the motors' input is not in the log; got wheel_speed; expected voltage, duty"
     ):
         fit_motor(run.replace(voltage=None))
-    with pytest.raises(InputError, match="no speed and no angle of this motor"):
+    with pytest.raises(InputError, match="no speed and no angle of the motors"):
         fit_motor(run.replace(wheel_speed=None))
     with pytest.raises(InputError, match="between: no such way; got spline"):
         fit_motor(run, between="spline")

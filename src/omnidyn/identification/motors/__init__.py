@@ -1,4 +1,7 @@
-"""A motor on a bench, or the motors of a robot off the ground.
+"""A motor on a bench, or the motors of a robot off the ground: slope, dead band, lag and inertia of each.
 
-In integral form: drive_windows, drive_line, drive_table. By output error: log, input, engine, fit, bend, run, choice.
+log, between: what a log tells of the motors, and their input between its rows. estimate: what every fit returns.
+windows, line: windows in integral form, and the line through them. engine, problem, fit, bend: whole logs as free runs.
+free_run, choice: runs of a fitted motor, and the way that best predicts logs left out. study: identify_motors, all
+motors by one of the two ways. into_robot: its numbers in a robot file.
 """

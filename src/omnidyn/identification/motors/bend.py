@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtri
 
-from omnidyn.identification.motors.engine import BAND, INNER, LAG, SLOPE
-from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.problem.nuisances import LATENCY
+from omnidyn.identification.motors.engine import SPEED, MotorEngine, MotorProblem
+from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, SLOPE
 from omnidyn.identification.output_error.problem.problem import Piece, Point
 from omnidyn.identification.output_error.solve.solver import Solver, State
 from omnidyn.statistics import t_quantile
@@ -27,7 +26,6 @@ FloatArray = NDArray[np.float64]
 BLOCKS, LEAST_BLOCK = 60, 8  # blocks of rows in all, rows of one at least
 SURE = 0.95
 MOST_NUMBERS = 20_000_000  # what is longer is not looked at: every row has all its slopes in memory
-SPEED = ("wheel_speed", 0)
 BENDS, LOW = 3, 0.25  # how many; w0 over the highest speed
 
 
@@ -45,9 +43,9 @@ class Bend:
     left: float
 
 
-def bend(solver: Solver, state: State) -> Bend | None:
+def bend(solver: Solver[MotorProblem], state: State) -> Bend | None:
     """None without a dead band or a speed, or where there are too few rows, or too many."""
-    problem, name = solver.problem, INNER + BAND
+    problem, name = solver.problem, BAND
     rows = sum(piece.last - piece.first + 1 for piece in problem.pieces)
     wide = len(problem.parameters) + len(problem.pieces) + BENDS
     if problem.where(name) < 0 or SPEED not in problem.columns or rows * wide > MOST_NUMBERS:
@@ -88,16 +86,16 @@ def bend(solver: Solver, state: State) -> Bend | None:
     )  # fmt: skip
 
 
-def _regression(solver: Solver, point: Point) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+def _regression(solver: Solver[MotorProblem], point: Point) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
     """(residual (N,), slopes (N, P + starts + BENDS), number of the piece (N,)) of the rows where a speed was measured.
 
     Slopes by the parameters, by the speed at which each piece starts, and by the bends.
     """
     problem, engine = solver.problem, solver.engine
-    assert isinstance(engine, ExactEngine)
+    assert isinstance(engine, MotorEngine)
     count, pieces = len(problem.parameters), problem.pieces
-    slope, lag = (float(point.values[problem.where(INNER + key)]) for key in (SLOPE, LAG))
-    k = problem.where(f"{LATENCY}.wheel_speed")
+    slope, lag = (float(point.values[problem.where(key)]) for key in (SLOPE, LAG))
+    k = problem.where(f"{LATENCY}.{SPEED[0]}")
     late = float(point.values[k]) if k >= 0 else 0.0
     residuals, found, numbers = [], [], []
     for n, (piece, (predicted, by)) in enumerate(zip(pieces, engine.outputs(point), strict=True)):

@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 
 from omnidyn.errors import InsufficientDataError, OmnidynError
-from omnidyn.identification.motors.fit import MotorFit, fit_motor
-from omnidyn.identification.motors.log import CURVE, HOLD, MEAN
-from omnidyn.identification.motors.run import fit_rmse
+from omnidyn.identification.motors.between import CURVE, HOLD, MEAN
+from omnidyn.identification.motors.estimate import MotorEstimate
+from omnidyn.identification.motors.fit import fit_motor
+from omnidyn.identification.motors.free_run import fit_rmse
 from omnidyn.run import Run
 
 TIE = 0.01  # relative difference of errors that does not pay for one more number
 SHARES = 4  # parts in time of a single log
 
 Way = Mapping[str, Any]  # options of fit_motor
-Score = Callable[[MotorFit, Sequence[Run]], float]
+Score = Callable[[MotorEstimate, Sequence[Run]], float]
 
 WAYS = tuple(
     {"between": between, "latency": latency, "dead_band": dead_band}
@@ -34,7 +35,7 @@ class MotorChoice:
     """
 
     way: Way
-    fit: MotorFit
+    fit: MotorEstimate
     errors: tuple[tuple[Way, float], ...]
 
 
@@ -66,7 +67,7 @@ def is_late(runs: Run | Sequence[Run], motor: int = 0, **shared: Any) -> bool:
         fit = fit_motor(runs, motor, dead_band=False, latency=True, **shared)
     except OmnidynError:
         return False
-    found = (number.ci95 for name, number in fit.nuisances.items() if name not in fit.unidentifiable)
+    found = (fit.ci95[name] for name in fit.late if name not in fit.unidentifiable)
     return fit.converged and any(low > 0.0 or high < 0.0 for low, high in found)
 
 

@@ -1,68 +1,100 @@
-"""A motor in the place of a robot: slope, dead band and lag as the numbers of the exact step of one axis."""
+"""The exact step of one motor, with its derivatives: slope, dead band and lag as numbers of the kernel.
+
+    w' = g u - a w - c sgn w,   a = 1/lag,   g = 1/(slope lag),   c = dead_band g
+
+The kernel knows three axes; the motor is the one that turns, and the other two rest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.problem.primitives import Primitives
-from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.motors.estimate import BAND, LATENCY
+from omnidyn.identification.output_error.engines.exact import Weighting, march_piece, padded, used_by
+from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, Slopes
+from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
+from omnidyn.model.actuation import Driver
+from omnidyn.model.layout import N_AXES, YAW
 
 FloatArray = NDArray[np.float64]
 
-SLOPE, BAND, LAG = "slope", "dead_band", "lag"
-INNER = "motor."  # in the problem: the engine takes a bare "dead_band" for one of the driver
-AXIS = 2  # yaw: the axis whose travel is an output
+SPEED, ANGLE = ("wheel_speed", 0), ("wheel_angle", 0)  # columns
 
 
-class MotorMapping:
-    """From slope, dead band and lag to the numbers of the exact step: a = 1/lag, g = 1/(slope lag), c = dead_band g."""
+@dataclass(frozen=True, eq=False)
+class MotorProblem(Fitted):
+    """parameters: slope, lag, a dead band where it is asked for, latencies. pieces: what is fitted to."""
 
-    linear = False
-
-    def __init__(self, names: Sequence[str]):
-        self.names = tuple(names)
-
-    def at(self, values: FloatArray) -> tuple[Primitives, Primitives]:
-        """(primitives, their derivatives by the values); the other two axes rest."""
-        slope, lag = float(values[0]), float(values[1])
-        band = float(values[2]) if len(values) > 2 else 0.0
-        rate, gain = 1.0 / lag, 1.0 / (slope * lag)
-        by_rate = np.array([0.0, -rate / lag, 0.0])
-        by_gain = np.array([-gain / slope, -gain / lag, 0.0])
-        by_level = band * by_gain + np.array([0.0, 0.0, gain])
-        none, count = np.zeros((1, AXIS + 1)), len(values)
-
-        def axis(number: float, other: float) -> FloatArray:
-            return np.array([other, other, number])
-
-        def slopes(by: FloatArray) -> FloatArray:
-            return np.concatenate([np.zeros((AXIS, count)), by[None, :count]])
-
-        now = Primitives(
-            axis(rate, 1.0), axis(band * gain, 0.0), axis(band * gain, 0.0), axis(gain, 0.0)[:, None],
-            np.array([[0.0, 0.0, 1.0]]), none, np.zeros(1), np.zeros(AXIS + 1),
-        )  # fmt: skip
-        derivatives = Primitives(
-            slopes(by_rate), slopes(by_level), slopes(by_level), slopes(by_gain)[:, None, :],
-            np.zeros((1, AXIS + 1, count)), np.zeros((1, AXIS + 1, count)), np.zeros((1, count)),
-            np.zeros((AXIS + 1, count)),
-        )  # fmt: skip
-        return now, derivatives
+    parameters: tuple[Parameter, ...]
+    pieces: tuple[Piece, ...]
 
 
-class MotorEngine(ExactEngine):
-    """The exact engine with a motor in place of the robot."""
+class MotorEngine:
+    """Residuals and sensitivities of a motor by the exact step."""
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: MotorProblem):
         self.problem = problem
-        self.mapping = MotorMapping([p.name for p in problem.parameters])  # type: ignore[assignment]
-        self._columns = problem.columns
-        self._axes_only = False
 
-    def on(self, problem: Problem) -> MotorEngine:
+    def on(self, problem: MotorProblem) -> MotorEngine:
         """The same engine on other pieces."""
         return MotorEngine(problem)
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the march over every piece adds up."""
+        return [sums for sums, _ in self._march(point, weighting)]
+
+    def outputs(self, point: Point) -> list[tuple[FloatArray, FloatArray]]:
+        """(outputs, slopes) of every piece, rows of its record, NaN outside: (rows, C) and (rows, C, P + 3 + C)."""
+        plain = Weighting(np.ones(len(self.problem.columns)), mode=KEEP)
+        return [kept for _, kept in self._march(point, plain)]
+
+    def _march(self, point: Point, weighting: Weighting) -> list[tuple[PieceSums, tuple[FloatArray, FloatArray]]]:
+        columns, count = self.problem.columns, len(self.problem.parameters)
+        return [
+            march_piece(piece, state, columns, count, self._numbers(piece, point.values), weighting)
+            for piece, state in zip(self.problem.pieces, point.states, strict=True)
+        ]
+
+    def _numbers(self, piece: Piece, values: FloatArray) -> tuple[Physics, Slopes, NDArray[np.int64]]:
+        """Physics and slopes of the outputs of one piece; each output is a group for its latency."""
+        problem, columns, count = self.problem, piece.record.columns, len(self.problem.parameters)
+        width, room = len(columns), padded(used_by(piece, count))
+        law, by_law, drive, by_drive = step_numbers(values, problem.where(BAND), room)
+        speed_map, travel_map = np.zeros((width, N_AXES)), np.zeros((width, PATH))
+        speed_map[:, YAW] = [column == SPEED for column in columns]
+        travel_map[:, YAW] = [column == ANGLE for column in columns]
+        late = [problem.where(f"{LATENCY}.{name}") for name, _ in columns]
+        at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
+        physics = Physics(
+            law, drive, np.zeros(N_AXES), speed_map, travel_map, np.zeros(width), np.full(width, -1),
+            np.array([values[k] if k >= 0 else 0.0 for k in late]), Driver(), bool(travel_map.any()),
+        )  # fmt: skip
+        slopes = Slopes(
+            by_law, by_drive, np.zeros((N_AXES, room)), np.zeros((width, N_AXES, room)), np.zeros((width, PATH, room)),
+            np.zeros((width, room)), True, np.zeros(width, bool), np.array(late), np.full(3, -1),
+            at[:N_AXES], at[N_AXES:],
+        )  # fmt: skip
+        return physics, slopes, np.arange(width + 1)
+
+
+def step_numbers(values: FloatArray, at_band: int, room: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """(law (3, 3), its slopes (2, 3, room), drive (3, 1), its slopes (3, 1, room)), as kernel/march.py has them.
+
+    values: slope, lag, and at `at_band`, if that is not -1, the dead band; slopes are by each of the values.
+    """
+    slope, lag, band = float(values[0]), float(values[1]), float(values[at_band]) if at_band >= 0 else 0.0
+    rate, gain = 1.0 / lag, 1.0 / (slope * lag)
+    law, drive = np.zeros((3, N_AXES)), np.zeros((N_AXES, 1))
+    law[0] = 1.0
+    law[:, YAW], drive[YAW] = (rate, band * gain, band * gain), gain
+    by_law, by_drive = np.zeros((2, N_AXES, room)), np.zeros((N_AXES, 1, room))
+    by_law[0, YAW, 1] = -rate / lag
+    by_drive[YAW, 0, :2] = -gain / slope, -gain / lag
+    by_law[1, YAW] = band * by_drive[YAW, 0]
+    if at_band >= 0:
+        by_law[1, YAW, at_band] += gain
+    return law, by_law, drive, by_drive

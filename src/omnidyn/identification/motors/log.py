@@ -1,128 +1,107 @@
-"""Logs as the fit of one motor sees them: its input, its speed and angle, and the rows that can tell of it."""
+"""Logs as the fits of motors see them: input, speed and angle of each motor, from whatever column they came."""
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motors.engine import AXIS, BAND, INNER, LAG, SLOPE
-from omnidyn.identification.motors.input import SUB, refined
-from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATENCY, LATEST
-from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
-from omnidyn.identification.output_error.problem.record import SHORTEST, Record
-from omnidyn.logs.resolved import unresolved_rows
+from omnidyn.errors import InputError
+from omnidyn.logs.plateaus import live_angle
 from omnidyn.logs.segments import segments
-from omnidyn.model.robot_file import load_robot
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import stretches
 
 FloatArray = NDArray[np.float64]
 
-HOLD, MEAN, CURVE = "hold", "mean", "curve"  # what the input does from row to row
-INPUTS = {"voltage": "V", "duty": "1"}
+INPUTS = {"voltage": ("V", 1.0), "duty": ("%", 100.0), "current": ("A", 1.0)}  # unit, and how many of it in one SI unit
+WHEEL, GROUND = "wheel", "ground"
+HEADING = "heading, the robot turning on the spot"
 
 
-def motor_records(runs: Sequence[Run], motor: int, kind: str, between: str, angle: bool) -> tuple[list[Record], str]:
-    """The runs with one input and the outputs of one motor, and the unit of the input."""
-    found = []
-    names = [name for name in INPUTS if name == kind or not kind]
-    if kind and kind not in INPUTS:
-        raise InputError("no such input", got=kind, expected=" or ".join(INPUTS), where="kind")
-    if not runs:
-        raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
-    chosen = next((n for n in names if all(getattr(run, n) is not None for run in runs)), "")
-    if not chosen:
-        raise InputError("the logs have no input of this motor", got=", ".join(runs[0].channels),
-                         expected=" or ".join(names), where=runs[0].source)  # fmt: skip
-    for run in runs:
-        found.append(_record(run.as_measured(), motor, getattr(run, chosen), between, angle))
-    return found, INPUTS[chosen]
+@dataclass(frozen=True, eq=False)
+class MotorLog:
+    """One run. Arrays of shape (rows, motors).
+
+    put_in: in `unit`, of `kind` (INPUTS). speed [rad/s] and angle [rad], as measured; one of them may be None.
+    motion [rad/s]: by the angle where there is one. motion_from: its origin in words. pieces: rows between gaps.
+    """
+
+    run: Run
+    kind: str
+    put_in: FloatArray
+    speed: FloatArray | None
+    angle: FloatArray | None
+    motion: FloatArray
+    motion_from: str
+    pieces: tuple[slice, ...]
+
+    @property
+    def t(self) -> FloatArray:
+        return self.run.t
+
+    @property
+    def unit(self) -> str:
+        return INPUTS[self.kind][0]
+
+    @property
+    def motors(self) -> int:
+        return self.motion.shape[1]
+
+    def piece(self, row: int) -> slice:
+        """The rows between the two gaps around a row."""
+        return self.pieces[bisect_right([each.start for each in self.pieces], row) - 1]
 
 
-def _record(run: Run, motor: int, put_in: FloatArray, between: str, angle: bool) -> Record:
-    if motor >= put_in.shape[1]:
-        raise InputError("no such motor", got=motor + 1, expected=f"1 to {put_in.shape[1]}", where=run.source)
-    outputs: dict[str, FloatArray] = {}
-    if run.wheel_speed is not None and np.isfinite(run.wheel_speed[:, motor]).any():
-        outputs["wheel_speed"] = run.wheel_speed[:, motor]
-    if angle and run.wheel_angle is not None and np.isfinite(run.wheel_angle[:, motor]).any():
-        outputs["heading"] = run.wheel_angle[:, motor]
-    if not outputs:
-        raise InputError("the log has no speed and no angle of this motor", got=", ".join(run.channels),
-                         expected="wheel_speed or wheel_angle", where=run.source)  # fmt: skip
-    u = put_in[:, motor]
-    rough, t, known = unresolved_rows(u), run.t, np.isfinite(u)
-    outputs = {name: np.where(rough, np.nan, column) for name, column in outputs.items()}
-    if between == MEAN:
-        u = np.append(0.5 * (u[1:] + u[:-1]), u[-1])
-        known = np.isfinite(u)
-    pieces = [
-        (s.start + int(a), s.start + int(b) - 1) for s in segments(t) for a, b in stretches(known[s]).tolist()
-        if b - a >= SHORTEST
-    ]  # fmt: skip
-    if not pieces:
-        raise InsufficientDataError(
-            "no stretch of the log has inputs throughout", got=f"{int(np.isfinite(u).sum())} rows",
-            expected=f"{SHORTEST} rows in a row", where=run.source,
-        )  # fmt: skip
-    measured = np.stack([*outputs.values()], axis=1)
-    if between == CURVE:
-        t, u, measured = refined(t, u, measured, pieces)
-        pieces = [(SUB * first, SUB * last) for first, last in pieces]
-    return Record(
-        t, np.ascontiguousarray(np.nan_to_num(u)[:, None]), measured,
-        tuple((name, 0) for name in outputs), (0.0,) * len(outputs), tuple(pieces), run.source, False, (),
+def motor_logs(
+    runs: Run | Sequence[Run], kind: str = "", speed: str = WHEEL, robot: Robot | None = None,
+    kinds: Sequence[str] = tuple(INPUTS),
+) -> list[MotorLog]:  # fmt: skip
+    """The runs with one input. kind: one of `kinds`; "" takes the first of them that all runs have.
+
+    speed: "wheel", or "ground": of the heading of a robot that turns on the spot, which needs `robot`.
+    Raises InputError for a run without the channels.
+    """
+    every = [runs] if isinstance(runs, Run) else list(runs)
+    if kind and kind not in kinds:
+        raise InputError("no such input", got=kind, expected=", ".join(kinds), where="input")
+    wanted = [kind] if kind else kinds
+    for name in wanted:
+        if every and all(getattr(run, name) is not None for run in every):
+            return [_motor_log(run, name, speed, robot) for run in every]
+    lacking = next((run for run in every if all(getattr(run, name) is None for name in wanted)), None)
+    lacking = lacking or (every[0] if every else None)
+    raise InputError(
+        "the motors' input is not in the log", got=", ".join(lacking.channels) if lacking else "no runs",
+        expected=", ".join(wanted), where=lacking.source if lacking else "",
     )  # fmt: skip
 
 
-def motor_problem(records: Sequence[Record], dead_band: bool, latency: bool) -> Problem:
-    """Free numbers and pieces; each piece starts at a fitted speed, and its angle at a fitted one."""
-    most = max(float(np.abs(r.voltage).max()) for r in records)
-    if most == 0.0:
-        raise InsufficientDataError("the motor was never driven", got="an input of 0 throughout", expected="an input")
-    numbers = [Parameter(INNER + SLOPE, 1.0, 1e-9, 1e9, True), Parameter(INNER + LAG, 0.1, 1e-5, 1e3, True)]
-    if dead_band:
-        numbers.append(Parameter(INNER + BAND, 0.0, 0.0, 0.5 * most))
-    columns = dict.fromkeys(name for r in records for name, _ in r.columns)
-    late = [Parameter(f"{LATENCY}.{name}", 0.0, EARLIEST, LATEST) for name in columns] if latency else []
-    pieces = [_piece(r, first, last, latency) for r in records for first, last in r.pieces]
-    # The robot is not used: a problem has one.
-    return Problem(load_robot("axebot"), (*numbers, *late), len(numbers), tuple(pieces))
+def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog:
+    put_in, pieces = getattr(run, kind) * INPUTS[kind][1], tuple(segments(run.t))
+    if speed == GROUND:
+        if run.pose is None or robot is None or not np.isfinite(run.pose[:, 2]).any():
+            raise InputError("the heading is not known", got=", ".join(run.channels), expected="heading, and a robot",
+                             where=run.source)  # fmt: skip
+        angle, measured = run.pose[:, 2:] * wheel_speed(robot.wheels, [0.0, 0.0, 1.0]), None
+        origin = HEADING
+    elif speed == WHEEL:
+        angle, measured = live_angle(run), run.wheel_speed
+        origin = "wheel_speed" if angle is None else "wheel_angle"
+    else:
+        raise InputError("no such speed", got=speed, expected=f"{WHEEL} or {GROUND}", where="speed")
+    motion = measured if angle is None else np.gradient(angle, run.t, axis=0) if len(run) > 1 else np.zeros_like(angle)
+    if motion is None:
+        raise InputError("the log has no speed and no angle of the motors", got=", ".join(run.channels),
+                         expected="wheel_angle or wheel_speed", where=run.source)  # fmt: skip
+    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces)
 
 
-def _piece(record: Record, first: int, last: int, latency: bool) -> Piece:
-    names = [name for name, _ in record.columns]
-    start, offset = np.zeros(3), np.zeros(len(names))
-    for c, name in enumerate(names):
-        column = record.outputs[first : last + 1, c]
-        known = column[np.isfinite(column)]
-        begin = float(known[0]) if known.size else 0.0
-        if name == "heading":
-            offset[c] = begin
-        else:
-            start[AXIS] = begin
-    free = np.array([False, False, True, *(name == "heading" for name in names)])
-    margin = min(LATEST, 0.1 * float(record.t[last] - record.t[first])) if latency else 0.0
-    return Piece(record, first, last, start, offset, free, np.full(len(names), margin))
-
-
-def begin(problem: Problem, records: Sequence[Record], lag: float) -> Point:
-    """Slope by the regression of the input on the speed that it would bring about without a dead band."""
-    point = problem.start()
-    up = low = 0.0
-    for r in records:
-        names = [name for name, _ in r.columns]
-        speed = (
-            r.outputs[:, names.index("wheel_speed")] if "wheel_speed" in names else np.gradient(r.outputs[:, 0], r.t)
-        )
-        known = np.isfinite(speed)
-        up += float(np.abs(r.voltage[known, 0]).sum())
-        low += float(np.abs(speed[known]).sum())
-    values = point.values.copy()
-    values[0], values[1] = up / low if low > 0.0 else 1.0, lag
-    return replace(point, values=values)
+def rows_with(known: NDArray[np.bool_], pieces: Sequence[slice]) -> list[tuple[int, int]]:
+    """(first, last) rows between gaps throughout which `known` (rows,) holds."""
+    return [(p.start + a, p.start + b - 1) for p in pieces for a, b in stretches(known[p]).tolist()]

@@ -14,7 +14,7 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS
-from omnidyn.identification.output_error.problem.problem import Problem, per_column
+from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import difference_noise
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
@@ -153,7 +153,7 @@ def noise_of(solver: Solver, solution: Solution) -> dict[str, float]:
 
 
 def intervals(
-    problem: Problem, values: FloatArray, known: Trust
+    problem: Fitted, values: FloatArray, known: Trust
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Standard errors and 95 % intervals, on the scale on which the solver works; at a bound as for a friction line.
 

@@ -226,7 +226,7 @@ class Fit:
         """The best so far as if it were the best, and what is to be said of it."""
         warnings, state = [INTERRUPTED], best.state
         if state is not None:  # it may be of a part of the logs, or of longer steps
-            assert state.problem is not None
+            assert isinstance(state.problem, Problem)
             solver = self._solver(_nuisances(state.problem) if self._settles else None)
             state = solver.state(state.point, state.variance if solver.scaled.any() else None)
         else:

@@ -158,41 +158,19 @@ class ExactEngine:
     def _piece(
         self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, weighting: Weighting
     ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:
-        columns, count = piece.record.columns, len(self.problem.parameters)
-        known = np.array([self._columns.index(column) for column in columns])
-        total = count + N_AXES + len(columns)
-        used = np.concatenate([np.arange(count), count + np.flatnonzero(piece.free)])  # the kernel knows no others
-        physics, slopes, groups = self._numbers(piece, state, values, now, by, -(-len(used) // VECTOR) * VECTOR)
-        counted = weighting.counted and any(piece.record.ticks)
-        tick = np.array(piece.record.ticks) if counted else None
-        share = np.ones(len(known)) if tick is None else information(weighting.variance[known], tick)[0]
-        loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode, share)
-        moves = any(name == POSITION for name, _ in columns)
-        sums = _empty(
-            len(columns), slopes.law.shape[2], len(used), len(piece.record.t), weighting.mode, _blocks(piece, weighting)
-        )
-        march(
-            piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
-            float(piece.record.t[0]), piece.record.span, piece.margin, state[:N_AXES], state[N_AXES:], groups,
-            physics, slopes, loss, sums, tick, np.zeros((2, PLACE_SIZE)) if moves else None,
-            np.zeros((3, 3)) if moves else None,
-        )  # fmt: skip
-        grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
-        info = np.zeros((len(columns), total, total))
-        info[:, used[:, None], used] = sums.info[:, : len(used), : len(used)]
-        waves = _at(used, sums.waves, total) if weighting.mode & WAVES else None
-        tight = PieceSums(known, sums.number, sums.square, sums.loss, sums.lag, grad, info, score, sums.drift, waves)
-        return tight, (sums.predicted, _at(used, sums.slopes, total))
+        count, used = len(self.problem.parameters), used_by(piece, len(self.problem.parameters))
+        physics, slopes, groups = self._numbers(piece, state, values, now, by, padded(used))
+        return march_piece(piece, state, self._columns, count, (physics, slopes, groups), weighting)
 
     def _numbers(
-        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, padded: int
+        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, room: int
     ) -> tuple[Physics, Slopes, NDArray[np.int64]]:
         """Physics and slopes of the outputs of one piece."""
         problem, columns = self.problem, piece.record.columns
         count, robot_count, width = len(problem.parameters), problem.robot_count, len(columns)
 
         def wide(slope: FloatArray) -> FloatArray:
-            out = np.zeros((*slope.shape[:-1], padded))
+            out = np.zeros((*slope.shape[:-1], room))
             out[..., :robot_count] = slope
             return out
 
@@ -220,6 +198,48 @@ class ExactEngine:
         )  # fmt: skip
         starts = [c for c in range(width) if c == 0 or columns[c][0] != columns[c - 1][0]]
         return physics, derivatives, np.array([*starts, width])
+
+
+def used_by(piece: Piece, count: int) -> NDArray[np.int64]:
+    """Which of `count` parameters and the states of a piece the kernel knows: it knows no state that is not free."""
+    return np.concatenate([np.arange(count), count + np.flatnonzero(piece.free)])
+
+
+def padded(used: NDArray[np.int64]) -> int:
+    """Entries of a row of slopes."""
+    return -(-len(used) // VECTOR) * VECTOR
+
+
+def march_piece(
+    piece: Piece, state: FloatArray, every: Sequence[Column], count: int,
+    numbers: tuple[Physics, Slopes, NDArray[np.int64]], weighting: Weighting,
+) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:  # fmt: skip
+    """The sums of a piece, and its (outputs, slopes) where the weighting keeps them. every: the columns of the problem.
+
+    count: of parameters. numbers: physics, their slopes (rows of `padded`), and the first column of each group, and C.
+    """
+    columns, used, (physics, slopes, groups) = piece.record.columns, used_by(piece, count), numbers
+    known, total = np.array([every.index(column) for column in columns]), count + N_AXES + len(columns)
+    counted = weighting.counted and any(piece.record.ticks)
+    tick = np.array(piece.record.ticks) if counted else None
+    share = np.ones(len(known)) if tick is None else information(weighting.variance[known], tick)[0]
+    loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode, share)
+    moves = any(name == POSITION for name, _ in columns)
+    sums = _empty(
+        len(columns), slopes.law.shape[2], len(used), len(piece.record.t), weighting.mode, _blocks(piece, weighting)
+    )
+    march(
+        piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
+        float(piece.record.t[0]), piece.record.span, piece.margin, state[:N_AXES], state[N_AXES:], groups,
+        physics, slopes, loss, sums, tick, np.zeros((2, PLACE_SIZE)) if moves else None,
+        np.zeros((3, 3)) if moves else None,
+    )  # fmt: skip
+    grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
+    info = np.zeros((len(columns), total, total))
+    info[:, used[:, None], used] = sums.info[:, : len(used), : len(used)]
+    waves = _at(used, sums.waves, total) if weighting.mode & WAVES else None
+    tight = PieceSums(known, sums.number, sums.square, sums.loss, sums.lag, grad, info, score, sums.drift, waves)
+    return tight, (sums.predicted, _at(used, sums.slopes, total))
 
 
 def _maps(columns: Sequence[Column], now: Primitives, facing: float, more: tuple[int, ...] = ()) -> list[FloatArray]:

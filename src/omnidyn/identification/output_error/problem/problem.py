@@ -35,13 +35,10 @@ class Piece:
     margin: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """robot: where the fit starts. parameters: of the robot file first, then nuisances. pieces: what is fitted to."""
+class Fitted:
+    """What the solver needs of a problem, whatever it is that moves: parameters, and the pieces that are fitted to."""
 
-    robot: Robot
     parameters: tuple[Parameter, ...]
-    robot_count: int
     pieces: tuple[Piece, ...]
 
     @property
@@ -62,6 +59,25 @@ class Problem:
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
+    def where(self, name: str) -> int:
+        """Index of a parameter by its name, -1 where it is not free."""
+        return self.names.index(name) if name in self.names else -1
+
+    def start(self) -> Point:
+        """Where the fit starts."""
+        values = np.array([p.value for p in self.parameters])
+        return Point(values, tuple(np.concatenate([piece.start, piece.offset]) for piece in self.pieces))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem(Fitted):
+    """robot: where the fit starts. parameters: of the robot file first, then nuisances. pieces: what is fitted to."""
+
+    robot: Robot
+    parameters: tuple[Parameter, ...]
+    robot_count: int
+    pieces: tuple[Piece, ...]
+
     @property
     def robot_parameters(self) -> tuple[Parameter, ...]:
         """Those of the robot file."""
@@ -70,10 +86,6 @@ class Problem:
     def robot_at(self, values: FloatArray) -> Robot:
         """The robot with these values of the parameters, not checked."""
         return robot_at(self.robot, self.robot_parameters, values)
-
-    def where(self, name: str) -> int:
-        """Index of a parameter by its name, -1 where it is not free."""
-        return self.names.index(name) if name in self.names else -1
 
     def shortened(self, rows: int) -> Problem:
         """The same problem on the first `rows` rows of all pieces together, each cut by the same share."""
@@ -86,11 +98,6 @@ class Problem:
             for piece in self.pieces
         ]
         return replace(self, pieces=tuple(pieces))
-
-    def start(self) -> Point:
-        """Where the fit starts."""
-        values = np.array([p.value for p in self.parameters])
-        return Point(values, tuple(np.concatenate([piece.start, piece.offset]) for piece in self.pieces))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
-from omnidyn.identification.output_error.problem.problem import PieceSums, Point, Problem, per_column
+from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
 
 FloatArray = NDArray[np.float64]
 
@@ -31,16 +31,19 @@ UNSEEN = 1e-100  # information on the start of a piece that is none: divided by 
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
 
 
-class Engine(Protocol):
+P = TypeVar("P", bound=Fitted)
+
+
+class Engine(Protocol[P]):
     """What simulates a problem with its sensitivities: engines/exact.py, engines/implicit.py."""
 
-    problem: Problem
+    problem: P
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the residuals of every piece add up to; see kernel/march.py."""
         ...
 
-    def on(self, problem: Problem) -> Self:
+    def on(self, problem: P) -> Self:
         """The same engine on other pieces of the same logs, with the same parameters."""
         ...
 
@@ -56,7 +59,7 @@ class State:
     sums: list[PieceSums]
     objective: float
     variance: FloatArray
-    problem: Problem | None = None
+    problem: Fitted | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,17 +73,17 @@ class Solution:
     held: NDArray[np.bool_]
     iterations: int
     converged: bool
-    solver: Solver
+    solver: Solver[Any]
 
 
-class Solver:
+class Solver(Generic[P]):
     """Minimises F over a problem. `floor` (columns,): least variance of each column.
 
     close: squared distance to the best point, in standard errors, at which it ends. counted: whether counts have a
     likelihood of their own.
     """
 
-    def __init__(self, problem: Problem, engine: Engine, nu: float = 0.0, close: float = CLOSE, counted: bool = True):
+    def __init__(self, problem: P, engine: Engine[P], nu: float = 0.0, close: float = CLOSE, counted: bool = True):
         self.problem, self.engine, self.nu, self.close = problem, engine, nu, close
         self.tick = problem.tick if counted else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
@@ -322,7 +325,7 @@ def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
     return (vectors @ (inverse * (vectors.T @ (gradient / size)))) / size
 
 
-def _floor(problem: Problem) -> FloatArray:
+def _floor(problem: Fitted) -> FloatArray:
     """Least variance of each column: (PRECISION times its root mean square)^2."""
     columns = problem.columns
     size, count = np.zeros(len(columns)), np.zeros(len(columns))

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motors.drive_line import fit_drive_lines
-from omnidyn.identification.motors.drive_windows import drive_windows
+from omnidyn.identification.motors.log import motor_logs
+from omnidyn.identification.motors.study import identify_motors
+from omnidyn.identification.motors.windows import motor_windows
 from omnidyn.run import Run
 
 SLOPE, INERTIA = 0.5, 0.08
@@ -48,7 +49,7 @@ def bench(band, seed=0, noise=0.0, with_angle=True, **how):
 
 
 def line_of(run, **how):
-    return fit_drive_lines([run], **how).lines[0]
+    return identify_motors([run], **how).motors[0]
 
 
 def test_a_clean_motor_gives_its_line():
@@ -84,14 +85,14 @@ def test_noise_of_the_speed_does_not_flatten_the_slope():
     low, high = line.ci95["slope"]
     assert low <= SLOPE <= high
     assert not line.dead_band_seen
-    assert "not identifiable here" in fit_drive_lines([run]).statements[0]
+    assert "not identifiable here" in identify_motors([run]).statements[0]
 
 
 def test_one_speed_gives_no_dead_band_and_says_so():
     voltage = np.full(600, 2.0)
     _speed, angle = motor(voltage, 0.01, 0.3)
-    study = fit_drive_lines([Run(t=np.arange(600) * 0.01, voltage=voltage[:, None], wheel_angle=angle[:, None])])
-    assert np.isnan(study.lines[0].value["dead_band"])
+    study = identify_motors([Run(t=np.arange(600) * 0.01, voltage=voltage[:, None], wheel_angle=angle[:, None])])
+    assert np.isnan(study.motors[0].value["dead_band"])
     assert "one speed or one input only" in study.statements[0]
 
 
@@ -109,7 +110,7 @@ def test_an_input_that_the_log_does_not_resolve_is_left_out():
     _speed, angle = motor(voltage, dt / fine, 0.0)
     run = Run(t=np.arange(600) * dt, voltage=voltage[::fine, None], wheel_angle=angle[::fine, None])
     with pytest.raises(InsufficientDataError, match=r"whose input the log does not resolve"):
-        drive_windows([run])
+        motor_windows(motor_logs([run]))
 
 
 def test_a_gap_is_not_integrated_over():
@@ -134,10 +135,10 @@ def test_several_motors_have_a_line_each_and_one_together():
         t=one.t, voltage=np.hstack([one.voltage, other.voltage]),
         wheel_angle=np.hstack([one.wheel_angle, other.wheel_angle]),
     )  # fmt: skip
-    lines = {line.motor: line for line in fit_drive_lines([both]).lines}
-    assert lines["1"].value["dead_band"] == pytest.approx(0.2, abs=0.05)
-    assert lines["2"].value["dead_band"] == pytest.approx(0.6, abs=0.05)
-    assert 0.2 < lines["all"].value["dead_band"] < 0.6
+    lines = {line.motor: line for line in identify_motors([both]).motors}
+    assert lines[0].value["dead_band"] == pytest.approx(0.2, abs=0.05)
+    assert lines[1].value["dead_band"] == pytest.approx(0.6, abs=0.05)
+    assert 0.2 < lines[None].value["dead_band"] < 0.6
 
 
 def test_the_same_data_give_the_same_intervals():
@@ -155,11 +156,11 @@ def test_the_same_data_give_the_same_intervals():
 )
 def test_wrong_options_are_refused(how, words):
     with pytest.raises(InputError, match=words):
-        fit_drive_lines([bench(0.4)], **how)
+        identify_motors([bench(0.4)], **how)
 
 
 def test_too_few_windows_are_refused():
     run = bench(0.4)
     short = Run(t=run.t[:30], voltage=run.voltage[:30] + 2.0, wheel_angle=run.t[:30, None] * 4.0)
     with pytest.raises(InsufficientDataError, match=r"too few windows for a line with intervals.*6 or more"):
-        fit_drive_lines([short], length=0.1)
+        identify_motors([short], length=0.1)

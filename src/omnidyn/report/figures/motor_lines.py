@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 
-from omnidyn.identification.motors.drive_line import DriveLine, DriveStudy
+from omnidyn.identification.motors.estimate import MotorEstimate
+from omnidyn.identification.motors.windows import MotorWindows
 from omnidyn.report.style import BLUE, GREY, INK, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
 
 PER_ROW = 3
 
 
-def draw_drive_lines(study: DriveStudy) -> Picture:
+def draw_motor_lines(motors: Sequence[MotorEstimate], windows: MotorWindows) -> Picture:
     """One panel per motor: a mark per window, its inertia taken off, and the line with its dead band."""
-    lines = [line for line in study.lines if line.motor != "all"][: 2 * PER_ROW]
+    lines = [line for line in motors if line.motor is not None][: 2 * PER_ROW]
     with look():
         rows = -(-len(lines) // PER_ROW)
         columns = min(len(lines), PER_ROW)
@@ -24,16 +27,16 @@ def draw_drive_lines(study: DriveStudy) -> Picture:
             left=0.1, right=0.98, top=1 - 0.35 / height, bottom=1.0 / height, wspace=0.34, hspace=0.45
         )
         for panel, line in zip(panels, lines, strict=False):
-            _panel(panel, study, line)
+            _panel(panel, windows, line)
         for panel in panels[len(lines) :]:
             panel.set_axis_off()
         handles, names = panels[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="lower left", bbox_to_anchor=(0.08, 0.0), ncols=3)
-        return picture("drive_lines", "What each motor needs to turn", _words(study), figure)
+        return picture("motor_lines", "What each motor needs to turn", _words(windows), figure)
 
 
-def _panel(axes: Axes, study: DriveStudy, line: DriveLine) -> None:
-    put_in, speed, error, side, change, _ = study.windows.of(int(line.motor) - 1)
+def _panel(axes: Axes, windows: MotorWindows, line: MotorEstimate) -> None:
+    put_in, speed, error, side, change, _ = windows.of(line.motor)
     inertia = np.nan_to_num(line.value["inertia"]) * change
     axes.errorbar(speed, put_in - inertia, xerr=error, fmt="o", color=GREY, markersize=3.5, elinewidth=0.6, zorder=1,
                   label="windows, inertia taken off")  # fmt: skip
@@ -50,16 +53,16 @@ def _panel(axes: Axes, study: DriveStudy, line: DriveLine) -> None:
                       solid_capstyle="butt", label="dead band, 95 %" if k == 0 else None)  # fmt: skip
     axes.axhline(0.0, color=INK, linewidth=0.6)
     axes.axvline(0.0, color=INK, linewidth=0.6)
-    axes.set_title(f"motor {line.motor}")
+    axes.set_title(line.name)
     axes.set_xlabel("speed, rad/s")
-    if (int(line.motor) - 1) % PER_ROW == 0:
-        axes.set_ylabel(f"{study.windows.kind}, {study.windows.unit}")
+    if (line.motor or 0) % PER_ROW == 0:
+        axes.set_ylabel(f"{windows.kind}, {windows.unit}")
     thin_out(axes, 4, 5)
 
 
-def _words(study: DriveStudy) -> str:
+def _words(windows: MotorWindows) -> str:
     return (
-        f"Mean {study.windows.kind} over each window against the mean speed ({study.windows.speed_from}), with the "
+        f"Mean {windows.kind} over each window against the mean speed ({windows.speed_from}), with the "
         "standard error of the speed. Where the line meets speed 0 is the dead band; the bar is its 95 % interval: "
         "where it contains 0, the data do not show one."
     )

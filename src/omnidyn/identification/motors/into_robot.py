@@ -1,0 +1,215 @@
+"""From slope and dead band of motors to numbers of a robot file, by eqs (10) (11) with the wheels off the ground.
+
+A wheel of radius r with friction b v + c sgn v at its rim, behind a gear l, at a constant speed w > 0 (v = r w):
+
+    u = R i + V_d + K_v l w                                              (11), the voltage drop V_d against the current
+    l K_t i = r (b r w + c)                                              (10), f = T/r balances friction
+    u = (K_v l + b r/g) w + (V_d + c/g),   g = l K_t/(R r) [N/V]         slope and dead band of a voltage
+    i = (b r/g) w + c/g,                   g = l K_t/r [N/A]             and of a current
+
+    voltage    K_v = (slope - b r/g)/l, b as the file has it;            c = g (dead_band - V_d)
+    duty       the same, times the supply
+    current    b = g slope/r                                             c = g dead_band
+
+Where the file has K_t = K_v, which are one number of the magnet, K_t goes along. The rotor and the wheel have the
+inertia J = inertia g r at the wheel, but a robot file has no `rotor_inertia` to take it. R, K_t, l, r and the supply
+are those of the file, as if they were exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from omnidyn.errors import InputError
+from omnidyn.identification.estimate import finite_or_none, identified
+from omnidyn.identification.motors.estimate import BAND, INERTIA, SLOPE, MotorEstimate
+from omnidyn.identification.motors.log import HEADING
+from omnidyn.identification.motors.study import MotorStudy
+from omnidyn.identification.steady.study_table import bullet, table_text
+from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
+from omnidyn.model.robot import Prior, Robot
+from omnidyn.model.wheels import per_wheel
+
+COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"
+STEP = 1e-6  # of a standard error: the differences by which errors propagate
+
+
+@dataclass(frozen=True, eq=False)
+class MotorNumbers:
+    """robot: with the numbers that the motors determine, their std and source. value, std: by key.
+
+    words: what was not written, and why; what a reader must know of what was.
+    """
+
+    robot: Robot
+    value: dict[str, float]
+    std: dict[str, float]
+    words: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """A table of the numbers, and the words, as plain text."""
+        rows = [(key, f"{value:.5g}", f"{self.std[key]:.2g}", unit(key)) for key, value in self.value.items()]
+        table = [*table_text(("number", "value", "+-", "unit"), rows), ""] if rows else []
+        return [*table, *(line for words in self.words for line in bullet("-", words))]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "numbers": {
+                key: {"value": value, "std": finite_or_none(self.std[key]), "unit": unit(key)}
+                for key, value in self.value.items()
+            },
+            "words": list(self.words),
+        }
+
+
+def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
+    """What the motors determine as numbers of a robot file, an entry per wheel; the motor m is at wheel m.
+
+    Raises InputError where the logs have more motors than the robot has wheels.
+    """
+    motors = [each for each in study.motors if each.motor is not None]
+    most = max((each.motor or 0) + 1 for each in motors)
+    if most > robot.wheels.count:
+        raise InputError("the logs have more motors than the robot has wheels", got=most,
+                         expected=f"{robot.wheels.count} or fewer, as {robot.name} has")  # fmt: skip
+    if study.speed_from == HEADING:
+        words = "slope and dead band are those of motors and floor together: of the motors alone nothing is determined"
+        return MotorNumbers(robot, {}, {}, (words,))
+    supply, words = _supply(study, robot)
+    value: dict[str, float] = {}
+    std: dict[str, float] = {}
+    priors: dict[str, Prior] = {}
+    for each in motors if supply else ():
+        wheel = _Wheel(robot, each.motor or 0, study.kind)
+        found, own = wheel.numbers(each, supply)
+        words += [f"{each.name}: {text}" for text in own]
+        for key, (number, spread) in found.items():
+            robot = wheel.put(robot, key, number)
+            value[key], std[key] = number, spread
+            priors[key] = identified(spread, f"motors by {each.way}, {each.source}")
+    if any(key.startswith(COULOMB) for key in value) and not _only_wheels(robot):
+        words.append(
+            "the friction of the floor is as it was: if it was fitted with that of the wheels in it, fit it anew"
+        )
+    return MotorNumbers(with_priors(robot, priors), value, std, tuple(words))
+
+
+def _supply(study: MotorStudy, robot: Robot) -> tuple[float, list[str]]:
+    """(volts, or ampere, in one unit of the input, words); 0 where that is not known."""
+    if study.kind != "duty":
+        return 1.0, []
+    if math.isfinite(study.supply):
+        return study.supply / 100.0, [f"the supply is the mean of the logs, {study.supply:.4g} V"]
+    if robot.drive.supply is not None:
+        return robot.drive.supply / 100.0, [
+            f"the supply is not logged: that of the file is taken, {robot.drive.supply:g} V"
+        ]
+    return 0.0, [
+        "a duty needs a supply to become volts: log it, or give drive.supply_V; nothing of the motors is written"
+    ]
+
+
+def _only_wheels(robot: Robot) -> bool:
+    """Whether all friction of a robot acts at its wheels."""
+    floor = [robot.friction.axes, robot.friction.direction]
+    return all(not np.any(each.coulomb) and not np.any(each.viscous) for each in floor)
+
+
+class _Wheel:
+    """The numbers of the file at one wheel, and what a line says beside them."""
+
+    def __init__(self, robot: Robot, wheel: int, kind: str):
+        motor, count = robot.motor, robot.wheels.count
+
+        def own(value: Any) -> float:
+            return float(per_wheel(value, count)[wheel])
+
+        self.wheel, self.kind = wheel, kind
+        self.gear, self.radius, self.resistance = (
+            own(motor.gear_ratio),
+            own(robot.wheels.wheel_radius),
+            own(motor.resistance),
+        )
+        self.torque, self.efficiency = own(motor.torque_constant), own(motor.gear_efficiency)
+        self.tied = self.torque == own(motor.emf_constant)
+        self.drop, self.viscous = own(motor.voltage_drop), own(robot.friction.wheels.viscous)
+
+    def key(self, name: str) -> str:
+        return f"{name}[{self.wheel}]"
+
+    def numbers(self, line: MotorEstimate, scale: float) -> tuple[dict[str, tuple[float, float]], list[str]]:
+        """(key -> (value, std), words). scale: volts or ampere in one unit of the line."""
+        if BAND in line.unidentifiable or SLOPE in line.unidentifiable or not line.ci95[SLOPE][0] > 0.0:
+            return {}, ["slope and dead band are not determined: nothing is written"]
+        at = np.array([line.value[SLOPE], line.value[BAND]]) * scale
+        spread = np.array([line.std[SLOPE], line.std[BAND]]) * scale
+        covariance = np.outer(spread, spread) * np.array([[1.0, line.correlation], [line.correlation, 1.0]])
+        found: dict[str, tuple[float, float]] = {}
+        words: list[str] = []
+
+        def add(name: str, of: Callable[[float, float], float], why: str = "") -> None:
+            number, slopes = float(of(*at)), np.zeros(2)
+            for k in range(2):
+                step = np.eye(2)[k] * STEP * spread[k]
+                slopes[k] = (of(*(at + step)) - of(*(at - step))) / (2.0 * STEP * spread[k]) if spread[k] > 0.0 else 0.0
+            if number > 0.0:
+                found[self.key(name)] = number, float(np.sqrt(slopes @ covariance @ slopes))
+            else:
+                words.append(f"{name} is not written: {why}")
+
+        if self.kind == "current":
+            add(VISCOUS, lambda slope, _: self._push(self.torque) * slope / self.radius)
+        else:
+            why = f"{VISCOUS} of the file explains all of the slope"
+            for name in (EMF, TORQUE) if self.tied else (EMF,):
+                add(name, lambda slope, _: self._emf(slope), why)
+        if line.dead_band_seen and self.key(VISCOUS if self.kind == "current" else EMF) in found:
+            drop = 0.0 if self.kind == "current" else self.drop
+            add(COULOMB, lambda slope, band: self._push(self._torque(slope)) * (band - drop),
+                "motor.voltage_drop_V of the file explains all of the dead band")  # fmt: skip
+        elif not line.dead_band_seen:
+            words.append(f"{COULOMB} is not written: no dead band is seen")
+        return found, words + self._of_inertia(line, at[0], scale)
+
+    def _emf(self, slope: float) -> float:
+        """K_v [V s/rad] from the slope [V s/rad]; 0 where the viscous friction of the file leaves none."""
+        lost = self.viscous * self.resistance * self.radius**2 / (self.gear * self.efficiency)  # times 1/K_t
+        if not self.tied:
+            return (slope - lost / self.torque) / self.gear
+        rest = slope**2 - 4.0 * self.gear * lost
+        return 0.5 * (slope + math.sqrt(rest)) / self.gear if rest >= 0.0 else 0.0
+
+    def _torque(self, slope: float) -> float:
+        return self._emf(slope) if self.tied and self.kind != "current" else self.torque
+
+    def _push(self, torque: float) -> float:
+        """g: force at the rim [N] by one volt, or ampere, at rest."""
+        per_ampere = self.efficiency * self.gear * torque / self.radius
+        return per_ampere if self.kind == "current" else per_ampere / self.resistance
+
+    def _of_inertia(self, line: MotorEstimate, slope: float, scale: float) -> list[str]:
+        if not line.ci95[INERTIA][0] > 0.0:
+            return []
+        inertia = line.value[INERTIA] * scale * self._push(self._torque(slope)) * self.radius
+        return [
+            f"rotor and wheel have {inertia:.3g} kg m^2 at the wheel, which is not written: a robot file has no "
+            "rotor_inertia yet"
+        ]
+
+    def put(self, robot: Robot, key: str, number: float) -> Robot:
+        """The robot with a number; other levels of Coulomb friction at the wheel go along where they have to."""
+        robot = Key.parse(key).set(robot, number, checked=False)
+        if key != self.key(COULOMB):
+            return robot
+        wheels = robot.friction.wheels
+        for name, least in (("coulomb_backward", False), ("breakaway", True), ("breakaway_backward", True)):
+            if getattr(wheels, name) is not None:
+                other = Key.parse(self.key(f"friction.wheels.{name}"))
+                robot = other.set(robot, max(number, other.get(robot)) if least else number, checked=False)
+        return robot

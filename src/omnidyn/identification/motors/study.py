@@ -1,0 +1,178 @@
+"""identify_motors: every motor of some logs, by one of two ways, and what they say together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from omnidyn.errors import InputError
+from omnidyn.identification.motors.choice import is_late
+from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
+from omnidyn.identification.motors.fit import AUTO, fit_motor, logs_of_free_runs
+from omnidyn.identification.motors.free_run import fit_rmse
+from omnidyn.identification.motors.line import DRAWS, fit_line
+from omnidyn.identification.motors.log import WHEEL, MotorLog, motor_logs
+from omnidyn.identification.motors.windows import MotorWindows, motor_windows
+from omnidyn.identification.question import GAUSS, OUTPUT_ERROR, STEADY_STATE
+from omnidyn.identification.steady.study_table import bullet, table_text
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+
+
+@dataclass(frozen=True, eq=False)
+class MotorStudy:
+    """motors: an estimate each, the last for all together where there are several in windows.
+
+    plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
+    found. windows: that the lines go through, None of free runs. supply [V]: of a
+    duty, the mean of the logs; NaN where it is not logged. warnings: of the logs, in words.
+    """
+
+    method: str
+    kind: str
+    unit: str
+    speed_from: str
+    motors: tuple[MotorEstimate, ...]
+    plain: tuple[MotorEstimate, ...] = ()
+    windows: MotorWindows | None = None
+    supply: float = math.nan
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def statements(self) -> tuple[str, ...]:
+        """What the logs say of each motor, and whether its dead band is any use on held-out logs."""
+        words = [each.statement() for each in self.motors]
+        for band, plain in zip(self.motors, self.plain, strict=False):
+            if band.dead_band_seen and band.held_out > (1.0 - PAYS) * plain.held_out:
+                words.append(
+                    f"{band.name}: held-out logs are met no better with the dead band (error {band.held_out:.4g} "
+                    f"rad/s, {plain.held_out:.4g} without): it may stand for something else"
+                )
+        return tuple(words)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Of the logs, then of each motor."""
+        words = list(self.warnings)
+        for each in self.motors:
+            own = [*each.doubts, *(f"{name} is at its bound" for name in each.at_bound)]
+            own += ["the intervals allow for errors that have a memory"] if each.covariance == "sandwich" else []
+            own += [] if each.converged else ["the fit was cut short: the numbers are of its last step"]
+            words += [f"{each.name}: {text}" for text in own]
+        return tuple(words)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Cells under HEAD, a motor after the other."""
+        pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((each,) for each in self.motors)
+        return [each.row() for several in pairs for each in several]
+
+    def summary(self) -> str:
+        """The study as plain text."""
+        how = "free runs of whole logs"
+        if self.windows is not None:
+            long = f"windows of {self.windows.length:g} s in integral form"
+            how = "steady windows" if self.windows.settled else long
+        lines = [f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", ""]
+        lines += [*table_text(HEAD, self.rows()), ""]
+        for words in self.statements:
+            lines += bullet("-", words)
+        for words in self.doubts:
+            lines += bullet("warning:", words)
+        return "\n".join(lines) + "\n"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The study as JSON can hold it."""
+        motors = [each.to_dict() for each in self.motors]
+        for own, plain in zip(motors, self.plain, strict=False):
+            own["without_dead_band"] = plain.to_dict()
+        return {
+            "method": self.method, "input": self.kind, "unit": self.unit, "speed_from": self.speed_from,
+            "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
+            "statements": list(self.statements), "warnings": list(self.doubts),
+        }  # fmt: skip
+
+
+def identify_motors(
+    runs: Run | Sequence[Run], *, method: str = STEADY_STATE, kind: str = "", speed: str = WHEEL,
+    robot: Robot | None = None, length: float | None = None, steady: bool = False,
+    share: tuple[float, float] | None = None, draws: int = DRAWS, between: str = AUTO, latency: bool | None = None,
+    loss: str = GAUSS, held_out: Sequence[Run] = (), now: Callable[[str], None] | None = None,
+) -> MotorStudy:  # fmt: skip
+    """Slope, dead band, lag and inertia of every motor of some logs.
+
+    method: "steady-state" takes windows in integral form, and gives the line of all motors together too; "output-error"
+    free runs of whole logs, with and without a dead band. kind: "voltage", "duty" or "current" (of free runs not);
+    "" takes the first of them that all runs have.
+    Of windows: speed, "wheel" or "ground" (by the heading of `robot`, turning on the spot); length [s], steady, share:
+    see `motor_windows`; draws: of the bootstrap. Of free runs: between, loss: see `fit_motor`; latency: None fits one
+    where the logs show it; held_out: logs for free runs that are not fitted. now: is told what is done.
+    Raises InputError for a run without the channels, InsufficientDataError where the motors say nothing.
+    """
+    if method not in (STEADY_STATE, OUTPUT_ERROR):
+        raise InputError("no such method", got=method, expected=f"{OUTPUT_ERROR} or {STEADY_STATE}", where="method")
+    if method == OUTPUT_ERROR:
+        if speed != WHEEL:
+            raise InputError(f"{OUTPUT_ERROR} has no such option", got="speed", expected=f"with {STEADY_STATE}")
+        return _free_runs(runs, kind, between, latency, loss, held_out, now or _silent)
+    logs = motor_logs(runs, kind, speed, robot)
+    windows = motor_windows(logs, length=length, steady=steady, share=share)
+    source = named([log.run.source for log in logs])
+    motors = [int(motor) for motor in np.unique(windows.motor)]
+    lines = [fit_line(windows, motor, source, draws=draws) for motor in (*motors, *([None] if motors[1:] else []))]
+    return MotorStudy(
+        method, windows.kind, windows.unit, windows.speed_from, tuple(lines), (), windows, _supply(logs),
+        tuple(_of_windows(windows, lines)),
+    )  # fmt: skip
+
+
+def _silent(words: str) -> None:
+    pass
+
+
+def _free_runs(
+    runs: Run | Sequence[Run], kind: str, between: str, latency: bool | None, loss: str, held_out: Sequence[Run],
+    now: Callable[[str], None],
+) -> MotorStudy:  # fmt: skip
+    logs = logs_of_free_runs(runs, kind)
+    own: list[Run] = [log.run for log in logs]
+    how: dict[str, Any] = {"kind": logs[0].kind, "between": between, "loss": loss}
+    motors = [m for m in range(min(log.motors for log in logs)) if all(_driven(log, m) for log in logs)] or [0]
+    pairs = []
+    for motor in motors:
+        now(f"fitting motor {motor + 1} of {len(motors)}")
+        late = is_late(own, motor, **how) if latency is None else latency
+        fits = [fit_motor(own, motor, dead_band=band, latency=late, **how) for band in (True, False)]
+        pairs.append([replace(fit, held_out=fit_rmse(fit, held_out)) if held_out else fit for fit in fits])
+    bands, plain = zip(*pairs, strict=True)
+    origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
+    return MotorStudy(OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, supply=_supply(logs))
+
+
+def _supply(logs: Sequence[MotorLog]) -> float:
+    """Mean supply of the logs [V], NaN where one has none."""
+    means = [float(np.nanmean(log.run.supply)) if log.run.supply is not None else math.nan for log in logs]
+    return float(np.mean(means))
+
+
+def _driven(log: MotorLog, motor: int) -> bool:
+    """Whether the log has an input of this motor: a robot may have more wheels than the log has motors."""
+    return bool(np.isfinite(log.put_in[:, motor]).any())
+
+
+def _of_windows(windows: MotorWindows, lines: Sequence[MotorEstimate]) -> Iterator[str]:
+    """Warnings: what was left out, and what cannot be told apart."""
+    if windows.unresolved:
+        yield (
+            f"{windows.unresolved} windows were left out: their input changes so much from row to row that what the "
+            "motor got is not in the log"
+        )
+    if windows.resting:
+        yield f"{windows.resting} windows at rest, wholly or in part, were left out"
+    if windows.every > 1:
+        yield f"the logs are long: one window in {windows.every} was used"
+    if any(line.one_way for line in lines):
+        yield "a motor turned one way only: a dead band and an offset of the input cannot be told apart"

@@ -1,0 +1,33 @@
+"""The report of `omnidyn identify` on motors: what each needs to turn, how sure that is, and the windows if any."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from omnidyn.identification.motors.estimate import HEAD
+from omnidyn.identification.motors.study import MotorStudy
+from omnidyn.report.figures.motor_lines import draw_motor_lines
+from omnidyn.report.html import Section, bullets, figure, page, paragraph, table
+
+WINDOWS = (
+    "What each motor needs to turn: slope, dead band and inertia, from windows in integral form: the integral of the "
+    "input is the slope times the angle turned, plus the dead band times the time it turned, plus the inertia times "
+    "the change of speed."
+)
+FREE_RUNS = (
+    "Slope, dead band and lag of each motor for which its free run under the logged input comes nearest to the "
+    "measured speed; with and without a dead band."
+)
+
+
+def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
+    """The page of the motors, as HTML."""
+    sections = [
+        Section("findings", "What the data say", bullets(study.statements)),
+        Section("numbers", "Numbers, with 95 % intervals", table(HEAD, study.rows())),
+    ]
+    if study.windows is not None:
+        sections.append(Section("figures", "Figures", figure(draw_motor_lines(study.motors, study.windows))))
+    sections.append(Section("doubts", "Doubts", bullets(study.doubts) or paragraph("None.")))
+    return page("Motors from logs", WINDOWS if study.windows is not None else FREE_RUNS, sections, provenance)
