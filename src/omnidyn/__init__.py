@@ -18,7 +18,9 @@ __version__ = "0.1.0"
 _HOME = {
     "Comparison": "omnidyn.comparison.result",
     "Estimate": "omnidyn.identification.estimate",
+    "Identification": "omnidyn.identification.identify",
     "OmnidynError": "omnidyn.errors",
+    "Question": "omnidyn.identification.question",
     "Robot": "omnidyn.model.robot",
     "Run": "omnidyn.run",
     "acceleration": "omnidyn.model.dynamics",
@@ -56,9 +58,10 @@ if TYPE_CHECKING:
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate
-    from omnidyn.identification.identify import identify
+    from omnidyn.identification.identify import Identification, identify
     from omnidyn.identification.motors.study import identify_motors
     from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
+    from omnidyn.identification.question import Question
     from omnidyn.identification.steady.steady_state import fit_steady_state
     from omnidyn.identification.steady.study import identify_steady
     from omnidyn.identification.validation import validate

@@ -175,9 +175,10 @@ def test_an_interrupt_while_groups_are_fitted_alone_leaves_the_best_so_far(call,
 
     def listening(self, words):
         told(self, words)
-        heard.extend([words] if words.startswith("rough alone") else [])
-        if len(heard) == 2:
-            raise KeyboardInterrupt
+        if words.startswith("rough alone"):
+            heard.append(words)
+            if len(heard) == 2:
+                raise KeyboardInterrupt
 
     monkeypatch.setattr(Progress, "doing", listening)
     code, out, err = call(".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--json",
@@ -288,7 +289,7 @@ def test_an_interrupt_while_free_runs_are_compared_keeps_the_fit(call, tmp_path,
     def cut(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("omnidyn.identification.validation.validate", cut)
+    monkeypatch.setattr("omnidyn.identification.identify.validate", cut)
     out = tmp_path / "fit.toml"
     code, text, err = call("smooth0.csv", "--robot", "axebot", "-o", str(out), "--report", str(tmp_path / "r.html"))
     assert code == 130

@@ -7,7 +7,9 @@ import omnidyn
 PUBLIC = [
     "Comparison",
     "Estimate",
+    "Identification",
     "OmnidynError",
+    "Question",
     "Robot",
     "Run",
     "__version__",
