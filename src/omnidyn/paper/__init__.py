@@ -1,1 +1,1 @@
-"""The paper as claims: tables (as printed), claim (our number and a verdict), one file per group, claims (all)."""
+"""The paper as claims: tables (as printed), claim (our number, a verdict), a file per group, claims (all, in words)."""
