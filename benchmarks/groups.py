@@ -14,7 +14,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import coloured, excitation, noisy
+from tests.support.axebot_logs import coloured, excitation, noisy_draw
 
 PAIRS, SECONDS = 200, 20.0
 COULOMB, VISCOUS, TORQUE = "friction.axes.coulomb[0]", "friction.axes.viscous[1]", "motor.torque_constant_Nm_A"
@@ -26,7 +26,7 @@ def measure() -> Table:
     """Both parts, about two minutes."""
     table = Table("groups: two floors in one likelihood", ["what", "noise", "value"])
     table.notes += [machine(), f"{PAIRS} pairs of logs of {SECONDS:g} s at 100 Hz, six differences each; 95 % wanted"]
-    for words, noise in (("white", noisy), ("coloured", coloured)):
+    for words, noise in (("white", noisy_draw), ("coloured", coloured)):
         _coverage(table, words, noise)
     _bootstrap(table)
     return table

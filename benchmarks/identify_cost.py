@@ -17,14 +17,14 @@ from benchmarks.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import excitation, noisy
+from tests.support.axebot_logs import excitation, noisy_draw
 
 FIRST = 10.0  # [s] of the command's first run
 
 
 def speed(table: Table, robot: Robot, clean: Run) -> None:
     """One log of 60 s."""
-    log = noisy(clean, 0)
+    log = noisy_draw(clean, 0)
     spent = cpu(lambda: fit_output_error(log, robot, start="rest"), 30)
     table.add("<= 5", spent <= 5.0, what="fit of one log, six numbers", value=spent, unit="ms")
 
@@ -55,7 +55,7 @@ def long(table: Table, robot: Robot, clean: Run) -> None:
     """(b) One hour at 1 kHz, each in a process of its own for its memory."""
     hour = simulate(robot, excitation(3600.0, 1000.0), 1e-3)
     rng = np.random.default_rng(3)
-    plain = noisy(hour, 0)
+    plain = noisy_draw(hour, 0)
     every = plain.replace(
         wheel_speed=hour.wheel_speed + 0.5 * rng.standard_normal(hour.wheel_speed.shape),
         current=hour.current + 0.05 * rng.standard_normal(hour.current.shape),
@@ -83,7 +83,7 @@ def _in_child(run: Run, options: dict[str, object]) -> tuple[float, float]:
 
 def command(table: Table, robot: Robot, clean: Run) -> None:
     """`omnidyn identify LOG --report`, as a child: with nothing compiled yet, three times, and then with everything."""
-    log = noisy(clean, 0)
+    log = noisy_draw(clean, 0)
     assert log.voltage is not None
     assert log.twist is not None
     heads = ",".join(["t_s", *(f"u{k + 1}_V" for k in range(log.voltage.shape[1])), "vx_m_s,vy_m_s,omega_rad_s"])

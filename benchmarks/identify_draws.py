@@ -12,7 +12,7 @@ from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import NOISE, RATE, excitation, noisy, truth, with_friction
+from tests.support.axebot_logs import NOISE, RATE, excitation, noisy_draw, truth, with_friction
 
 LOGS, IMPAIRED, STARTS, BREAKAWAYS = (max(int(n * SHARE), 10) for n in (10_000, 1000, 1000, 200))
 LATE, GAIN, DEAD = 0.013, 0.97, 0.15
@@ -25,7 +25,7 @@ def coverage(table: Table, robot: Robot, clean: Run) -> None:
     least = cramer_rao(robot, clean)
     draws = Draws(truth(robot))
     for seed in range(LOGS):
-        draws.add(fit_output_error(noisy(clean, seed), robot, start="rest"))
+        draws.add(fit_output_error(noisy_draw(clean, seed), robot, start="rest"))
     slack = 0.0 if SHARE >= 1.0 else COUNTING * np.sqrt(0.95 * 0.05 / LOGS)
     shared = {"draws": LOGS}
     low, high = draws.coverage.min(), draws.coverage.max()
@@ -44,7 +44,7 @@ def coverage(table: Table, robot: Robot, clean: Run) -> None:
 
 def starts(table: Table, robot: Robot, clean: Run) -> None:
     """(d) All six numbers wrong by factors of up to 100 either way."""
-    log, rng = noisy(clean, 0), np.random.default_rng(7)
+    log, rng = noisy_draw(clean, 0), np.random.default_rng(7)
     best = fit_output_error(log, robot, start="rest")
     good, true = 0, np.array(list(truth(robot).values()))
     for _ in range(STARTS):
@@ -87,7 +87,7 @@ def breakaway(table: Table, robot: Robot, clean: Run) -> None:
         level = (1.0, 1.2, 1.5)[seed % 3] * coulomb[0]
         axes = robot.friction.axes.replace(breakaway=(float(level), *coulomb[1:].tolist()))
         true = robot.replace(friction=robot.friction.replace(axes=axes))
-        log = noisy(simulate(true, excitation(seed=100 + seed), 1.0 / RATE), seed)
+        log = noisy_draw(simulate(true, excitation(seed=100 + seed), 1.0 / RATE), seed)
         low, high = fit_output_error(log, robot, free=[*BOX, key], start="rest").ci95[key]
         held += low <= level <= high
         widths.append((high - low) / coulomb[0])

@@ -30,7 +30,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import NOISE, RATE, excitation, noisy
+from tests.support.axebot_logs import NOISE, RATE, excitation, noisy_draw
 
 LOGS = max(int(300 * SHARE), 10)
 LATE, FINE_ROWS = 0.013, 10  # [s]; rows of the truth in a row of the log
@@ -98,7 +98,7 @@ def measure() -> Table:
     """All of it, about four minutes."""
     table = Table("identify_ellipse: output error by the implicit engine", ["what", "draws", "value", "unit"])
     table.notes += [machine(), "times: processor time of this process, everything compiled"]
-    fitted(noisy(clean(), 0), begun(0))  # compiles
+    fitted(noisy_draw(clean(), 0), begun(0))  # compiles
     _draws(table)
     _slow(table)
     return table
@@ -108,7 +108,7 @@ def _draws(table: Table) -> None:
     """Time, coverage, efficiency and bias over many draws of noise and start."""
     draws, spent = Draws(truth()), []
     for seed in range(LOGS):
-        log, start = noisy(clean(), seed), begun(seed)
+        log, start = noisy_draw(clean(), seed), begun(seed)
         began = time.process_time()
         fit = fitted(log, start)
         spent.append(time.process_time() - began)
@@ -139,7 +139,7 @@ def _slow(table: Table) -> None:
     table.add("< 0.1", error.max() < 0.1, what="systematic error: log without noise", value=error.max(), unit="std")
     away = []
     for seed in range(min(LOGS, 10)):
-        log = noisy(clean(), seed)
+        log = noisy_draw(clean(), seed)
         fit, solver = fitted(log, begun(seed)), _solver(log, SLOW)
         own = np.array([*fit.value.values(), fit.nuisances[LATENCY].value])
         slow = solver.minimise(Point(own, solver.problem.start().states)).state.point.values

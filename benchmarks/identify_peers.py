@@ -29,7 +29,7 @@ from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.run import Run
-from tests.support.axebot_logs import NOISE, RATE, bare, noisy, truth, with_friction
+from tests.support.axebot_logs import NOISE, RATE, bare, noisy_draw, truth, with_friction
 
 WRONG = 2.0  # times the truth: where all begin
 FASTER_SYSID, FASTER_LMFIT, SYSTEMATIC = 500.0, 5000.0, 0.1  # the goals
@@ -83,7 +83,7 @@ def compare(table: Table, robot: Robot, clean: Run) -> None:
     """Time and both errors, ours first."""
     true, log, quiet, std = (
         np.array(list(truth(robot).values())),
-        noisy(clean, 0),
+        noisy_draw(clean, 0),
         bare(clean),
         cramer_rao(robot, clean),
     )

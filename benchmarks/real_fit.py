@@ -24,7 +24,7 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support import real_logs as logs
-from tests.support.axebot_logs import excitation, noisy
+from tests.support.axebot_logs import excitation, noisy_draw
 
 TURN = 2.0 * np.pi
 CHIRP_END = 4.0  # [s] after it the chirp outruns the rows
@@ -54,7 +54,7 @@ def command(table: Table) -> None:
     """From a CSV file of 60 s at 100 Hz of the axebot to the report, in one command, start-up included."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.csv"
-        write_run(noisy(simulate(load_robot("axebot"), excitation(), 0.01), 0), log)
+        write_run(noisy_draw(simulate(load_robot("axebot"), excitation(), 0.01), 0), log)
         words = [sys.executable, "-m", "omnidyn", "identify", str(log), "--robot", "axebot", "--force", "--report",
                  str(Path(folder) / "report.html")]  # fmt: skip
         times = []

@@ -11,7 +11,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import excitation, noisy
+from tests.support.axebot_logs import excitation, noisy_draw
 from tests.support.outputs import strict
 
 ROUGH = 2.6  # N along x; the preset has 2.2
@@ -25,7 +25,7 @@ def logs(tmp_path_factory):
     folder, axebot = tmp_path_factory.mktemp("logs"), load_robot("axebot")
     for k, name in enumerate(("smooth", "smooth", "rough", "rough")):
         robot = axebot if name == "smooth" else Key.parse(COULOMB).set(axebot, ROUGH)
-        write_run(noisy(simulate(robot, excitation(20.0, seed=k), 0.01), k), folder / f"{name}{k}.csv")
+        write_run(noisy_draw(simulate(robot, excitation(20.0, seed=k), 0.01), k), folder / f"{name}{k}.csv")
     speeds = simulate(axebot, excitation(5.0), 0.01)
     write_run(Run(t=speeds.t, wheel_speed=speeds.wheel_speed), folder / "inputless.csv")
     return folder
@@ -111,7 +111,7 @@ def test_a_new_robot_is_fitted_to_its_logs_by_default(tmp_path, monkeypatch, cap
     levels = tuple(1.3 * level for level in guess.friction.direction.coulomb)
     direction = guess.friction.direction.replace(coulomb=levels)
     true = guess.replace(friction=guess.friction.replace(direction=direction))
-    write_run(noisy(simulate(true, 2.0 * excitation(8.0), 0.01), 1), "log.csv")
+    write_run(noisy_draw(simulate(true, 2.0 * excitation(8.0), 0.01), 1), "log.csv")
     capsys.readouterr()
     assert main(["identify", "log.csv", "--robot", "newbie.toml", "--json"]) == 0
     told = strict(capsys.readouterr().out)

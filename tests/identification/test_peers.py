@@ -8,7 +8,7 @@ from benchmarks.identify_peers import by_sysid, most_likely, our_fit, peers, res
 from benchmarks.table import Table
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import bare, excitation, noisy, truth, with_friction
+from tests.support.axebot_logs import bare, excitation, noisy_draw, truth, with_friction
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def test_our_fit_ends_at_the_optimum_that_scipy_finds(robot, clean, true):
     """Stops and reversals kink the likelihood: draw 1 has two optima, 0.06 standard errors and 5e-4 apart."""
     std = cramer_rao(robot, clean)
     for seed, nearness, depth in ((0, 1e-3, 1e-6), (1, 0.1, 5e-3), (2, 1e-3, 1e-6)):
-        log = noisy(clean, seed)
+        log = noisy_draw(clean, seed)
         residual = residuals(robot, log, run_events)
         found, best = our_fit(with_friction(robot, 2.0 * true), log), most_likely(robot, log)
         assert np.abs((found - best) / std).max() < nearness

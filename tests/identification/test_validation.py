@@ -17,7 +17,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import NOISE, excitation, noisy
+from tests.support.axebot_logs import NOISE, excitation, noisy_draw
 
 AXEBOT = load_robot("axebot")
 LATE, GAIN, DEAD = 0.013, 0.95, 0.2
@@ -53,7 +53,7 @@ def test_a_held_out_log_is_compared_as_it_was_fitted(fit):
 def test_what_lasts_is_not_called_small(fit):
     """A motor twice as weak as the robot file says: the fit takes its errors for noise, the words do not."""
     weak = Key.parse("motor.resistance_ohm").set(AXEBOT, 2.0 * AXEBOT.motor.resistance)
-    log = noisy(simulate(weak, excitation(20.0), 0.01), 1)
+    log = noisy_draw(simulate(weak, excitation(20.0), 0.01), 1)
     wrong = fit_output_error(log, AXEBOT, nuisances=())
     (words,) = validate(wrong, [log], [log]).statements()
     assert "no larger than on the fitted ones" in words
@@ -63,8 +63,8 @@ def test_what_lasts_is_not_called_small(fit):
 
 def test_another_floor_is_seen(fit):
     rough = Key.parse("friction.axes.coulomb[0]").set(AXEBOT, 3.0)
-    plain = fit_output_error(noisy(simulate(AXEBOT, excitation(20.0), 0.01), 1), AXEBOT, nuisances=())
-    other = noisy(simulate(rough, excitation(20.0, seed=5), 0.01), 2)
+    plain = fit_output_error(noisy_draw(simulate(AXEBOT, excitation(20.0), 0.01), 1), AXEBOT, nuisances=())
+    other = noisy_draw(simulate(rough, excitation(20.0, seed=5), 0.01), 2)
     found = validate(plain, [other], [other])
     assert found.scores["held out"]["vx"].chi2 > 1.5
     assert found.scores["held out"]["vy"].chi2 < 1.2
@@ -72,7 +72,7 @@ def test_another_floor_is_seen(fit):
 
 
 def test_a_fit_by_students_t_has_a_chi2_of_one_too():
-    run = noisy(simulate(AXEBOT, excitation(20.0), 0.01), 1)
+    run = noisy_draw(simulate(AXEBOT, excitation(20.0), 0.01), 1)
     fit = fit_output_error(run, AXEBOT, nuisances=(), loss="student-t", start="rest")
     for score in validate(fit, [run]).scores["fitted"].values():
         assert score.chi2 == pytest.approx(1.0, abs=0.08)
@@ -89,7 +89,7 @@ def test_scale_of_students_t_on_gaussian_noise():
 
 
 def test_without_nuisances_the_run_is_left_alone():
-    run = noisy(simulate(AXEBOT, excitation(5.0), 0.01), 1)
+    run = noisy_draw(simulate(AXEBOT, excitation(5.0), 0.01), 1)
     assert as_fitted(run, fit_output_error(run, AXEBOT, nuisances=())) is run
 
 
@@ -109,7 +109,7 @@ def test_voltage_at_the_motors():
 
 
 def test_identify_takes_output_error_where_it_can():
-    run = noisy(simulate(AXEBOT, excitation(10.0), 0.01), 1)
+    run = noisy_draw(simulate(AXEBOT, excitation(10.0), 0.01), 1)
     estimate = omnidyn.identify([run], AXEBOT)
     assert estimate.method.startswith("output error")
     assert estimate.value == fit_output_error(run, AXEBOT).value
@@ -117,7 +117,7 @@ def test_identify_takes_output_error_where_it_can():
 
 
 def test_what_decides_the_method():
-    run = noisy(simulate(AXEBOT, excitation(2.0), 0.01), 1)
+    run = noisy_draw(simulate(AXEBOT, excitation(2.0), 0.01), 1)
     assert choose_method([run], AXEBOT) == ("output-error", "")
     assert choose_method([run], AXEBOT, ["shape"]) == ("steady-state", "")
     assert choose_method([run], load_robot("robotino"), ["free"]) == ("output-error", "")
@@ -130,7 +130,7 @@ def test_what_decides_the_method():
 
 
 def test_options_of_another_method_are_refused():
-    run = noisy(simulate(AXEBOT, excitation(2.0), 0.01), 1)
+    run = noisy_draw(simulate(AXEBOT, excitation(2.0), 0.01), 1)
     with pytest.raises(InputError, match=r"output-error has no such option; got `shape`; expected with steady-state"):
         omnidyn.identify(run, AXEBOT, method="output-error", shape="disc")
     with pytest.raises(InputError, match="steady-state has no such option; got `loss`"):

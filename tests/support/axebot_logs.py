@@ -52,8 +52,13 @@ def voltages(rng: np.random.Generator, seconds: float = 30.0, rate: float = 100.
 def noisy(run: Run, seed: int) -> Run:
     """Its voltage and twist as instruments with noise record them."""
     assert run.twist is not None
-    twist = run.twist + np.random.default_rng(1000 + seed).normal(size=run.twist.shape) * NOISE
+    twist = run.twist + np.random.default_rng(seed).normal(size=run.twist.shape) * NOISE
     return Run(t=run.t, voltage=run.voltage, twist=twist, source="simulated")
+
+
+def noisy_draw(run: Run, number: int) -> Run:
+    """The run with the noise of one of many draws, as benchmarks number them from 0."""
+    return noisy(run, 1000 + number)
 
 
 def coloured(run: Run, seed: int) -> Run:

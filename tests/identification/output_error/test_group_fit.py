@@ -9,7 +9,7 @@ from omnidyn.identification.output_error.prepare import expand_keys
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import excitation, noisy
+from tests.support.axebot_logs import excitation, noisy_draw
 
 AXEBOT = load_robot("axebot")
 TORQUE, EMF, COULOMB, MASS = (
@@ -30,7 +30,7 @@ def clean():
 
 
 def fitted(clean, seed, **options):
-    runs = [noisy(run, 10 * seed + k) for k, run in enumerate(clean.values())]
+    runs = [noisy_draw(run, 10 * seed + k) for k, run in enumerate(clean.values())]
     return runs, identify_groups(runs, AXEBOT, [*clean], free=FREE, nuisances=(), start="rest", **options)
 
 
@@ -52,7 +52,7 @@ def test_differences_and_shared_numbers_hold_the_truth(clean):
 
 def test_with_nothing_shared_it_is_two_fits(clean):
     """Independent: each group alone. The noise is common, so that the weights, hence the last digits, differ."""
-    runs = [noisy(run, k) for k, run in enumerate(clean.values())]
+    runs = [noisy_draw(run, k) for k, run in enumerate(clean.values())]
     study = identify_groups(runs, AXEBOT, [*clean], nuisances=(), start="rest", covariance="white")
     for run, estimate in zip(runs, study.estimates.values(), strict=True):
         alone = fit_output_error(run, AXEBOT, nuisances=(), start="rest", covariance="white")
@@ -64,7 +64,7 @@ def test_with_nothing_shared_it_is_two_fits(clean):
 
 def test_with_everything_shared_it_is_one_fit(clean):
     """All but one number shared between two logs of the same floor: the shared ones are those of one fit to both."""
-    runs = [noisy(clean["smooth"], k) for k in range(2)]
+    runs = [noisy_draw(clean["smooth"], k) for k in range(2)]
     both = fit_output_error(runs, AXEBOT, free=[*BOX, TORQUE], nuisances=(), start="rest")
     study = identify_groups(
         runs, AXEBOT, ["a", "b"], free=FREE, per_free=["friction.axes.viscous[2]"], nuisances=(), start="rest"
@@ -85,7 +85,7 @@ def test_a_load_is_a_mass_of_its_own():
     """Friction is the same, the second log carries 0.3 kg more."""
     runs = []
     for k, mass in enumerate((1.5, 1.8)):
-        runs.append(noisy(simulate(Key.parse(MASS).set(AXEBOT, mass), excitation(20.0, seed=k), 0.01), k))
+        runs.append(noisy_draw(simulate(Key.parse(MASS).set(AXEBOT, mass), excitation(20.0, seed=k), 0.01), k))
     study = identify_groups(
         runs, AXEBOT, ["empty", "loaded"], free=["friction", MASS], per_free=[MASS], nuisances=(), start="rest"
     )
@@ -96,7 +96,7 @@ def test_a_load_is_a_mass_of_its_own():
 
 
 def test_automatic_nuisances_are_those_that_every_group_supports(clean):
-    runs = [noisy(run, k) for k, run in enumerate(clean.values())]
+    runs = [noisy_draw(run, k) for k, run in enumerate(clean.values())]
     study = identify_groups(runs, AXEBOT, [*clean], free=FREE, start="rest")
     for estimate in study.estimates.values():
         late = estimate.nuisances["latency.twist"]

@@ -12,14 +12,14 @@ from omnidyn.identification.question import Question
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import coloured, excitation, noisy
+from tests.support.axebot_logs import coloured, excitation, noisy_draw
 
 AXEBOT = load_robot("axebot")
 TORQUE, COULOMB, MASS = "motor.torque_constant_Nm_A", "friction.axes.coulomb[0]", "body.mass_kg"
 QUIET = {"nuisances": (), "start": "rest"}
 
 
-def floors(runs, noise=noisy):
+def floors(runs, noise=noisy_draw):
     """As many runs of 6 s at 50 Hz on a smooth floor and on a rough one: (runs, groups)."""
     found, names = [], []
     for g, (name, level) in enumerate((("smooth", 2.2), ("rough", 2.6))):
