@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from omnidyn.cli.identify_logs import Loaded
 from omnidyn.cli.identify_show import Out, say_warnings, say_written
 from omnidyn.cli.terminal.streams import say, show, show_json
-from omnidyn.identification.question import STEADY_STATE, Question
+from omnidyn.identification.question import AUTO, STEADY_STATE, Question
 
 if TYPE_CHECKING:
     from omnidyn.identification.motors.into_robot import MotorNumbers
@@ -26,7 +26,7 @@ def run_motors(
     runs = [run for run, away in zip(loaded.runs, out, strict=True) if not away]
     held = [run for run, away in zip(loaded.runs, out, strict=True) if away]
     study = identify_motors(
-        runs, method=question.method or STEADY_STATE, kind=question.input, speed=question.speed, robot=robot,
+        runs, method=STEADY_STATE if question.method == AUTO else question.method, kind=question.input, speed=question.speed, robot=robot,
         share=question.window, between=question.between, latency=_latency(question), loss=question.loss, held_out=held,
         now=now,
     )  # fmt: skip
