@@ -25,10 +25,10 @@ def run_motors(
     out = held_out([run.source for run in loaded.runs], question.hold_out)
     runs = [run for run, away in zip(loaded.runs, out, strict=True) if not away]
     held = [run for run, away in zip(loaded.runs, out, strict=True) if away]
+    method = STEADY_STATE if question.method == AUTO else question.method
     study = identify_motors(
-        runs, method=STEADY_STATE if question.method == AUTO else question.method, kind=question.input, speed=question.speed, robot=robot,
-        share=question.window, between=question.between, latency=_latency(question), loss=question.loss, held_out=held,
-        now=now,
+        runs, method=method, kind=question.input, speed=question.speed, robot=robot, share=question.window,
+        between=question.between, latency=_latency(question), loss=question.loss, held_out=held, now=now,
     )  # fmt: skip
     now("writing")
     _tell(study, robot, record, to)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.identification.output_error.problem.primitives import primitives
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import (
     count_far,
@@ -20,6 +19,7 @@ from omnidyn.identification.output_error.problem.starts import (
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.robot import Robot
+from omnidyn.model.statespace import state_space
 
 FloatArray = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Motion:
 def motion(records: Sequence[Record], robot: Robot) -> Motion:
     """What all logs together show."""
     moved, seen, held = np.zeros(3, bool), np.zeros(3, bool), np.zeros(3)
-    drive, mass = primitives(robot).drive, mass_matrix(robot)
+    drive, mass = state_space(robot).B, mass_matrix(robot)
     for record in records:
         twist = measured_twist(record, robot)
         if twist is None:

@@ -117,9 +117,10 @@ class Mapping:
         viscous, coulomb, _ = robot.friction.axes.levels
         levels = {"viscous": tuple(viscous + 1.0), "coulomb": tuple(coulomb + 1.0), "breakaway": None}
         friction = robot.friction.model_copy(update={"axes": robot.friction.axes.model_copy(update=levels)})
-        more = primitives(robot.model_copy(update={"friction": friction}))
+        probe = robot.model_copy(update={"friction": friction})
+        rate, coulomb, _ = axis_levels(probe, state_space(probe))
         for j, p in enumerate(self.parameters):
             if p.name in BOX:
                 kind, axis = divmod(BOX.index(p.name), 3)
-                slopes[kind][axis, j] = (more.rate - base.rate, more.coulomb - base.coulomb)[kind][axis]
+                slopes[kind][axis, j] = (rate - base.rate, coulomb - base.coulomb)[kind][axis]
         return Primitives(*slopes)
