@@ -26,7 +26,7 @@ def test_one_name_is_a_tuple_of_it_and_none_is_none():
     [
         ({"method": "magic"}, "method: no such method; got magic; expected output-error or steady-state"),
         ({"loss": "huber"}, "loss: unknown loss; got huber; expected gaussian or student-t"),
-        ({"start": "moving"}, "start: unknown start; got moving; expected auto or rest or free"),
+        ({"start": "moving"}, "start: unknown start; got moving; expected auto, rest or free"),
         ({"covariance": "blue"}, "covariance: unknown covariance; got blue"),
         ({"what": "magic"}, "what: nothing of that name; got magic; expected friction or motors"),
         ({"speed": "fast"}, "speed: no such speed; got fast"),

@@ -166,7 +166,8 @@ class Question:
                 value = value if value is None else (value,) if isinstance(value, str) else tuple(value)
                 object.__setattr__(self, each.name, value)
             elif (choices := each.metadata["choices"]) and value not in choices:
-                expected = " or ".join(word for word in choices if word and (each.name, word) != ("method", AUTO))
+                *first, last = (word for word in choices if word and (each.name, word) != ("method", AUTO))
+                expected = f"{', '.join(first)} or {last}"
                 words = WRONG.get(each.name, f"unknown {each.name}")
                 raise InputError(words, got=value, expected=expected, where=each.name)
         object.__setattr__(self, "nuisances", _nuisances(self.nuisances))

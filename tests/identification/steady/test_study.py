@@ -260,7 +260,7 @@ def test_a_shape_for_comparison_cannot_be_asked_for():
     "how, words",
     [
         ({"shape": "sphere"}, r"no such shape; got sphere; expected auto, box"),
-        ({"speed": "light"}, r"no such speed; got light; expected wheel, set, ground"),
+        ({"speed": "light"}, r"no such speed; got light; expected wheel, set or ground"),
         ({"speed": "ground"}, r"lacks a channel; got .*; expected twist"),
         ({"force_from": "will"}, r"no such origin of the force; got will"),
         ({"groups": ["a"]}, r"one group per run; got 1 groups; expected 24"),
