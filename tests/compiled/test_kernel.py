@@ -127,6 +127,21 @@ def test_without_a_writable_folder_it_compiles_in_memory(copy, tmp_path):
     assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc", ".kernel")]
 
 
+def test_a_numba_that_nobody_tried_gives_the_same_numbers(copy):
+    """To the last bit; it goes its own way, and takes longer."""
+    cache = {"NUMBA_CACHE_DIR": str(copy / "cache")}
+    before, file = fresh(copy, **cache), copy / "omnidyn" / "compiled" / "kernel.py"
+    text = file.read_text()
+    assert text.count("range(61, 69)") == 1, "kernel.py reads differently now"
+    file.write_text(text.replace("range(61, 69)", "range(0)"))
+    try:
+        after = fresh(copy, **cache)
+    finally:
+        file.write_text(text)
+    assert after["hits"] == [0, 0]
+    assert {**after, "hits": before["hits"]} == before
+
+
 def test_without_a_compiler_it_runs_as_plain_python(copy):
     """NUMBA_DISABLE_JIT, for debuggers: the same numbers."""
     numbers = fresh(copy, NUMBA_DISABLE_JIT="1")
