@@ -68,7 +68,8 @@ def at_motors(voltage: FloatArray, share: FloatArray, driver: Driver) -> tuple[F
     voltage u [V], shape (rows, wheels); share of the run that has gone by, 0 to 1, shape (rows,).
     """
     out, by = np.empty(voltage.shape), np.empty((len(driver), *voltage.shape))
-    _put_at_motors(np.ascontiguousarray(voltage), np.ascontiguousarray(share), driver, out, by)
+    # Whatever arrays a caller has, writable or not, one kernel serves them.
+    _put_at_motors(np.require(voltage, requirements="CW"), np.require(share, requirements="CW"), driver, out, by)
     return out, by
 
 
