@@ -69,7 +69,7 @@ def at_motors(voltage: FloatArray, share: FloatArray, driver: Driver) -> tuple[F
     """
     out, by = np.empty(voltage.shape), np.empty((len(driver), *voltage.shape))
     # Whatever arrays a caller has, writable or not, one kernel serves them.
-    _put_at_motors(np.require(voltage, requirements="CW"), np.require(share, requirements="CW"), driver, out, by)
+    _put_at_motors(*(np.require(each, requirements=["C", "W"]) for each in (voltage, share)), driver, out, by)
     return out, by
 
 
