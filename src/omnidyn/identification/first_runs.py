@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +51,7 @@ def _run(robot: Robot) -> Run:
     return simulate(robot, dt=DT, twist_command=given * TWIST) if looped else simulate(robot, given * VOLTAGE, DT)
 
 
-def _fit(robot: Robot, *sensors: str, **options: object) -> Estimate:
+def _fit(robot: Robot, *sensors: str, **options: Any) -> Estimate:
     """A fit to what these sensors show of that run."""
     random, run = np.random.default_rng(1), _run(robot)
     seen = {name: value + NOISE[name] * random.standard_normal(value.shape) for name, value in run.channels.items()

@@ -68,7 +68,10 @@ def at_motors(voltage: FloatArray, share: FloatArray, driver: Driver) -> tuple[F
     voltage u [V], shape (rows, wheels); share of the run that has gone by, 0 to 1, shape (rows,).
     """
     out, by = np.empty(voltage.shape), np.empty((len(driver), *voltage.shape))
-    _put_at_motors(np.ascontiguousarray(voltage), np.ascontiguousarray(share), driver, out, by)
+    applied, gone = (
+        np.require(each, requirements=["C", "W"]) for each in (voltage, share)
+    )  # one kind: compiled once for it
+    _put_at_motors(applied, gone, driver, out, by)
     return out, by
 
 
