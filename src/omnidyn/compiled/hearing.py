@@ -8,15 +8,14 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 
 
-@dataclass(eq=False)
 class Compiling:
     """Kernels, by name: those that are being compiled just now, in any thread, and those that have been, with [s]."""
 
-    under_way: list[str] = field(default_factory=list)
-    done: list[tuple[str, float]] = field(default_factory=list)
+    def __init__(self) -> None:
+        self.under_way: list[str] = []
+        self.done: list[tuple[str, float]] = []
 
 
 _listeners: list[Compiling] = []  # those who are inside `heard` just now
