@@ -23,16 +23,6 @@ def hits(compiled):
     return len(compiled.stats.cache_hits)
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """Where entries of this test go."""
-    with monkeypatch.context() as patch:
-        patch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-        numba.config.reload_config()
-        yield tmp_path
-    numba.config.reload_config()
-
-
 def files(folder):
     return sorted(path for path in folder.rglob("*") if path.is_file())
 

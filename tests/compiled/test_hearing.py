@@ -11,7 +11,7 @@ from omnidyn.compiled.hearing import heard, told
 from omnidyn.compiled.kernel import kernel
 
 
-def test_who_waits_can_see_that_a_kernel_is_being_compiled(monkeypatch):
+def test_who_waits_can_see_that_a_kernel_is_being_compiled(monkeypatch, folder):
     seen = []
 
     @kernel

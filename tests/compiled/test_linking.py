@@ -12,6 +12,8 @@ from omnidyn.compiled.linking import Piece
 
 ROOT = Path(__file__).resolve().parents[2]
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 
 def thrice_at(x, k):
     return 3.0 * x[k]

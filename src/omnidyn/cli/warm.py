@@ -18,7 +18,7 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
     """Compile all that first runs need, once.
 
     Small runs and fits of every kind are made; what is compiled for them stays on disk. Takes about a minute, and
-    a second or two where all is there. After an update only what has changed is compiled.
+    seconds where all is there. After an update only what has changed is compiled.
     """
     started = time.monotonic()
     with progress("loading", hint="") as now, heard() as compiling:

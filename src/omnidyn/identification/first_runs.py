@@ -18,7 +18,7 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
-ROWS, HOLD, DT = 400, 40, 0.01  # rows of a run; rows and [s] that a command holds
+ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds
 NOISE = {"twist": 0.005, "current": 0.05, "pose": 0.002}  # [m/s, rad/s], [A], [m, rad]
 TWIST, VOLTAGE = (0.4, 0.4, 2.0), 10.0  # the largest commands [m/s, m/s, rad/s], [V]
 TICK = 2.0 * np.pi / 200.0  # of a counted angle [rad]
