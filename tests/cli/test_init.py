@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from omnidyn import Run, write_run
 from omnidyn.cli import main
 from omnidyn.model.first_guess import first_guess
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 
@@ -336,6 +337,10 @@ def test_wrong_words_are_usage(call, here, arguments, words):
         (["mini", *MINI, "--voltage-limit", "-6"], "--voltage-limit: no motor .*; got -6 V; expected more than 0 V"),
         (["mini", *MINI, "--voltage-limit", "1e-3"], "mini: cannot make such a robot; got .*resistance"),
         (["mini", *MINI[:-4], "--robot-radius", "0.001", "--mass", "0.0001"], "cannot .*inertia"),
+        (["mini", *MINI, "--robot-radius", "0.1,0.1"], r"--robot-radius: wrong number .*expected 1, or one per wheel"),
+        (["mini", *MINI, "--wheel-radius", "0.1,x"], "--wheel-radius: not a list of numbers"),
+        (["mini", *MINI, "--speed-loop", "1,2"], "--speed-loop: not a speed loop; got 2 numbers"),
+        (["mini", *MINI, "--speed-loop", "0"], "rate"),
     ],
 )
 def test_bad_values_are_refused(call, here, arguments, words):
@@ -345,6 +350,25 @@ def test_bad_values_are_refused(call, here, arguments, words):
     assert err.startswith("omnidyn: error: ")
     assert err.count("\n") == 1
     assert os.listdir(here) == []
+
+
+def test_radii_of_each_wheel_and_the_loop_of_the_firmware(call, here):
+    radii = ["--wheel-radius", "0.03,0.03,0.034", "--robot-radius", "0.11,0.11,0.14"]
+    assert call("init", "uneven", *MINI, *radii, "--speed-loop", "0.5,3,100")[0] == 0
+    robot = load_robot(here / "uneven.toml")
+    assert robot.wheels.wheel_radius == (0.03, 0.03, 0.034)
+    assert robot.wheels.robot_radius == (0.11, 0.11, 0.14)
+    assert (robot.drive.kind, robot.drive.kp, robot.drive.ki, robot.drive.rate) == ("speed", 0.5, 3.0, 100.0)
+    assert {robot.priors[f"drive.{key}"].origin for key in ("kp_V_s_rad", "ki_V_rad", "rate_Hz")} == {"given"}
+
+
+def test_gains_that_nobody_gave_are_guesses(call, here):
+    assert call("init", "looped", *MINI, "--speed-loop", "100")[0] == 0
+    robot = load_robot(here / "looped.toml")
+    for key in ("drive.kp_V_s_rad", "drive.ki_V_rad"):
+        assert (robot.priors[key].origin, robot.priors[key].std) == ("guess", Key.parse(key).get(robot))
+    no_load = robot.motor.voltage_limit / (robot.motor.emf_constant * robot.motor.gear_ratio)
+    assert 0.5 * no_load * robot.drive.kp == pytest.approx(robot.motor.voltage_limit, rel=0.01)
 
 
 def test_an_existing_file_is_refused_before_any_question(typed, here):
@@ -365,6 +389,7 @@ FLAGS = st.one_of(
     st.tuples(st.just("--azimuth"), st.lists(NUMBER, max_size=5).map(",".join) | TEXT),
     st.tuples(st.just("--like"), st.sampled_from(["axebot", "robotino", "four-wheel"]) | TEXT),
     st.tuples(st.just("--friction"), st.sampled_from(["axes", "direction"]) | TEXT),
+    st.tuples(st.just("--speed-loop"), st.lists(NUMBER, max_size=4).map(",".join) | TEXT),
     st.sampled_from([("--mecanum",), ("--json",), ("--force",)]),
 )
 

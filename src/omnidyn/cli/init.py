@@ -51,8 +51,10 @@ def init(
     ),
     like: str = typer.Option("", metavar="ROBOT", help="Take what is not given from this preset or robot file."),
     azimuth: str = typer.Option("", metavar="DEGREES", help="Where they stand, such as 60,180,300; 0 is forward."),
-    wheel_radius: float | None = typer.Option(None, help="Radius of a wheel [m]."),
-    robot_radius: float | None = typer.Option(None, help="Centre to wheel [m]; mecanum: half track + half wheelbase."),
+    wheel_radius: str = typer.Option("", metavar="M", help="Radius of a wheel [m], or one per wheel: 0.03,0.03,0.034."),
+    robot_radius: str = typer.Option(
+        "", metavar="M", help="Centre to wheel [m], or one per wheel; mecanum: half track + half wheelbase."
+    ),
     mass: float | None = typer.Option(None, help="Mass of the robot [kg]."),
     voltage_limit: float | None = typer.Option(None, help="Most the driver gives to a motor [V]; default: a guess."),
     log: list[str] = typer.Option(
@@ -60,6 +62,9 @@ def init(
     ),
     mecanum: bool = typer.Option(False, "--mecanum", help="Four mecanum wheels, in an X seen from above."),
     friction: str = typer.Option("", help="Where the guessed friction acts: direction (default) or axes."),
+    speed_loop: str = typer.Option(
+        "", metavar="[KP,KI,]HZ", help="The firmware holds wheel speeds: V s/rad, V/rad, ticks a second."
+    ),
     map_file: str = logs.MAP,
     column: list[str] = logs.COLUMN,
     assume: list[str] = logs.ASSUME,
@@ -74,8 +79,9 @@ def init(
     The rest is guessed, with a wide spread, and marked as a guess.
     """
     given = {
-        "wheels": wheels, "azimuth": _azimuths(azimuth), "wheel_radius": wheel_radius, "robot_radius": robot_radius,
-        "mass": mass, "voltage_limit": voltage_limit,
+        "wheels": wheels, "azimuth": _listed("azimuth", azimuth), "wheel_radius": _radii("wheel_radius", wheel_radius),
+        "robot_radius": _radii("robot_radius", robot_radius), "mass": mass, "voltage_limit": voltage_limit,
+        "speed_loop": _listed("speed_loop", speed_loop),
     }  # fmt: skip
     _refuse_words(given, mecanum, friction, like, out, json)
     _refuse_numbers(given)
@@ -102,8 +108,9 @@ def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str
         raise typer.BadParameter(f"--azimuth has {len(azimuth)} values for --wheels {count}.")
     if friction not in ("", "direction", "axes"):
         raise typer.BadParameter("--friction is direction or axes.")
-    if friction and like:
-        raise typer.BadParameter("--friction is for a guess; with --like friction comes from there.")
+    for flag in ("--friction",) * bool(friction) + ("--speed-loop",) * bool(given["speed_loop"]):
+        if like:
+            raise typer.BadParameter(f"{flag} is for a guess; with --like it comes from there.")
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
 
@@ -112,7 +119,19 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
     """Numbers with which no robot can be guessed, by the names that they have here. Raises InputError."""
     from omnidyn.errors import InputError
 
-    azimuth, limit = given["azimuth"], given["voltage_limit"]
+    azimuth, limit, loop = given["azimuth"], given["voltage_limit"], given["speed_loop"]
+    count = given["wheels"] or (azimuth and len(azimuth))
+    for key in ("wheel_radius", "robot_radius"):
+        if count and isinstance(given[key], tuple) and len(given[key]) != count:
+            raise InputError(
+                "wrong number of values", got=number_words(given[key]), expected=f"1, or one per wheel ({count})",
+                where=f"--{key.replace('_', '-')}",
+            )  # fmt: skip
+    if loop is not None and len(loop) not in (1, 3):
+        raise InputError(
+            "not a speed loop", got=f"{len(loop)} numbers", where="--speed-loop",
+            expected="its rate, such as 100 [Hz], or both gains and its rate: 0.5,3,100 [V s/rad, V/rad, Hz]",
+        )  # fmt: skip
     if azimuth is not None and not LEAST_WHEELS <= len(azimuth) <= MOST_WHEELS:
         raise InputError(
             "a robot that can move in every direction has three wheels or more", got=f"{len(azimuth)} angles",
@@ -125,10 +144,16 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
         )  # fmt: skip
 
 
-def _azimuths(text: str) -> list[float] | None:
+def _listed(key: str, text: str) -> list[float] | None:
     from omnidyn.cli.terminal.numbers import number_list
 
-    return number_list("--azimuth", text) if text else None
+    return number_list(f"--{key.replace('_', '-')}", text) if text else None
+
+
+def _radii(key: str, text: str) -> float | tuple[float, ...] | None:
+    """One radius for all wheels, or one each."""
+    values = _listed(key, text)
+    return None if values is None else values[0] if len(values) == 1 else tuple(values)
 
 
 def _checked_path(name: str, out: str, force: bool) -> str:
@@ -295,7 +320,9 @@ def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, fri
         if preset is not None:
             robot = like(preset, name, wheels, mass, value.get("voltage_limit"), told)
         else:
-            robot = first_guess(name, wheels, mass, value.get("voltage_limit"), friction or DIRECTION)
+            robot = first_guess(
+                name, wheels, mass, value.get("voltage_limit"), friction or DIRECTION, value.get("speed_loop", ())
+            )
     except InputError as error:
         raise InputError(
             "cannot make such a robot", got=str(error), remedy="check the units: m, kg, V, degree", where=name

@@ -10,19 +10,20 @@ overrules it at once. What is known, by stall force per mass, friction per weigh
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 
+from omnidyn.model.drive import SPEED, Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.keys import EMF, FRICTION, TORQUE, Key, all_keys
+from omnidyn.model.keys import EMF, FRICTION, GAINS, TORQUE, Key, all_keys
 from omnidyn.model.motor import Motor
 from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Prior, Robot
 from omnidyn.model.wheels import PerWheel, Wheels
 
 DIRECTION, AXES = "direction", "axes"
-GEAR = "motor.gear_ratio"
+GEAR, RATE = "motor.gear_ratio", "drive.rate_Hz"
 GRAVITY = 9.81  # [m/s^2]
 
 TOP_SPEED = 1.0  # [m/s] that the robot reaches at the voltage limit, friction included
@@ -31,6 +32,7 @@ VOLTAGE_LIMIT = 12.0  # [V]
 MOTOR_SPEED = 600.0  # [rad/s] no-load speed of the motor shaft: small brushed motors turn at 4000 to 10 000 rpm
 FRICTION_SHARE = 0.2  # of the weight: Coulomb friction; 0.02 to 0.5 are known
 VISCOUS_SHARE = 0.2  # of the Coulomb friction, added at 1 m/s
+LOOP_TIME = 0.2  # [s] of a speed loop, kp/ki
 YAW_SHARE = 0.5  # of Coulomb friction * b: turning on the spot omni wheels roll, and hardly scrub
 
 # Standard deviations over values. 0.5: a factor of about 2 either way; 1: only the order of magnitude is known.
@@ -55,6 +57,8 @@ WHY = {
     "motor.torque_constant_Nm_A": "equal to the EMF constant in SI units",
     "motor.emf_constant_Vs_rad": f"the motor turns at {MOTOR_SPEED:g} rad/s at the voltage limit without load",
     "motor.gear_ratio": f"the robot reaches {TOP_SPEED:g} m/s at the voltage limit",
+    "drive.kp_V_s_rad": "the whole voltage for an error of half the no-load speed",
+    "drive.ki_V_rad": f"kp / {LOOP_TIME:g} s",
     "friction.axes.coulomb": f"{_COULOMB}, C; about yaw {_YAW}",
     "friction.axes.viscous": f"{_VISCOUS}, B; about yaw B b^2",
     "friction.direction.coulomb": f"{_COULOMB}, C, the same in every direction",
@@ -81,11 +85,13 @@ def mecanum_wheels(wheel_radius: PerWheel, robot_radius: PerWheel) -> Wheels:
 
 
 def first_guess(
-    name: str, wheels: Wheels, mass: float, voltage_limit: float | None = None, shape: str = DIRECTION
-) -> Robot:
+    name: str, wheels: Wheels, mass: float, voltage_limit: float | None = None, shape: str = DIRECTION,
+    speed_loop: Sequence[float] = (),
+) -> Robot:  # fmt: skip
     """A robot from its wheels and its mass [kg]; voltage_limit [V] where it is known.
 
     shape: where friction acts, on the "direction" of travel (a disc) or on the body "axes" (the paper's box).
+    speed_loop: of the firmware, (kp, ki, rate) [V s/rad, V/rad, Hz], or the rate alone: then the gains are guessed.
 
     Its priors say of every number whether it was given or guessed, and how wide the guess is. Raises InputError.
     """
@@ -95,8 +101,10 @@ def first_guess(
     robot = Robot(
         name=name, source="omnidyn init: a first guess, to be identified", body=body, wheels=wheels, motor=motor,
         friction=Friction(direction=friction) if shape == DIRECTION else Friction(axes=_as_box(friction)), priors={},
+        drive=_speed_loop(motor, speed_loop),
     )  # fmt: skip
     given = {"body.mass_kg"} | ({"motor.voltage_limit_V"} if voltage_limit is not None else set())
+    given |= {RATE} if len(speed_loop) == 1 else {RATE, *GAINS}
     priors = {}
     for key in map(Key.parse, all_keys(robot)):
         if key.name in given or key.part == "wheels":
@@ -105,6 +113,19 @@ def first_guess(
             spread = SPREAD.get(key.name, FRICTION_SPREAD)
             priors[str(key)] = Prior(std=_round(spread * key.get(robot)), origin=GUESS)
     return robot.replace(priors=priors)
+
+
+def _speed_loop(motor: Motor, given: Sequence[float]) -> Drive:
+    """The firmware's loop, none where nothing is given of it.
+
+    Guessed gains: the whole voltage for an error of half the no-load speed, and the integral takes over in 0.2 s.
+    """
+    if not given:
+        return Drive()
+    if len(given) == 3:
+        return Drive(kind=SPEED, kp=given[0], ki=given[1], rate=given[2])
+    kp = _round(2.0 * float(np.mean(motor.emf_constant)) * float(np.mean(motor.gear_ratio)))
+    return Drive(kind=SPEED, kp=kp, ki=_round(kp / LOOP_TIME), rate=given[0])
 
 
 def with_gear(robot: Robot, gear_ratio: float, source: str) -> Robot:
