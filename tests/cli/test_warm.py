@@ -116,6 +116,7 @@ def asked(folder, *commands):
     return json.loads((folder / "asked.json").read_text())
 
 
+@pytest.mark.long
 def test_the_first_runs_need_what_commands_need(tmp_path):
     """The whole of every signature: a kernel for other types would be compiled in the first run of the command."""
     voltage = np.repeat(np.random.default_rng(0).uniform(-8.0, 8.0, (15, 3)), 40, axis=0)

@@ -19,6 +19,7 @@ from tests.reference.modes import reference
 from tests.support.run_differences import AGREES, BODY, CHANNELS, MOTOR, differences, held, worst
 
 TIGHT = 1e-8
+DYNAMIC = pytest.param("dynamic", marks=pytest.mark.long)  # the reference takes a minute where windings are stiff
 
 
 def check(run, robot, voltage, keys, width, tol=TIGHT, channels=CHANNELS, agrees=AGREES, **start):
@@ -165,6 +166,7 @@ def test_a_wheel_without_current_brakes_what_the_parameter_sets_in_motion(axebot
     assert (found.current[1:, 0] != 0.0).all()
 
 
+@pytest.mark.long
 def test_currents_that_pass_zero_against_a_voltage_drop(unequal):
     """L di/dt leaps where the drop changes sign: the derivative of the current leaps with it."""
     robot = unequal.replace(name="drop", motor=unequal.motor.replace(voltage_drop=0.2))
@@ -172,7 +174,7 @@ def test_currents_that_pass_zero_against_a_voltage_drop(unequal):
     check(lambda r: reference(r, FOUR, 0.01), robot, FOUR, keys, 1e-4, channels=("twist", "pose"))
 
 
-@pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
+@pytest.mark.parametrize("electrical", ["quasi-static", DYNAMIC])
 def test_lossy_gears(axebot, electrical):
     """Gears that lose while they drive and lose while they are driven, and hold what rests."""
     motor = axebot.motor.replace(gear_efficiency=(0.75, 0.8, 0.7), electrical=electrical, inductance=0.004)
@@ -182,7 +184,7 @@ def test_lossy_gears(axebot, electrical):
     check(lambda r: reference(r, TURNING, 0.01), robot, TURNING, keys, 1e-4, channels=("twist", "pose"))
 
 
-@pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
+@pytest.mark.parametrize("electrical", ["quasi-static", DYNAMIC])
 @pytest.mark.parametrize("off", ["brake", "coast"])
 def test_duty_of_a_supply(axebot, off, electrical):
     """voltage = duty * supply, by the chain rule; at a duty of 0 the motor brakes, or carries no current."""
