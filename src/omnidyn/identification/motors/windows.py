@@ -70,20 +70,18 @@ class MotorWindows:
 
 
 def motor_windows(
-    logs: Sequence[MotorLog], *, length: float | None = None, steady: bool = False,
-    share: tuple[float, float] | None = None,
-) -> MotorWindows:  # fmt: skip
+    logs: Sequence[MotorLog], *, steady: bool = False, share: tuple[float, float] | None = None
+) -> MotorWindows:
     """Windows of the motors in logs.
 
-    length [s]: of the windows; None takes the shortest that gives a sharp mean speed; where none does and the input
-    comes in steps, a window is the last two thirds of each step. steady: take the steady windows of `find_plateaus`
-    instead; share: with these shares of each command's rows. Raises InsufficientDataError where no window is left.
+    They are as short as gives a sharp mean speed; where nothing does and the input comes in steps, a window is the last
+    two thirds of each step. steady: take the steady windows of `find_plateaus` instead; share: with these shares of
+    each command's rows. Raises InsufficientDataError where no window is left.
     """
     usual = _usual_speed(logs)
-    if length is None:
-        length, sharp = _length(logs, usual)
-        if not sharp and not steady and share is None and all(map(_in_steps, logs)):
-            share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
+    length, sharp = _length(logs, usual)
+    if not sharp and not steady and share is None and all(map(_in_steps, logs)):
+        share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
     every = max(1, -(-sum(map(len, windows)) // MAX_WINDOWS))
     block, readers = 0, []
