@@ -9,6 +9,7 @@ from omnidyn.cli.identify_logs import Loaded
 from omnidyn.cli.identify_show import Out, say_written
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell
+from omnidyn.document import apart
 from omnidyn.identification.question import Question
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def run_motors(
     now("writing")
     told, numbers = study.document(), _into_file(study, robot, to)
     if numbers is not None:
-        told = replace(told, parts=[*told.parts, *numbers.parts()])
+        told = replace(told, parts=apart(told.parts, numbers.parts()))
     if to.report:
         from omnidyn.report.motors_page import render_motors
 

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.document import Part, Points, Table
+from omnidyn.document import Part, Points, Table, apart
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import finite_or_none, identified
 from omnidyn.identification.motors.estimate import BAND, INERTIA, SLOPE, MotorEstimate
@@ -54,8 +54,7 @@ class MotorNumbers:
     def parts(self) -> list[Part]:
         """A table of the numbers, and the words."""
         rows = [(key, f"{value:.5g}", f"{self.std[key]:.2g}", unit(key)) for key, value in self.value.items()]
-        table = Table(("number", "value", "+-", "unit"), rows)
-        return [*(("", table) if rows else ()), *(("", Points(self.words)) if self.words else ())]
+        return apart([Table(("number", "value", "+-", "unit"), rows)] if rows else [], [Points(self.words)])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
