@@ -55,17 +55,6 @@ class Plateau:
     hold: int = 0
     count: int = 0
 
-    @property
-    def wheel_side(self) -> FloatArray:
-        """The way each wheel turns: -1, 0, 1. Shape (wheels,). From the command where the speed reads 0."""
-        speed, command = self.mean.get("wheel_speed"), self.mean.get("wheel_speed_command")
-        if speed is None:
-            speed = command
-        if speed is None:
-            raise InputError("no speed of wheels", got=", ".join(self.mean), expected="wheel_speed or wheel_angle")
-        side = np.sign(np.nan_to_num(speed))
-        return side if command is None else np.where(side == 0.0, np.sign(np.nan_to_num(command)), side)
-
 
 def find_plateaus(run: Run, *, start: float | None = None, end: float | None = None) -> tuple[Plateau, ...]:
     """The steady windows of a run, in order, one point each.
@@ -103,11 +92,6 @@ def _pooled(windows: Sequence[Plateau]) -> Plateau:
     }
     rows, count = slice(first.rows.start, last.rows.stop), sum(each.count for each in windows)
     return replace(first, rows=rows, end=last.end, mean=mean, std=std, count=count)
-
-
-def plateau(run: Run, rows: slice) -> Plateau:
-    """The point of the given rows, which the caller knows to lie between two gaps."""
-    return _plateau(run, rows, live_angle(run))
 
 
 def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:

@@ -18,7 +18,6 @@ from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents, wrench_from_currents
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-from omnidyn.run import Run
 
 FloatArray = NDArray[np.float64]
 
@@ -102,24 +101,6 @@ def points_from_voltage(
         source=source,
         notes=_at_limit(robot, twist, volts),
     )
-
-
-def points_from_run(
-    robot: Robot, run: Run, *, force_from: str = "current", axis: str | Sequence[str] | None = None
-) -> SteadyTable:
-    """Points from a Run with one row per steady point; force_from: "current" or "voltage".
-
-    Raises InputError when the run lacks the twist or the channel asked for.
-    """
-    needed = {"current": ("twist", "current"), "voltage": ("twist", "voltage")}.get(force_from)
-    if needed is None:
-        raise InputError("unknown origin of the force", got=force_from, expected="current or voltage")
-    for name in needed:
-        if getattr(run, name) is None:
-            raise InputError("the run lacks a channel", got=", ".join(run.channels), expected=name, where=run.source)
-    if force_from == "voltage":
-        return points_from_voltage(robot, run.twist, run.voltage, axis=axis, source=run.source)  # type: ignore[arg-type]
-    return points_from_currents(robot, run.twist, run.current, axis=axis, voltage=run.voltage, source=run.source)  # type: ignore[arg-type]
 
 
 def driven_axes(robot: Robot, twist: FloatArray, wrench: FloatArray) -> NDArray[np.bool_]:
