@@ -13,15 +13,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.segments import segments
 from omnidyn.model.frames import world_to_body
 from omnidyn.run import Run
 from omnidyn.statistics import robust_mean, robust_std
-
-FloatArray = NDArray[np.float64]
 
 MIN_ROWS, MIN_DURATION = 12, 0.4  # [s]
 WINDOW = 0.5  # [s] length where no command comes in steps
@@ -138,7 +136,7 @@ def _between_gaps(run_segments: Sequence[slice], hold: slice) -> list[slice]:
     return [segment for segment in cut if segment.stop > segment.start]
 
 
-def _changes(run: Run) -> NDArray[np.bool_] | None:
+def _changes(run: Run) -> BoolArray | None:
     """Rows with another command than the row before; None where no command comes in steps."""
     changed, known = np.zeros(len(run), dtype=bool), False
     if len(run) < 2:

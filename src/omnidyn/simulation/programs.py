@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-
-FloatArray = NDArray[np.float64]
 
 
 def steps(levels: ArrayLike, duration: float, dt: float) -> FloatArray:

@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, WINDOWS, MotorEstimate
 from omnidyn.identification.motors.windows import MotorWindows
@@ -26,8 +26,6 @@ from omnidyn.statistics import (
     huber_weight,
     t_quantile,
 )
-
-FloatArray = NDArray[np.float64]
 
 DRAWS, SEED, BLOCK = 1000, 20121, 3
 ITERATIONS, SETTLED = 200, 1e-8
@@ -140,7 +138,7 @@ def _york(
 
 
 def _bootstrap(
-    design: FloatArray, put_in: FloatArray, speed_std: FloatArray, fit: _Fit, block: NDArray[np.int64], settled: bool
+    design: FloatArray, put_in: FloatArray, speed_std: FloatArray, fit: _Fit, block: IntArray, settled: bool
 ) -> FloatArray:
     """Parameters of fits to windows drawn anew, in blocks of neighbours. Shape (DRAWS, p).
 

@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.between import InputIntegral
 from omnidyn.identification.motors.log import MotorLog, rows_with
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus
 from omnidyn.logs.resolved import unresolved_input
 from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step
-
-FloatArray = NDArray[np.float64]
 
 LENGTHS = (0.05, 0.1, 0.2, 0.5)  # [s] the shortest whose mean speed is sharp enough is taken
 SHARP = 0.02  # of the spread of the speeds: a mean speed with this error needs no longer window
@@ -51,8 +49,8 @@ class MotorWindows:
     speed_std: FloatArray
     side: FloatArray
     change: FloatArray
-    motor: NDArray[np.int64]
-    block: NDArray[np.int64]
+    motor: IntArray
+    block: IntArray
     unit: str
     kind: str
     speed_from: str

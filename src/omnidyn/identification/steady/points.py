@@ -11,15 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents, wrench_from_currents
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-
-FloatArray = NDArray[np.float64]
 
 # An axis slower than this share of the row's fastest is not driven: its speed and force are noise around zero.
 DRIVEN_SHARE = 0.1
@@ -103,7 +102,7 @@ def points_from_voltage(
     )
 
 
-def driven_axes(robot: Robot, twist: FloatArray, wrench: FloatArray) -> NDArray[np.bool_]:
+def driven_axes(robot: Robot, twist: FloatArray, wrench: FloatArray) -> BoolArray:
     """Which axes a row is about. Shape (rows, 3).
 
     A moving row: the axes that carry a tenth or more of the fastest rim speed (v_x, v_y, b omega). A row at rest:
@@ -155,7 +154,7 @@ def _points(
     )
 
 
-def _chosen(axis: str | Sequence[str], rows: int) -> NDArray[np.bool_]:
+def _chosen(axis: str | Sequence[str], rows: int) -> BoolArray:
     names = SteadyTable(axis, np.zeros(rows), np.zeros(rows)).axis  # checks names and their number
     return np.array([[name == each for each in AXES] for name in names])
 
