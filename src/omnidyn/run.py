@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -113,6 +113,11 @@ class Run:
     def replace(self, **changes: Any) -> Run:
         """The same run with some fields changed, checked again."""
         return replace(self, **changes)
+
+
+def as_list(runs: Run | Sequence[Run]) -> list[Run]:
+    """One run, or several, as a list."""
+    return [runs] if isinstance(runs, Run) else list(runs)
 
 
 def _values(run: Run) -> Iterator[Any]:

@@ -30,7 +30,7 @@ from omnidyn.identification.validation import Validation, validate
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 
 Tell = Callable[[str], object]
 
@@ -49,7 +49,7 @@ def identify(runs: Run | Sequence[Run], robot: Robot, *, question: Question | No
     Raises InputError for options of another method and for what cannot be used, InsufficientDataError where the logs
     cannot answer.
     """
-    every = [runs] if isinstance(runs, Run) else list(runs)
+    every = as_list(runs)
     asked = Question.for_method("", question, options)
     method, why = (
         choose_method(every, robot, [*options, *asked.given()]) if asked.method == AUTO else (asked.method, "")
@@ -121,7 +121,7 @@ class Identification:
         user must know at once. keep_best: an interrupt leaves the best so far, instead of being raised.
         Errors: as `identify` raises.
         """
-        every = [runs] if isinstance(runs, Run) else list(runs)
+        every = as_list(runs)
         asked = (question or Question()).but(options)
         heard = _Heard(progress or _silent, tell or _silent, keep_best)
         if asked.what == MOTORS:

@@ -28,7 +28,7 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
 FREE_RUN_INPUTS = ("voltage", "duty")
@@ -77,8 +77,7 @@ def fit_motor(
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
     """Runs as a free run takes them: what was interpolated in between does not count."""
-    every = [runs] if isinstance(runs, Run) else runs
-    return motor_logs([run.as_measured() for run in every], kind, kinds=FREE_RUN_INPUTS)
+    return motor_logs([run.as_measured() for run in as_list(runs)], kind, kinds=FREE_RUN_INPUTS)
 
 
 def _with_bend(fit: MotorEstimate, bent: Bend | None) -> MotorEstimate:

@@ -25,9 +25,9 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.document import Part, Points, Table, apart
+from omnidyn.document import Part, Points, Table, apart, plain
 from omnidyn.errors import InputError
-from omnidyn.identification.estimate import finite_or_none, identified
+from omnidyn.identification.estimate import identified
 from omnidyn.identification.motors.estimate import BAND, INERTIA, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import HEADING
 from omnidyn.identification.motors.study import MotorStudy
@@ -58,13 +58,8 @@ class MotorNumbers:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        return {
-            "numbers": {
-                key: {"value": value, "std": finite_or_none(self.std[key]), "unit": unit(key)}
-                for key, value in self.value.items()
-            },
-            "words": list(self.words),
-        }
+        numbers = {key: {"value": v, "std": self.std[key], "unit": unit(key)} for key, v in self.value.items()}
+        return plain({"numbers": numbers, "words": self.words})
 
 
 def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:

@@ -21,7 +21,7 @@ from omnidyn.identification.motors.log import MotorLog, motor_logs
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
 from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.model.robot import Robot
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def identify_motors(
     Raises InputError for options of another method and for a run without the channels, InsufficientDataError where the
     motors say nothing.
     """
-    every = [runs] if isinstance(runs, Run) else list(runs)
+    every = as_list(runs)
     asked = (question or Question()).but({**options, "what": MOTORS})
     if asked.method_asked() == OUTPUT_ERROR:
         return _free_runs(every, asked, now)
