@@ -113,6 +113,24 @@ class Document:
         return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
 
 
+def apart(*blocks: Sequence[Part]) -> list[Part]:
+    """The parts of all blocks that have any, with an empty line between the blocks."""
+    return [part for block in blocks if block for part in ("", *block)][1:]
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON can hold it: lists of arrays and tuples, None for a number that is not finite."""
+    if hasattr(value, "tolist"):  # NumPy, which need not be imported for this
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not -float("inf") < value < float("inf"):
+        return None
+    return value
+
+
 def cell(value: float | None, form: str) -> str:
     """A number of a table; "-" where there is none."""
     return "-" if value is None else f"{value:{form}}"

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 
-FloatArray = NDArray[np.float64]
 WHEEL, AXIS, SCALAR = "wheel", "axis", "scalar"
 
 # What the columns of a channel are: one per wheel, one per axis (x, y, yaw), or none.
@@ -59,7 +59,7 @@ class Run:
     supply: FloatArray | None = None
     source: str = ""
     warnings: tuple[str, ...] = ()
-    interpolated: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    interpolated: Mapping[str, BoolArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         time = _read_only("t", self.t, None)
@@ -113,6 +113,11 @@ class Run:
     def replace(self, **changes: Any) -> Run:
         """The same run with some fields changed, checked again."""
         return replace(self, **changes)
+
+
+def as_list(runs: Run | Sequence[Run]) -> list[Run]:
+    """One run, or several, as a list."""
+    return [runs] if isinstance(runs, Run) else list(runs)
 
 
 def _values(run: Run) -> Iterator[Any]:

@@ -15,7 +15,7 @@ from omnidyn.comparison.traces import Trace, compared_components, trace_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.model.robot import Robot
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 from omnidyn.simulation.simulate import TOLERANCE
 
 POSE = components("pose", 0)
@@ -36,7 +36,7 @@ def compare(
     sensor without sign. tol: as in `simulate`. seed: of the bootstrap. progress: is told what is being replayed.
     Raises InputError when a log does not fit a robot, InsufficientDataError when there is nothing to compare.
     """
-    runs = (run,) if isinstance(run, Run) else tuple(run)
+    runs = tuple(as_list(run))
     robots = _named(robot, other)
     channels = what_is_compared([*robots.values()], runs, apply)
     replays: dict[str, list[Replay]] = {name: [] for name in robots}

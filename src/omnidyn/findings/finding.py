@@ -7,10 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from omnidyn.document import Document, Words
+from omnidyn.arrays import BoolArray, IntArray
+from omnidyn.document import Document, Words, plain
 from omnidyn.statistics import stretches
 
 FATAL, WARN, NOTE = "fatal", "warn", "note"
@@ -45,11 +43,11 @@ class Finding:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; a number that is not finite is None."""
-        return {
+        return plain({
             "code": self.code, "level": self.level, "where": self.where, "message": self.message,
-            "remedy": self.remedy, "rows": [list(span) for span in self.rows], "count": self.count,
-            "numbers": {name: _finite(value) for name, value in self.numbers.items()},
-        }  # fmt: skip
+            "remedy": self.remedy, "rows": self.rows, "count": self.count,
+            "numbers": {name: float(value) for name, value in self.numbers.items()},
+        })  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -97,12 +95,12 @@ class Verdict:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, without NaN."""
-        return {
-            "source": self.source, "rows": self.rows, "duration_s": _finite(self.duration),
-            "rate_Hz": _finite(self.rate), "channels": list(self.channels), "fatal": self.fatal,
-            "counts": self.counts, "findings": [finding.to_dict() for finding in self.findings],
-            "excitation": {name: _finite(value) for name, value in self.excitation.items()},
-        }  # fmt: skip
+        return plain({
+            "source": self.source, "rows": self.rows, "duration_s": float(self.duration), "rate_Hz": float(self.rate),
+            "channels": self.channels, "fatal": self.fatal, "counts": self.counts,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "excitation": {name: float(value) for name, value in self.excitation.items()},
+        })  # fmt: skip
 
 
 def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -110,7 +108,7 @@ def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda finding: LEVELS.index(finding.level)))
 
 
-def spans_of(bad: NDArray[np.bool_], lines: NDArray[np.int64]) -> tuple[Span, ...]:
+def spans_of(bad: BoolArray, lines: IntArray) -> tuple[Span, ...]:
     """The first stretches of rows where `bad` holds, as (first line, last line). Shapes (rows,)."""
     return tuple((int(lines[a]), int(lines[b - 1])) for a, b in stretches(bad)[:MAX_SPANS])
 
@@ -165,8 +163,3 @@ def _excited(excitation: Mapping[str, float]) -> Words:
     if "speeds" in known:
         parts.append(f"speeds a factor of {known['speeds']:.2g} apart")
     return Words("shows  " + "; ".join(parts) if excitation else "", "  ", INDENT)
-
-
-def _finite(value: float) -> float | None:
-    value = float(value)
-    return value if math.isfinite(value) else None

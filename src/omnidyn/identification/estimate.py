@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from omnidyn.document import Document, Part, Points, Table, interval_cell
+from omnidyn.arrays import FloatArray
+from omnidyn.document import Document, Part, Points, Table, interval_cell, plain
 from omnidyn.model.keys import unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
@@ -23,7 +20,7 @@ class Correlation:
     """Correlations of the estimates: matrix[i, j] between names[i] and names[j]. Shape (names, names)."""
 
     names: tuple[str, ...]
-    matrix: NDArray[np.float64]
+    matrix: FloatArray
 
     def between(self, first: str, second: str) -> float:
         """The correlation of two parameters."""
@@ -81,27 +78,21 @@ class Estimate:
         """The estimate as JSON can hold it: no NaN, no infinity (null instead); the robot as the text of its file."""
         parameters = {
             name: {
-                "value": finite_or_none(value),
-                "std": finite_or_none(self.std[name]),
-                "ci95": [finite_or_none(bound) for bound in self.ci95[name]],
-                "degrees_of_freedom": int(self.degrees_of_freedom[name]),
-                "at_bound": name in self.at_bound,
+                "value": value, "std": self.std[name], "ci95": self.ci95[name],
+                "degrees_of_freedom": int(self.degrees_of_freedom[name]), "at_bound": name in self.at_bound,
                 "unit": unit(name),
             }
             for name, value in self.value.items()
-        }
-        return {
+        }  # fmt: skip
+        return plain({
             "parameters": parameters,
-            "lower_bound": {name: finite_or_none(bound) for name, bound in self.lower_bound.items()},
-            "correlation": {
-                "names": list(self.correlation.names),
-                "matrix": [[finite_or_none(entry) for entry in row] for row in self.correlation.matrix.tolist()],
-            },
-            "warnings": list(self.warnings),
+            "lower_bound": self.lower_bound,
+            "correlation": {"names": self.correlation.names, "matrix": self.correlation.matrix},
+            "warnings": self.warnings,
             "method": self.method,
             "data": self.data,
             "robot": robot_to_toml(self.robot),
-        }
+        })  # fmt: skip
 
 
 def identified(std: float | None, source: str) -> Prior:
@@ -109,8 +100,3 @@ def identified(std: float | None, source: str) -> Prior:
     text = "".join(c if c.isprintable() else " " for c in source)[:SOURCE_LENGTH]
     known = std is not None and 0.0 < std <= 1e9
     return Prior(std=float(std) if known else None, source=text, origin=IDENTIFIED)  # type: ignore[arg-type]
-
-
-def finite_or_none(value: float) -> float | None:
-    """The number as JSON can hold it."""
-    return float(value) if math.isfinite(value) else None

@@ -13,6 +13,7 @@ from typing import Any
 import typer
 
 from omnidyn.cli.terminal.flags import with_flags
+from omnidyn.document import plain
 
 MIN_WIDTH, WIDTH_WITHOUT_TERMINAL = 20, 110
 COLOURS = {
@@ -74,19 +75,7 @@ def show_json(document: dict[str, Any]) -> None:
 
 def to_json(document: Any) -> str:
     """JSON of numbers, text, arrays and what holds them; a number that is not finite becomes null."""
-    return json.dumps(_finite(document), indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if hasattr(value, "tolist"):  # NumPy, which need not be imported for this
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not -float("inf") < value < float("inf"):
-        return None
-    return value
+    return json.dumps(plain(document), indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def width() -> int:

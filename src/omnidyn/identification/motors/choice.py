@@ -14,7 +14,7 @@ from omnidyn.identification.motors.between import CURVE, HOLD, MEAN
 from omnidyn.identification.motors.estimate import MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor
 from omnidyn.identification.motors.free_run import fit_rmse
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 
 TIE = 0.01  # relative difference of errors that does not pay for one more number
 SHARES = 4  # parts in time of a single log
@@ -48,7 +48,7 @@ def choose_motor(
     default of the speed [rad/s]; combined as root mean square. shared: options that all ways have.
     Raises InsufficientDataError where no way could be tried, and what `fit_motor` raises.
     """
-    every = [runs] if isinstance(runs, Run) else list(runs)
+    every = as_list(runs)
     errors = tuple((way, _left_out(every, motor, score, {**shared, **way})) for way in ways)
     best: tuple[Way, float] | None = None
     for way, error in errors:

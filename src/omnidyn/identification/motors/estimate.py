@@ -10,12 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from omnidyn.identification.estimate import finite_or_none
-
-FloatArray = NDArray[np.float64]
+from omnidyn.arrays import FloatArray
+from omnidyn.document import plain
 
 SLOPE, BAND, LAG, INERTIA, LATENCY = "slope", "dead_band", "lag", "inertia", "latency"
 WINDOWS, FREE_RUN = "windows", "free run"
@@ -123,24 +119,19 @@ class MotorEstimate:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         parameters = {
-            name: {
-                "value": finite_or_none(value), "std": finite_or_none(self.std[name]),
-                "ci95": [finite_or_none(bound) for bound in self.ci95[name]],
-            }
-            for name, value in self.value.items()
-        }  # fmt: skip
+            name: {"value": value, "std": self.std[name], "ci95": self.ci95[name]} for name, value in self.value.items()
+        }
         of_way = (
-            {"rest": finite_or_none(self.rest), "one_way": self.one_way} if self.way == WINDOWS
-            else {"between": self.between, "noise": dict(self.noise), "covariance": self.covariance,
+            {"rest": self.rest, "one_way": self.one_way} if self.way == WINDOWS
+            else {"between": self.between, "noise": self.noise, "covariance": self.covariance,
                   "converged": self.converged, "left_out": self.left_out}
         )  # fmt: skip
-        return {
+        return plain({
             "motor": "all" if self.motor is None else self.motor + 1, "unit": self.unit, "from": self.way,
             "count": self.count, "parameters": parameters, "dead_band_seen": self.dead_band_seen,
-            "rmse_rad_s": finite_or_none(self.rmse), "held_out_rmse_rad_s": finite_or_none(self.held_out),
-            "at_bound": list(self.at_bound), "unidentifiable": list(self.unidentifiable), "doubts": list(self.doubts),
-            "data": self.source, **of_way,
-        }  # fmt: skip
+            "rmse_rad_s": self.rmse, "held_out_rmse_rad_s": self.held_out, "at_bound": self.at_bound,
+            "unidentifiable": self.unidentifiable, "doubts": self.doubts, "data": self.source, **of_way,
+        })  # fmt: skip
 
 
 def named(sources: Sequence[str]) -> str:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.motors.between import CURVE, SUB
 from omnidyn.identification.motors.engine import SPEED, MotorEngine
 from omnidyn.identification.motors.estimate import BAND, MotorEstimate
@@ -15,9 +15,7 @@ from omnidyn.identification.motors.fit import logs_of_free_runs
 from omnidyn.identification.motors.problem import motor_problem, motor_record
 from omnidyn.identification.output_error.problem.record import SHORTEST
 from omnidyn.logs.resolved import unresolved_rows
-from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
+from omnidyn.run import Run, as_list
 
 
 def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]:
@@ -48,7 +46,7 @@ def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
 
     Rows whose input the log does not resolve do not count.
     """
-    every = [runs] if isinstance(runs, Run) else list(runs)
+    every = as_list(runs)
     errors = [
         (ours - run.wheel_speed[:, fit.motor])[~unresolved_rows(getattr(run, fit.kind)[:, fit.motor])]
         for ours, run in zip(run_motor(fit, every), every, strict=True)

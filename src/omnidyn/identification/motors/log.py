@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.plateaus import live_angle
 from omnidyn.logs.segments import segments
@@ -16,8 +16,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import stretches
-
-FloatArray = NDArray[np.float64]
 
 INPUTS = {"voltage": ("V", 1.0), "duty": ("%", 100.0), "current": ("A", 1.0)}  # unit, and how many of it in one SI unit
 WHEEL, GROUND = "wheel", "ground"
@@ -59,7 +57,7 @@ class MotorLog:
 
 
 def motor_logs(
-    runs: Run | Sequence[Run], kind: str = "", speed: str = WHEEL, robot: Robot | None = None,
+    runs: Sequence[Run], kind: str = "", speed: str = WHEEL, robot: Robot | None = None,
     kinds: Sequence[str] = tuple(INPUTS),
 ) -> list[MotorLog]:  # fmt: skip
     """The runs with one input. kind: one of `kinds`; "" takes the first of them that all runs have.
@@ -67,15 +65,14 @@ def motor_logs(
     speed: "wheel", or "ground": of the heading of a robot that turns on the spot, which needs `robot`.
     Raises InputError for a run without the channels.
     """
-    every = [runs] if isinstance(runs, Run) else list(runs)
     if kind and kind not in kinds:
         raise InputError("no such input", got=kind, expected=", ".join(kinds), where="input")
     wanted = [kind] if kind else kinds
     for name in wanted:
-        if every and all(getattr(run, name) is not None for run in every):
-            return [_motor_log(run, name, speed, robot) for run in every]
-    lacking = next((run for run in every if all(getattr(run, name) is None for name in wanted)), None)
-    lacking = lacking or (every[0] if every else None)
+        if runs and all(getattr(run, name) is not None for run in runs):
+            return [_motor_log(run, name, speed, robot) for run in runs]
+    lacking = next((run for run in runs if all(getattr(run, name) is None for name in wanted)), None)
+    lacking = lacking or (runs[0] if runs else None)
     raise InputError(
         "the motors' input is not in the log", got=", ".join(lacking.channels) if lacking else "no runs",
         expected=", ".join(wanted), where=lacking.source if lacking else "",
@@ -102,6 +99,6 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces)
 
 
-def rows_with(known: NDArray[np.bool_], pieces: Sequence[slice]) -> list[tuple[int, int]]:
+def rows_with(known: BoolArray, pieces: Sequence[slice]) -> list[tuple[int, int]]:
     """(first, last) rows between gaps throughout which `known` (rows,) holds."""
     return [(p.start + a, p.start + b - 1) for p in pieces for a, b in stretches(known[p]).tolist()]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from omnidyn.document import Part, Points, interval_cell
-from omnidyn.identification.estimate import Estimate, finite_or_none
+from omnidyn.document import Part, Points, interval_cell, plain
+from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.steady.study_parts import Difference
 
 
@@ -51,22 +51,11 @@ class OutputErrorEstimate(Estimate):
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it."""
-        nuisances = {
-            name: {
-                "value": finite_or_none(n.value), "std": finite_or_none(n.std),
-                "ci95": [finite_or_none(b) for b in n.ci95], "unit": n.unit,
-            }
-            for name, n in self.nuisances.items()
-        }  # fmt: skip
-        return {
-            **super().to_dict(),
-            "nuisances": nuisances,
-            "noise": {name: finite_or_none(std) for name, std in self.noise.items()},
-            "unidentifiable": list(self.unidentifiable),
-            "blind": list(self.blind),
-            "covariance": self.covariance,
-            "converged": self.converged,
-        }
+        nuisances = {name: asdict(own) for name, own in self.nuisances.items()}
+        return super().to_dict() | plain({
+            "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable, "blind": self.blind,
+            "covariance": self.covariance, "converged": self.converged,
+        })  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,7 +47,7 @@ from omnidyn.identification.output_error.trust.support import supported, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.identification.question import GAUSS, OUTPUT_ERROR, STUDENT, Question
 from omnidyn.model.robot import Robot
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
@@ -77,7 +77,7 @@ class Fit:
         UnsupportedError for what an engine does not know. Of the nuisances, robots that need the implicit engine have
         latencies by default; they know the others, but no position and no wheel angle as outputs.
         """
-        every = [runs] if isinstance(runs, Run) else list(runs)
+        every = as_list(runs)
         names = _group_names(every, question, groups)
         exact = is_exact(robot)
         usual = free_by_default(robot, exact)
