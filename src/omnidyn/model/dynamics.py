@@ -48,6 +48,8 @@ def drive_wrench(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[
 
 def linear_part(robot: Robot) -> Robot:
     """The same robot with motors whose current is linear in voltage and speed: no drop, no current limit."""
+    if robot.motor.current_limit is None and robot.motor.voltage_drop == 0.0:
+        return robot
     motor = robot.motor.model_copy(update={"voltage_drop": 0.0, "current_limit": None})  # valid: not checked again
     return robot.model_copy(update={"motor": motor})
 
