@@ -135,6 +135,13 @@ def test_a_bad_robot_is_refused_in_one_line(call, robot):
 # ---- simulate -------------------------------------------------------------------------------------------
 
 
+def test_simulate_refuses_a_tolerance_that_is_none(call, here):
+    code, out, err = call("simulate", "axebot", "u.csv", "--tol", "-1")
+    assert (code, out) == (3, "")
+    assert "--tol: tolerance out of range; got -1.0; expected 1e-10 to 1 m/s" in err
+    assert "leave --tol out" in err
+
+
 def test_simulate_writes_the_run_that_python_gives(call, here):
     from omnidyn import read_voltages, simulate
 

@@ -138,3 +138,11 @@ def test_every_kernel_of_the_package_is_kept_once():
     assert first_runs()
     stamps = [cache.stamp for cache in kept()]
     assert len(stamps) == len(set(stamps)) >= 15
+
+
+def test_nothing_slow_is_imported_for_what_most_logs_do_not_need():
+    """scipy.signal takes as long as all the rest together; only repeats in a column of wheel speeds need it."""
+    told = "import sys; import omnidyn.identification.first_runs; print('scipy.signal' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", told], check=True, capture_output=True, text=True,
+                          env=os.environ | {"PYTHONPATH": SOURCE})  # fmt: skip
+    assert done.stdout.strip() == "False"

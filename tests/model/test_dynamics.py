@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from omnidyn.errors import InputError
 from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench
 from omnidyn.model.statespace import discretise, is_decoupled, state_space
 from tests.support.robots import random_robot, robot_of
@@ -108,6 +109,27 @@ def test_friction_at_rest_balances_up_to_breakaway_then_gives_way_to_coulomb(axe
         [-3.0, -1.5, 0.099],
     ]
     assert friction.wrench([0.5, -0.5, 2.0], np.zeros(3)) == pytest.approx([-2.2 - 0.47, 1.5 + 0.48, -0.099 - 0.02])
+
+
+TWISTS, VOLTS = np.zeros((2, 3)), np.zeros((2, 3))
+
+
+@pytest.mark.parametrize("turning", [False, True])
+@pytest.mark.parametrize(
+    "twist, voltage, words",
+    [
+        (TWISTS, np.zeros(4), r"voltage: wrong shape; got \(4,\); expected \(\*batch, 3\); give one value per wheel"),
+        (TWISTS, np.zeros((2, 2)), r"voltage: wrong shape; got \(2, 2\)"),
+        (TWISTS, 6.0, r"voltage: wrong shape; got \(\)"),
+        (np.zeros(2), VOLTS, r"twist: wrong shape; got \(2,\); expected \(\*batch, 3\); give vx, vy and omega"),
+        (np.zeros((4, 3)), VOLTS, r"voltage: twist and voltage do not go together; got \(4, 3\) and \(2, 3\)"),
+    ],
+)
+def test_a_wrong_shape_is_refused_by_name(axebot, twist, voltage, words, turning):
+    direction = axebot.friction.direction.replace(coulomb=(1.0, 1.0) if turning else (0.0, 0.0))
+    robot = axebot.replace(friction=axebot.friction.replace(direction=direction))
+    with pytest.raises(InputError, match=words):
+        acceleration(robot, twist, voltage)
 
 
 @pytest.mark.parametrize("dt", [1e-9, 1e-5, 1e-3, 0.02, 0.5, 30.0])

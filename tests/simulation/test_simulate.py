@@ -165,6 +165,17 @@ def test_bad_inputs_are_refused_with_their_row(axebot, voltage, dt, words):
         simulate(axebot, voltage, dt)
 
 
+@pytest.mark.parametrize("tol", [-1.0, 0.0, np.nan, 1e-11, 2.0])
+@pytest.mark.parametrize("turning", [False, True])
+def test_a_tolerance_out_of_range_is_refused_by_either_engine(axebot, tol, turning):
+    robot = axebot.replace(body=axebot.body.replace(rotating_frame=turning))
+    words = (
+        f"tol: tolerance out of range; got {tol!r}; expected 1e-10 to 1 m/s, or None for a fixed step; leave `tol` out"
+    )
+    with pytest.raises(InputError, match=re.escape(words)):
+        simulate(robot, ROWS, 0.1, tol=tol)
+
+
 @pytest.mark.parametrize(
     "start", [{"twist": (0.0, np.nan, 0.0)}, {"pose": (0.0, 0.0)}, {"twist": "x"}, {"pose": [[0, 0, 0]]}]
 )

@@ -97,6 +97,6 @@ class Estimate:
 
 def identified(std: float | None, source: str) -> Prior:
     """The prior of an identified number: its standard error, where it is one, and from what it was identified."""
-    text = "".join(c if c.isprintable() else " " for c in source)[:SOURCE_LENGTH]
+    text = source if source.isprintable() else "".join(c if c.isprintable() else " " for c in source)
     known = std is not None and 0.0 < std <= 1e9
-    return Prior(std=float(std) if known else None, source=text, origin=IDENTIFIED)  # type: ignore[arg-type]
+    return Prior(std=float(std) if known else None, source=text[:SOURCE_LENGTH], origin=IDENTIFIED)  # type: ignore[arg-type]

@@ -18,6 +18,9 @@ def segments(t: FloatArray, gap: float = GAP) -> list[slice]:
     if len(t) < 3:
         return [slice(0, len(t))]
     steps = np.diff(t)
-    limit = max(gap * float(np.median(steps)), 2.0 * float(np.quantile(steps, 0.95)))
+    long = gap * float(np.median(steps))
+    if not (steps > long).any():
+        return [slice(0, len(t))]
+    limit = max(long, 2.0 * float(np.quantile(steps, 0.95)))
     cuts = np.flatnonzero(steps > limit) + 1
     return [slice(int(a), int(b)) for a, b in zip([0, *cuts], [*cuts, len(t)], strict=True)]

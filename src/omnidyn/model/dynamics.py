@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.layout import LENGTH
+from omnidyn.errors import InputError
+from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
@@ -49,6 +50,8 @@ def drive_wrench(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
 
 def linear_part(robot: Robot) -> Robot:
     """The same robot with motors whose current is linear in voltage and speed: no drop, no current limit."""
+    if robot.motor.current_limit is None and robot.motor.voltage_drop == 0.0:
+        return robot
     motor = robot.motor.model_copy(update={"voltage_drop": 0.0, "current_limit": None})  # valid: not checked again
     return robot.model_copy(update={"motor": motor})
 
@@ -67,18 +70,41 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
 
     Friction at rest balances what drives it; where several parts hold at once, stick_slip/inclusion.py decides.
     `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
+    Raises InputError for other shapes.
     """
-    twist, voltage = np.asarray(twist, dtype=float), np.asarray(voltage, dtype=float)
+    twist, voltage = _vectors("twist", twist, N_AXES), _vectors("voltage", voltage, robot.wheels.count)
+    batch, n = _batch(twist, voltage), robot.wheels.count
     if axes_hold_alone(robot):
         applied = drive_wrench(robot, twist, voltage) + frame_wrench(robot, twist)
         return (applied + robot.friction.axes.wrench(twist, applied)) / mass_matrix(robot)
-    batch, n = np.broadcast_shapes(twist.shape[:-1], voltage.shape[:-1]), robot.wheels.count
     twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
     volts = np.ascontiguousarray(np.broadcast_to(voltage, (*batch, n)).reshape(-1, n))
     numbers = plant(robot.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
     return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(
         *batch, 3
     )
+
+
+def _vectors(name: str, value: ArrayLike, size: int) -> FloatArray:
+    """An array of vectors of so many entries. Raises InputError for another shape."""
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 0 or array.shape[-1] != size:
+        raise InputError(
+            "wrong shape", got=array.shape, expected=f"(*batch, {size})", where=name,
+            remedy="give one value per wheel of the robot" if name == "voltage" else "give vx, vy and omega",
+        )  # fmt: skip
+    return array
+
+
+def _batch(twist: FloatArray, voltage: FloatArray) -> tuple[int, ...]:
+    """The leading axes of both. Raises InputError where they do not go together."""
+    try:
+        return np.broadcast_shapes(twist.shape[:-1], voltage.shape[:-1])
+    except ValueError:
+        raise InputError(
+            "twist and voltage do not go together", got=f"{twist.shape} and {voltage.shape}",
+            expected="the same leading axes", remedy="give a voltage for each twist, or one for all", where="voltage",
+        ) from None  # fmt: skip
 
 
 def axes_hold_alone(robot: Robot) -> bool:

@@ -10,6 +10,7 @@ K = -M^-1 C_coulomb. sgn is set-valued at 0: K sgn(x) balances what drives an ax
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,21 +38,37 @@ class StateSpace:
         return -1.0 / np.diag(self.A)
 
 
-def state_space(robot: Robot) -> StateSpace:
+class MotorWrench(NamedTuple):
+    """What the motors do, as linear maps: -k G G^T and g G of the equations above, transposed.
+
+    braking: wrench [N, N, N m] of each unit of the twist without voltage, shape (3, 3). driving: of each volt at rest,
+    shape (wheels, 3).
+    """
+
+    braking: FloatArray
+    driving: FloatArray
+
+
+def motor_wrench(robot: Robot) -> MotorWrench:
+    """The motors of a robot, without their drop and limit."""
+    linear, count = linear_part(robot), robot.wheels.count
+    return MotorWrench(
+        drive_wrench(linear, np.eye(3), np.zeros(count)), drive_wrench(linear, np.zeros(3), np.eye(count))
+    )
+
+
+def state_space(robot: Robot, motors: MotorWrench | None = None) -> StateSpace:
     """Eqs (13) (14) of a robot: what is linear, with the friction of the body axes as K.
 
     Left out: inductance, drop and limit of the motors, terms of a turning frame, friction of other shapes.
+    motors: its `motor_wrench`, where that is known.
     """
-    count = robot.wheels.count
-    at_rest, no_voltage = np.zeros(3), np.zeros(count)
+    motors = motors or motor_wrench(robot)
     mass = mass_matrix(robot)
     viscous, coulomb, _ = robot.friction.axes.levels
-    linear = linear_part(robot)
-    braking = drive_wrench(linear, np.eye(3), no_voltage)
-    driving = drive_wrench(linear, at_rest, np.eye(count))
     return StateSpace(
-        A=(braking.T - np.diag(viscous)) / mass[:, None] + 0.0,
-        B=driving.T / mass[:, None] + 0.0,
+        A=(motors.braking.T - np.diag(viscous)) / mass[:, None] + 0.0,
+        B=motors.driving.T / mass[:, None] + 0.0,
         K=np.diag(-coulomb / mass),
         C=np.eye(3),
     )

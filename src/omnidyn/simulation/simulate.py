@@ -49,11 +49,13 @@ def simulate(
     engine, used wherever the robot allows it, needs no tolerance; Run.source says which engine ran.
     Returns a Run of n + 1 samples: t, voltage (the last row repeats), current, wheel_speed, twist, pose.
     What is at rest within its dead zone has a speed of exactly 0.0.
-    Raises InputError for wrong shapes, NaN or infinite values, dt outside 1e-9..3600 s, or a missing supply.
+    Raises InputError for wrong shapes, NaN or infinite values, dt outside 1e-9..3600 s, a missing supply,
+    or a tol outside 1e-10..1 m/s.
     """
     given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
     start = as_start("twist", twist, 3), as_start("pose", pose, 3)
     amperes = as_start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
+    tolerance = as_tolerance(tol)  # refused for either engine: which one runs is not what the caller chose
     if given.set_point is None and given.open_circuit is None and not why_not_exact(robot):
         assert given.voltage is not None
         if robot.motor.electrical == DYNAMIC:
@@ -61,14 +63,17 @@ def simulate(
         else:
             (twists, poses), currents = simulate_exact(robot, given.voltage, given.dt, *start), None
         return as_run(robot, given, given.voltage, twists, poses, None, "exact engine", (), currents)
-    return _implicit(robot, given, *start, amperes, as_tolerance(tol))
+    return _implicit(robot, given, *start, amperes, tolerance)
 
 
 def as_tolerance(tol: float | None) -> float:
     if tol is None:
         return 0.0
     if not 1e-10 <= tol <= 1.0:
-        raise InputError("tolerance out of range", got=tol, expected="1e-10 to 1 m/s, or None for a fixed step")
+        raise InputError(
+            "tolerance out of range", got=tol, expected="1e-10 to 1 m/s, or None for a fixed step",
+            remedy="leave `tol` out", where="tol",
+        )  # fmt: skip
     return float(tol)
 
 

@@ -104,10 +104,14 @@ def test_missing_values_are_counted(log, robot, with_channels):
     assert (finding.level, finding.where, finding.count) == ("note", "i1", 50)
 
 
-def test_a_slow_wheel_that_reads_zero(robot, log, with_channels):
+@pytest.mark.parametrize("missing", [None, 0, 1])
+def test_a_slow_wheel_that_reads_zero(robot, log, with_channels, missing):
+    """Against its own command, whichever other wheel was not logged."""
     command = np.tile([3.0, 3.0, 0.2], (len(log), 1))
     rng = np.random.default_rng(0)
     speed = np.round((0.9 * command + 0.2 * rng.normal(size=command.shape)) / 0.5) * 0.5
+    if missing is not None:
+        speed[:, missing] = np.nan
     others = dict.fromkeys(("voltage", "current", "twist", "pose"))
     broken = with_channels(wheel_speed_command=command, wheel_speed=speed, **others)
     (finding,) = check(broken).of("reads_zero")

@@ -6,7 +6,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import lfilter
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
@@ -72,4 +71,6 @@ def _normal(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _remembered(values: FloatArray, share: float) -> FloatArray:
     """What is left of each column by a first-order memory; share: of a step in the time it lasts."""
     keep = float(np.exp(-share))
+    from scipy.signal import lfilter  # takes a second to import, and most logs never come here
+
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, axis=0))

@@ -78,7 +78,8 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
     expected = ("the commanded speed", command) if command is not None else expected_wheel_speed(work)
     groups: dict[tuple[str, float], list[tuple[str, float, float]]] = {}
     for channel in SENSORS:
-        for k, (component, values) in enumerate(work.columns(channel)):
+        for component, values in work.columns(channel):
+            k = place(component)[1]  # type: ignore[index]
             step = quantum(values)
             busy = np.abs(values[np.isfinite(values) & (values != 0.0)])
             usual = float(np.median(busy)) if busy.size else 0.0

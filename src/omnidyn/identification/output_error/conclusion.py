@@ -97,8 +97,10 @@ def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
         parts = [part - part.mean() if column[0] in TRAVELS else part for part in parts if part.size]
         left = noise.get(_column(column), 0.0)
         spread = float(np.std(np.concatenate(parts))) if parts else 0.0
+        if solver.tick[c] or not left > HALF * spread:
+            continue
         rough = max((difference_noise(part) for part in parts), default=0.0)
-        if left > max(HALF * spread, ROUGH * rough) and spread > ROUGH * rough and not solver.tick[c]:
+        if left > ROUGH * rough and spread > ROUGH * rough:
             found[_column(column)] = left / spread
     return found
 

@@ -163,7 +163,7 @@ def joint_start(engine: JointEngine, nu: float, progress: Progress, alone: Mappi
         if alone and member.name in alone:
             point = alone[member.name].point
         elif member.group.engine == EXACT:
-            point = first_point(Solver(member.problem, member.engine, nu), member.group.records)
+            point = first_point(Solver(member.problem, member.engine, nu), member.group.records).point
         elif member.group.engine == LOOP:
             point = loop_start(member.problem, nu, progress.aside(words))
         else:

@@ -26,8 +26,9 @@ CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """moved (3,): whether an axis visibly moved; True where no twist is known. held (3,): largest drive [N, N, N m].
+    """moved (3,): whether an axis visibly moved; True where no twist is known.
 
+    held (3,): largest drive [N, N, N m] of the axes that were measured; 0 where all have moved, and nothing was held.
     seen (3,): whether anything tells of an axis; what was not measured has held nothing.
     """
 
@@ -45,26 +46,36 @@ class Motion:
 
 def motion(records: Sequence[Record], robot: Robot) -> Motion:
     """What all logs together show."""
-    moved, seen, held = np.zeros(3, bool), np.zeros(3, bool), np.zeros(3)
-    drive, mass = state_space(robot).B, mass_matrix(robot)
+    moved, seen = np.zeros(3, bool), np.zeros(3, bool)
+    measured = []
     for record in records:
         twist = measured_twist(record, robot)
         if twist is None:
             return Motion(np.ones(3, bool), np.zeros(3), np.ones(3, bool))
-        known = np.isfinite(twist).any(axis=0)
+        known = np.array([np.isfinite(twist[:, axis]).any() for axis in range(3)])
+        measured.append(known)
         others = any(name != "twist" for name, _ in record.columns)  # which may tell of an axis without a speed
         seen |= known | others
         moved |= others & ~known
         for first, last in record.pieces:
-            wrench = record.voltage[first:last] @ drive.T * mass
-            held = np.maximum(held, np.where(known, np.abs(wrench).max(axis=0), 0.0))
+            rows = max(window_rows(record.t[first : last + 1]) // 2, 1)
             for axis in np.flatnonzero(known).tolist():
-                moved[axis] |= _moved(record.t, twist, axis, first, last)
-    return Motion(moved, held, seen)
+                moved[axis] |= _moved(twist, axis, first, last, rows)
+    return Motion(moved, np.zeros(3) if moved.all() else _most_drive(records, measured, robot), seen)
 
 
-def _moved(t: FloatArray, twist: FloatArray, axis: int, first: int, last: int) -> bool:
-    rows = max(window_rows(t[first : last + 1]) // 2, 1)
+def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot: Robot) -> FloatArray:
+    """The largest drive of each axis [N, N, N m] in logs that have measured it, each (3,). Shape (3,)."""
+    drive, mass, most = state_space(robot).B, mass_matrix(robot), np.zeros(3)
+    for record, known in zip(records, measured, strict=True):
+        for first, last in record.pieces:
+            wrench = record.voltage[first:last] @ drive.T * mass
+            most = np.maximum(most, np.where(known, np.abs(wrench).max(axis=0), 0.0))
+    return most
+
+
+def _moved(twist: FloatArray, axis: int, first: int, last: int, rows: int) -> bool:
+    """Whether the mean over so many rows is beyond what noise makes of it, in as many rows."""
     own = twist[first : last + 1, axis]
     clear = CLEAR * difference_noise(own) / np.sqrt(measured_rows(own, rows))
     return int(count_far(twist, axis, first, last, rows, clear)) >= rows

@@ -17,7 +17,7 @@ from omnidyn.identification.output_error.problem.parameters import Parameter, ro
 from omnidyn.model.dynamics import mass_matrix, settled_currents
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
+from omnidyn.model.statespace import MotorWrench, motor_wrench, state_space
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.exact.march import axis_levels
 
@@ -47,9 +47,9 @@ class Primitives:
         return self.rate, self.coulomb, self.hold, self.drive, self.wheels, self.braking, self.per_volt, self.per_force
 
 
-def primitives(robot: Robot) -> Primitives:
-    """The numbers of a robot that the exact engine takes."""
-    system, count = state_space(robot), robot.wheels.count
+def primitives(robot: Robot, motors: MotorWrench | None = None) -> Primitives:
+    """The numbers of a robot that the exact engine takes. motors: its `motor_wrench`, where that is known."""
+    system, count = state_space(robot, motors), robot.wheels.count
     rate, coulomb, hold = axis_levels(robot, system)
     return Primitives(
         rate, coulomb, hold, system.B,
@@ -73,8 +73,9 @@ class Mapping:
         self.breakaway = self.breakaway if breakaway is None else breakaway
         self.linear = all(p.name in BOX for p in parameters)
         self._start = np.array([Key.parse(p.name).get(robot) for p in parameters])
-        self._base = primitives(robot)
-        self._probe = self._friction_slopes()
+        motors = motor_wrench(robot)
+        self._base = primitives(robot, motors)
+        self._probe = self._friction_slopes(robot, self._base, motors)
 
     def robot_at(self, values: FloatArray) -> Robot:
         """The robot with these values, not checked."""
@@ -82,14 +83,15 @@ class Mapping:
 
     def at(self, values: FloatArray) -> tuple[Primitives, Primitives]:
         """(primitives, their derivatives by the values). `values`, shape (P,)."""
-        if self.linear:
-            moved = values - self._start
-            parts = [part + slope @ moved for part, slope in zip(self._base.parts, self._probe.parts, strict=True)]
-            now = Primitives(*parts)
-            return self._held(now, self.robot), self._probe
+        if self.linear:  # in rate and coulomb; nothing else depends on the friction of the axes
+            moved, base, probe = values - self._start, self._base, self._probe
+            rate, coulomb = base.rate + probe.rate @ moved, base.coulomb + probe.coulomb @ moved
+            return self._held(base, self.robot, rate, coulomb), probe
         robot = self.robot_at(values)
-        slopes = [np.zeros((*part.shape, len(values))) for part in self._base.parts]
-        fast = self._friction_at(robot)
+        motors = motor_wrench(robot)
+        now = primitives(robot, motors)
+        slopes = [np.zeros((*part.shape, len(values))) for part in now.parts]
+        fast = self._friction_slopes(robot, now, motors)
         for j, (p, value) in enumerate(zip(self.parameters, values, strict=True)):
             if p.name in BOX:
                 for slope, known in zip(slopes, fast.parts, strict=True):
@@ -99,24 +101,21 @@ class Mapping:
             up, down = (primitives(p.on(robot, float(value) + side * step)) for side in (1.0, -1.0))
             for slope, a, b in zip(slopes, up.parts, down.parts, strict=True):
                 slope[..., j] = (a - b) / (2.0 * step)
-        return self._held(primitives(robot), robot), Primitives(*slopes)
+        return self._held(now, robot, now.rate, now.coulomb), Primitives(*slopes)
 
-    def _held(self, now: Primitives, robot: Robot) -> Primitives:
-        """With the breakaway of this mapping; never below coulomb."""
-        return replace(now, hold=np.fmax(now.coulomb, self.breakaway / mass_matrix(robot)))
+    def _held(self, now: Primitives, robot: Robot, rate: FloatArray, coulomb: FloatArray) -> Primitives:
+        """At this rate and coulomb, with the breakaway of this mapping; never below coulomb."""
+        hold = np.fmax(coulomb, self.breakaway / mass_matrix(robot))
+        return replace(now, rate=rate, coulomb=coulomb, hold=hold)
 
-    def _friction_slopes(self) -> Primitives:
-        return self._friction_at(self.robot)
-
-    def _friction_at(self, robot: Robot) -> Primitives:
+    def _friction_slopes(self, robot: Robot, base: Primitives, motors: MotorWrench) -> Primitives:
         """Derivatives by the six levels of the axes, from one probe: B moves the rate of its axis, C its coulomb."""
-        base = self._base if robot is self.robot else primitives(robot)
         slopes = [np.zeros((*part.shape, len(self.parameters))) for part in base.parts]
         viscous, coulomb, _ = robot.friction.axes.levels
         levels = {"viscous": tuple(viscous + 1.0), "coulomb": tuple(coulomb + 1.0), "breakaway": None}
         friction = robot.friction.model_copy(update={"axes": robot.friction.axes.model_copy(update=levels)})
         probe = robot.model_copy(update={"friction": friction})
-        rate, coulomb, _ = axis_levels(probe, state_space(probe))
+        rate, coulomb, _ = axis_levels(probe, state_space(probe, motors))
         for j, p in enumerate(self.parameters):
             if p.name in BOX:
                 kind, axis = divmod(BOX.index(p.name), 3)

@@ -69,16 +69,19 @@ def record(
     set_point = _set_point(run, robot, loop)
     voltage, supplied, notes = _voltage(run, robot) if set_point is None else (np.zeros_like(set_point), False, [])
     clipped = clip_voltage(robot.motor, voltage)
-    beyond = int((np.abs(clipped) < np.abs(voltage)).any(axis=1).sum())
-    if beyond:
-        notes.append(f"{beyond} rows ask for more than the voltage limit: they are clipped to it")
+    beyond = np.abs(clipped) < np.abs(voltage)
+    if beyond.any():
+        notes.append(
+            f"{int(beyond.any(axis=1).sum())} rows ask for more than the voltage limit: they are clipped to it"
+        )
         voltage = clipped
     if made_up:
         notes.append(f"{', '.join(made_up)}: only what was measured is fitted, not what was interpolated in between")
     found = outputs_of(run, robot, outputs, tick_rad, set_point is not None)
     inputs = voltage if set_point is None else set_point
-    _refuse_wheels_without_input(run, robot, inputs)
-    known = np.asarray(np.isfinite(inputs).all(axis=1), dtype=bool)
+    finite = np.isfinite(inputs)
+    _refuse_wheels_without_input(run, robot, finite)
+    known = np.full(len(run), True) if finite.all() else np.asarray(finite.all(axis=1))
     pieces = [piece for s in segments(run.t) for piece in _whole(known, s.start, s.stop)]
     if not pieces:
         raise InsufficientDataError(
@@ -93,10 +96,12 @@ def record(
     )  # fmt: skip
 
 
-def _refuse_wheels_without_input(run: Run, robot: Robot, inputs: FloatArray) -> None:
-    """A log of fewer wheels than the robot has leaves the others without a number."""
-    empty = np.flatnonzero(~np.isfinite(inputs).any(axis=0))
-    if 0 < len(empty) < inputs.shape[1]:
+def _refuse_wheels_without_input(run: Run, robot: Robot, finite: BoolArray) -> None:
+    """A log of fewer wheels than the robot has leaves the others without a number. finite (rows, W): of the inputs."""
+    if finite.all():
+        return
+    empty = np.flatnonzero(~finite.any(axis=0))
+    if 0 < len(empty) < finite.shape[1]:
         raise InputError(
             "wheels without any input", got=", ".join(f"none for wheel {w + 1}" for w in empty), where=run.source,
             expected=f"one for each of the {robot.wheels.count} wheels of {robot.name}",

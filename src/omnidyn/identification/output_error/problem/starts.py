@@ -73,16 +73,12 @@ def _rates(record: Record, columns: slice | list[int]) -> FloatArray:
 
 def integral_start(mapping: Mapping, values: FloatArray, records: Sequence[Record]) -> FloatArray:
     """Rates and levels of the axes by the integral form. Shape (2, 3), NaN where an axis has too few windows."""
-    robot = mapping.robot_at(values)
     now, _ = mapping.at(values)
     found = np.full((2, 3), np.nan)
-    twists = [measured_twist(record, robot) for record in records]
+    twists = [measured_twist(record, mapping.robot) for record in records]
+    seen = [(record, twist, _parts(record)) for record, twist in zip(records, twists, strict=True) if twist is not None]
     for axis in range(3):
-        parts = [
-            _windows(record, twist, now.drive[axis], axis)
-            for record, twist in zip(records, twists, strict=True)
-            if twist is not None
-        ]
+        parts = [_windows(*each, now.drive[axis], axis) for each in seen]
         if not parts:
             continue
         design = np.concatenate([part.design for part in parts])
@@ -106,12 +102,18 @@ def friction_values(mapping: Mapping, values: FloatArray, found: FloatArray) -> 
     return values
 
 
-def _windows(record: Record, twist: FloatArray, drive: FloatArray, axis: int) -> Windows:
-    """The windows of one axis of a log, all pieces."""
+def _parts(record: Record) -> list[tuple[int, int, int]]:
+    """(first, last, rows of a window) of what is looked at of each piece."""
+    ends = [(first, min(last, first + ENOUGH)) for first, last in record.pieces]
+    return [(first, last, window_rows(record.t[first : last + 1])) for first, last in ends]
+
+
+def _windows(
+    record: Record, twist: FloatArray, parts: Sequence[tuple[int, int, int]], drive: FloatArray, axis: int
+) -> Windows:
+    """The windows of one axis of a log, of all `_parts` of it."""
     designs, changes, most = [np.zeros((0, 3))], [np.zeros(0)], 0.0
-    for first, last in record.pieces:
-        last = min(last, first + ENOUGH)
-        rows = window_rows(record.t[first : last + 1])
+    for first, last, rows in parts:
         if last - first < 2 * rows or np.isfinite(twist[first : last + 1, axis]).sum() < 2 * LEAST_ROWS:
             continue
         noise = difference_noise(twist[first : last + 1, axis])
@@ -138,8 +140,8 @@ def difference_noise(v: FloatArray) -> float:
 
     Their median is 0.954 sigma; where most are 0, the signal is quantised, and half of its step is taken.
     """
-    size = np.abs(np.diff(v[np.isfinite(v)]))
-    size = size[:: max(len(size) // SAMPLE, 1)]
+    steps = np.diff(v[np.isfinite(v)])
+    size = np.abs(steps[:: max(len(steps) // SAMPLE, 1)])
     size = size[np.isfinite(size)]
     middle = float(np.median(size)) / 0.954 if size.size else 0.0
     return middle if middle > 0.0 else 0.5 * float(size[size > 0.0].min(initial=np.inf)) if size.any() else 0.0

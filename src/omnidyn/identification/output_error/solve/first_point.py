@@ -13,7 +13,7 @@ from omnidyn.identification.output_error.problem.problem import Point, Problem, 
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
 from omnidyn.identification.output_error.solve.progress import Progress
-from omnidyn.identification.output_error.solve.solver import Solver
+from omnidyn.identification.output_error.solve.solver import Solver, State
 from omnidyn.model.keys import FRICTION
 
 MANY = 100_000  # rows to which a long log is first fitted
@@ -23,8 +23,11 @@ LESS = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as
 NEAR = 0.1  # squared distance to the best point, in standard errors, that is near
 
 
-def first_point(solver: Solver, records: Sequence[Record]) -> Point:
-    """The better one of the robot as it is and the integral form; for long logs, the fit to their first part."""
+def first_point(solver: Solver, records: Sequence[Record]) -> State:
+    """The better one of the robot as it is and the integral form; for long logs, the fit to their first part.
+
+    A state of the problem that was marched through: of the first part, it says where to start and no more.
+    """
     problem, engine = solver.problem, solver.engine
     assert isinstance(engine, ExactEngine)
     own = problem.start()
@@ -35,20 +38,20 @@ def first_point(solver: Solver, records: Sequence[Record]) -> Point:
     short = problem.shortened(MANY)
     trial = solver if short is problem else Solver(short, ExactEngine(short))
     states = [trial.state(own), trial.state(Point(values, own.states))]
-    best = _with_latencies(trial, min(states, key=lambda state: state.objective).point)
-    return best if trial is solver else trial.minimise(best).state.point
+    best = _with_latencies(trial, min(states, key=lambda state: state.objective))
+    return best if trial is solver else trial.minimise(best).state
 
 
-def _with_latencies(solver: Solver, point: Point) -> Point:
-    """The point with the best of a few latencies for each channel.
+def _with_latencies(solver: Solver, begun: State) -> State:
+    """The state with the best of a few latencies for each channel.
 
     A current follows the voltage at once, so that its likelihood jumps where a latency passes a row: no descent crosses
     that. What a channel shows depends on its own latency only, so that one march tries a latency for all of them.
     """
-    problem = solver.problem
+    problem, point = solver.problem, begun.point
     own = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
     if not own:
-        return point
+        return begun
     row = float(np.median(np.diff(problem.pieces[0].record.t[: 2 * LATENCIES + 1])))
     tried = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
     costs = []
@@ -63,7 +66,7 @@ def _with_latencies(solver: Solver, point: Point) -> Point:
     for j in own:
         mine = [k for k, (channel, _) in enumerate(problem.columns) if f"{LATENCY}.{channel}" == problem.names[j]]
         values[j] = tried[int(np.argmin([cost[mine].sum() for cost in costs]))]
-    return Point(values, point.states)
+    return solver.state(Point(values, point.states))
 
 
 def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:

@@ -111,11 +111,15 @@ class Solver(Generic[P]):
         return np.full(len(self.tick), True) if self.nu else self.tick > 0.0
 
     def minimise(
-        self, start: Point, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None
+        self, start: Point | State, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None
     ) -> Solution:
-        """The best point from `start`; `watch` sees every better one on the way."""
+        """The best point from `start`; `watch` sees every better one on the way.
+
+        Where the start is a state that this engine found, the logs are not marched through for it again.
+        """
         if not self.scaled.any():
-            return self._descend(self.state(self._inside(start)), limit, watch)
+            return self._descend(self._begun(start), limit, watch)
+        start = start.point if isinstance(start, State) else start
         plain = Solver(self.problem, self.engine, close=self.close, counted=False).minimise(start, limit)
         now = self.state(plain.state.point, np.maximum(plain.state.variance - self.tick**2 / 12.0, self.floor))
         return self._descend(self._rescaled(now)[0], limit, watch)
@@ -178,6 +182,14 @@ class Solver(Generic[P]):
         """Which parameters stand at a bound and are pushed against it by `gradient` (downhill direction)."""
         return ((inner <= self._low) & (gradient < 0.0)) | ((inner >= self._high) & (gradient > 0.0))
 
+    def _begun(self, start: Point | State) -> State:
+        """The state to start from, within the bounds; one of this very problem is not marched through again."""
+        if not isinstance(start, State):
+            return self.state(self._inside(start))
+        inside = self._inside(start.point)
+        known = start.problem is self.problem and np.array_equal(inside.values, start.point.values)
+        return start if known else self.state(inside)
+
     def _inside(self, point: Point) -> Point:
         return Point(self.outer(self.clipped(self.inner(point.values))), point.states)
 
@@ -192,8 +204,7 @@ class Solver(Generic[P]):
 class Normal:
     """The normal equations at a state, in the numbers that the solver sees, states of the pieces eliminated.
 
-    gradient (P,): downhill. information (P, P): of all parameters, free of the states. distance: squared length of the
-    Gauss-Newton step in standard errors, over what no bound holds.
+    gradient (P,): downhill. information (P, P): of all parameters, free of the states. held: at a bound.
     """
 
     def __init__(self, solver: Solver, state: State):
@@ -209,7 +220,6 @@ class Normal:
         self._add_priors()
         self.gradient, self.information = self._reduced(0.0)
         self.held = solver.at_bound(self.inner, self.gradient)
-        self.distance = self.distance_without(self.held)
 
     def _add_priors(self) -> None:
         self.prior_gradient, self.prior_information = np.zeros(self._count), np.zeros(self._count)
@@ -297,10 +307,11 @@ def _weighted(
     full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
     grad = (weight @ sums.grad) * full
     info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
-    if not np.diag(info)[count:].max(initial=0.0) > UNSEEN:
+    told = info.diagonal()[count:]
+    if not told.max(initial=0.0) > UNSEEN:
         return grad[:count], info[:count, :count]
-    still = np.diag(info)[count:] <= UNSEEN
-    still[: len(FASTEST)] |= np.diag(info)[count : count + len(FASTEST)] < FASTEST**-2
+    still = told <= UNSEEN
+    still[: len(FASTEST)] |= told[: len(FASTEST)] < FASTEST**-2
     speeds, pull = states[: len(FASTEST)], grad[count : count + len(FASTEST)]
     still[: len(FASTEST)] |= (np.abs(speeds) >= FASTEST) & (np.sign(speeds) * pull > 0.0)
     where = np.flatnonzero(still) + count
@@ -310,12 +321,12 @@ def _weighted(
 
 
 def _damped(info: FloatArray, damping: float) -> FloatArray:
-    return info + np.diag(damping * np.diag(info)) if damping else info
+    return info + np.diag(damping * info.diagonal()) if damping else info
 
 
 def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
     """information^-1 gradient in balanced units; directions that the data do not see stay where they are."""
-    size = np.sqrt(np.maximum(np.diag(information), 0.0))
+    size = np.sqrt(np.maximum(information.diagonal(), 0.0))
     size[size == 0.0] = 1.0
     values, vectors = np.linalg.eigh(information / np.outer(size, size))
     seen = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
