@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.frames import body_to_world
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -27,10 +28,12 @@ from omnidyn.simulation.sensitivity.directions import (
     directions_of,
     refuse_switched_off,
 )
-from omnidyn.simulation.sensitivity.sample import MEET, Samples, empty_samples
+from omnidyn.simulation.sensitivity.sample import MEET, PATH, TURN, Samples, empty_samples
 from omnidyn.simulation.simulate import as_tolerance, current_bounds
 
 FloatArray = NDArray[np.float64]
+
+PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,33 +55,56 @@ class Direction:
 class LateSample:
     """What a channel with one latency shows at the rows of a log; NaN where that lies outside the run.
 
-    twist (rows, 3), pace: its time derivative, heading (rows,), voltage (rows, n) in force, current (rows, n) of
-    dynamic electrics, else None. d...: derivatives, (rows, K, 3), (rows, K), (rows, K, n).
+    twist (rows, 3), pace: its time derivative, way (rows, W) since the start, voltage (rows, n) in force, current
+    (rows, n) of dynamic electrics, else None. d...: derivatives, (rows, K, 3), (rows, K, W), (rows, K, n).
     """
 
     robot: Robot
     directions: tuple[Direction, ...]
     twist: FloatArray
     pace: FloatArray
-    heading: FloatArray
+    way: FloatArray
     voltage: FloatArray
     dtwist: FloatArray
-    dheading: FloatArray
+    dway: FloatArray
     dvoltage: FloatArray
     current: FloatArray | None
     current_pace: FloatArray | None
     dcurrent: FloatArray | None
 
+    def heading(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(heading since the start [rad], its time derivative, its derivatives). Shapes (rows, 1), same, (rows, K, 1)."""
+        return self.way[:, :TURN], self.twist[:, 2:], self.dway[..., :TURN]
+
     def wheel_speeds(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(wheel speeds [rad/s], their time derivative, their derivatives). Shapes (rows, n), same, (rows, K, n)."""
+        value, by = self._at_wheels(self.twist, self.dtwist)
+        return value, wheel_speed(self.robot.wheels, self.pace), by
+
+    def wheel_angles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(angles that the wheels have turned by [rad], ...), shapes as above: theirs is the path as speed the twist."""
+        value, by = self._at_wheels(self.way[:, PATH_AND_TURN], self.dway[..., PATH_AND_TURN])
+        return value, wheel_speed(self.robot.wheels, self.twist), by
+
+    def _at_wheels(self, motion: FloatArray, by: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What the wheels make of a motion of the body (rows, 3), and of its derivatives (rows, K, 3)."""
         wheels = self.robot.wheels
-        by = np.empty((len(self.twist), len(self.directions), wheels.count))
+        found = np.empty((*by.shape[:2], wheels.count))
         for k, one in enumerate(self.directions):
-            by[:, k] = wheel_speed(wheels, self.dtwist[:, k])
+            found[:, k] = wheel_speed(wheels, by[:, k])
             if one.up is not None and one.down is not None and one.up.wheels != one.down.wheels:
-                ends = (wheel_speed(end.wheels, self.twist) for end in (one.up, one.down))
-                by[:, k] += difference(np.array([*ends]))[0]
-        return wheel_speed(wheels, self.twist), wheel_speed(wheels, self.pace), by
+                ends = (wheel_speed(end.wheels, motion) for end in (one.up, one.down))
+                found[:, k] += difference(np.array([*ends]))[0]
+        return wheel_speed(wheels, motion), found
+
+    def position(self, facing: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(place since the start [m], its time derivative, its derivatives) of a robot that faced `facing` [rad] there.
+
+        Shapes (rows, 2), same, (rows, K, 2).
+        """
+        turn = body_to_world(facing)[:2, :2].T
+        pace = np.einsum("kij,kj->ki", body_to_world(facing + self.way[:, 0])[:, :2, :2], self.twist[:, :2])
+        return self.way[:, PATH:] @ turn, pace, self.dway[..., PATH:] @ turn
 
     def currents(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(currents [A], their time derivative under held voltages, their derivatives), shapes as above."""
@@ -99,12 +125,12 @@ class LateSample:
 
 def late_samples(
     robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
-    late: Sequence[float], tol: float | None,
+    late: Sequence[float], tol: float | None, ways: int = TURN,
 ) -> tuple[list[LateSample], int]:  # fmt: skip
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
-    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors; start: (3,) twist; tol as for `simulate`.
-    Also returns the number of rows in which the friction solver hit its cap.
+    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors; start: (3,) twist; tol as for `simulate`;
+    ways: what is wanted of the way, see sample.py. Also returns the number of rows in which the friction solver hit its cap.
     Raises InputError for a direction that changes friction or a gear loss which is off.
     """
     numbers = plant(robot)
@@ -120,7 +146,7 @@ def late_samples(
     first[:, 2] += start[2] * stretch
     given = Commands(np.ascontiguousarray(np.diff(t)), np.ascontiguousarray(voltage))
     size = N_AXES + (numbers.wheels if robot.motor.electrical == DYNAMIC else 0)
-    seen = empty_samples(t, np.asarray(late, dtype=float), size, len(directions))
+    seen = empty_samples(t, np.asarray(late, dtype=float), size, len(directions), ways)
     outcome, _, _ = run_with_derivatives(
         numbers, directions_of(numbers, plants, rates), given, current_bounds(robot, given, len(given.dt)),
         (np.asarray(start, dtype=float), np.zeros(3)), first, as_tolerance(tol), seen,
@@ -134,7 +160,7 @@ def late_samples(
         dtwist[..., 2] = (dtwist[..., 2] - twist[:, 2, None] * stretch) / length
         found.append(
             LateSample(
-                robot, tuple(directions), twist, pace, seen.heading[c], voltage[at], dtwist, seen.dheading[c],
+                robot, tuple(directions), twist, pace, seen.way[c], voltage[at], dtwist, seen.dway[c],
                 np.moveaxis(rates[:, at], 0, 1), *_currents(seen, c, size),
             )
         )  # fmt: skip

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.exact import LATE, Weighting
 from omnidyn.identification.output_error.engines.sums import added
-from omnidyn.identification.output_error.problem.outputs import refuse_exact_only
 from omnidyn.identification.output_error.problem.problem import Piece, PieceSums, Point, Problem
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.layout import N_AXES
@@ -49,7 +48,6 @@ class LoopEngine:
                 "a log of set speeds has no voltage that could be changed on its way", got=", ".join(other),
                 expected="latency", where="nuisances",
             )  # fmt: skip
-        refuse_exact_only(problem.columns, problem.robot.name)
 
     def on(self, problem: Problem) -> LoopEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
@@ -66,12 +64,11 @@ class LoopEngine:
         """What the residuals of every piece add up to; see kernel/march.py."""
         ready, found = self.ready_at(point.values), []
         for piece, state in zip(self.problem.pieces, point.states, strict=True):
-            known = np.array([self._columns.index(column) for column in piece.record.columns])
             outputs, slopes = self.outputs(ready, piece, state, point.values)
             residual = piece.record.outputs[piece.first : piece.last + 1] - outputs
             width = slopes.shape[2]
             turned = np.ascontiguousarray(residual.T), np.ascontiguousarray(np.swapaxes(slopes, 0, 1))
-            found.append(added(*turned, np.arange(width), weighting, known, width))
+            found.append(added(piece, self._columns, (*turned, np.arange(width)), weighting, len(point.values)))
         return found
 
     def meets_limit(self, point: Point) -> bool:

@@ -8,19 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError
 from omnidyn.identification.output_error.kernel.counts import find_tick
 from omnidyn.identification.output_error.problem.redundant import redundant
-from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.exact.march import why_not_exact
 
 FloatArray = NDArray[np.float64]
 
 OUTPUTS = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")
 POSE, PARTS = "pose", ("heading", "position")
-EXACT_ONLY = ("position", "wheel_angle")  # what the implicit engine has no slopes of
 TRAVEL = ("heading", "position", "wheel_angle")
 
 
@@ -34,13 +31,10 @@ class Outputs:
     notes: tuple[str, ...]
 
 
-def outputs_of(
-    run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: float | None, looped: bool = False
-) -> Outputs:
+def outputs_of(run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: float | None) -> Outputs:
     """wanted: names of OUTPUTS, "pose" for two of them; None for all that the log has and that do not say it twice.
 
-    tick_rad: of the angles of the wheels; None: found in the log; 0: they are taken like any other output. looped:
-    whether set speeds drive the robot; neither this nor an implicit robot is fitted to positions and angles.
+    tick_rad: of the angles of the wheels; None: found in the log; 0: they are taken like any other output.
     Raises InputError for an unknown name and for a log without any of them.
     """
     wanted = wanted if wanted is None else [each for name in wanted for each in (PARTS if name == POSE else (name,))]
@@ -50,8 +44,6 @@ def outputs_of(
     found = {name: value for name in OUTPUTS if (value := _measured(run, name)) is not None}
     if wanted is not None:
         found = {name: value for name, value in found.items() if name in wanted}
-    elif found.keys() & set(EXACT_ONLY) and (looped or why_not_exact(robot) or robot.motor.electrical == DYNAMIC):
-        found = {name: value for name, value in found.items() if name not in EXACT_ONLY}
     if not found:
         raise InputError(
             "the log has no output to fit", got=", ".join(run.channels) or "no channels",
@@ -101,13 +93,3 @@ def _without_doubles(
 def _tick(values: FloatArray, given: float | None) -> float:
     return find_tick(values) if given is None else given
 
-
-def refuse_exact_only(columns: Sequence[tuple[str, int]], where: str) -> None:
-    """Raises UnsupportedError for outputs that only the exact engine knows."""
-    found = sorted({name for name, _ in columns} & set(EXACT_ONLY))
-    if found:
-        raise UnsupportedError(
-            "this output is fitted by the exact engine only", got=", ".join(found), where=where,
-            expected=", ".join(name for name in OUTPUTS if name not in EXACT_ONLY),
-            remedy="leave it out of the outputs; twist, wheel speeds and heading tell of the same motion",
-        )  # fmt: skip

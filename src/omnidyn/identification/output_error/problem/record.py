@@ -77,7 +77,7 @@ def record(
         voltage = clipped
     if made_up:
         notes.append(f"{', '.join(made_up)}: only what was measured is fitted, not what was interpolated in between")
-    found = outputs_of(run, robot, outputs, tick_rad, set_point is not None)
+    found = outputs_of(run, robot, outputs, tick_rad)
     inputs = voltage if set_point is None else set_point
     _refuse_wheels_without_input(run, robot, inputs)
     known = np.asarray(np.isfinite(inputs).all(axis=1), dtype=bool)
