@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of
-from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, Weighting, turned_by
+from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, Weighting
 from omnidyn.identification.output_error.engines.sums import Parts, added
 from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
@@ -102,25 +102,22 @@ class ImplicitEngine:
         """(residuals (C, rows), slopes (C, rows, U), index of each of the U among the P parameters and the states)."""
         record, count = piece.record, len(self.problem.parameters)
         t, measured = record.t[piece.first : piece.last + 1], record.outputs[piece.first : piece.last + 1].T
-        voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
         where = [self.problem.where(LATE + name) for name, _ in record.columns]
         late = [float(values[k]) if k >= 0 else 0.0 for k in where]
         distinct = sorted(set(late))
-        seen, _ = late_samples(
-            robot, t, voltage, directions, state[:N_AXES], distinct, self.tol, ways_of(record.columns)
-        )
+        seen, at, factors = self._run(robot, moved, scales, piece, state, values, distinct)
         residual = np.empty(measured.shape)
         keys = len(at)
         offsets = count + N_AXES + np.flatnonzero(piece.free[N_AXES:])
         at += [*dict.fromkeys(k for k in where if k >= 0), *offsets]
         slopes = np.zeros((*measured.shape, len(at)))
-        facing = record.columns.index(HEADING) if HEADING in record.columns else -1
+        faces = N_AXES + record.columns.index(HEADING) if HEADING in record.columns else -1
+        facing = float(state[faces]) if faces >= 0 else 0.0
         shown: dict[tuple[str, float], Shown] = {}
         for c, (name, i) in enumerate(record.columns):
-            key = (name, late[c])
-            own = seen[distinct.index(late[c])]
+            key, number = (name, late[c]), distinct.index(late[c])
             if key not in shown:
-                shown[key] = shown_by(own, name, state[N_AXES + facing])
+                shown[key] = self._shown(seen, number, name, facing)
             value, pace, by = shown[key]
             residual[c] = measured[c] - value[:, i] - state[N_AXES + c]
             residual[c][t - t[0] < piece.margin[c]] = np.nan
@@ -129,9 +126,33 @@ class ImplicitEngine:
                 slopes[c, :, at.index(where[c])] = -pace[:, i]
             if piece.free[N_AXES + c]:
                 slopes[c, :, at.index(count + N_AXES + c)] = 1.0
-            if name == POSITION and piece.free[N_AXES + facing]:
-                slopes[c, :, at.index(count + N_AXES + facing)] = own.way[:, PATH:] @ turned_by(state[N_AXES + facing])[i]
+            if name == POSITION and piece.free[faces]:  # a quarter of a turn further is d/d facing
+                slopes[c, :, at.index(count + faces)] = seen[number].position(facing + 0.5 * np.pi)[0][:, i]
         return residual, slopes, np.array(at)
+
+    def _run(
+        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
+        values: FloatArray, late: list[float],
+    ) -> tuple[list[LateSample], list[int], FloatArray]:  # fmt: skip
+        """(a look at the run for every latency, index of each direction among the slopes, their factors)."""
+        t = piece.record.t[piece.first : piece.last + 1]
+        voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
+        ways = ways_of(piece.record.columns)
+        seen, _ = late_samples(robot, t, voltage, directions, state[:N_AXES], late, self.tol, ways)
+        return seen, at, factors
+
+    def _shown(self, seen: list[LateSample], number: int, name: str, facing: float) -> Shown:
+        """What a channel of m columns shows at latency `number`, from the start; facing: the heading there [rad]."""
+        own = seen[number]
+        if name == POSITION:
+            return own.position(facing)
+        if name == "twist":
+            return own.twist, own.pace, own.dtwist
+        every = {
+            "heading": own.heading, "wheel_speed": own.wheel_speeds, "wheel_angle": own.wheel_angles,
+            "current": own.currents,
+        }  # fmt: skip
+        return every[name]()
 
     def _directions(
         self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, values: FloatArray
@@ -165,15 +186,3 @@ def ways_of(columns: Sequence[Column]) -> int:
     """What these outputs take of the way of a run, see simulation/sensitivity/sample.py."""
     names = {name for name, _ in columns}
     return PLACE if POSITION in names else PATH if "wheel_angle" in names else TURN
-
-
-def shown_by(seen: LateSample, name: str, facing: float) -> Shown:
-    """What a channel of m columns shows, from where the run starts; facing: the heading there [rad]."""
-    if name == POSITION:
-        return seen.position(facing)
-    if name == "twist":
-        return seen.twist, seen.pace, seen.dtwist
-    return {
-        "heading": seen.heading, "wheel_speed": seen.wheel_speeds, "wheel_angle": seen.wheel_angles,
-        "current": seen.currents,
-    }[name]()  # fmt: skip
