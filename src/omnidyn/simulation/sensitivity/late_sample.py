@@ -75,7 +75,7 @@ class LateSample:
     dcurrent: FloatArray | None
 
     def heading(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(heading since the start [rad], its time derivative, its derivatives). Shapes (rows, 1), same, (rows, K, 1)."""
+        """(heading since the start [rad], its time derivative, derivatives). Shapes (rows, 1), same, (rows, K, 1)."""
         return self.way[:, :TURN], self.twist[:, 2:], self.dway[..., :TURN]
 
     def wheel_speeds(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -84,7 +84,7 @@ class LateSample:
         return value, wheel_speed(self.robot.wheels, self.pace), by
 
     def wheel_angles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(angles that the wheels have turned by [rad], ...), shapes as above: theirs is the path as speed the twist."""
+        """(angles that the wheels have turned by [rad], ...), as above: of the path what speeds are of the twist."""
         value, by = self._at_wheels(self.way[:, PATH_AND_TURN], self.dway[..., PATH_AND_TURN])
         return value, wheel_speed(self.robot.wheels, self.twist), by
 
@@ -177,7 +177,7 @@ def looped_samples(
 
 
 def _in_force(found: LoopRun) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """[s] when each voltage of a loop comes into force, the voltages, their derivatives: 0 before, unknown at the end."""
+    """[s] when each voltage of a loop comes into force, the voltages, derivatives: 0 before, unknown at the end."""
     begins = np.concatenate([[-np.inf], found.edges])
     voltage = np.zeros((len(begins), found.voltage.shape[1]))
     voltage[1:-1], voltage[-1] = found.voltage, np.nan

@@ -67,8 +67,9 @@ def row_with_derivatives(
 ):  # fmt: skip
     """One row with derivatives, in place: adaptive steps, or for a tol of 0 one fixed step. Returns the next h.
 
-    kept: whether the derivatives are kept by row, those of the pose included; else they are sampled, and the pose stays.
-    There those of the step as a whole do where it is smooth: they are within the tolerance too. begin: of the row [s].
+    kept: whether the derivatives are kept by row, those of the pose included; else they are sampled, and the pose
+    stays. There those of the step as a whole do where it is smooth: they are within the tolerance too. begin: of the
+    row [s].
     """
     counts[0] = counts[1] = 0
     if tol > 0.0:

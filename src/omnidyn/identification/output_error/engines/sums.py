@@ -70,7 +70,7 @@ def _terms(residual, variance, nu, tick, share, final):
 
 @kernel
 def _waves(slopes, turns, count):
-    """Sum over the rows of (cos, sin)(2 pi m turns) J for m = 1 to `count`; turns (C, rows), NaN where there is none."""
+    """Sum over the rows of (cos, sin)(2 pi m turns) J, m = 1 to `count`; turns (C, rows), NaN where there is none."""
     columns, rows, width = slopes.shape
     out = np.zeros((columns, count, 2, width))
     for c in range(columns):

@@ -92,4 +92,3 @@ def _without_doubles(
 
 def _tick(values: FloatArray, given: float | None) -> float:
     return find_tick(values) if given is None else given
-
