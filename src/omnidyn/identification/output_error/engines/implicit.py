@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class ImplicitEngine:
             )  # fmt: skip
         self.last = LastPoints()
 
-    def on(self, problem: Problem) -> ImplicitEngine:
+    def on(self, problem: Problem) -> Self:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
         engine.problem, engine._columns, engine.last = problem, problem.columns, LastPoints()
