@@ -67,7 +67,7 @@ class LoopEngine(ImplicitEngine):
     ) -> tuple[list[LateSample], list[int], FloatArray]:  # fmt: skip
         """As of any run; where currents jump from tick to tick, a look a period after theirs is the last one."""
         count, (t, set_point) = self.problem.robot_count, _driven(piece)
-        ways = [Direction(p.name, *ends) for p, ends in zip(self.problem.robot_parameters, moved, strict=True)]
+        ways = [Direction(p.name, up, down) for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True)]
         own = self.problem.where(f"{LATE}current")
         more = [float(values[own]) - self._period] if own >= 0 and self._jumps(t) else []
         seen = looped_samples(

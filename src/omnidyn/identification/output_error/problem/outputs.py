@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError
-from omnidyn.identification.output_error.kernel.counts import find_tick
 from omnidyn.identification.output_error.problem.redundant import redundant
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.statistics import find_tick
 
 FloatArray = NDArray[np.float64]
 
@@ -23,12 +23,16 @@ TRAVEL = ("heading", "position", "wheel_angle")
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """columns: (channel, index) each; values (rows, C); ticks (C,): of counts [rad], 0 for others; notes in words."""
+    """columns: (channel, index) each; values (rows, C); ticks (C,): of counts [rad], 0 for others; notes in words.
+
+    unused: what was measured and is not fitted, and why, in words.
+    """
 
     columns: tuple[tuple[str, int], ...]
     values: FloatArray
     ticks: tuple[float, ...]
     notes: tuple[str, ...]
+    unused: tuple[str, ...]
 
 
 def outputs_of(run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: float | None) -> Outputs:
@@ -42,6 +46,7 @@ def outputs_of(run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: f
     if unknown:
         raise InputError("no such output", got=unknown[0], expected=", ".join((*OUTPUTS, POSE)), where="outputs")
     found = {name: value for name in OUTPUTS if (value := _measured(run, name)) is not None}
+    unused = [f"{name}: not among the outputs asked for" for name in found if wanted is not None and name not in wanted]
     if wanted is not None:
         found = {name: value for name, value in found.items() if name in wanted}
     if not found:
@@ -56,7 +61,7 @@ def outputs_of(run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: f
     columns = tuple((name, i) for name, value in found.items() for i in range(value.shape[1]))
     ticks = tuple(_tick(found[name][:, i], tick_rad) if name == "wheel_angle" else 0.0 for name, i in columns)
     values = next(iter(found.values())) if len(found) == 1 else np.hstack(list(found.values()))
-    return Outputs(columns, np.ascontiguousarray(values), ticks, tuple(notes))
+    return Outputs(columns, np.ascontiguousarray(values), ticks, tuple(notes), tuple(unused))
 
 
 def _measured(run: Run, name: str) -> FloatArray | None:
