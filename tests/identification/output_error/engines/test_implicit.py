@@ -19,7 +19,8 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key, find_key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
-from tests.support.axebot_logs import NOISE, voltages
+from tests.support.axebot_logs import NOISE, excitation, voltages
+from tests.support.rolled_logs import TICK, captured_log, counted_log, rolled
 
 TRUTH = {
     "friction.direction.coulomb[0]": 2.2,
@@ -213,3 +214,57 @@ def test_gain_dead_band_and_latency_from_a_log_that_starts_in_motion(ellipse):
             assert abs(value - true[name]) < 4.5 * std, name
         assert fit.nuisances["gain"].std < 0.01
     assert fit.covariance == "white"
+
+
+@pytest.fixture(scope="module")
+def turning(axebot):
+    """As `omnidyn init` makes it: friction along the axes, the frame turns."""
+    return axebot.replace(body=axebot.body.replace(rotating_frame=True))
+
+
+def test_counts_and_positions_of_an_independent_run(turning):
+    """Encoders of 2048 counts, and motion capture, of a run by DOP853: z-scores of all draws are those of a normal."""
+    run, angle = rolled(turning, excitation(8.0, seed=1), 0.01)
+    for kind in ("counts", "pose"):
+        z = []
+        for seed in range(6):
+            log = counted_log(run, angle, seed) if kind == "counts" else captured_log(run, seed)
+            fit = fit_output_error(log, turning, start="rest")
+            assert not fit.unused
+            assert not fit.unidentifiable
+            z.append([(v - float(Key.parse(key).get(turning))) / fit.std[key] for key, v in fit.value.items()])
+        print(kind, np.round(z, 1).tolist())
+        assert len(z[0]) == 6
+        assert np.abs(z).max() < 4.5
+        assert 0.7 < np.sqrt(np.mean(np.square(z))) < 1.35
+    plain = fit_output_error(counted_log(run, angle, 1), turning, start="rest", tick_rad=0.0)
+    counts = fit_output_error(counted_log(run, angle, 1), turning, start="rest")
+    for name in ("wheel_angle[0]", "wheel_angle[1]"):  # of a tick: what is rounded off, and next to no other noise
+        assert plain.noise[name] == pytest.approx(TICK / np.sqrt(12.0), rel=0.1)
+        assert counts.noise[name] < 0.15 * TICK
+
+
+def test_many_logs_take_as_many_runs_as_one(turning, monkeypatch):
+    """24 logs of 8 s that begin under voltage: 34 runs of each, until starts that nothing tells of were held back."""
+    logs = []
+    for seed in range(1, 25):
+        run = simulate(turning, voltages(np.random.default_rng(seed), 8.0), 0.01)
+        noise = np.random.default_rng(99 + seed).normal(size=run.twist.shape) * NOISE
+        logs.append(Run(t=run.t, voltage=run.voltage, twist=run.twist + noise))
+    start, rows = turning, 0
+    for axis in range(3):
+        for kind, factor in (("coulomb", 0.6), ("viscous", 1.5)):
+            key = Key.parse(f"friction.axes.{kind}[{axis}]")
+            start = key.set(start, factor * key.get(start))
+    plain = ImplicitEngine._piece
+
+    def counting(self, robot, moved, scales, piece, *rest):
+        nonlocal rows
+        rows += piece.last - piece.first
+        return plain(self, robot, moved, scales, piece, *rest)
+
+    monkeypatch.setattr(ImplicitEngine, "_piece", counting)
+    fit = fit_output_error(logs, start)
+    assert rows < 15 * sum(len(log) for log in logs)
+    for key, value in fit.value.items():
+        assert abs(value - float(Key.parse(key).get(turning))) < 4.5 * fit.std[key]
