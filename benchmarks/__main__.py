@@ -23,7 +23,7 @@ NAMES = {
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
     "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
-    "outputs": "output error from counts of encoders, from positions, and on a tilted floor (four minutes)",
+    "outputs": "output error from counts of encoders, from positions, and on a tilted floor (eight minutes)",
     "identify": "output error on simulated logs: coverage, starts, nuisances, time beside peers (ten minutes)",
     "identify_ellipse": "the same by the implicit engine: an ellipse of friction in a turning frame (four minutes)",
     "identify_loop": "output error through a firmware's speed loop, simulated logs: coverage (a few minutes)",

@@ -1,7 +1,7 @@
 """Fits to counts of encoders and to positions, and on a tilted floor: coverage and efficiency on simulated logs.
 
-The axebot and the voltages of benchmarks/identify.py, 60 s at 100 Hz. The seed of every draw is its number.
-OMNIDYN_BENCH_SHARE=0.05 does that share of the draws.
+The axebot and the voltages of benchmarks/identify.py, 60 s at 100 Hz; 20 s where its frame turns. The seed of every
+draw is its number. OMNIDYN_BENCH_SHARE=0.05 does that share of the draws.
 """
 
 from __future__ import annotations
@@ -25,15 +25,17 @@ from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, excitation, truth
+from tests.support.rolled_logs import CAPTURE, captured_log, counted_log
+from tests.support.rolled_logs import rolled as independent
 
 TICKED, TILTED, CAPTURED = (max(int(n * SHARE), 10) for n in (300, 200, 200))
 COUNTS, JITTERS = (64, 512, 2048), (0.3, 0.0)  # counts a turn; noise before the encoder rounds, in ticks
 SLOPE = np.radians(1.0)
-CAPTURE = np.array([0.002, 0.002, 0.005])  # [m, m, rad]
+IMPLICIT, PROGRAMS = max(int(100 * SHARE), 10), 8  # draws of the implicit engine, and the runs that they are of
 
 
 def measure() -> Table:
-    """All of it, about four minutes."""
+    """All of it, about eight minutes."""
     table = Table("outputs: counts, positions and a tilted floor", ["what", "draws", "value", "unit"])
     table.notes += [machine(), "worst of the six friction numbers, unless said otherwise"]
     robot = load_robot("axebot")
@@ -42,7 +44,25 @@ def measure() -> Table:
             _ticks(table, robot, counts, jitter)
     _pose(table, robot)
     _tilt(table, robot)
+    _implicit(table, robot.replace(body=robot.body.replace(rotating_frame=True)))
     return table
+
+
+def _implicit(table: Table, robot: Robot) -> None:
+    """Both on a robot as `omnidyn init` makes it, which the implicit engine fits; runs by DOP853, latencies free."""
+    runs = [independent(robot, excitation(20.0, seed=seed), 0.01) for seed in range(max(int(PROGRAMS * SHARE), 1))]
+    for what in ("2048 counts a turn", "pose by motion capture"):
+        draws = Draws(truth(robot))
+        for seed in range(IMPLICIT):
+            run, angle = runs[seed % len(runs)]
+            log = counted_log(run, angle, seed) if "counts" in what else captured_log(run, seed)
+            draws.add(fit_output_error(log, robot, start="rest"))
+        z = np.asarray(draws.error) / np.asarray(draws.std)
+        name = f"turning frame, {what}"
+        _cover(table, name, draws, IMPLICIT)
+        spread = float(np.sqrt(np.mean(z**2)))
+        table.add("0.9 to 1.1", 0.9 <= spread <= 1.1 if SHARE >= 1.0 else None, what="... rms of all z-scores",
+                  draws=IMPLICIT, value=spread)  # fmt: skip
 
 
 def rolled(robot: Robot, voltage: np.ndarray, dt: float) -> tuple[Run, np.ndarray]:

@@ -12,6 +12,7 @@ from omnidyn.statistics import (
     central_interval,
     drawn_times,
     errors_in_variables,
+    find_tick,
     huber_loss,
     huber_mean,
     huber_weight,
@@ -223,3 +224,19 @@ def test_without_errors_of_the_variable_it_is_weighted_least_squares():
     found = errors_in_variables(design, y, variance, np.zeros(20), np.linalg.solve)
     root = np.sqrt(variance)
     np.testing.assert_allclose(found.parameters, np.linalg.lstsq(design / root[:, None], y / root)[0], rtol=1e-12)
+
+
+def test_the_tick_of_a_log_is_found():
+    rng = np.random.default_rng(2)
+    angle = np.cumsum(rng.uniform(-0.2, 0.3, 2000))
+    for counts in (64, 512, 2048):
+        q = 2.0 * np.pi / counts
+        values = np.floor(angle / q) * q + 0.123
+        assert find_tick(values) == pytest.approx(q, rel=1e-9)
+        assert find_tick(np.round(values, 5)) == pytest.approx(q, rel=1e-4)  # as a text file holds it
+        values[::7] = np.nan
+        assert find_tick(values) == pytest.approx(q, rel=1e-9)
+    assert find_tick(angle) == 0.0
+    assert find_tick(np.round(angle, 6)) == 0.0  # too fine to matter
+    assert find_tick(np.zeros(100)) == 0.0
+    assert find_tick(np.full(100, np.nan)) == 0.0

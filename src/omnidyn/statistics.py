@@ -21,6 +21,9 @@ MAX_ITERATIONS, SETTLED = 50, 1e-9  # of a Huber mean, in scales
 SOKAL = 5.0  # autocorrelation times to sum over
 SAME = 1e-6  # readings that differ by less than this share of their range are one reading
 MEMORY_SHARE = 4.0  # a block of a bootstrap is so many times the memory of its series
+ENOUGH, LEAST_ROWS = 20_000, 20  # rows looked at for a tick; rows that change, without which there is none
+FINE = 1e-3  # of the usual change from row to row: a smaller tick is noise like any other
+TEXT = 0.05  # of a tick that the text of a log may round by
 
 
 # ---- spread -----------------------------------------------------------------------------------------------
@@ -274,3 +277,24 @@ def errors_in_variables(
         if converged:
             break
     return FittedLine(parameters, np.ascontiguousarray(np.swapaxes(moved, -1, -2)), inner, converged)
+
+
+def find_tick(values: FloatArray) -> float:
+    """The step of which a column is made [its unit], 0 where it is made of none, or of one too small to matter.
+
+    values (rows,), NaN where missing. Rounding of the text of a log may be up to TEXT of the step.
+    """
+    known = values[np.isfinite(values)][:ENOUGH]
+    change = np.abs(np.diff(known))
+    if change.size < LEAST_ROWS or not change.any():
+        return 0.0
+    moved = change[change > 1e-9 * max(float(np.abs(known).max()), 1.0)]
+    typical = float(np.sqrt(np.mean(change**2)))
+    if moved.size < LEAST_ROWS:
+        return 0.0
+    step = float(moved.min())
+    for _ in range(2):
+        turns = np.round(moved / step)
+        step = float((turns * moved).sum() / (turns * turns).sum())
+    off = np.abs(moved / step - np.round(moved / step))
+    return step if step > FINE * typical and float(np.quantile(off, 0.99)) <= TEXT else 0.0

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_simpson
 from scipy.stats import binom
 
 import omnidyn
@@ -204,3 +205,19 @@ def test_what_is_refused(logs):
     with pytest.raises(InputError, match="did you mean voltage"):
         omnidyn.compare(AXEBOT, logs[0], apply="voltages")
     assert what_is_compared([AXEBOT], logs[:1])[:3] == ("vx", "vy", "omega")
+
+
+def test_angles_of_wheels_are_compared_from_where_they_begin():
+    """Against Simpson's rule on a run with a hundred rows for one; they count from any level."""
+    voltage = np.repeat(np.random.default_rng(4).uniform(-6.0, 6.0, (10, 3)), 15, axis=0)
+    voltage[:15] = 0.0
+    speed = omnidyn.simulate(AXEBOT, np.repeat(voltage, 100, axis=0), 2e-4).wheel_speed
+    assert speed is not None
+    angle = cumulative_simpson(speed, dx=2e-4, axis=0, initial=0.0)[::100] + np.array([5.0, -3.0, 100.0])
+    log = Run(t=0.02 * np.arange(151), voltage=np.vstack([voltage, voltage[-1:]]), wheel_angle=angle)
+    found = omnidyn.compare(AXEBOT, log)
+    assert found.channels == ("a1", "a2", "a3")
+    assert max(found.rmse.values()) < 1e-3
+    assert min(found.fit_percent.values()) > 99.9
+    wrong = omnidyn.compare(coulomb_times(AXEBOT, 1.2), log)
+    assert max(wrong.rmse.values()) > 100.0 * max(found.rmse.values())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.comparison.start import first_level, scatter, start_of, theil_sen
+from omnidyn.comparison.start import first_level, first_slope, scatter, start_of, theil_sen
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
@@ -125,3 +125,29 @@ def test_a_piece_starts_at_its_own_first_row():
     twist = np.outer(T, TWIST)
     start = start_of(moving(twist=twist), ROBOT, slice(100, 200))
     np.testing.assert_allclose(start.twist, TWIST, rtol=1e-9)
+
+
+def test_the_slope_at_the_start_of_what_sets_off_is_0():
+    """From rest under a held voltage: the line through the first samples has the speed of 25 ms later."""
+    v = 0.8 * (1.0 - np.exp(-T / 0.15))
+    path = 0.8 * (T - 0.15 * (1.0 - np.exp(-T / 0.15)))
+    assert abs(first_slope(T, path)) < 0.02 < 0.5 * v[3]
+    tick = 2e-4
+    assert abs(first_slope(T, np.floor(path / tick) * tick)) < 0.02
+    assert first_slope(T, 0.3 * T + path) == pytest.approx(0.3, abs=0.02)
+    noise = np.random.default_rng(1).normal(size=(200, 200)) * 0.002
+    found = [first_slope(T, each) for each in noise]
+    assert np.mean(np.array(found) == 0.0) > 0.8
+    spiked = 0.3 * T + 1e-4 * noise[0]
+    spiked[2] = 5.0
+    assert first_slope(T, spiked) == pytest.approx(0.3, abs=0.01)
+
+
+def test_wheel_angles_tell_where_a_run_starts():
+    """Both their level and, where no speed was logged, the twist."""
+    twist = np.array([0.3, -0.1, 1.0])
+    angle = wheel_speed(ROBOT.wheels, twist) * T[:, None] + [1.0, -2.0, 3.0]
+    found = start_of(Run(t=T, wheel_angle=angle), ROBOT, ALL)
+    np.testing.assert_allclose(found.twist, twist, atol=1e-9)
+    np.testing.assert_allclose(found.angle, [1.0, -2.0, 3.0], atol=1e-9)
+    assert found.source == "the slope of the wheel angles"

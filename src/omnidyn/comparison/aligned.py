@@ -1,7 +1,8 @@
 """Errors as the test of whiteness sees them: without what the start of a free run was off by.
 
 A start is measured, hence off by noise. Off in speed, it is forgotten within a few time constants: that stretch is left
-out. Off in pose, it stays: a shift and a turn of the whole path, which are taken off. rmse and its kin keep both.
+out. Off in pose, it stays: a shift and a turn of the whole path, which are taken off, as a shift is off the angle of a
+wheel. rmse and its kin keep both.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.comparison.traces import Trace
+from omnidyn.comparison.traces import Trace, counts_from_start
 
 FORGOTTEN = 0.6  # [s] four time constants of the robots known, about 0.15 s
 MOST = 0.25  # of a piece is left out at most
@@ -24,7 +25,7 @@ def errors_for_whiteness(component: str, traces: Mapping[str, Sequence[Trace]]) 
         along, pairs = PATH.index(component), zip(*(traces[name] for name in PATH), strict=True)
         return [_without_pose(settled(x), settled(y))[along] for x, y in pairs]
     errors = [settled(trace).error for trace in traces[component]]
-    return [_centred(each) for each in errors] if component in (*PATH, "heading") else errors
+    return [_centred(each) for each in errors] if counts_from_start(component) else errors
 
 
 def settled(trace: Trace) -> Trace:

@@ -11,14 +11,13 @@ from omnidyn.comparison.difference import ModelDifference, difference
 from omnidyn.comparison.metrics import Metrics, metrics
 from omnidyn.comparison.replay import HOLD, Replay, choose_input, refuse_other_robot, replay
 from omnidyn.comparison.result import Comparison, Segment
-from omnidyn.comparison.traces import Trace, compared_components, trace_of
+from omnidyn.comparison.traces import Trace, compared_components, counts_from_start, trace_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 from omnidyn.simulation.simulate import TOLERANCE
 
-POSE = components("pose", 0)
 ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
@@ -84,14 +83,15 @@ def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | 
     if not found:
         raise InsufficientDataError(
             "the logs hold nothing that a model predicts", got=", ".join(runs[0].channels),
-            expected="twist, wheel_speed, current or pose", remedy="map the columns of speeds, currents or the pose",
+            expected="twist, wheel_speed, wheel_angle, current or pose",
+            remedy="map the columns of speeds, angles, currents or the pose",
         )  # fmt: skip
     return in_order(found, robots[0].wheels.count)
 
 
 def in_order(names: Mapping[str, None], wheels: int) -> tuple[str, ...]:
     """Components in the order they are shown in: speeds first."""
-    channels = ("twist", "wheel_speed", "current", "voltage", "pose")
+    channels = ("twist", "wheel_speed", "wheel_angle", "current", "voltage", "pose")
     return tuple(name for channel in channels for name in components(channel, wheels) if name in names)
 
 
@@ -131,11 +131,11 @@ def _traces(
 
 
 def _overall(traces: Mapping[str, list[Trace]]) -> dict[str, Metrics]:
-    """Component -> metrics over all traces. A pose has no lag: it cannot be told from another speed."""
+    """Component -> metrics over all traces. What counts from the start has no lag: a speed would look the same."""
     found: dict[str, Metrics] = {}
     for key, rows in traces.items():
-        pose = key in POSE
-        each = metrics(rows, errors_for_whiteness(key, traces), with_lag=not pose, start_known=pose)
+        known = counts_from_start(key)
+        each = metrics(rows, errors_for_whiteness(key, traces), with_lag=not known, start_known=known)
         if each is not None:
             found[key] = each
     return found
@@ -154,7 +154,10 @@ def _differences(
     traces: Sequence[Mapping[str, list[Trace]]], channels: Sequence[str], seed: int
 ) -> dict[str, ModelDifference]:
     first, second = traces
-    found = ((key, difference(first[key], second[key], len(channels), seed, whole=key in POSE)) for key in channels)
+    found = (
+        (key, difference(first[key], second[key], len(channels), seed, whole=counts_from_start(key)))
+        for key in channels
+    )
     return {key: each for key, each in found if each is not None}
 
 

@@ -29,10 +29,11 @@ from omnidyn.statistics import stretches
 
 INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
 SET_SPEEDS = INPUTS[2:]
-SIMULATED = ("voltage", "current", "wheel_speed", "twist", "pose")
+SIMULATED = ("voltage", "current", "wheel_speed", "wheel_angle", "twist", "pose")
 HOLD = 0.2  # [s] a missing input keeps its last value for so long
 FEWEST = 3  # rows of a piece
 SHOWN = 3  # warnings of one kind
+FINEST, MOST_PARTS = 2.5e-3, 20  # [s] rows over which the angles of wheels are summed, and half their number in a row
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,13 +201,32 @@ def _free_run(
         robot, dt=np.diff(run.t[rows]), **{applied: inputs[held]}, **extra, twist=start.twist, pose=start.pose,
         current=current, tol=tol,
     )  # fmt: skip
+    if run.wheel_angle is not None:
+        dt = np.diff(run.t[rows])
+        parts = 2 * min(int(np.ceil(dt.max() / (2.0 * FINEST))), MOST_PARTS)
+        given = {name: np.repeat(values, parts, axis=0) for name, values in {applied: inputs[held], **extra}.items()}
+        fine = simulate(robot, dt=np.repeat(dt / parts, parts), **given, twist=start.twist, current=current, tol=tol)
+        simulated = simulated.replace(wheel_angle=start.angle + _turned(fine, parts))
     return simulated, start.source
+
+
+def _turned(fine: Run, parts: int) -> FloatArray:
+    """Angles that the wheels turn by [rad], by Simpson's rule over `parts` rows for one of the log. Shape (rows, n)."""
+    assert fine.wheel_speed is not None
+    rule = np.where(np.arange(parts + 1) % 2, 4.0, 2.0) / 3.0
+    rule[[0, -1]] = 1.0 / 3.0
+    first = np.arange(0, len(fine) - 1, parts)
+    held = fine.wheel_speed[first[:, None] + np.arange(parts + 1)]
+    steps = np.einsum("p,kpw->kw", rule, held) * np.diff(fine.t)[first, None]
+    return np.vstack([np.zeros(held.shape[2]), np.cumsum(steps, axis=0)])
 
 
 def _assembled(run: Run, robot: Robot, pieces: list[slice], parts: list[Run]) -> Run:
     """One Run at the times of the log, NaN between the pieces."""
     channels: dict[str, Any] = {}
     for name in SIMULATED:
+        if getattr(parts[0], name) is None:
+            continue
         width = robot.wheels.count if CHANNELS[name] == WHEEL else 3
         whole = np.full((len(run), width), np.nan)
         for rows, part in zip(pieces, parts, strict=True):

@@ -11,40 +11,49 @@ from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
-from omnidyn.statistics import robust_std
+from omnidyn.statistics import find_tick, robust_std
 
 WINDOW = 0.05  # [s] the first samples: well below the time constants of a robot, about 0.15 s
 FEWEST, MOST = 5, 65  # samples of a line through the first ones; each try doubles them
 LONGEST = 0.25  # [s] FEWEST samples that take longer are no neighbours: only the first one counts
 SURE = 2.0  # standard errors beyond which a difference is believed
 END_OF_LINE = 2.2  # standard error of a Theil-Sen line at its end, times sqrt(n) over the noise
+FIT, FLAT = 4.0, 0.1  # noises, and shares of its bend, that the samples of a parabola may be away from it
 FAR = 3.0  # a first sample so many ranges of the next ones away from them is a spike
 
 
 class Start(NamedTuple):
-    """twist [m/s, m/s, rad/s] and pose [m, m, rad], shapes (3,); where the twist comes from, in words."""
+    """twist [m/s, m/s, rad/s] and pose [m, m, rad], shapes (3,); where the twist comes from, in words.
+
+    angle: of the wheels [rad], shape (n,); 0 where they were not logged.
+    """
 
     twist: FloatArray
     pose: FloatArray
     source: str
+    angle: FloatArray
 
 
 def start_of(run: Run, robot: Robot, rows: slice) -> Start:
     """The state at the first row of a piece of `run`, from its first samples.
 
-    The twist is that over the ground where it was logged, else that of the wheels, else the slope of the pose, else
-    rest. A pose that was not logged starts at 0.
+    The twist is that over the ground where it was logged, else that of the wheels, else the slope of their angles, else
+    that of the pose, else rest. A pose that was not logged starts at 0.
     """
     t = run.t[rows]
+    angle = np.zeros(robot.wheels.count) if run.wheel_angle is None else _levels(t, run.wheel_angle[rows])
     pose = np.zeros(3) if run.pose is None else _levels(t, _continuous(run.pose[rows]))
     if run.twist is not None and _seen(run.twist[rows]):
-        return Start(_levels(t, run.twist[rows], at_rest=True), pose, "the measured twist")
+        return Start(_levels(t, run.twist[rows], at_rest=True), pose, "the measured twist", angle)
     if run.wheel_speed is not None and _seen(run.wheel_speed[rows]):
         speeds = _levels(t, run.wheel_speed[rows], at_rest=True)
-        return Start(twist_from_wheel_speed(robot.wheels, speeds), pose, "the wheel speeds")
+        return Start(twist_from_wheel_speed(robot.wheels, speeds), pose, "the wheel speeds", angle)
+    if run.wheel_angle is not None and _seen(run.wheel_angle[rows]):
+        speeds = _slopes(t, run.wheel_angle[rows])
+        return Start(twist_from_wheel_speed(robot.wheels, speeds), pose, "the slope of the wheel angles", angle)
     if run.pose is not None and _seen(run.pose[rows]):
-        return Start(_twist_from_pose(t, _continuous(run.pose[rows])), pose, "the slope of the pose")
-    return Start(np.zeros(3), pose, "rest, as no speed was logged")
+        return Start(_twist_from_pose(t, _continuous(run.pose[rows])), pose, "the slope of the pose", angle)
+    return Start(np.zeros(3), pose, "rest, as no speed was logged", angle)
 
 
 def first_level(t: FloatArray, values: FloatArray, at_rest: bool = False) -> float:
@@ -130,13 +139,35 @@ def _continuous(pose: FloatArray) -> FloatArray:
 
 
 def _twist_from_pose(t: FloatArray, pose: FloatArray) -> FloatArray:
-    slopes, heading = np.zeros(3), 0.0
-    for axis in range(3):
-        times, values = _first_samples(t, pose[:, axis])
-        if len(times):
-            slopes[axis], level = theil_sen(times - t[0], values)
-            heading = level if axis == 2 else heading
-    return world_to_body(heading) @ slopes
+    times, heading = _first_samples(t, pose[:, 2])
+    level = theil_sen(times - t[0], heading)[1] if len(times) else 0.0
+    return world_to_body(level) @ _slopes(t, pose)
+
+
+def _slopes(t: FloatArray, values: FloatArray) -> FloatArray:
+    """Slope of each column at its first samples, see `first_slope`. Shape (columns,)."""
+    return np.array([first_slope(t, column) for column in values.T])
+
+
+def first_slope(t: FloatArray, values: FloatArray) -> float:
+    """The slope at the first samples: of the line of median slope, or at the start of a parabola that surely bends.
+
+    Within two standard errors of 0 it is 0. t [s] and values, shape (n,); NaN are passed over.
+    """
+    noise = max(scatter(t, values), find_tick(values) / np.sqrt(12.0))
+    t, values = _first_samples(t, values)
+    if len(t) < 2:
+        return 0.0
+    t = t - t[0]
+    slope, error = theil_sen(t, values)[0], noise / (float(np.std(t)) * np.sqrt(len(t)))
+    if len(t) >= FEWEST:
+        design = np.vander(t, 3, increasing=True)
+        found = np.linalg.lstsq(design, values, rcond=None)[0]
+        errors = noise * np.sqrt(np.diag(np.linalg.pinv(design.T @ design, rcond=1e-20, hermitian=True)))
+        left, bend = np.abs(values - design @ found).max(), abs(found[2])
+        if bend > SURE * errors[2] and left <= FIT * noise + FLAT * bend * t[-1] ** 2:  # and none of them is a spike
+            slope, error = float(found[1]), float(errors[1])
+    return slope if abs(slope) > SURE * error else 0.0
 
 
 def _seen(values: FloatArray) -> bool:

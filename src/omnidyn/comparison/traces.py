@@ -11,7 +11,8 @@ from omnidyn.comparison.replay import SET_SPEEDS
 from omnidyn.logs.channels import components, place, si_suffix
 from omnidyn.run import Run
 
-COMPARED = ("twist", "wheel_speed", "current", "pose")
+COMPARED = ("twist", "wheel_speed", "wheel_angle", "current", "pose")
+SINCE_START = ("wheel_angle", "pose")  # channels that count from where a piece begins
 TURN = 2.0 * np.pi
 
 
@@ -70,6 +71,12 @@ def unwrapped(measured: FloatArray, model: FloatArray) -> FloatArray:
     error = np.unwrap(model[known] - measured[known])
     result[known] = model[known] - (error - TURN * np.round(error[0] / TURN))
     return result
+
+
+def counts_from_start(component: str) -> bool:
+    """Whether a component counts from where a piece begins: its level there was given to the model."""
+    found = place(component)
+    return found is not None and found[0] in SINCE_START
 
 
 def unit(component: str) -> str:

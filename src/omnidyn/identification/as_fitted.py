@@ -18,14 +18,8 @@ from omnidyn.model.keys import GAINS, Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
-LATE = (
-    "twist",
-    "wheel_speed",
-    "current",
-    "heading",
-    "position",
-    "wheel_angle",
-)  # channels that may be late, the first one sets the clock
+LATE = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")  # the first late one sets the clock
+POSE = ("heading", "position")
 
 
 def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
@@ -34,7 +28,7 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
     Without nuisances it is the run itself. With a latency the clock is that of the first late channel, whose samples
     are left as they are; a voltage that changes within a row is the mean over it, and other channels are interpolated
     by what they differ. At 100 Hz the mean is off by less than 1 % of what one row changes. A tilt becomes the volts
-    that push as hard; currents do not follow it. A wheel angle is dropped.
+    that push as hard; currents do not follow it.
     """
     values = {name: nuisance.value for name, nuisance in fit.nuisances.items()}
     if not values:
@@ -50,25 +44,26 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
     main = next(late[name] for name in LATE if f"{LATENCY}.{name}" in values)
     parts = segments(run.t)
     moved = np.concatenate([mean_before(run.t[rows], voltage[rows], main) for rows in parts])
-    changes: dict[str, FloatArray] = {}
-    for name in LATE[:3]:
-        own = getattr(run, name)
-        if own is not None:
-            changes[name] = _shifted(run.t, own, late[name] - main, parts)
-    if run.pose is not None:
-        moved_by = [late["position"] - main, late["position"] - main, late["heading"] - main]
-        columns = [_shifted(run.t, run.pose[:, k : k + 1], by, parts) for k, by in enumerate(moved_by)]
-        changes["pose"] = np.hstack(columns)
-    note = f"channels were moved back by the fitted latency of {main:.4g} s"
     return run.replace(
-        t=run.t - main,
-        voltage=moved,
-        duty=None,
-        supply=None,
-        wheel_angle=None,
-        warnings=(*run.warnings, note),
-        **changes,
-    )
+        t=run.t - main, voltage=moved, duty=None, supply=None, **_moved(run, late, main, parts),
+        warnings=(*run.warnings, _note(main)),
+    )  # fmt: skip
+
+
+def _moved(run: Run, late: Mapping[str, float], main: float, parts: list[slice]) -> dict[str, FloatArray]:
+    """The channels moved back by their latency, to rows that are `main` late."""
+    found = {
+        name: _shifted(run.t, own, late[name] - main, parts)
+        for name in LATE if name not in POSE and (own := getattr(run, name)) is not None
+    }  # fmt: skip
+    if run.pose is not None:
+        by = [late["position"] - main, late["position"] - main, late["heading"] - main]
+        found["pose"] = np.hstack([_shifted(run.t, run.pose[:, [k]], each, parts) for k, each in enumerate(by)])
+    return found
+
+
+def _note(main: float) -> str:
+    return f"channels were moved back by the fitted latency of {main:.4g} s"
 
 
 def pushing(robot: Robot, values: Mapping[str, float]) -> FloatArray:
@@ -85,15 +80,9 @@ def _set_points_as_fitted(run: Run, set_point: FloatArray, values: Mapping[str, 
     main = next(late[name] for name in LATE if f"{LATENCY}.{name}" in values)
     parts = segments(run.t)
     moved = np.concatenate([mean_before(run.t[rows], set_point[rows], main, 0.0) for rows in parts])
-    shifted = {
-        name: _shifted(run.t, own, late[name] - main, parts)
-        for name in LATE[:3]
-        if (own := getattr(run, name)) is not None
-    }
     return run.replace(
-        t=run.t - main, voltage=None, duty=None, supply=None, wheel_angle=None, twist_command=None,
-        wheel_speed_command=moved, **shifted,
-        warnings=(*run.warnings, f"channels were moved back by the fitted latency of {main:.4g} s"),
+        t=run.t - main, voltage=None, duty=None, supply=None, twist_command=None, wheel_speed_command=moved,
+        **_moved(run, late, main, parts), warnings=(*run.warnings, _note(main)),
     )  # fmt: skip
 
 

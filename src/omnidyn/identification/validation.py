@@ -8,15 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.arrays import FloatArray
+from omnidyn.comparison.aligned import PATH, errors_for_whiteness
 from omnidyn.comparison.compare import compare
 from omnidyn.comparison.result import Comparison
-from omnidyn.comparison.traces import unit
+from omnidyn.comparison.traces import counts_from_start, unit
 from omnidyn.document import Document, Table, cell, chance_cell
 from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
 from omnidyn.run import Run
-from omnidyn.statistics import robust_std
+from omnidyn.statistics import find_tick, robust_std
 
 STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
 FITTED, HELD_OUT = "fitted", "held out"
@@ -30,7 +32,9 @@ NOT_WHITE = 0.01
 class Score:
     """One component of some logs. rmse in SI; fit_percent [%] and whiteness as in comparison.Metrics; chi2: mean square
     of the error over the noise that the fit found, 1 where the model leaves nothing but noise, None without a noise;
-    after a fit by Student's t from the median size of the error, for outliers have no part in that noise.
+    after a fit by Student's t from the median size of the error, for outliers have no part in that noise. chi2 of what
+    counts from the start (a pose, the angle of a wheel) is without what the start was off by; that of a counted angle
+    allows for the tick of its encoder, tick^2/12.
     """
 
     samples: int
@@ -103,10 +107,11 @@ class Validation:
         """Errors on held-out logs over what white noise, which differs from row to row, makes of them."""
         found = self.held_out
         assert found is not None
-        errors = [found.trace(found.robots[0], name, segment).error for segment in found.segments]
+        errors = _errors(found, name)
         steps = np.concatenate([np.diff(each) for each in errors])
         scatter = float(np.sqrt(0.5 * np.nanmean(steps**2))) if np.isfinite(steps).any() else 0.0
-        return self.scores[HELD_OUT][name].rmse / scatter if scatter > 0.0 else 0.0
+        size = float(np.sqrt(np.nanmean(np.concatenate(errors) ** 2)))
+        return size / scatter if scatter > 0.0 else 0.0
 
     def summary(self) -> str:
         """A plain table, for reading."""
@@ -146,22 +151,49 @@ def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[
 
 
 def _scores(fit: OutputErrorEstimate, found: Comparison) -> dict[str, Score]:
-    """The score of each component. What was not fitted has no noise, and no chi2."""
+    """The score of each component. What was not fitted has no noise, and no chi2.
+
+    An encoder at rest repeats what it rounds off: of a counted angle nothing tells whether errors are white.
+    """
     scores = {}
     for name, each in found.overall[found.robots[0]].items():
-        chi2 = _chi2(fit, found, name, each.rmse)
-        scores[name] = Score(each.samples, each.rmse, each.fit_percent, chi2, each.whiteness, each.lag)
+        tick = _tick(found, name)
+        chi2, white = _chi2(fit, found, name, tick), None if tick else each.whiteness
+        scores[name] = Score(each.samples, each.rmse, each.fit_percent, chi2, white, each.lag)
     return scores
 
 
-def _chi2(fit: OutputErrorEstimate, found: Comparison, name: str, rmse: float) -> float | None:
+def _errors(found: Comparison, name: str) -> list[FloatArray]:
+    """Errors of each free run; of what counts from the start, without what the start was off by."""
+    near = PATH if name in PATH else (name,)
+    traces = {
+        key: [found.trace(found.robots[0], key, segment) for segment in found.segments]
+        for key in near if key in found.channels
+    }  # fmt: skip
+    if counts_from_start(name):
+        return errors_for_whiteness(name, traces)
+    return [trace.error for trace in traces[name]]
+
+
+def _tick(found: Comparison, name: str) -> float:
+    """The largest tick of a counted angle in any log [rad]; 0 for what is not counted."""
+    channel, column = place(name) or ("", 0)
+    if channel != "wheel_angle":
+        return 0.0
+    angles = [run.wheel_angle for run in found.measured if run.wheel_angle is not None]
+    return max((find_tick(angle[:, column]) for angle in angles), default=0.0)
+
+
+def _chi2(fit: OutputErrorEstimate, found: Comparison, name: str, tick: float) -> float | None:
     noise = fit.noise.get(output_name(name))
     if not noise:
         return None
-    if STUDENT_WORDS not in fit.method:
-        return rmse**2 / noise**2
-    errors = np.concatenate([found.trace(found.robots[0], name, segment).error for segment in found.segments])
-    return float((robust_std(errors[np.isfinite(errors)], 0.0) / noise) ** 2)
+    errors = np.concatenate(_errors(found, name))
+    errors = errors[np.isfinite(errors)]
+    if not errors.size:
+        return None
+    square = robust_std(errors, 0.0) ** 2 if STUDENT_WORDS in fit.method else np.mean(errors**2)
+    return float(square / (noise**2 + tick**2 / 12.0))
 
 
 def output_name(component: str) -> str:

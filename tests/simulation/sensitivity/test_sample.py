@@ -53,7 +53,7 @@ def test_between_the_rows(robot):
         twist, heading = at(robot, voltage, 0.01, late)
         np.testing.assert_array_equal(np.isnan(own.twist), np.isnan(twist))
         np.testing.assert_allclose(own.twist, twist, atol=1e-6)  # ten times the tolerance in rad/s
-        np.testing.assert_allclose(own.heading, heading, atol=1e-6)
+        np.testing.assert_allclose(own.heading()[0][:, 0], heading, atol=1e-6)
         before, after = at(robot, voltage, 0.01, late + 1e-4)[0], at(robot, voltage, 0.01, late - 1e-4)[0]
         rate, known = (after - before) / 2e-4, slice(5, 115)
         if late:  # at a row the voltage changes, and the rate with it
@@ -61,7 +61,7 @@ def test_between_the_rows(robot):
         for k, key in enumerate(KEYS):
             value, width = Key.parse(key).get(robot), 1e-4
             up, down = (at(Key.parse(key).set(robot, value * (1 + s * width)), voltage, 0.01, late) for s in (1, -1))
-            for found, ends in ((own.dtwist[:, k], (up[0], down[0])), (own.dheading[:, k], (up[1], down[1]))):
+            for found, ends in ((own.dtwist[:, k], (up[0], down[0])), (own.dway[:, k, 0], (up[1], down[1]))):
                 slope = (ends[0] - ends[1]) / (2.0 * width)
                 size = np.nanmax(np.abs(slope), axis=0)
                 assert (np.nanmax(np.abs(found - slope), axis=0) <= 2e-5 * np.max(size) + 1e-6).all(), key

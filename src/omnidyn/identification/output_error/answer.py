@@ -29,7 +29,7 @@ class OutputErrorEstimate(Estimate):
     Student's t without its wild samples, of counts before the encoder rounds.
     unidentifiable: names of what the data do not determine; they keep what the robot had, std and interval are
     infinite. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
-    iterations, converged: of the minimisation.
+    unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the minimisation.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -37,6 +37,7 @@ class OutputErrorEstimate(Estimate):
     unidentifiable: tuple[str, ...] = ()
     blind: tuple[str, ...] = ()
     covariance: str = ""
+    unused: tuple[str, ...] = ()
     iterations: int = 0
     converged: bool = True
 
@@ -47,14 +48,15 @@ class OutputErrorEstimate(Estimate):
             for name, own in self.nuisances.items()
         ]
         noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
-        return [*super()._parts(), *logs, *noise, Points(self.blind, "not shown by the data:")]
+        left = [Points(self.blind, "not shown by the data:"), Points(self.unused, "not used:")]
+        return [*super()._parts(), *logs, *noise, *left]
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it."""
         nuisances = {name: asdict(own) for name, own in self.nuisances.items()}
         return super().to_dict() | plain({
             "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable, "blind": self.blind,
-            "covariance": self.covariance, "converged": self.converged,
+            "covariance": self.covariance, "unused": self.unused, "converged": self.converged,
         })  # fmt: skip
 
 

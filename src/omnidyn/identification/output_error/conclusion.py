@@ -75,6 +75,7 @@ def conclude(
         unidentifiable=blind,
         blind=tuple(_direction(problem, value, way, known.blind) for value, way in known.directions),
         covariance=known.kind,
+        unused=_unused(records),
         iterations=solution.iterations,
         converged=solution.converged,
     )
@@ -255,6 +256,18 @@ def _warnings(
             f"intervals allow for it{by}, up to {max(known.widening, 1.0):.2g} times as wide as for white noise"
         )
     return words
+
+
+def _unused(records: Sequence[Record]) -> tuple[str, ...]:
+    """What the logs hold and the fit does not use: each reason once, with the logs it is true of where not of all."""
+    where: dict[str, list[str]] = {}
+    for record in records:
+        for words in record.unused:
+            where.setdefault(words, []).append(record.source or "a log")
+    return tuple(
+        words if len(own) == len(records) else f"{words} ({len(own)} of {len(records)} logs, such as {own[0]})"
+        for words, own in where.items()
+    )
 
 
 def _direction(problem: Problem, value: float, way: FloatArray, lost: BoolArray) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from omnidyn.identification.output_error.prepare import is_exact
 from omnidyn.identification.output_error.problem.record import LOOP_REMEDY
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
@@ -22,9 +21,6 @@ def why_no_inputs(runs: Sequence[Run], robot: Robot) -> str:
                 return f"{run.source or 'a log'} holds set speeds only; to fit it whole, {LOOP_REMEDY}"
         elif none:
             return f"{run.source or 'a log'} holds no voltage and no duty"
-        known = [name for name in OUTPUTS if getattr(run, name) is not None]
-        if not known:
-            return f"{run.source or 'a log'} holds no speed, current or pose"
-        if known == ["wheel_angle"] and (none or not is_exact(robot)):
-            return f"{run.source or 'a log'} holds angles of wheels only, which a fit of {robot.name} does not know"
+        if not any(getattr(run, name) is not None for name in OUTPUTS):
+            return f"{run.source or 'a log'} holds no speed, angle, current or pose"
     return ""

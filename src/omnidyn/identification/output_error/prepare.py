@@ -33,6 +33,7 @@ NOTHING = 1e-9  # [N, N m] a drive that is only rounding
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
+START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 
 
@@ -156,7 +157,11 @@ def make_problem(
     more = nuisance_parameters(auto if question.nuisances is None else question.nuisances, records, robot)
     late = any(p.name.startswith(LATENCY) for p in more)
     start = question.start
-    parts = loop_pieces(records, robot, start) if engine == LOOP else pieces(records, robot, start, late)
+    parts = (
+        loop_pieces(records, robot, start)
+        if engine == LOOP
+        else pieces(records, robot, start, late, START_STD if engine == IMPLICIT else None)
+    )
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
     if rows <= len(own) + len(more):
         raise InsufficientDataError(

@@ -89,20 +89,17 @@ def derivatives(
 
 def differentiate(
     ready: Prepared, given: Commands, rates: FloatArray, start: tuple[FloatArray, FloatArray], tol: float,
-    settled: float = 0.0, travels: bool = True,
+    settled: float = 0.0,
 ) -> Derivatives:  # fmt: skip
     """`derivatives` of one run.
 
     rates: derivatives of the voltages or set points, shape (K, rows, n), by key / scale, as are all derivatives up to
-    the last line. start: twist and pose. tol: 0 for a fixed step. settled, travels: of a speed loop, see
+    the last line. start: twist and pose. tol: 0 for a fixed step. settled: of a speed loop, see
     `run_loop_with_derivatives`.
     """
     robot, keys, robots, numbers, plants = ready.robot, ready.keys, ready.robots, ready.numbers, ready.plants
-    if given.set_point is not None and RATE in keys:
-        raise UnsupportedError(
-            "no derivative by the rate of the speed loop", got=RATE, expected="other keys",
-            remedy="its ticks would move; try a few rates instead", where="keys",
-        )  # fmt: skip
+    if given.set_point is not None:
+        refuse_rate(keys)
     directions, length = directions_of(numbers, plants, rates), numbers.body[LENGTH]
     stretch = difference(np.array([p.body[LENGTH] for p in plants]))
     first = np.zeros((len(keys), N_AXES + numbers.wheels))
@@ -112,9 +109,9 @@ def differentiate(
         outcome, ds, dposes = run_with_derivatives(numbers, directions, given, bound, start, first, tol)
         voltage, dvolts = given.voltage, rates
     else:
-        outcome, ds, dposes, voltage, dvolts, _ = run_loop_with_derivatives(
-            ready, directions, given, start, first, tol, settled, travels
-        )
+        found = run_loop_with_derivatives(robot, robots, numbers, directions, given, start, first, tol, settled)
+        outcome, ds, dposes, rows = found.outcome, found.dstate, found.dpose, found.keep[:-1]
+        voltage, dvolts = found.voltage[rows], found.dvoltage[:, rows]
     assert voltage is not None
     run = implicit_run(robot, given, voltage, outcome, tol)
     assert run.twist is not None
@@ -127,6 +124,15 @@ def differentiate(
     dcurrent = dcurrent * (np.append(bound, bound[-1:], axis=0)[:, None] > 0.0)  # none while a motor coasts
     parts = (np.moveaxis(part, 1, 2) / ready.scale for part in (dtwist, dposes, dcurrent))
     return Derivatives(run, keys, *parts)
+
+
+def refuse_rate(keys: Sequence[str]) -> None:
+    """Raises UnsupportedError where the rate of a speed loop is among the keys."""
+    if RATE in keys:
+        raise UnsupportedError(
+            "no derivative by the rate of the speed loop", got=RATE, expected="other keys",
+            remedy="its ticks would move; try a few rates instead", where="keys",
+        )  # fmt: skip
 
 
 def run_with_derivatives(

@@ -13,22 +13,26 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.frames import body_to_world
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.model.stick_slip.plant import plant
+from omnidyn.model.stick_slip.plant import Plant, plant
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands
 from omnidyn.simulation.implicit.march import capped
-from omnidyn.simulation.sensitivity.derivatives import run_with_derivatives
+from omnidyn.simulation.sensitivity.derivatives import refuse_rate, run_with_derivatives
 from omnidyn.simulation.sensitivity.directions import (
     current_derivatives,
     difference,
     directions_of,
     refuse_switched_off,
 )
-from omnidyn.simulation.sensitivity.sample import MEET, Samples, empty_samples
+from omnidyn.simulation.sensitivity.loop import LoopRun, run_loop_with_derivatives
+from omnidyn.simulation.sensitivity.sample import MEET, PATH, TURN, Samples, empty_samples
 from omnidyn.simulation.simulate import as_tolerance, current_bounds
+
+PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,35 +52,59 @@ class Direction:
 
 @dataclass(frozen=True, eq=False)
 class LateSample:
-    """What a channel with one latency shows at the rows of a log; NaN where that lies outside the run.
+    """What a channel with one latency, `late` [s], shows at the rows of a log; NaN where that lies outside the run.
 
-    twist (rows, 3), pace: its time derivative, heading (rows,), voltage (rows, n) in force, current (rows, n) of
-    dynamic electrics, else None. d...: derivatives, (rows, K, 3), (rows, K), (rows, K, n).
+    twist (rows, 3), pace: its time derivative, way (rows, W) since the start, voltage (rows, n) in force, current
+    (rows, n) of dynamic electrics, else None. d...: derivatives, (rows, K, 3), (rows, K, W), (rows, K, n).
     """
 
     robot: Robot
     directions: tuple[Direction, ...]
+    late: float
     twist: FloatArray
     pace: FloatArray
-    heading: FloatArray
+    way: FloatArray
     voltage: FloatArray
     dtwist: FloatArray
-    dheading: FloatArray
+    dway: FloatArray
     dvoltage: FloatArray
     current: FloatArray | None
     current_pace: FloatArray | None
     dcurrent: FloatArray | None
 
+    def heading(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(heading since the start [rad], its time derivative, derivatives). Shapes (rows, 1), same, (rows, K, 1)."""
+        return self.way[:, :TURN], self.twist[:, 2:], self.dway[..., :TURN]
+
     def wheel_speeds(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(wheel speeds [rad/s], their time derivative, their derivatives). Shapes (rows, n), same, (rows, K, n)."""
+        value, by = self._at_wheels(self.twist, self.dtwist)
+        return value, wheel_speed(self.robot.wheels, self.pace), by
+
+    def wheel_angles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(angles that the wheels have turned by [rad], ...), as above: of the path what speeds are of the twist."""
+        value, by = self._at_wheels(self.way[:, PATH_AND_TURN], self.dway[..., PATH_AND_TURN])
+        return value, wheel_speed(self.robot.wheels, self.twist), by
+
+    def _at_wheels(self, motion: FloatArray, by: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What the wheels make of a motion of the body (rows, 3), and of its derivatives (rows, K, 3)."""
         wheels = self.robot.wheels
-        by = np.empty((len(self.twist), len(self.directions), wheels.count))
+        found = np.empty((*by.shape[:2], wheels.count))
         for k, one in enumerate(self.directions):
-            by[:, k] = wheel_speed(wheels, self.dtwist[:, k])
+            found[:, k] = wheel_speed(wheels, by[:, k])
             if one.up is not None and one.down is not None and one.up.wheels != one.down.wheels:
-                ends = (wheel_speed(end.wheels, self.twist) for end in (one.up, one.down))
-                by[:, k] += difference(np.array([*ends]))[0]
-        return wheel_speed(wheels, self.twist), wheel_speed(wheels, self.pace), by
+                ends = (wheel_speed(end.wheels, motion) for end in (one.up, one.down))
+                found[:, k] += difference(np.array([*ends]))[0]
+        return wheel_speed(wheels, motion), found
+
+    def position(self, facing: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(place since the start [m], its time derivative, its derivatives) of a robot that faced `facing` [rad] there.
+
+        Shapes (rows, 2), same, (rows, K, 2).
+        """
+        turn = body_to_world(facing)[:2, :2].T
+        pace = np.einsum("kij,kj->ki", body_to_world(facing + self.way[:, 0])[:, :2, :2], self.twist[:, :2])
+        return self.way[:, PATH:] @ turn, pace, self.dway[..., PATH:] @ turn
 
     def currents(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(currents [A], their time derivative under held voltages, their derivatives), shapes as above."""
@@ -97,50 +125,111 @@ class LateSample:
 
 def late_samples(
     robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
-    late: Sequence[float], tol: float | None,
+    late: Sequence[float], tol: float | None, ways: int = TURN,
 ) -> tuple[list[LateSample], int]:  # fmt: skip
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
-    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors; start: (3,) twist; tol as for `simulate`.
-    Also returns the number of rows in which the friction solver hit its cap.
-    Raises InputError for a direction that changes friction or a gear loss which is off.
+    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors; start: (3,) twist; tol as for `simulate`;
+    ways: what is wanted of the way, see sample.py. Also returns the number of rows in which the friction solver hit its
+    cap. Raises InputError for a direction that changes friction or a gear loss which is off.
     """
-    numbers = plant(robot)
-    plants = [numbers if r is None else plant(r) for one in directions for r in (one.up, one.down)]
-    for k, one in enumerate(directions):
-        refuse_switched_off(one.name, numbers, plants[2 * k])
+    numbers, plants = _plants(robot, directions)
     rates = np.zeros((len(directions), *voltage.shape))
-    first = np.zeros((len(directions), N_AXES + numbers.wheels))
-    length, stretch = numbers.body[LENGTH], difference(np.array([p.body[LENGTH] for p in plants]))
+    first, length = np.zeros((len(directions), N_AXES + numbers.wheels)), numbers.body[LENGTH]
+    stretch = _stretch(plants)
     for k, one in enumerate(directions):
         rates[k] = 0.0 if one.voltage is None else one.voltage
         first[k, :N_AXES] = 0.0 if one.start is None else one.start * [1.0, 1.0, length]
     first[:, 2] += start[2] * stretch
     given = Commands(np.ascontiguousarray(np.diff(t)), np.ascontiguousarray(voltage))
-    size = N_AXES + (numbers.wheels if robot.motor.electrical == DYNAMIC else 0)
-    seen = empty_samples(t, np.asarray(late, dtype=float), size, len(directions))
+    seen = _room(robot, t, late, len(directions), ways)
     outcome, _, _ = run_with_derivatives(
         numbers, directions_of(numbers, plants, rates), given, current_bounds(robot, given, len(given.dt)),
         (np.asarray(start, dtype=float), np.zeros(3)), first, as_tolerance(tol), seen,
     )  # fmt: skip
+    return _looks(robot, directions, seen, (length, stretch), (seen.t, voltage, rates)), capped(outcome)
+
+
+def looped_samples(
+    robot: Robot, t: FloatArray, set_point: FloatArray, directions: Sequence[Direction], late: Sequence[float],
+    tol: float | None, ways: int = TURN, settled: float = 0.0,
+) -> list[LateSample]:  # fmt: skip
+    """The same through the speed loop of the robot, under set points [rad/s], (rows - 1, n), from rest.
+
+    Before the run it has rested. Directions change the robot only. settled: see `run_loop_with_derivatives`.
+    """
+    refuse_rate([one.name for one in directions])
+    numbers, plants = _plants(robot, directions)
+    robots = [each or robot for one in directions for each in (one.up, one.down)]
+    given = Commands(np.ascontiguousarray(np.diff(t)), None, set_point=np.ascontiguousarray(set_point))
+    seen, count = _room(robot, t, late, len(directions), ways), len(directions)
+    found = run_loop_with_derivatives(
+        robot, robots, numbers, directions_of(numbers, plants, np.zeros((count, *set_point.shape))), given,
+        (np.zeros(3), np.zeros(3)), np.zeros((count, N_AXES + numbers.wheels)), as_tolerance(tol), settled, seen,
+    )  # fmt: skip
+    for c, own in enumerate(seen.late):
+        rests = seen.t - own < -MEET
+        for part in (seen.state, seen.pace, seen.way, seen.dstate, seen.dway):
+            part[c, rests] = 0.0
+    return _looks(robot, directions, seen, (numbers.body[LENGTH], _stretch(plants)), _in_force(found))
+
+
+def _in_force(found: LoopRun) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """[s] when each voltage of a loop comes into force, the voltages, derivatives: 0 before, unknown at the end."""
+    begins = np.concatenate([[-np.inf], found.edges])
+    voltage = np.zeros((len(begins), found.voltage.shape[1]))
+    voltage[1:-1], voltage[-1] = found.voltage, np.nan
+    by = np.zeros((len(found.dvoltage), *voltage.shape))
+    by[:, 1:-1] = found.dvoltage
+    return begins, voltage, by
+
+
+def _plants(robot: Robot, directions: Sequence[Direction]) -> tuple[Plant, list[Plant]]:
+    """(the plant of the robot, those up and down each direction)."""
+    numbers = plant(robot)
+    plants = [numbers if r is None else plant(r) for one in directions for r in (one.up, one.down)]
+    for k, one in enumerate(directions):
+        refuse_switched_off(one.name, numbers, plants[2 * k])
+    return numbers, plants
+
+
+def _stretch(plants: Sequence[Plant]) -> FloatArray:
+    """Derivative of the length that omega is scaled by. Shape (K,)."""
+    return difference(np.array([p.body[LENGTH] for p in plants]))
+
+
+def _room(robot: Robot, t: FloatArray, late: Sequence[float], keys: int, ways: int) -> Samples:
+    size = N_AXES + (robot.wheels.count if robot.motor.electrical == DYNAMIC else 0)
+    return empty_samples(t, np.asarray(late, dtype=float), size, keys, ways)
+
+
+def _looks(
+    robot: Robot, directions: Sequence[Direction], seen: Samples, lengths: tuple[float, FloatArray],
+    applied: tuple[FloatArray, FloatArray, FloatArray],
+) -> list[LateSample]:  # fmt: skip
+    """A LateSample for every latency. lengths: what omega is scaled by, and its derivatives.
+
+    applied: [s] when each voltage comes into force, and more; voltages (J, n); their derivatives (K, J, n).
+    """
+    (length, stretch), (begins, voltage, rates) = lengths, applied
     found = []
     for c, own in enumerate(seen.late):
-        at = np.clip(np.searchsorted(t, t - own + MEET, side="right") - 1, 0, len(voltage) - 1)
+        at = np.clip(np.searchsorted(begins, seen.t - own + MEET, side="right") - 1, 0, len(voltage) - 1)
         twist, pace, dtwist = seen.state[c, :, :N_AXES], seen.pace[c, :, :N_AXES], seen.dstate[c, :, :, :N_AXES]
         twist[:, 2] /= length
         pace[:, 2] /= length
         dtwist[..., 2] = (dtwist[..., 2] - twist[:, 2, None] * stretch) / length
         found.append(
             LateSample(
-                robot, tuple(directions), twist, pace, seen.heading[c], voltage[at], dtwist, seen.dheading[c],
-                np.moveaxis(rates[:, at], 0, 1), *_currents(seen, c, size),
+                robot, tuple(directions), float(own), twist, pace, seen.way[c], voltage[at], dtwist, seen.dway[c],
+                np.moveaxis(rates[:, at], 0, 1), *_currents(seen, c),
             )
         )  # fmt: skip
-    return found, capped(outcome)
+    return found
 
 
-def _currents(seen: Samples, c: int, size: int) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
+def _currents(seen: Samples, c: int) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
     """Currents of windings with inductance: (value, time derivative, derivatives)."""
-    if size == N_AXES:
+    if seen.state.shape[2] == N_AXES:
         return None, None, None
     return seen.state[c, :, N_AXES:], seen.pace[c, :, N_AXES:], seen.dstate[c, :, :, N_AXES:]

@@ -7,20 +7,23 @@ so that they are exact to rounding. A voltage at its limit has the derivative of
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import LENGTH, N_AXES
+from omnidyn.model.robot import Robot
+from omnidyn.model.stick_slip.plant import Plant
 from omnidyn.model.stick_slip.release import SIGNS, start_state, with_given_currents
 from omnidyn.model.stick_slip.workspace import copy_row, copy_table, workspace
 from omnidyn.simulation.commands import Commands, loop_gains, on_ticks
 from omnidyn.simulation.implicit.march import SIMPSON, Outcome, advance_pose, begun, room
-from omnidyn.simulation.sensitivity.directions import EPS, Directions, Prepared
+from omnidyn.simulation.sensitivity.directions import EPS, Directions
 from omnidyn.simulation.sensitivity.march import apply_row, pose_derivatives, row_with_derivatives
-from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
+from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples, take_samples
 from omnidyn.simulation.simulate import current_bounds
 from omnidyn.simulation.speed_loop import close_loop, loop_of, seen_speed, tick_answer, tick_branch
 
@@ -38,45 +41,52 @@ class LoopDirections(NamedTuple):
 
 
 class LoopRun(NamedTuple):
-    """Row 0 is the start. voltage: after the tick of a row, the last one repeats. d...: derivatives of them."""
+    """Row 0 is the start; voltages are those of the J intervals into which ticks cut the rows. d...: derivatives.
+
+    Where the run is sampled, dstate and dpose are empty.
+    """
 
     outcome: Outcome
     dstate: FloatArray  # (rows + 1, K, 3 + n)
     dpose: FloatArray  # (rows + 1, K, 3)
-    voltage: FloatArray  # (rows, n)
-    dvoltage: FloatArray  # (K, rows, n)
-    seen: Samples  # none
+    voltage: FloatArray  # (J, n)
+    dvoltage: FloatArray  # (K, J, n)
+    edges: FloatArray  # (J + 1,) [s] when each begins, and the end
+    keep: IntArray  # (rows + 1,) the interval with which each row begins, and J
+    seen: Samples
 
 
 def run_loop_with_derivatives(
-    ready: Prepared, along: Directions, given: Commands, start: tuple[FloatArray, FloatArray], first: FloatArray,
-    tol: float, settled: float, travels: bool,
+    robot: Robot, robots: Sequence[Robot], numbers: Plant, along: Directions, given: Commands,
+    start: tuple[FloatArray, FloatArray], first: FloatArray, tol: float, settled: float = 0.0,
+    seen: Samples | None = None,
 ) -> LoopRun:  # fmt: skip
     """The run of set points, with derivatives; see `derivatives`.
 
-    along.voltage: derivatives of the set points; start: twist and pose; first (K, 3 + n): derivatives of the state
-    there. settled: a run whose state and derivatives change by less than this from tick to tick [m/s, A, V] stays as it
-    is until the next command; 0: never. travels: whether the pose is wanted.
+    robots: up (2k) and down (2k + 1) each of K parameters. along.voltage: derivatives of the set points; start: twist
+    and pose; first (K, 3 + n): derivatives of the state there. settled: a run whose state and derivatives change by
+    less than this from tick to tick [m/s, A, V] stays as it is until the next command; 0: never. With `seen` the run is
+    sampled there, and derivatives by row are left out.
     """
-    robot, numbers = ready.robot, ready.numbers
     dt, _, tick, keep = on_ticks(robot, given)
     assert given.set_point is not None
-    count, n, rows = len(first), numbers.wheels, len(given.dt)
+    count, n, kept = len(first), numbers.wheels, len(given.dt) + 1 if seen is None else 0
     state, bound = start_state(numbers, start[0], np.zeros(n)), current_bounds(robot, given, 1)[0]
     loop = loop_of(robot, np.ascontiguousarray(given.set_point), tick)
-    gain = np.array([loop_gains(r) for r in ready.robots]).reshape(-1, 4, n)
+    gain = np.array([loop_gains(r) for r in robots]).reshape(-1, 4, n)
     extra = LoopDirections(
         gain, along.voltage, np.zeros((count, n)), np.zeros((count, n)), np.zeros(len(state)), np.zeros_like(first),
         np.zeros((2, n)),
     )  # fmt: skip
     found = LoopRun(
-        begun(rows, state, start[1]), np.zeros((rows + 1, *first.shape)), np.zeros((rows + 1, count, 3)),
-        np.zeros((rows, n)), np.zeros((count, rows, n)), NO_SAMPLES,
+        begun(len(given.dt), state, start[1]), np.zeros((kept, *first.shape)), np.zeros((kept, count, 3)),
+        np.zeros((len(dt), n)), np.zeros((count, len(dt), n)), np.concatenate([[0.0], np.cumsum(dt)]),
+        keep.astype(np.int64), seen or NO_SAMPLES,
     )  # fmt: skip
-    found.dstate[0] = first
+    found.dstate[:1] = first
     march_loop(
         *numbers.copy(), *with_given_currents(numbers), workspace(), room(state), along, loop, extra, bound, dt,
-        keep.astype(np.int64), tol, settled, travels, found,
+        first, tol, settled, found,
     )  # fmt: skip
     return found
 
@@ -136,13 +146,13 @@ def _as_before(loop, extra, state, d, settled):
 
 @kernel
 def march_loop(
-    body, element, bare_body, bare_element, s, spare, along, loop, extra, bound, dt, keep, tol, settled, travels, found
+    body, element, bare_body, bare_element, s, spare, along, loop, extra, bound, dt, first, tol, settled, found
 ):
-    """All rows, cut at the ticks; what is at keep[i] goes to row i. See run_loop_with_derivatives."""
-    out = found.outcome
+    """All rows, cut at the ticks. See run_loop_with_derivatives."""
+    out, seen, keep, edges, m = found.outcome, found.seen, found.keep, found.edges, len(element)
     state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
-    d, dnext, dpose, h = found.dstate[0].copy(), found.dstate[0].copy(), found.dpose[0].copy(), dt[0]
-    voltage, row, still = np.zeros((1, len(bound))), 0, False
+    d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
+    voltage, row, still, kept = np.zeros((1, len(bound))), 0, False, len(found.dstate) > 0
     for j in range(len(dt)):
         if j == keep[row + 1]:
             row += 1
@@ -153,23 +163,25 @@ def march_loop(
         if loop.tick[j] and not still:
             still = settled > 0.0 and j > keep[row] and _as_before(loop, extra, state, d, settled)
             _tick(element, along, loop, extra, state, d, row, voltage, loop.tick[j : j + 1])
-        if j == keep[row]:
-            copy_row(found.voltage[row], voltage[0])
-            for k in range(len(d)):
-                copy_row(found.dvoltage[k, row], extra.voltage[k])
+        copy_row(found.voltage[j], voltage[0])
+        for k in range(len(d)):
+            copy_row(found.dvoltage[k, j], extra.voltage[k])
         if not still:
             apply_row(element, along, voltage[0], bound, extra.voltage)
             h = row_with_derivatives(
                 body, element, bare_body, bare_element, s, spare, along, state, dt[j], tol, h, pose, d, dnext, dpose,
-                counts, True, found.seen, 0.0,
+                counts, kept, seen, edges[j],
             )  # fmt: skip
             out.iterations[row] = max(out.iterations[row], counts[0])
             out.steps[row] += counts[1]
-        elif travels:
+        elif kept:
             pose_derivatives(along, pose, dpose, state, state, state, d, d, d, dt[j], SIMPSON)
             advance_pose(pose, state, state, state, body[LENGTH], dt[j], SIMPSON)
+        else:
+            take_samples(seen, along, edges[j], dt[j], m, state, state, state, 0.5, d, d, d, 0.5)
         if j + 1 == keep[row + 1]:
             copy_row(out.state[row + 1], state)
             copy_row(out.pose[row + 1], pose)
-            copy_table(found.dstate[row + 1], d)
-            copy_table(found.dpose[row + 1], dpose)
+            if kept:
+                copy_table(found.dstate[row + 1], d)
+                copy_table(found.dpose[row + 1], dpose)

@@ -14,7 +14,7 @@ from omnidyn.simulation.implicit.march import SIMPSON, STAGES, advance_pose, fin
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
 from omnidyn.simulation.sensitivity.events import bends, differ, half_derivatives
-from omnidyn.simulation.sensitivity.sample import take_samples, turn_derivatives
+from omnidyn.simulation.sensitivity.sample import take_samples
 from omnidyn.simulation.sensitivity.stage import step_with_derivatives
 
 
@@ -67,8 +67,9 @@ def row_with_derivatives(
 ):  # fmt: skip
     """One row with derivatives, in place: adaptive steps, or for a tol of 0 one fixed step. Returns the next h.
 
-    kept: whether the derivatives are kept by row, position included. Where they are only sampled, those of the step
-    as a whole do where it is smooth: they are within the tolerance too. begin: of the row [s].
+    kept: whether the derivatives are kept by row, those of the pose included; else they are sampled, and the pose
+    stays. There those of the step as a whole do where it is smooth: they are within the tolerance too. begin: of the
+    row [s].
     """
     counts[0] = counts[1] = 0
     if tol > 0.0:
@@ -101,12 +102,11 @@ def _adaptive(
         else:
             half_derivatives(body, element, bare_body, bare_element, s, along, state, middle, inner, half, d, dhalf)
             half_derivatives(body, element, bare_body, bare_element, s, along, middle, two, inner, half, dhalf, dnext)
-        take_samples(seen, along, end - left, taken, m, state, middle, two, 0.5, pose, d, dhalf, dnext, node, dpose)
         if kept:
             pose_derivatives(along, pose, dpose, state, middle, two, d, along.half, dnext, taken, SIMPSON)
+            advance_pose(pose, state, middle, two, body[LENGTH], taken, SIMPSON)
         else:
-            turn_derivatives(along, dpose, state, middle, two, d, dhalf, dnext, taken, node, SIMPSON)
-        advance_pose(pose, state, middle, two, body[LENGTH], taken, SIMPSON)
+            take_samples(seen, along, end - left, taken, m, state, middle, two, 0.5, d, dhalf, dnext, node)
         copy_row(state, settled)
         copy_table(d, dnext)  # half_derivatives has moved d past a release that settle finds here
         left = left - taken if taken < left else 0.0
@@ -119,12 +119,11 @@ def _fixed(body, element, s, spare, along, state, dt, pose, d, dnext, dpose, kep
     middle, end, m = spare[3], spare[2], len(element)
     count = step_with_derivatives(body, element, s, along, state, end, middle, dt, d, dnext)
     _middle_currents(state, middle, end, m)
-    take_samples(seen, along, begin, dt, m, state, middle, end, GAMMA, pose, d, along.middle, dnext, GAMMA, dpose)
     if kept:
         pose_derivatives(along, pose, dpose, state, middle, end, d, along.middle, dnext, dt, STAGES)
+        advance_pose(pose, state, middle, end, body[LENGTH], dt, STAGES)
     else:
-        turn_derivatives(along, dpose, state, middle, end, d, along.middle, dnext, dt, GAMMA, STAGES)
-    advance_pose(pose, state, middle, end, body[LENGTH], dt, STAGES)
+        take_samples(seen, along, begin, dt, m, state, middle, end, GAMMA, d, along.middle, dnext, GAMMA)
     copy_row(state, end)
     copy_table(d, dnext)
     return count

@@ -5,10 +5,19 @@ the states at the start, at a middle node and at the end of the step, and so is 
 weights are the continuous extension of SDIRK2 itself, with b2 = (th^2/2 - gamma th)/(1 - gamma), b1 = th - b2; for two
 half steps, the parabola through the three. Both leave h^3, as the step does. See Hairer, Norsett, Wanner, Solving
 Ordinary Differential Equations I, II.6.
+
+Beside the state goes the way since the start: the heading th, the path s that the wheels have rolled along the body's
+own axes, and the place p, both from where the robot stood and along where it faced then,
+
+    th' = omega    s' = v    p' = R(th) v        dp'/dq = R(th) (dv/dq + dth/dq z x v)
+
+The first two are linear in the velocities: their integral over a part of a step is that of the weights. p takes three
+nodes of Simpson's rule. A fit asks for no more of the way than it needs: TURN, PATH or PLACE.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,16 +26,20 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import LENGTH
 from omnidyn.model.stick_slip.release import current_entry
+from omnidyn.model.stick_slip.workspace import copy_row, copy_table
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
 
 MEET = 1e-9  # [s] times that differ by less are one
 
 
+TURN, PATH, PLACE = 1, 3, 5  # numbers of the way: heading; path along x, y of the body; place along x, y at the start
+
+
 class Samples(NamedTuple):
     """Rows of a log, each seen late: what it shows at t - late. L latencies, K derivatives, S = 3 or 3 + n numbers.
 
-    NaN where t - late lies outside the run.
+    W numbers of the way: TURN, PATH or PLACE. NaN where t - late lies outside the run.
     """
 
     t: FloatArray  # (rows,) [s], from the start of the run
@@ -34,18 +47,21 @@ class Samples(NamedTuple):
     next: IntArray  # (L,) the row whose sample is next
     state: FloatArray  # (L, rows, S) x, and currents
     pace: FloatArray  # (L, rows, S) its time derivative
-    heading: FloatArray  # (L, rows)
+    way: FloatArray  # (L, rows, W)
     dstate: FloatArray  # (L, rows, K, S)
-    dheading: FloatArray  # (L, rows, K)
+    dway: FloatArray  # (L, rows, K, W)
+    gone: FloatArray  # (W,) the way so far
+    dgone: FloatArray  # (K, W)
 
 
-def empty_samples(t: FloatArray, late: FloatArray, size: int, keys: int) -> Samples:
-    """Samples that have not been taken yet. size: S; keys: K."""
+def empty_samples(t: FloatArray, late: FloatArray, size: int, keys: int, ways: int = TURN) -> Samples:
+    """Samples that have not been taken yet. size: S; keys: K; ways: W."""
     shape = (len(late), len(t))
     return Samples(
         np.ascontiguousarray(t - t[0]), np.array(late, dtype=float), np.zeros(len(late), np.int64),
-        np.full((*shape, size), np.nan), np.full((*shape, size), np.nan), np.full(shape, np.nan),
-        np.full((*shape, keys, size), np.nan), np.full((*shape, keys), np.nan),
+        np.full((*shape, size), np.nan), np.full((*shape, size), np.nan), np.full((*shape, ways), np.nan),
+        np.full((*shape, keys, size), np.nan), np.full((*shape, keys, ways), np.nan), np.zeros(ways),
+        np.zeros((keys, ways)),
     )  # fmt: skip
 
 
@@ -90,22 +106,60 @@ def _mixed(weight, a, b, c):
 
 
 @part
-def turn_derivatives(along, dpose, x0, xm, x1, d0, dm, d1, h, node, rule):
-    """Derivatives of the heading alone over a step, in place; rule: weights of `advance_pose`; node: that of dm."""
-    length = along.body[-1, LENGTH]
-    turn, own = h / length * (rule[0] * x0[2] + rule[1] * xm[2] + rule[2] * x1[2]), _areas(1.0, node)
-    for k in range(len(dpose)):
-        stretch = (along.body[2 * k, LENGTH] - along.body[2 * k + 1, LENGTH]) / (2.0 * EPS)
-        dpose[k, 2] += (h * _mixed(own, d0[k, 2], dm[k, 2], d1[k, 2]) - turn * stretch) / length
+def _stretch(along, k):
+    """Derivative of the length by which omega is scaled."""
+    return (along.body[2 * k, LENGTH] - along.body[2 * k + 1, LENGTH]) / (2.0 * EPS)
 
 
 @part
-def take_samples(seen, along, begin, h, m, x0, xm, x1, node, pose, d0, dm, d1, dnode, dpose):
-    """Sample all rows whose t - late lies in a step of length h from `begin`; m elements. pose, dpose: before it.
+def go_on(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
+    """Move the way and its derivatives on over a share of a step of length h, in place.
 
     node, dnode: where in the step xm and dm are, GAMMA or 1/2.
     """
-    size, length = seen.state.shape[2], along.body[-1, LENGTH]
+    if len(way) == PLACE:
+        _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
+    length, area, darea = along.body[-1, LENGTH], _areas(share, node), _areas(share, dnode)
+    turn = h / length * _mixed(area, x0[2], xm[2], x1[2])
+    way[0] += turn
+    for k in range(len(dway)):
+        dway[k, 0] += (h * _mixed(darea, d0[k, 2], dm[k, 2], d1[k, 2]) - turn * _stretch(along, k)) / length
+    if len(way) > TURN:
+        for a in range(2):
+            way[1 + a] += h * _mixed(area, x0[a], xm[a], x1[a])
+            for k in range(len(dway)):
+                dway[k, 1 + a] += h * _mixed(darea, d0[k, a], dm[k, a], d1[k, a])
+
+
+@part
+def _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
+    """Move the place, and its derivatives, on; the heading is still that at the start of the step."""
+    length = along.body[-1, LENGTH]
+    for point in range(3):
+        at = 0.5 * point * share
+        rule = h * share * (4.0 if point == 1 else 1.0) / 6.0
+        weight, dweight, area, darea = _weights(at, node), _weights(at, dnode), _areas(at, node), _areas(at, dnode)
+        turn = h / length * _mixed(area, x0[2], xm[2], x1[2])
+        cos, sin = rule * math.cos(way[0] + turn), rule * math.sin(way[0] + turn)
+        vx, vy = _mixed(weight, x0[0], xm[0], x1[0]), _mixed(weight, x0[1], xm[1], x1[1])
+        east, north = cos * vx - sin * vy, sin * vx + cos * vy
+        way[PATH] += east
+        way[PATH + 1] += north
+        for k in range(len(dway)):
+            swing = h * _mixed(darea, d0[k, 2], dm[k, 2], d1[k, 2]) - turn * _stretch(along, k)
+            angle = dway[k, 0] + swing / length
+            ux, uy = _mixed(dweight, d0[k, 0], dm[k, 0], d1[k, 0]), _mixed(dweight, d0[k, 1], dm[k, 1], d1[k, 1])
+            dway[k, PATH] += cos * ux - sin * uy - angle * north
+            dway[k, PATH + 1] += sin * ux + cos * uy + angle * east
+
+
+@part
+def take_samples(seen, along, begin, h, m, x0, xm, x1, node, d0, dm, d1, dnode):
+    """Sample all rows whose t - late lies in a step of length h from `begin`, then go on to its end; m elements.
+
+    node, dnode: where in the step xm and dm are, GAMMA or 1/2.
+    """
+    size = seen.state.shape[2]
     for c in range(len(seen.late)):
         while seen.next[c] < len(seen.t):
             r = seen.next[c]
@@ -123,9 +177,7 @@ def take_samples(seen, along, begin, h, m, x0, xm, x1, node, pose, d0, dm, d1, d
                 seen.pace[c, r, a] = _mixed(rate, x0[j], xm[j], x1[j]) / h
                 for k in range(len(d0)):
                     seen.dstate[c, r, k, a] = _mixed(dweight, d0[k, a], dm[k, a], d1[k, a])
-            turn, darea = h / length * _mixed(_areas(share, node), x0[2], xm[2], x1[2]), _areas(share, dnode)
-            seen.heading[c, r] = pose[2] + turn
-            for k in range(len(d0)):
-                stretch = (along.body[2 * k, LENGTH] - along.body[2 * k + 1, LENGTH]) / (2.0 * EPS)
-                swing = h * _mixed(darea, d0[k, 2], dm[k, 2], d1[k, 2])
-                seen.dheading[c, r, k] = dpose[k, 2] + (swing - turn * stretch) / length
+            copy_row(seen.way[c, r], seen.gone)
+            copy_table(seen.dway[c, r], seen.dgone)
+            go_on(seen.way[c, r], seen.dway[c, r], along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
+    go_on(seen.gone, seen.dgone, along, x0, xm, x1, node, d0, dm, d1, dnode, h, 1.0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_simpson
 from scipy.optimize import least_squares
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
@@ -116,23 +117,33 @@ def test_an_independent_optimiser_ends_at_the_same_point(ellipse):
 def test_outputs_and_slopes(ellipse, late):
     """Outputs against `simulate` on a fine grid; slopes against differences of the outputs. Latency of a twist too."""
     run = log(ellipse, 4, 200)
-    run = run.replace(wheel_speed=np.zeros((200, 3)), pose=np.zeros((200, 3)))
-    free = (*friction_keys(ellipse), KP, "body.mass_kg")
+    run = run.replace(wheel_speed=np.zeros((200, 3)), pose=np.zeros((200, 3)), wheel_angle=np.zeros((200, 3)))
+    free = (*friction_keys(ellipse), KP, "body.mass_kg", "wheels.robot_radius_m")
     records = read_records([run], ellipse, Question(free=free, nuisances=()))
     problem = make_problem(records, ellipse, Question(free=free, nuisances=("latency",)))
     engine, piece, start = LoopEngine(problem, 1e-8), problem.pieces[0], problem.start()
     values = start.values.copy()
     values[problem.robot_count :] = late
+    facing = 3 + piece.record.columns.index(("heading", 0))
+    assert piece.free[[facing, facing + 1, -1]].all()
 
-    def at(values):
-        return engine.outputs(engine.ready_at(values), piece, start.states[0], values)
+    def at(values, heading=0.3):
+        """(outputs (rows, C), slopes (rows, C, U), what each slope is by)."""
+        state = start.states[0].copy()
+        state[facing] = heading
+        residual, slopes, by = engine.residuals(Point(values, (state,)))[0]
+        return (piece.record.outputs.T - residual).T, np.swapaxes(slopes, 0, 1), by
 
-    outputs, slopes = at(values)
-    fine = simulate(ellipse, dt=1e-4, twist_command=np.repeat(run.twist_command, 100, axis=0), tol=1e-8)
+    outputs, slopes, by = at(values)
+    fine = simulate(
+        ellipse, dt=1e-4, twist_command=np.repeat(run.twist_command, 100, axis=0), tol=1e-8, pose=(0.0, 0.0, 0.3)
+    )
+    angle = cumulative_simpson(fine.wheel_speed, dx=1e-4, axis=0, initial=0.0)
     seen = np.maximum(np.arange(200) * 100 - round(late * 1e4), 0)
     late_enough = np.arange(200) * 100 >= round(late * 1e4)
     for c, (name, i) in enumerate(piece.record.columns):
-        model = fine.pose[:, 2] if name == "heading" else getattr(fine, name)[:, i]
+        pose = {"heading": fine.pose[:, 2:], "position": fine.pose, "wheel_angle": angle}
+        model = (pose[name] if name in pose else getattr(fine, name))[:, i]
         last = -1 if name == "current" and not late else None  # the loop has not answered there yet
         np.testing.assert_allclose(outputs[late_enough, c][:last], model[seen][late_enough][:last], atol=2e-6)
         assert np.isnan(outputs[-1, c]) == (last is not None)
@@ -143,7 +154,7 @@ def test_outputs_and_slopes(ellipse, late):
         up, down = values.copy(), values.copy()
         up[j], down[j] = values[j] + width, values[j] - width
         change = (at(up)[0] - at(down)[0]) / (2.0 * width)
-        error = np.abs(slopes[:, :, j] - change)
+        error = np.abs(slopes[:, :, list(by).index(j)] - change)
         size = np.nanmax(np.abs(change), axis=0)
         current = np.array([name == "current" for name, _ in piece.record.columns])
         if p.name.startswith("latency"):  # of a current: the slope is a mean over a tick, by intent
@@ -151,6 +162,10 @@ def test_outputs_and_slopes(ellipse, late):
             size = size[~current]
         good = ~(error > 1e-3 * size + 3e-4)  # the tolerance over the width is 1e-4
         assert good.mean() > 0.97, p.name  # a row beside an event or a tick is not differentiable
+    turned = (at(values, 0.3 + 1e-5)[0] - at(values, 0.3 - 1e-5)[0]) / 2e-5
+    own = slopes[:, :, list(by).index(len(values) + facing)]
+    current = [name == "current" for name, _ in piece.record.columns]
+    np.testing.assert_allclose(own[:, ~np.array(current)], turned[:, ~np.array(current)], atol=1e-8)
 
 
 def test_two_floors_share_the_gains(looped):

@@ -8,7 +8,7 @@ from scipy.special import log_ndtr
 from scipy.stats import truncnorm
 
 from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
-from omnidyn.identification.output_error.kernel.counts import count_terms, find_tick, information, rounding, tail
+from omnidyn.identification.output_error.kernel.counts import count_terms, information, rounding, tail
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -115,22 +115,6 @@ def test_groups_of_counts_without_noise_say_what_each_says_alone(axebot, rolled)
         alone = fit_output_error(log, axebot, nuisances=(), start="rest")
         for key, std in alone.std.items():
             assert both.estimates[name].std[key] == pytest.approx(std, rel=0.05)
-
-
-def test_the_tick_of_a_log_is_found():
-    rng = np.random.default_rng(2)
-    angle = np.cumsum(rng.uniform(-0.2, 0.3, 2000))
-    for counts in (64, 512, 2048):
-        q = 2.0 * np.pi / counts
-        values = np.floor(angle / q) * q + 0.123
-        assert find_tick(values) == pytest.approx(q, rel=1e-9)
-        assert find_tick(np.round(values, 5)) == pytest.approx(q, rel=1e-4)  # as a text file holds it
-        values[::7] = np.nan
-        assert find_tick(values) == pytest.approx(q, rel=1e-9)
-    assert find_tick(angle) == 0.0
-    assert find_tick(np.round(angle, 6)) == 0.0  # too fine to matter
-    assert find_tick(np.zeros(100)) == 0.0
-    assert find_tick(np.full(100, np.nan)) == 0.0
 
 
 def ticks_of(angle, tick, rng, jitter):

@@ -134,3 +134,40 @@ def test_the_noise_of_a_student_t_fit_is_a_standard_deviation(axebot, clean):
     wild = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise), axebot, nuisances=(),
                             loss="student-t")  # fmt: skip
     assert list(wild.noise.values()) == pytest.approx(list(NOISE), rel=0.1)
+
+
+def test_what_a_log_holds_and_a_fit_does_not_use_is_listed_with_the_reason(axebot, clean):
+    """By default nothing is left out, on a robot of either engine."""
+    for robot in (axebot, axebot.replace(body=axebot.body.replace(rotating_frame=True))):
+        log = captured(clean, 9, twist=clean.twist + np.random.default_rng(9).normal(size=clean.twist.shape) * NOISE)
+        log = Run(**{"t": log.t[:300]} | {name: values[:300] for name, values in log.channels.items()})
+        log = log.replace(wheel_angle=np.floor(np.cumsum(clean.wheel_speed[:300], axis=0) * 0.01 / 1e-3) * 1e-3)
+        whole = fit_output_error(log, robot, nuisances=())
+        assert whole.unused == ()
+        assert {name.partition("[")[0] for name in whole.noise} == {"twist", "heading", "position", "wheel_angle"}
+    asked = fit_output_error(log.replace(twist_command=log.twist), axebot, outputs=["twist"], nuisances=())
+    assert asked.unused == (
+        "twist_command: the voltage that reached the motors drives the model",
+        "heading: not among the outputs asked for",
+        "position: not among the outputs asked for",
+        "wheel_angle: not among the outputs asked for",
+    )
+    assert "not used: heading: not among the outputs asked for" in asked.summary()
+    assert asked.to_dict()["unused"] == list(asked.unused)
+    both = fit_output_error([log, log.replace(pose=None, source="bare")], axebot, outputs=["twist"], nuisances=())
+    assert "heading: not among the outputs asked for (1 of 2 logs, such as a log)" in both.unused
+
+
+def test_an_interval_over_many_powers_of_ten_is_none(axebot):
+    """Yaw is driven hardly beyond its friction: what little moves drowns in noise, and says nothing of the inertia."""
+    voltage = np.tile([0.0, -4.0, 4.0], (400, 1)) + np.where(np.arange(400) % 100 < 20, 0.18, 0.0)[:, None]
+    run = simulate(axebot, voltage, 0.01)
+    assert 0.0 < np.abs(run.twist[:, 2]).max() < 0.1
+    twist = run.twist + np.random.default_rng(1).normal(size=run.twist.shape) * [0.01, 0.01, 0.2]
+    free = ["friction.axes.coulomb[0]", "body.inertia_kg_m2"]
+    fit = fit_output_error(
+        Run(t=run.t, voltage=run.voltage, twist=twist), axebot, free=free, nuisances=(), start="rest"
+    )
+    print(fit.summary())
+    assert fit.unidentifiable == ("body.inertia_kg_m2",)
+    assert np.isfinite(fit.std["friction.axes.coulomb[0]"])

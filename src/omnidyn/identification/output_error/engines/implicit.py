@@ -7,24 +7,25 @@ run is sampled between its rows (sensitivity/sample.py).
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of
-from omnidyn.identification.output_error.engines.exact import LATE, Weighting
-from omnidyn.identification.output_error.engines.sums import added
-from omnidyn.identification.output_error.problem.outputs import refuse_exact_only
-from omnidyn.identification.output_error.problem.problem import Piece, PieceSums, Point, Problem
+from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, Weighting
+from omnidyn.identification.output_error.engines.sums import Parts, added
+from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
 from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, late_samples
+from omnidyn.simulation.sensitivity.sample import PATH, PLACE, TURN
 
-Found = tuple[FloatArray, FloatArray, IntArray]
+Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time derivative (rows, m), (rows, K, m)
 
 
 class LastPoints:
@@ -34,9 +35,9 @@ class LastPoints:
     KEPT = 2
 
     def __init__(self) -> None:
-        self._found: dict[tuple[bytes, ...], list[Found]] = {}
+        self._found: dict[tuple[bytes, ...], list[Parts]] = {}
 
-    def at(self, point: Point, find: Callable[[Point], list[Found]]) -> list[Found]:
+    def at(self, point: Point, find: Callable[[Point], list[Parts]]) -> list[Parts]:
         """What `find` says at a point, found anew unless it is one of the last."""
         key = (point.values.tobytes(), *(state.tobytes() for state in point.states))
         found = self._found.pop(key, None) or find(point)
@@ -49,7 +50,7 @@ class LastPoints:
 class ImplicitEngine:
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
-    Raises UnsupportedError for nuisances and outputs that it does not know.
+    Raises UnsupportedError for nuisances that it does not know.
     """
 
     def __init__(self, problem: Problem, tol: float | None = None):
@@ -62,10 +63,9 @@ class ImplicitEngine:
                 got=", ".join(other), expected=f"nuisances: latency, {', '.join(Driver._fields)}",
                 remedy="leave it out of the nuisances", where=problem.robot.name,
             )  # fmt: skip
-        refuse_exact_only(problem.columns, problem.robot.name)
         self.last = LastPoints()
 
-    def on(self, problem: Problem) -> ImplicitEngine:
+    def on(self, problem: Problem) -> Self:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
         engine.problem, engine._columns, engine.last = problem, problem.columns, LastPoints()
@@ -73,18 +73,17 @@ class ImplicitEngine:
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the residuals of every piece add up to; see kernel/march.py."""
-        found = []
-        for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True):
-            columns = piece.record.columns
-            known = np.array([self._columns.index(column) for column in columns])
-            found.append(added(*parts, weighting, known, len(self.problem.parameters) + N_AXES + len(columns)))
-        return found
+        count = len(self.problem.parameters)
+        return [
+            added(piece, self._columns, parts, weighting, count)
+            for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True)
+        ]
 
-    def residuals(self, point: Point) -> list[Found]:
+    def residuals(self, point: Point) -> list[Parts]:
         """(residuals, slopes, at) of every piece, see `_piece`; those of `last` are not simulated again."""
         return self.last.at(point, self._simulated)
 
-    def _simulated(self, point: Point) -> list[Found]:
+    def _simulated(self, point: Point) -> list[Parts]:
         robot, values = self.problem.robot_at(point.values), point.values
         scales = [abs(float(value)) or 1.0 for value in values]
         moved = [
@@ -99,25 +98,26 @@ class ImplicitEngine:
     def _piece(
         self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
         values: FloatArray,
-    ) -> Found:  # fmt: skip
+    ) -> Parts:  # fmt: skip
         """(residuals (C, rows), slopes (C, rows, U), index of each of the U among the P parameters and the states)."""
         record, count = piece.record, len(self.problem.parameters)
         t, measured = record.t[piece.first : piece.last + 1], record.outputs[piece.first : piece.last + 1].T
-        voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
         where = [self.problem.where(LATE + name) for name, _ in record.columns]
         late = [float(values[k]) if k >= 0 else 0.0 for k in where]
         distinct = sorted(set(late))
-        seen, _ = late_samples(robot, t, voltage, directions, state[:N_AXES], distinct, self.tol)
+        seen, at, factors = self._run(robot, moved, scales, piece, state, values, distinct)
         residual = np.empty(measured.shape)
         keys = len(at)
         offsets = count + N_AXES + np.flatnonzero(piece.free[N_AXES:])
         at += [*dict.fromkeys(k for k in where if k >= 0), *offsets]
         slopes = np.zeros((*measured.shape, len(at)))
-        shown: dict[tuple[str, float], tuple[FloatArray, FloatArray, FloatArray]] = {}
+        faces = N_AXES + record.columns.index(HEADING) if HEADING in record.columns else -1
+        facing = float(state[faces]) if faces >= 0 else 0.0
+        shown: dict[tuple[str, float], Shown] = {}
         for c, (name, i) in enumerate(record.columns):
-            key = (name, late[c])
+            key, number = (name, late[c]), distinct.index(late[c])
             if key not in shown:
-                shown[key] = _shown(seen[distinct.index(late[c])], name)
+                shown[key] = self._shown(seen, number, name, facing)
             value, pace, by = shown[key]
             residual[c] = measured[c] - value[:, i] - state[N_AXES + c]
             residual[c][t - t[0] < piece.margin[c]] = np.nan
@@ -126,7 +126,33 @@ class ImplicitEngine:
                 slopes[c, :, at.index(where[c])] = -pace[:, i]
             if piece.free[N_AXES + c]:
                 slopes[c, :, at.index(count + N_AXES + c)] = 1.0
+            if name == POSITION and piece.free[faces]:  # a quarter of a turn further is d/d facing
+                slopes[c, :, at.index(count + faces)] = seen[number].position(facing + 0.5 * np.pi)[0][:, i]
         return residual, slopes, np.array(at)
+
+    def _run(
+        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
+        values: FloatArray, late: list[float],
+    ) -> tuple[list[LateSample], list[int], FloatArray]:  # fmt: skip
+        """(a look at the run for every latency, index of each direction among the slopes, their factors)."""
+        t = piece.record.t[piece.first : piece.last + 1]
+        voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
+        ways = ways_of(piece.record.columns)
+        seen, _ = late_samples(robot, t, voltage, directions, state[:N_AXES], late, self.tol, ways)
+        return seen, at, factors
+
+    def _shown(self, seen: list[LateSample], number: int, name: str, facing: float) -> Shown:
+        """What a channel of m columns shows at latency `number`, from the start; facing: the heading there [rad]."""
+        own = seen[number]
+        if name == POSITION:
+            return own.position(facing)
+        if name == "twist":
+            return own.twist, own.pace, own.dtwist
+        every = {
+            "heading": own.heading, "wheel_speed": own.wheel_speeds, "wheel_angle": own.wheel_angles,
+            "current": own.currents,
+        }  # fmt: skip
+        return every[name]()
 
     def _directions(
         self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, values: FloatArray
@@ -156,12 +182,7 @@ class ImplicitEngine:
         return voltage, directions, at, factors
 
 
-def _shown(seen: LateSample, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(value (rows, m), its time derivative (rows, m), its derivatives (rows, K, m)) of a channel of m columns."""
-    if name == "wheel_speed":
-        return seen.wheel_speeds()
-    if name == "current":
-        return seen.currents()
-    if name == "heading":
-        return seen.heading[:, None], seen.twist[:, 2:], seen.dheading[:, :, None]
-    return seen.twist, seen.pace, seen.dtwist
+def ways_of(columns: Sequence[Column]) -> int:
+    """What these outputs take of the way of a run, see simulation/sensitivity/sample.py."""
+    names = {name for name, _ in columns}
+    return PLACE if POSITION in names else PATH if "wheel_angle" in names else TURN

@@ -7,29 +7,30 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.kernel.march import FINAL
-from omnidyn.identification.output_error.problem.problem import PieceSums
+from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
+from omnidyn.identification.output_error.kernel.march import FINAL, WAVES, add_waves, terms_of
+from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums
+from omnidyn.model.layout import N_AXES
+
+Parts = tuple[FloatArray, FloatArray, IntArray]
 
 
-def added(
-    residual: FloatArray, slopes: FloatArray, at: IntArray, weighting: Weighting, known: IntArray, width: int
-) -> PieceSums:
-    """The sums of kernel/march.py from residuals (C, rows) and slopes (C, rows, U).
+def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weighting, count: int) -> PieceSums:
+    """The sums of kernel/march.py for a piece of a problem with the columns `every` and `count` parameters.
 
-    at (U,): index of each slope among the parameters and states, `width` in all. known: index of each column among
-    Problem.columns.
+    parts: residuals (C, rows), slopes (C, rows, U) and (U,) the index of each slope among the parameters and states.
     """
+    residual, slopes, at = parts
+    columns, width = piece.record.columns, count + N_AXES + len(piece.record.columns)
+    known = np.array([every.index(column) for column in columns])
     there = np.isfinite(residual) & np.isfinite(slopes).all(axis=2)  # at a kink a slope may not be a number
-    variance = weighting.variance[known][:, None]
     r, j = residual, slopes
     if not there.all():
-        r, j = np.where(there, residual, 0.0), np.where(there[:, :, None], slopes, 0.0)
-    z2, nu, final = r**2 / variance, weighting.nu, bool(weighting.mode & FINAL)
-    weight, curvature, rho = np.ones_like(r), np.ones_like(r), 0.5 * z2
-    if nu:
-        weight, rho = (nu + 1.0) / (nu + z2), 0.5 * (nu + 1.0) * np.log1p(z2 / nu)
-        curvature = weight * ((nu - z2) / (nu + z2) if final else (nu + 1.0) / (nu + 3.0))
-    pull = weight * r
+        r, j = np.where(there, residual, np.nan), np.where(there[:, :, None], slopes, 0.0)
+    variance, final = weighting.variance[known], bool(weighting.mode & FINAL)
+    tick = np.array(piece.record.ticks) if weighting.counted and any(piece.record.ticks) else None
+    share = np.ones(len(known)) if tick is None else information(variance, tick)[0]
+    pull, square, curvature, rho = _terms(r, variance, weighting.nu, tick, share, final)
     grad, info = np.zeros((len(r), width)), np.zeros((len(r), width, width))
     grad[:, at] = np.einsum("ck,cku->cu", pull, j)
     info[:, at[:, None], at] = _squares(j, curvature)
@@ -37,13 +38,44 @@ def added(
     if final:
         starts = np.arange(0, r.shape[1], weighting.block)
         score = np.zeros((len(starts), width))
-        score[:, at] = np.add.reduceat(np.einsum("ck,cku->ku", pull / variance, j), starts, axis=0)
+        score[:, at] = np.add.reduceat(np.einsum("ck,cku->ku", pull / variance[:, None], j), starts, axis=0)
         drift = np.add.reduceat(pull.T, starts, axis=0)
+    waves = None
+    if weighting.mode & WAVES:
+        waves = np.zeros((len(r), HARMONICS, 2, width))
+        if tick is not None:
+            shown = piece.record.outputs[piece.first : piece.last + 1].T - r
+            waves[..., at] = _waves(j, shown / np.where(tick > 0.0, tick, np.nan)[:, None], HARMONICS)
     lag = (pull[:, 1:] * pull[:, :-1]).sum(axis=1)
     return PieceSums(
-        known, there.sum(axis=1).astype(float), (pull * r).sum(axis=1), np.where(there, rho, 0.0).sum(axis=1), lag,
-        grad, info, score, drift,
+        known, there.sum(axis=1).astype(float), square.sum(axis=1), rho.sum(axis=1), lag, grad, info, score, drift,
+        waves,
     )  # fmt: skip
+
+
+@kernel
+def _terms(residual, variance, nu, tick, share, final):
+    """(w r, w r^2, curvature, rho) of every residual (C, rows), see kernel/march.py; 0 where it is NaN."""
+    columns, rows = residual.shape
+    out = np.zeros((4, columns, rows))
+    for c in range(columns):
+        for k in range(rows):
+            if residual[c, k] == residual[c, k]:
+                pull, square, curvature, rho = terms_of(residual[c, k], variance, nu, c, tick, share, final)
+                out[0, c, k], out[1, c, k], out[2, c, k], out[3, c, k] = pull, square, curvature, rho
+    return out
+
+
+@kernel
+def _waves(slopes, turns, count):
+    """Sum over the rows of (cos, sin)(2 pi m turns) J, m = 1 to `count`; turns (C, rows), NaN where there is none."""
+    columns, rows, width = slopes.shape
+    out = np.zeros((columns, count, 2, width))
+    for c in range(columns):
+        for k in range(rows):
+            if turns[c, k] == turns[c, k]:
+                add_waves(out[c], slopes[c, k], turns[c, k])
+    return out
 
 
 @kernel

@@ -11,6 +11,7 @@ start             twist at the start of each piece of the log; pose and angles o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -90,8 +91,12 @@ def automatic(records: Sequence[Record]) -> tuple[str, ...]:
     return (LATENCY, DEAD_BAND, GAIN) if any(record.supplied for record in records) else (LATENCY, DEAD_BAND)
 
 
-def pieces(records: Sequence[Record], robot: Robot, start: str, late: bool) -> list[Piece]:
+def pieces(
+    records: Sequence[Record], robot: Robot, start: str, late: bool, start_std: FloatArray | None = None
+) -> list[Piece]:
     """The pieces of all records. start: "rest", "free" or "auto"; late: whether a latency is free.
+
+    start_std: of a start that was measured, None where it may be anywhere.
 
     "auto": at rest where the log begins without voltage and without visible motion; else free.
     """
@@ -101,6 +106,8 @@ def pieces(records: Sequence[Record], robot: Robot, start: str, late: bool) -> l
         for number, (first, last) in enumerate(record.pieces):
             rest = start == REST and number == 0
             found.append(_piece(record, twist, first, last, rest, start == AUTO, late))
+            if twist is not None and start_std is not None:
+                found[-1] = replace(found[-1], start_std=start_std)
     return found
 
 

@@ -31,6 +31,7 @@ class Record:
 
     ticks (C,): of columns that are counts [rad], 0 for the others. pieces: (first, last) rows of what has no gap.
     supplied: whether the voltage is a duty times a supply that was not logged. notes: what a reader should know.
+    unused: what the log holds and a fit does not use, and why, in words.
     set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
     here then; else None.
     """
@@ -45,6 +46,7 @@ class Record:
     supplied: bool
     notes: tuple[str, ...]
     set_point: FloatArray | None = None
+    unused: tuple[str, ...] = ()
 
     @property
     def span(self) -> float:
@@ -77,7 +79,7 @@ def record(
         voltage = clipped
     if made_up:
         notes.append(f"{', '.join(made_up)}: only what was measured is fitted, not what was interpolated in between")
-    found = outputs_of(run, robot, outputs, tick_rad, set_point is not None)
+    found = outputs_of(run, robot, outputs, tick_rad)
     inputs = voltage if set_point is None else set_point
     finite = np.isfinite(inputs)
     _refuse_wheels_without_input(run, robot, finite)
@@ -92,8 +94,25 @@ def record(
         notes.append(f"{int((~known).sum())} rows lack an input: the log is split there")
     return Record(
         run.t, np.ascontiguousarray(voltage), found.values, found.columns, found.ticks, tuple(pieces), run.source,
-        supplied, (*notes, *found.notes), set_point,
+        supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused),
     )  # fmt: skip
+
+
+def _unused_inputs(run: Run, looped: bool) -> list[str]:
+    """Inputs that drive nothing, and why, in words. looped: the speed loop of the robot file makes the voltage."""
+    made = "the speed loop of the robot file makes the voltage from the set speeds"
+    volts, speeds = "the logged voltage drives the model", "the voltage that reached the motors drives the model"
+    given = run.voltage is not None
+    why = {
+        "voltage": made if looped else "",
+        "duty": made if looped else volts if given else "",
+        "supply": made if looped else volts if given else "",
+        "wheel_speed_command": "" if looped else speeds,
+        "twist_command": speeds if not looped else "the set speeds of the wheels drive the model",
+    }
+    if looped and run.wheel_speed_command is None:
+        why["twist_command"] = ""
+    return [f"{name}: {words}" for name, words in why.items() if words and getattr(run, name) is not None]
 
 
 def _refuse_wheels_without_input(run: Run, robot: Robot, finite: BoolArray) -> None:

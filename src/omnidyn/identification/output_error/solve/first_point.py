@@ -21,6 +21,7 @@ FEW = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
 LESS = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
 NEAR = 0.1  # squared distance to the best point, in standard errors, that is near
+BIAS = 1e-4  # the same per row: what a step a row is off by does not shrink with the rows
 
 
 def first_point(solver: Solver, records: Sequence[Record]) -> State:
@@ -72,8 +73,9 @@ def _with_latencies(solver: Solver, begun: State) -> State:
 def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
     """Near the best point, by one step a row; a long log is first fitted in part, of which `watch` hears only."""
     watch.doing("looking for a start")
+    rows = sum(piece.last - piece.first for piece in problem.pieces)
     solver, short, own = (
-        Solver(problem, ImplicitEngine(problem), nu, NEAR),
+        Solver(problem, ImplicitEngine(problem), nu, max(NEAR, BIAS * rows)),
         problem.shortened(FEW),
         moving_start(problem, nu),
     )

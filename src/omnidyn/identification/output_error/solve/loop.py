@@ -15,7 +15,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
-from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST
+from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
@@ -109,7 +109,7 @@ def _begins_at_rest(twist: FloatArray | None, first: int, last: int) -> bool:
 
 def _piece(record: Record, first: int, last: int) -> Piece:
     columns = record.columns
-    travels = np.array([name == "heading" for name, _ in columns])
+    travels = np.array([name in TRAVELS for name, _ in columns])
     offset = np.where(travels, record.outputs[first], 0.0)
     return Piece(
         record, first, last, np.zeros(3), np.where(np.isfinite(offset), offset, 0.0),

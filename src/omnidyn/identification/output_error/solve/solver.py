@@ -198,6 +198,9 @@ class Solver(Generic[P]):
         for p, value in zip(self.problem.parameters, point.values, strict=True):
             if p.prior is not None:
                 total += 0.5 * ((float(value) - p.prior[0]) / p.prior[1]) ** 2
+        for piece, state in zip(self.problem.pieces, point.states, strict=True):
+            pull, known = piece.start_prior(state)
+            total += 0.5 * float(pull[known > 0.0] ** 2 @ (1.0 / known[known > 0.0]))
         return total
 
 
@@ -212,8 +215,8 @@ class Normal:
         self.solver, self.state, count = solver, state, len(problem.parameters)
         self.scale = np.array([p.slope(float(v)) for p, v in zip(problem.parameters, state.point.values, strict=True)])
         self.pieces = [
-            _weighted(sums, 1.0 / state.variance[sums.columns], self.scale, states)
-            for sums, states in zip(state.sums, state.point.states, strict=True)
+            _weighted(sums, 1.0 / state.variance[sums.columns], self.scale, states, piece.start_prior(states))
+            for sums, states, piece in zip(state.sums, state.point.states, problem.pieces, strict=True)
         ]
         self._count = count
         self.inner = solver.inner(state.point.values)
@@ -296,9 +299,9 @@ def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def _weighted(
-    sums: PieceSums, weight: FloatArray, scale: FloatArray, states: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Gradient and information of a piece over its columns, in inner numbers.
+    sums: PieceSums, weight: FloatArray, scale: FloatArray, states: FloatArray, known: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Gradient and information of a piece over its columns, in inner numbers. known: of its start, see `start_prior`.
 
     States that are not free do not move. Nor does a speed that the rows only know to be below the fastest (a robot may
     forget its start before the first row that is used), or that they would pull beyond it.
@@ -307,6 +310,9 @@ def _weighted(
     full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
     grad = (weight @ sums.grad) * full
     info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
+    start = np.arange(count, count + len(known[0]))
+    grad[start] += known[0]
+    info[start, start] += known[1]
     told = info.diagonal()[count:]
     if not told.max(initial=0.0) > UNSEEN:
         return grad[:count], info[:count, :count]

@@ -32,6 +32,7 @@ BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
 MANY_RUNS = 20  # from so many on each run is a block
 COLOURED = 4.0  # standard errors of a correlation of neighbours, and of a variance ratio
 BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below which a direction is not seen
+UNTOLD = 3.0  # std of a logarithm beyond which a number is not told: 95 % of it lie between 1/360 and 360 times
 WEAK = 1e-4  # below it, is hardly seen
 SHARE = 0.05  # of a blind direction that a parameter must have to be named
 WHITE, SANDWICH = "white", "sandwich"
@@ -105,6 +106,8 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     least = _least(solver, solution, plain, lost)
     covariance = _at_least(wide, least) if kind == SANDWICH else least.copy()
     widening = float(np.sqrt(_ratio(np.maximum(np.diag(wide), np.diag(least)), np.diag(plain), seen)))
+    logs = np.array([p.log for p in solver.problem.parameters], bool)
+    seen = seen & ~(logs & (np.sqrt(np.diag(covariance)) > UNTOLD))
     covariance[~seen, ~seen] = np.inf
     return Trust(
         covariance, normal.held, ~seen, np.diag(normal.information) <= 0.0, _free_step(plain, normal), kind, widening,
