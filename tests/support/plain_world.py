@@ -165,3 +165,14 @@ def spoiled(log, rng, *, noise=0.1, between=0.03, step=0.02):
     current = np.where(rng.random(current.shape) < 0.005, 5.0, current)
     speed = speed + 0.3 * rng.standard_normal(speed.shape)
     return t, step * np.round(current / step), 0.25 * np.round(speed / 0.25)
+
+
+def steady_logs(world, twists, seconds=2.0):
+    """[(twist asked for, log from rest under the voltage for it)]."""
+    return [(twist, world.drive(world.voltage(twist), seconds)) for twist in map(np.asarray, twists)]
+
+
+def fan(speeds=(0.4,), step=15, first=0.0):
+    """Twists in all directions, every `step` degrees."""
+    angles = np.radians(np.arange(first, 360.0 + first, step))
+    return [np.array([*np.round([s * np.cos(a), s * np.sin(a)], 12), 0.0]) for s in speeds for a in angles]

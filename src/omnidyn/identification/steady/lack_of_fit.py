@@ -63,6 +63,11 @@ class Remedy:
     probability: float
     same_as: tuple[str, ...] = ()
 
+    def fits(self, force: float) -> bool:
+        """Whether it is no chance, tells more of what was left out, and is as large as matters. force [N]: rms."""
+        sure = self.probability < FALSE_ALARM and self.gain > APART * self.gain_std
+        return sure and self.size > MATTERS * force
+
 
 @dataclass(frozen=True)
 class LackOfFit:
@@ -106,9 +111,8 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
             tried.append((rival, columns, solved))
     force = float(np.sqrt(np.mean((problem.target**2).sum(axis=1))))
     tests = sum(columns.shape[2] for _, columns, _ in tried) + 1
-    remedies = [each for each in (_remedy(*one, plain, problem.fold, tests) for one in tried)
-                if each.probability < FALSE_ALARM and each.gain > APART * each.gain_std and each.size > MATTERS * force]  # fmt: skip
-    remedies.sort(key=lambda each: each.error)
+    every = (_remedy(*one, plain, problem.fold, tests) for one in tried)
+    remedies = sorted((each for each in every if each.fits(force)), key=lambda each: each.error)
     repeated = _repeated(plain, problem, len(fit.keys))
     found = bool(remedies) or (repeated.probability * tests < FALSE_ALARM and repeated.size > MATTERS * force)
     share = max(repeated.share if found else 0.0, _share(remedies))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.recordings import count_once
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
 from omnidyn.model.actuation import asked_voltage
@@ -112,6 +113,7 @@ def force_points(
     "current" or "voltage"; "" takes current where all runs have it. window: shares of each command's rows instead of
     steady rows found, see `find_plateaus`.
     Currents must carry the sign of the torque. Voltage may be duty times supply.
+    A recording given twice counts once, and the notes say so.
     Raises InputError for a run without what is asked for, InsufficientDataError when no window is steady and moves,
     UnsupportedError for losses in the gear.
     """
@@ -121,8 +123,10 @@ def force_points(
     names = tuple(groups) if groups is not None else ("all",) * len(runs)
     if len(names) != len(runs):
         raise InputError("one group per run", got=f"{len(names)} groups", expected=str(len(runs)), where="groups")
+    kept, twice = count_once(runs, names)
+    runs, names = [runs[k] for k in kept], tuple(names[k] for k in kept)
     origin = _origin(runs, force_from)
-    found, notes, empty = [], [], []
+    found, notes, empty = [], [*twice], []
     for number, run in enumerate(runs):
         _check_wheels(run, robot)
         run = _with_voltage(run, robot) if origin == VOLTAGE else run
