@@ -52,7 +52,8 @@ def _robotino(table: Table, data: Path) -> None:
     began = time.process_time()
     runs, robot = logs.robotino_groups(data), load_robot("robotino")
     read = time.process_time() - began
-    fixed = {group: force_points(own, robot, speed="set", window=SHARE) for group, own in runs.items()}
+    readme = logs.without_mass(robot)
+    fixed = {group: force_points(own, readme, speed="set", window=SHARE) for group, own in runs.items()}
     for group, own in fixed.items():
         _travel(table, group, own, "rows 40..95 %", 0.02)
         _travel(table, group, force_points(runs[group], robot, speed="set"), "windows found", 1.1 * TRAVEL[group][1])

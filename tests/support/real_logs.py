@@ -60,3 +60,8 @@ def odrive(data: Path, kinds: Sequence[str]) -> list[Run]:
     paths = [data / "odrive_umn" / "demo_data" / f"{kind}{k}.csv" for kind in kinds for k in (1, 2)]
     options = LogOptions(overrides=(f"t=timestep (8Hz):{TIME_STEP}",))
     return [load_log(path, None, options).to_run() for path in paths]
+
+
+def without_mass(robot: Robot) -> Robot:
+    """The robot as the numbers of the README know it: they take no mass times acceleration off the forces."""
+    return robot.replace(body=robot.body.replace(mass=1e-4, inertia=1e-9))

@@ -1,6 +1,7 @@
 """From logs to a robot with intervals.
 
-question (every option, once) and grouping (whose logs belong together) are what is asked; identify is the door,
+question (every option, once), grouping (whose logs belong together) and recordings (none counts twice) are what is
+asked; identify is the door,
 estimate the answer, Identification all of it. Methods: output_error/ (whole logs), steady/ (stretches of constant
 speed), motors/ (a motor on a bench), geometry (where the wheels stand). Then validation (free runs beside the logs),
 with as_fitted and shape_residual, advice (what to do next), and fit_document (all of it as tables and words).

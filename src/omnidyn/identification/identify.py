@@ -21,6 +21,7 @@ from omnidyn.identification.output_error.inputs import why_no_inputs
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.identification.question import AUTO, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.identification.recordings import fingerprint
 from omnidyn.identification.steady.axis_lines import identify_lines
 from omnidyn.identification.steady.settling import why_no_transient
 from omnidyn.identification.steady.study import SteadyStudy, identify_steady
@@ -202,13 +203,23 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
         if not heard.keep_best:
             raise
         validations, cut = {}, NOT_COMPARED
-    words = verdict_advice(verdicts)
+    words = [*verdict_advice(verdicts), *_not_independent(runs, held)]
     for group, fit in answer.estimates.items():
         own = advice(fit, validations.get(group))
         words += own if len(answer.estimates) == 1 else [f"{group}: {each}" for each in own]
     return Identification(
         asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, tuple(verdicts), tuple(words), cut
     )
+
+
+def _not_independent(runs: Sequence[Run], held: Sequence[bool]) -> list[str]:
+    """Held-out logs that are fitted too, under another name: they prove nothing."""
+    marks = [fingerprint(run) for run in runs] if any(held) else []
+    fitted = {mark: run.source for mark, run, out in zip(marks, runs, held, strict=False) if not out}
+    return [
+        f"{run.source} is held out, and the same recording as {fitted[mark]}, which is fitted: hold out another"
+        for mark, run, out in zip(marks, runs, held, strict=False) if out and mark in fitted
+    ]  # fmt: skip
 
 
 def _verdicts(logs: Sequence[Log], robot: Robot, heard: _Heard) -> list[Verdict]:

@@ -4,12 +4,14 @@ A window lies between two gaps, within a hold: a stretch over which the commands
 where the standard error of what remains is least: MSER, K. P. White, Simulation 69, 323 (1997), here for all measured
 channels at once; an end that differs (the robot brakes) is cut off in the same way. Where no command comes in steps,
 windows of fixed length are taken instead. A window whose second half differs from its first is not steady and left out.
+What is left of a transient in a window is told by the mean rate of change of its speeds; mass times that is no
+friction.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +21,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.segments import segments
 from omnidyn.model.frames import world_to_body
 from omnidyn.run import Run
-from omnidyn.statistics import robust_mean, robust_std
+from omnidyn.statistics import HUBER_CLIP, autocorrelation_time, robust_mean, robust_std
 
 MIN_ROWS, MIN_DURATION = 12, 0.4  # [s]
 WINDOW = 0.5  # [s] length where no command comes in steps
@@ -29,6 +31,8 @@ START_SHARE, END_SHARE = 0.5, 0.25  # at most so much of a hold is cut off
 SAFETY = 3  # times what MSER cuts: it leaves a transient as large as the noise of one window, which many do not average
 DEAD_SHARE = 0.05  # of what the speeds tell: an angle that turns less is dead
 DRIFT_ERRORS, DRIFT_SHARE = 4.0, 0.1  # halves that differ by more than both are not steady
+
+CUBIC, CLIPPINGS = 3, 3  # degree of the curve through the speeds of a window; times that its spikes are clipped
 
 COMMANDS = ("wheel_speed_command", "twist_command", "duty", "voltage")
 ANGLE, SPEED = "differences of wheel_angle", "wheel_speed"
@@ -42,6 +46,8 @@ class Plateau:
     standard error, SI, shape (columns,) or (); of wheel_speed, and of twist where only a pose was logged, from
     differences over the window. speed_from: where wheel_speed comes from, "" where there is none.
     hold: number of its hold in the run; a gap may cut one into several windows. count: rows used.
+    rate, rate_std: "wheel_speed" and "twist", where there are any -> mean rate of change over the window and its
+    standard error, SI per s, shape (columns,).
     """
 
     rows: slice
@@ -52,6 +58,8 @@ class Plateau:
     speed_from: str = ""
     hold: int = 0
     count: int = 0
+    rate: Mapping[str, FloatArray] = field(default_factory=dict)
+    rate_std: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def find_plateaus(run: Run, *, start: float | None = None, end: float | None = None) -> tuple[Plateau, ...]:
@@ -83,29 +91,46 @@ def _pooled(windows: Sequence[Plateau]) -> Plateau:
     first, last = windows[0], windows[-1]
     weight = np.array([each.count for each in windows], dtype=float)
     weight /= weight.sum()
-    mean = {name: sum(w * each.mean[name] for w, each in zip(weight, windows, strict=True)) for name in first.mean}
-    std = {
-        name: np.sqrt(sum((w * each.std[name]) ** 2 for w, each in zip(weight, windows, strict=True)))
-        for name in first.std
-    }
+    mean, rate = (_averaged([getattr(each, part) for each in windows], weight) for part in ("mean", "rate"))
+    std, rate_std = (_error([getattr(each, part) for each in windows], weight) for part in ("std", "rate_std"))
     rows, count = slice(first.rows.start, last.rows.stop), sum(each.count for each in windows)
-    return replace(first, rows=rows, end=last.end, mean=mean, std=std, count=count)
+    return replace(
+        first, rows=rows, end=last.end, mean=mean, std=std, count=count, rate=rate, rate_std=rate_std
+    )  # fmt: skip
+
+
+def _averaged(parts: Sequence[Mapping[str, FloatArray]], weight: FloatArray) -> dict[str, FloatArray]:
+    """What all windows have, averaged."""
+    names = [name for name in parts[0] if all(name in part for part in parts)]
+    return {name: np.tensordot(weight, np.stack([part[name] for part in parts]), 1) for name in names}
+
+
+def _error(parts: Sequence[Mapping[str, FloatArray]], weight: FloatArray) -> dict[str, FloatArray]:
+    """The standard error of that average."""
+    squares = _averaged([{name: each**2 for name, each in part.items()} for part in parts], weight**2)
+    return {name: np.sqrt(each) for name, each in squares.items()}
 
 
 def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
-    mean, std = {}, {}
+    mean, std, t = {}, {}, run.t[rows]
+    middle = 0.5 * (t[1:] + t[:-1])
+    speeds = {name: (t, values[rows]) for name, values in run.channels.items() if name in ("wheel_speed", "twist")}
     for name, values in run.channels.items():
         if name not in ("wheel_angle", "pose"):
             mean[name], std[name] = robust_mean(values[rows])
     speed_from = SPEED if "wheel_speed" in mean else ""
     if angle is not None and np.isfinite(angle[rows]).all():
-        mean["wheel_speed"], std["wheel_speed"] = _rate(run.t[rows], angle[rows])
+        mean["wheel_speed"], std["wheel_speed"] = _rate(t, angle[rows])
+        speeds["wheel_speed"] = middle, np.diff(angle[rows], axis=0) / np.diff(t)[:, None]
         speed_from = ANGLE
     if run.twist is None and run.pose is not None and np.isfinite(run.pose[rows]).all():
-        mean["twist"], std["twist"] = _body_rate(run.t[rows], run.pose[rows])
+        mean["twist"], std["twist"] = _body_rate(t, run.pose[rows])
+        speeds["twist"] = middle, _body_steps(run.pose[rows]) / np.diff(t)[:, None]
+    rates = {name: _rate_of_change(*each) for name, each in speeds.items()}
     return Plateau(
-        rows, float(run.t[rows][0]), float(run.t[rows][-1]), mean, std, speed_from, count=rows.stop - rows.start
-    )
+        rows, float(t[0]), float(t[-1]), mean, std, speed_from, count=rows.stop - rows.start,
+        rate={name: each[0] for name, each in rates.items()}, rate_std={name: each[1] for name, each in rates.items()},
+    )  # fmt: skip
 
 
 def live_angle(run: Run) -> FloatArray | None:
@@ -243,6 +268,41 @@ def _rate(t: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _body_rate(t: FloatArray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mean twist over a window from the pose: each step turned into the body frame of its middle."""
-    heading = 0.5 * (pose[1:, 2] + pose[:-1, 2])
-    turned = np.einsum("nij,nj->ni", world_to_body(heading), np.diff(pose, axis=0))
+    turned = _body_steps(pose)
     return turned.sum(axis=0) / (t[-1] - t[0]), robust_mean(turned / np.diff(t)[:, None])[1]
+
+
+def _body_steps(pose: FloatArray) -> FloatArray:
+    """Each step of a pose in the body frame of its middle. Shape (n - 1, 3)."""
+    heading = 0.5 * (pose[1:, 2] + pose[:-1, 2])
+    return np.einsum("nij,nj->ni", world_to_body(heading), np.diff(pose, axis=0))
+
+
+def _rate_of_change(t: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean rate of change of each column over a window, (v(end) - v(start))/T, and its standard error.
+
+    The ends are those of a cubic through all rows, spikes clipped: with Legendre's polynomials on -1 .. 1 it rises by
+    2 (c_1 + c_3). The line of least squares does not tell it: it looks at the middle, a transient is at the start.
+    0 and infinity for a column without enough numbers.
+    """
+    known = [np.isfinite(column) for column in speed.T]
+    found = [_rise(t[seen], column[seen]) for seen, column in zip(known, speed.T, strict=True)]
+    rise, error = np.array(found).reshape(-1, 2).T
+    return rise / (t[-1] - t[0]), error / (t[-1] - t[0])
+
+
+def _rise(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
+    """(v(end) - v(start), its standard error) of a cubic through one column."""
+    if len(t) < MIN_ROWS:
+        return 0.0, np.inf
+    design = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, CUBIC)
+    inverse, ends = np.linalg.pinv(design), np.array([0.0, 2.0, 0.0, 2.0])
+    clipped = speed
+    for _ in range(CLIPPINGS):
+        curve = design @ (inverse @ clipped)
+        residual = speed - curve
+        bound = HUBER_CLIP * float(robust_std(residual, 0.0)) or np.inf
+        clipped = curve + np.clip(residual, -bound, bound)
+    left = clipped - design @ (inverse @ clipped)
+    spread = np.sqrt(left @ left / (len(t) - CUBIC - 1) * autocorrelation_time(left))
+    return float(ends @ inverse @ clipped), float(spread * np.linalg.norm(ends @ inverse))

@@ -46,6 +46,7 @@ from omnidyn.identification.output_error.trust.resampling import refuse_bootstra
 from omnidyn.identification.output_error.trust.support import supported, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.identification.question import GAUSS, OUTPUT_ERROR, STUDENT, Question
+from omnidyn.identification.recordings import count_once
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 
@@ -60,11 +61,12 @@ class Fit:
     """A fit of whole logs, ready to be solved.
 
     `solve` finds the best point, `answer` says what it means. After an interrupt, `answer` takes the `best` of the
-    Progress that `solve` was given.
+    Progress that `solve` was given. twice: which runs were given twice and count once, in words.
     """
 
     question: Question
     groups: tuple[Group, ...]
+    twice: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -79,6 +81,8 @@ class Fit:
         """
         every = as_list(runs)
         names = _group_names(every, question, groups)
+        kept, twice = count_once(every, names)
+        every, names = [every[k] for k in kept], [names[k] for k in kept]
         exact = is_exact(robot)
         usual = free_by_default(robot, exact)
         refuse_repeated(question.free or ())
@@ -102,7 +106,7 @@ class Fit:
         ]
         if groups is not None:
             own_names(question.per_free, [group.problem() for group in made])
-        return cls(question, tuple(made))
+        return cls(question, tuple(made), twice)
 
     @property
     def nu(self) -> float:
@@ -124,7 +128,7 @@ class Fit:
         """
         progress, done = progress or Progress(), isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
-        hints = self._hints(solution, done)
+        warnings, hints = [*self.twice, *warnings], self._hints(solution, done)
         solution, levels = self._levels(solution) if done else (solution, [])
         solver = solution.solver
         progress.doing("finding how sure the numbers are")

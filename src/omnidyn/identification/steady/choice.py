@@ -21,7 +21,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.steady.operating_points import ForcePoints
+from omnidyn.identification.steady.operating_points import CURRENT, ForcePoints
 from omnidyn.identification.steady.shape_fit import (
     HUBER,
     RAYLEIGH,
@@ -126,14 +126,14 @@ def _refuse_lost_signs(points: ForcePoints) -> None:
         raise InsufficientDataError(
             "the force points against the motion, as if friction drove the robot", got=f"in {wrong} of {len(along)} "
             "points", expected="forces along the motion",
-            remedy="check the sign of the currents (`current_unsigned`) and which wheel is which",
+            remedy="check the sign of the currents (`current_unsigned`) and which wheel is which"
+            if points.force_from == CURRENT else "check K_t, K_v, the gear, the radii, and which wheel is which",
         )  # fmt: skip
 
 
 def speeds_differ(points: ForcePoints) -> bool:
     """Whether the speeds of the points differ enough to show a viscous friction."""
-    moving = points.speed > points.still
-    speed = points.speed[moving] if moving.any() else np.abs(points.twist[:, 2])
+    speed = points.speed[points.travels] if points.travels.any() else np.abs(points.twist[:, 2])
     return bool(speed.size > 1 and np.quantile(speed, 0.9) > SPEED_RATIO * np.quantile(speed, 0.1))
 
 

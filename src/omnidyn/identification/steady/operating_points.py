@@ -1,7 +1,8 @@
 """Points at constant speed with all axes at once: the motion, and the force of the motors that friction balances there.
 
 traction   f = l K_t i / r from currents, or with i = (u - K_v l w)/R from voltage and speed, eqs (10) (11)
-wrench     G f, eqs (7)-(9); in a turning frame friction also balances M omega v
+wrench     G f - M dv/dt, eqs (4)-(9): what still accelerates in a window is not balanced by friction; in a turning
+           frame friction also balances M omega v
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.recordings import count_once
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
 from omnidyn.model.actuation import asked_voltage
-from omnidyn.model.dynamics import frame_wrench
+from omnidyn.model.dynamics import frame_wrench, mass_matrix
 from omnidyn.model.motor import settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wrench_from_traction
@@ -33,6 +35,8 @@ CURRENT, VOLTAGE = "current", "voltage"
 STILL_SHARE = 1e-6  # of the fastest rim: slower is not moving, whatever the speed is
 STILL_ERRORS = 2.0  # standard errors: a measured speed below is not known to move
 AT_REST = 1e-3  # [m/s] at the rim
+SPOT_SHARE = 0.1  # of the speed of the rims by turning: a robot that travels less than this turns on the spot
+ACCELERATES = 0.01  # of the force: what the acceleration takes of it is told from there on
 UNSIGNED_SHARE = 0.1  # of the windows, in which a wheel turns backward while no current is below 0
 
 
@@ -42,8 +46,10 @@ class ForcePoints:
 
     twist [m/s, m/s, rad/s], (points, 3), by `speed_from`. traction [N], (points, wheels); wrench [N, N, N m], (points,
     3): what friction balances; wrench_std: of its mean over the window. still [m/s], (points,): a component of the
-    motion slower than this is not known to move. direction: of the commanded motion [degree], or of the twist where no
-    command was logged. group: name of each point's group. run: number of its run. rows: rows of the log behind it.
+    motion slower than this is not known to move. travels, turns: whether the point has a direction of travel, and
+    whether it turns, (points,); a turn on the spot has no direction of travel. direction: of the commanded motion
+    [degree], or of the twist where no command was logged. group: name of each point's group. run: number of its run.
+    rows: rows of the log behind it.
     speed_from: "wheel", "set" or "ground". force_from: "current" or "voltage". notes: in words.
     """
 
@@ -52,6 +58,8 @@ class ForcePoints:
     wrench: FloatArray
     wrench_std: FloatArray
     still: FloatArray
+    travels: BoolArray
+    turns: BoolArray
     direction: FloatArray
     group: tuple[str, ...]
     run: IntArray
@@ -75,16 +83,16 @@ class ForcePoints:
 
     @property
     def along(self) -> FloatArray:
-        """Force along travel [N]; NaN where the robot does not travel. Shape (points,)."""
+        """Force along travel [N]; NaN where the robot has no direction of travel. Shape (points,)."""
         speed = self.speed
         with np.errstate(invalid="ignore", divide="ignore"):
             along = (self.wrench[:, :2] * self.twist[:, :2]).sum(axis=1) / speed
-        return np.where(speed > self.still, along, np.nan)
+        return np.where(self.travels, along, np.nan)
 
     def chosen(self, keep: NDArray) -> ForcePoints:
         """Some of the points: a mask or indices."""
         index = np.arange(len(self))[keep]
-        arrays = ("twist", "traction", "wrench", "wrench_std", "still", "direction", "run", "rows")
+        arrays = ("twist", "traction", "wrench", "wrench_std", "still", "travels", "turns", "direction", "run", "rows")
         parts = {name: getattr(self, name)[index] for name in arrays}
         return replace(self, **parts, group=tuple(self.group[k] for k in index))
 
@@ -104,6 +112,7 @@ def force_points(
     "current" or "voltage"; "" takes current where all runs have it. window: shares of each command's rows instead of
     steady rows found, see `find_plateaus`.
     Currents must carry the sign of the torque. Voltage may be duty times supply.
+    A recording given twice counts once, and the notes say so.
     Raises InputError for a run without what is asked for, InsufficientDataError when no window is steady and moves,
     UnsupportedError for losses in the gear.
     """
@@ -113,8 +122,10 @@ def force_points(
     names = tuple(groups) if groups is not None else ("all",) * len(runs)
     if len(names) != len(runs):
         raise InputError("one group per run", got=f"{len(names)} groups", expected=str(len(runs)), where="groups")
+    kept, twice = count_once(runs, names)
+    runs, names = [runs[k] for k in kept], tuple(names[k] for k in kept)
     origin = _origin(runs, force_from)
-    found, notes, empty = [], [], []
+    found, notes, empty = [], [*twice], []
     for number, run in enumerate(runs):
         _check_wheels(run, robot)
         run = _with_voltage(run, robot) if origin == VOLTAGE else run
@@ -173,17 +184,36 @@ def _point(run: Run, robot: Robot, each: Plateau, speed: str, origin: str) -> di
     moves = _twist(run, robot, each, speed)
     current, current_std = _current(run, robot, each, origin)
     force = traction(robot.motor, robot.wheels, current)
+    inertial, inertial_std = _inertial_wrench(robot, each)
     unit_force = traction(robot.motor, robot.wheels, np.eye(len(current)))
     per_wheel = wrench_from_traction(robot.wheels, unit_force)  # of one ampere in each motor, (wheels, 3)
     twist, still = moves
+    travel, turn = np.hypot(*twist[:2]), abs(twist[2]) * float(np.mean(robot.wheels.robot_radius))
     return {
         "twist": twist,
         "still": still,
+        "travels": travel > max(still, SPOT_SHARE * turn),
+        "turns": turn > max(still, SPOT_SHARE * travel),
         "traction": force,
-        "wrench": wrench_from_traction(robot.wheels, force) + frame_wrench(robot, twist),
-        "wrench_std": np.sqrt(current_std**2 @ per_wheel**2),
+        "wrench": wrench_from_traction(robot.wheels, force) - inertial + frame_wrench(robot, twist),
+        "wrench_std": np.sqrt(current_std**2 @ per_wheel**2 + inertial_std**2),
+        "inertial": inertial,
         "direction": _direction(robot, each, twist),
     }
+
+
+def _inertial_wrench(robot: Robot, each: Plateau) -> tuple[FloatArray, FloatArray]:
+    """M dv/dt [N, N, N m] of a window, and its standard error; by the wheels, else by the twist, else 0."""
+    name = "wheel_speed" if "wheel_speed" in each.rate else "twist"
+    rate, std = each.rate.get(name, np.zeros(3)), each.rate_std.get(name, np.zeros(3))
+    if not np.isfinite(std).all():  # too few numbers to tell
+        return np.zeros(3), np.zeros(3)
+    if name == "wheel_speed":
+        one = twist_from_wheel_speed(robot.wheels, np.eye(len(rate)))  # of 1 rad/s^2 at each wheel, (wheels, 3)
+        rate, std = rate @ one, np.sqrt(std**2 @ one**2)
+    mass = mass_matrix(robot)
+    full = np.diag(mass) if mass.ndim == 1 else mass
+    return full @ rate, np.sqrt(full**2 @ std**2)
 
 
 def _current(run: Run, robot: Robot, each: Plateau, origin: str) -> tuple[FloatArray, FloatArray]:
@@ -269,10 +299,14 @@ def _stacked(
             expected="stretches of constant speed, half a second or longer", remedy="hold each command longer",
         )  # fmt: skip
     arrays = {name: np.array([point[name] for _, point, _ in found]) for name in found[0][1]}
+    notes = [*notes, *_about_acceleration(arrays.pop("inertial"), arrays["wrench"], robot)]
     if any(each.speed_from == ANGLE for *_, each in found) and speed == WHEEL:
         notes = [*notes, f"speeds of the wheels are from {ANGLE}, finer than a quantised speed"]
+    travels, turns = arrays.pop("travels") > 0.0, arrays.pop("turns") > 0.0
     return ForcePoints(
         **arrays,
+        travels=travels,
+        turns=turns,
         group=tuple(names[number] for number, _, _ in found),
         run=np.array([number for number, _, _ in found]),
         rows=np.array([each.count for *_, each in found]),
@@ -280,6 +314,15 @@ def _stacked(
         force_from=origin,
         notes=tuple(notes),
     )
+
+
+def _about_acceleration(inertial: FloatArray, wrench: FloatArray, robot: Robot) -> list[str]:
+    """What accelerations took of the forces, where it is worth a word."""
+    scale = [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))]
+    most = float(np.linalg.norm(inertial / scale, axis=1).max())
+    if most <= ACCELERATES * float(np.median(np.linalg.norm(wrench / scale, axis=1))):
+        return []
+    return [f"some windows still accelerate: up to {most:.2g} N, mass times that, was taken off their forces"]
 
 
 def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.identification.steady.operating_points import ForcePoints
+from omnidyn.identification.steady.operating_points import SPOT_SHARE, ForcePoints
 from omnidyn.identification.steady.shapes import Shape
 from omnidyn.model.robot import Robot
 from omnidyn.statistics import huber_weight, standard_error
@@ -24,8 +24,8 @@ RAYLEIGH = 1.1774  # median length of a two-dimensional normal residual, in its 
 ITERATIONS, SETTLED, WEIGHTS_SETTLED = 30, 1e-10, 1e-6
 MAX_CONDITION = 1e7
 FEW_FOLDS = 6
+FEW_TURNS = 4  # both ways at two speeds
 FOLD_DEG = 1.0
-TURNING_SHARE = 0.1  # of the fastest rim speed: less is not turning
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +34,9 @@ class ShapeFit:
 
     level: within level >= 0; free: without that bound. Shape (levels,). covariance: of `free`, by jackknife.
     weight: of each point, 1 or less. fold: number of what was left out together with each point.
-    error: measured minus predicted force of each point, fitted without its fold [N]: (F_x, F_y), and T / b where the
-    robot turns; shape (points, 2 or 3). along_error: the same along travel, shape (points,).
+    error: measured minus predicted force of each point, fitted without its fold [N]: (F_x, F_y), and T / b where any
+    point turns; shape (points, 2 or 3), 0 for what has no part in the fit. along_error: the same along travel, shape
+    (points,).
     """
 
     shape: Shape
@@ -62,7 +63,7 @@ class ShapeFit:
 def is_turning(robot: Robot, points: ForcePoints) -> bool:
     """Whether enough points turn to tell the friction about yaw."""
     turning = np.abs(points.twist[:, 2]) * _arm(robot)
-    return bool((turning > TURNING_SHARE * np.maximum(points.speed, turning).max()).sum() >= FEW_FOLDS)
+    return bool((points.turns & (turning > SPOT_SHARE * turning.max())).sum() >= FEW_TURNS)
 
 
 def fit_shape(
@@ -96,12 +97,26 @@ def fit_shape(
 
 def fold_numbers(points: ForcePoints) -> IntArray:
     """What is left out together: points of one direction of travel, numbered in the order of the direction; with fewer
-    than six directions, or where the robot turns on the spot, each run and command for itself. Shape (points,).
+    than six directions each run and command for itself. Behind them each turn on the spot. Shape (points,).
     """
-    _, folds = np.unique(np.round(points.direction / FOLD_DEG) % round(360.0 / FOLD_DEG), return_inverse=True)
-    if folds.max() + 1 < FEW_FOLDS or (points.speed <= points.still).any():
-        folds = np.argsort(np.argsort(points.direction, kind="stable"), kind="stable")
-    return folds.astype(np.int64)
+    found, travel = np.zeros(len(points), dtype=np.int64), np.flatnonzero(points.travels)
+    direction, spot = points.direction[travel], np.flatnonzero(~points.travels)
+    folds = np.zeros(0, dtype=np.int64)
+    if travel.size:
+        _, folds = np.unique(np.round(direction / FOLD_DEG) % round(360.0 / FOLD_DEG), return_inverse=True)
+        if folds.max() + 1 < FEW_FOLDS:
+            folds = np.argsort(np.argsort(direction, kind="stable"), kind="stable")
+    found[travel] = folds
+    found[spot] = np.arange(spot.size) + (int(folds.max()) + 1 if travel.size else 0)
+    return found
+
+
+def seen_components(points: ForcePoints, turning: bool) -> FloatArray:
+    """1 for the components of the force that a point tells, 0 for others: F_x, F_y where it travels, and T where it
+    turns. A turn on the spot has no direction of travel, and friction at rest holds any force. Shape (points, 2 or 3).
+    """
+    seen = np.stack([points.travels, points.travels, points.turns], axis=1).astype(float)
+    return seen[:, : 3 if turning else 2]
 
 
 def rms_and_error(squares: FloatArray, fold: IntArray) -> tuple[float, float]:
@@ -132,8 +147,10 @@ class _Problem:
 
     def _components(self, wrench: FloatArray) -> FloatArray:
         """(F_x, F_y), and T / b where the robot turns [N], of an array of shape (points, 3, ...)."""
-        scale = np.array([1.0, 1.0, _arm(self.robot)]).reshape(1, 3, *([1] * (wrench.ndim - 2)))
-        return (wrench / scale)[:, : 3 if self.turning else 2]
+        more = [1] * (wrench.ndim - 2)
+        scale = np.array([1.0, 1.0, _arm(self.robot)]).reshape(1, 3, *more)
+        seen = seen_components(self.points, self.turning)
+        return (wrench / scale)[:, : seen.shape[1]] * seen.reshape(*seen.shape, *more)
 
     def _aimed(self, force: FloatArray) -> FloatArray:
         """What is fitted: all components, or the one along travel. Shape (points, components, ...)."""

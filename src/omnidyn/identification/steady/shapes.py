@@ -127,11 +127,26 @@ def _rims(robot: Robot, points: ForcePoints) -> FloatArray:
     return robot.wheels.wrench_matrix[None] * side[:, None, :]
 
 
-def _rollers(robot: Robot, points: ForcePoints) -> FloatArray:
+def on_rollers(robot: Robot, points: ForcePoints) -> FloatArray:
     """Wrench of a unit push along the axle of each wheel, the way it slides there; all wheels together."""
     sin, cos = sin_cos_deg(robot.wheels.azimuth_deg)
     axle = np.stack([cos, sin, np.zeros_like(cos)])
     return (axle[None] * _side(points.twist @ axle, points)[:, None, :]).sum(axis=2, keepdims=True)
+
+
+def element_speeds(shape: Shape, robot: Robot, points: ForcePoints) -> FloatArray:
+    """How fast the parts of a shape with a sign of their own move, those that a point tells [m/s], >= 0.
+
+    A part at rest holds any force up to its level. inf for a part without. Shape (points, parts).
+    """
+    names = {term.keys[0].rpartition(".")[0] for term in shape.terms}
+    parts = [np.full((len(points), 1), np.inf)]
+    if AXES in names:
+        seen = np.stack([points.travels, points.travels, points.turns], axis=1)
+        parts.append(np.where(seen, np.abs(points.twist * [1.0, 1.0, _arm(robot)]), np.inf))
+    if WHEELS in names:
+        parts.append(np.abs(rim_speed(robot.wheels, points.twist)))
+    return np.concatenate(parts, axis=1)
 
 
 def _ellipse_force(points: ForcePoints, level: FloatArray) -> FloatArray:
@@ -168,7 +183,7 @@ _TERMS = {
     "viscous-yaw": Term((f"{DIRECTION}.yaw_viscous",), lambda r, p: _on_axes(p.twist, (2,)), yaw=True),
     "wheel": Term((f"{WHEELS}.coulomb",), lambda r, p: _rims(r, p).sum(axis=2, keepdims=True)),
     "wheels": Term((f"{WHEELS}.coulomb[i]",), _rims),
-    "roller": Term(("roller",), _rollers),
+    "roller": Term(("roller",), on_rollers),
     "wheel-viscous": Term(
         (f"{WHEELS}.viscous",), lambda r, p: _columns(rim_speed(r.wheels, p.twist) @ r.wheels.wrench_matrix.T)
     ),

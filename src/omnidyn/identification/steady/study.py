@@ -8,7 +8,7 @@ levels   of each group, with 95 % intervals; what differs between groups, and wh
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -21,13 +21,17 @@ from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.question import STEADY_STATE, Question
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
-from omnidyn.identification.steady.operating_points import ForcePoints, force_points
+from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
+from omnidyn.identification.steady.operating_points import VOLTAGE, ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
+from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import AXES, DIRECTION, Key
-from omnidyn.model.robot import Prior, Robot
+from omnidyn.model.keys import AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
+from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
+from omnidyn.model.layout import YAW
+from omnidyn.model.robot import GUESS, Prior, Robot
 from omnidyn.run import Run
 from omnidyn.statistics import t_quantile
 
@@ -41,7 +45,8 @@ class SteadyStudy:
     points: what was used. choice: shapes compared. estimates: group -> Estimate, whose robot holds that group's
     friction. travel: group -> force along travel. viscous: group -> what is known of the viscous levels. differences
     between groups. internal: group -> rms of the forces with which the wheels work against each other [N], where there
-    are more than three. statements, warnings, advice: in words.
+    are more than three. lack_of_fit: group -> whether any offered shape fits, and what would. statements, warnings,
+    advice: in words.
     """
 
     robot: Robot
@@ -52,6 +57,7 @@ class SteadyStudy:
     viscous: Mapping[str, tuple[Viscous, ...]]
     differences: tuple[Difference, ...]
     internal: Mapping[str, float]
+    lack_of_fit: Mapping[str, LackOfFit]
     statements: tuple[str, ...]
     warnings: tuple[str, ...]
     advice: tuple[str, ...]
@@ -91,13 +97,15 @@ def identify_steady(
     estimates = {group: _estimate(robot, own, choice, group, robust) for group, own in parts.items()}
     differences = _differences(choice)
     internal = {group: _internal(robot, own) for group, own in parts.items()} if robot.wheels.count > 3 else {}
+    lack = {group: lack_of_fit(robot, own, choice.fits[choice.chosen][group]) for group, own in parts.items()}
     turning = any(is_turning(robot, own) for own in parts.values())
     return SteadyStudy(
         robot=robot, points=points, choice=choice, estimates=estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
-        statements=words.statements(choice, viscous, differences, internal, MATTERS),
-        warnings=(*points.notes, *words.doubts(points, choice, turning)),
-        advice=words.advice(choice, viscous, turning, points.force_from),
+        lack_of_fit=lack,
+        statements=words.statements(choice, viscous, differences, internal, lack, MATTERS),
+        warnings=(*points.notes, *words.doubts(points, choice, turning), *words.about_lack_of_fit(lack, choice)),
+        advice=words.lack_advice(lack) + words.advice(choice, viscous, turning, points.force_from),
     )  # fmt: skip
 
 
@@ -106,7 +114,7 @@ def _travel(points: ForcePoints) -> Travel:
     n = len(along)
     spread = float(np.std(along, ddof=1)) if n > 1 else float("nan")
     mean, error = (float(np.mean(along)), spread / np.sqrt(n)) if n else (float("nan"), float("nan"))
-    speed = points.speed
+    speed = points.speed[points.travels] if points.travels.any() else points.speed
     return Travel(
         mean, error, spread, float(speed.min()), float(speed.max()), len(points), len(set(points.run.tolist())),
         int(points.rows.sum()),
@@ -123,20 +131,68 @@ def _viscous(
         fit = fit_shape(SHAPES[name], robot, points, turning=is_turning(robot, points), robust=robust)
     if fit is None:
         return ()
+    emf = _back_emf(robot, points)
     for k, key in enumerate(fit.keys):
-        if ".viscous" in key:
-            half = t_quantile(fit.degrees_of_freedom) * float(fit.std[k])
-            value, low, high = float(fit.free[k]), float(fit.free[k]) - half, float(fit.free[k]) + half
-            effect = max(abs(low), abs(high)) * (travel.fast - travel.slow)
-            seen = not low <= 0.0 <= high
-            found.append(
-                Viscous(key, value, float(fit.std[k]), low, high, seen, effect, travel.mean, travel.slow, travel.fast)
-            )
+        name = Key.parse(key)
+        if name.level != VISCOUS_LEVEL:
+            continue
+        level, slow, fast = travel.mean, travel.slow, travel.fast
+        if name.axis == YAW:
+            turned = np.abs(points.twist[points.turns, 2])
+            level, slow, fast = float(np.abs(points.wrench[points.turns, 2]).mean()), turned.min(), turned.max()
+        brake = emf.of(name)
+        value, std = float(fit.free[k]), float(np.hypot(fit.std[k], emf.doubt * brake))
+        half = t_quantile(fit.degrees_of_freedom) * std
+        low, high = value - half, value + half
+        found.append(
+            Viscous(key, value, std, low, high, seen=not low <= 0.0 <= high,
+                    effect=max(abs(low), abs(high)) * float(fast - slow), level=level, slow=float(slow),
+                    fast=float(fast), back_emf=brake, guesses=emf.guesses, sum_std=float(fit.std[k]))
+        )  # fmt: skip
     return tuple(found)
 
 
+@dataclass(frozen=True, eq=False)
+class _BackEmf:
+    """How the back-EMF brakes: forces from a voltage show its sum with viscous friction, and never one alone.
+
+    brake: -d(wrench)/d(twist), shape (3, 3). at_rim: the same of one wheel [N s/m]. guesses: the motor constants that
+    are guesses of the robot file. doubt: relative standard deviation of `brake` by these, as far as it is known.
+    """
+
+    brake: FloatArray
+    at_rim: float
+    guesses: tuple[str, ...] = ()
+    doubt: float = 0.0
+
+    def of(self, key: Key) -> float:
+        """The part of a viscous level that is back-EMF, in its unit."""
+        if key.table == WHEELS:
+            return self.at_rim
+        return float(self.brake[key.axis, key.axis] if key.axis is not None else np.mean(np.diag(self.brake)[:2]))
+
+
+def _back_emf(robot: Robot, points: ForcePoints) -> _BackEmf:
+    """None where forces are from currents."""
+    if points.force_from != VOLTAGE:
+        return _BackEmf(np.zeros((3, 3)), 0.0)
+    brake = -drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count))
+    matrix = robot.wheels.wrench_matrix
+    guesses = {key: prior for key, prior in robot.priors.items()
+               if prior.origin == GUESS and Key.parse(key).name in (TORQUE, EMF)}  # fmt: skip
+    doubts = [float(prior.std / abs(np.mean(Key.parse(expand(key, robot)[0]).get(robot))))
+              for key, prior in guesses.items() if prior.std is not None]  # fmt: skip
+    # K_t and K_v are one number of a motor, and the brake has both
+    return _BackEmf(
+        brake, float(np.trace(brake) / np.sum(matrix**2)), tuple(guesses), 2.0 * max(doubts, default=0.0)
+    )  # fmt: skip
+
+
 def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool) -> Estimate:
-    fit = choice.fits[choice.chosen][group]
+    fit, emf = choice.fits[choice.chosen][group], _back_emf(robot, points)
+    extra = np.array([emf.doubt * emf.of(Key.parse(key)) if Key.parse(key).level == VISCOUS_LEVEL else 0.0
+                      for key in fit.keys])  # fmt: skip
+    fit = replace(fit, covariance=fit.covariance + np.diag(extra**2))
     value = dict(zip(fit.keys, fit.level.tolist(), strict=True))
     std = dict(zip(fit.keys, fit.std.tolist(), strict=True))
     turning = is_turning(robot, points)
@@ -150,7 +206,7 @@ def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str
         correlation=Correlation(fit.keys, _correlation(fit.covariance)),
         degrees_of_freedom=dict.fromkeys(fit.keys, fit.degrees_of_freedom),
         at_bound=tuple(key for key, free in zip(fit.keys, fit.free, strict=True) if free < 0.0),
-        warnings=words.about_fit(fit, robust, kept),
+        warnings=(*words.about_fit(fit, robust, kept), *words.about_back_emf(fit.keys, emf.guesses)),
         method=words.method(points, fit, robust),
         data=data,
     )

@@ -27,7 +27,11 @@ class Viscous:
     """What the data say about a viscous level of one group: its key, value, standard error and 95 % interval.
 
     seen: the interval does not contain 0. effect [N]: the most that a viscous force inside the interval changes
-    between the slowest and the fastest point. level [N]: the force along travel, to compare.
+    between the slowest and the fastest point. level [N]: the force along travel, to compare. slow, fast [m/s]: range of
+    the speeds. About yaw [N m] and [rad/s].
+    back_emf: the part of the slope of the drive that the robot file says is back-EMF, where forces are from voltages; 0
+    from currents. guesses: motor constants that are guesses; where there are any, only the sum of `value` and
+    `back_emf` is known, with standard error `sum_std`: `std` and the interval count the std of the guess.
     """
 
     key: str
@@ -40,6 +44,9 @@ class Viscous:
     level: float
     slow: float
     fast: float
+    back_emf: float = 0.0
+    guesses: tuple[str, ...] = ()
+    sum_std: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -86,10 +86,12 @@ def _data(study: SteadyStudy) -> dict[str, Any]:
                 **study.estimates[group].to_dict(),
                 "along_travel": asdict(study.travel[group]),
                 "viscous": [asdict(each) for each in study.viscous[group]],
+                "lack_of_fit": asdict(study.lack_of_fit[group]),
                 "internal_force_N": study.internal.get(group),
             }
             for group in study.estimates
         },
+        "lack_of_fit": any(each.found for each in study.lack_of_fit.values()),
         "differences": [{**asdict(each), "differs": each.differs} for each in study.differences],
         "statements": list(study.statements),
         "warnings": list(study.warnings),

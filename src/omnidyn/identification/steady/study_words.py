@@ -7,14 +7,23 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.identification.steady.choice import APART, ShapeChoice, ShapeScore
+from omnidyn.identification.steady.lack_of_fit import LackOfFit
 from omnidyn.identification.steady.operating_points import CURRENT, SPEEDS, ForcePoints
 from omnidyn.identification.steady.shape_fit import ShapeFit
-from omnidyn.identification.steady.study_parts import Difference, Viscous
-from omnidyn.model.keys import Key, unit
+from omnidyn.identification.steady.study_parts import Difference
+from omnidyn.identification.steady.study_parts import Viscous as ViscousLevel
+from omnidyn.model.keys import VISCOUS, Key, unit
+from omnidyn.model.layout import YAW
 
 FORCES = {"current": "motor currents, eqs (7)-(10)", "voltage": "voltage and speed, eq (11)"}
 LOW_WEIGHT = 0.5
 WRONG_WAY = 0.05  # share of points whose force points against the motion from which a sign is doubted
+
+
+LOST = {
+    "current": "the sign of the currents is lost (`current_unsigned`)",
+    "voltage": "the sign of the voltages or speeds is wrong, or K_t, K_v, the gear or a radius of the robot file is",
+}
 
 
 def method(points: ForcePoints, fit: ShapeFit, robust: bool) -> str:
@@ -35,11 +44,12 @@ def data(points: ForcePoints, group: str) -> str:
 
 
 def statements(
-    choice: ShapeChoice, viscous: Mapping[str, Sequence[Viscous]], differences: Sequence[Difference],
-    internal: Mapping[str, float], matters: float,
+    choice: ShapeChoice, viscous: Mapping[str, Sequence[ViscousLevel]], differences: Sequence[Difference],
+    internal: Mapping[str, float], lack: Mapping[str, LackOfFit], matters: float,
 ) -> tuple[str, ...]:  # fmt: skip
     """What the data say, one sentence each."""
     found = [_about_choice(choice), *_about_ties(choice), *_about_comparison(choice)]
+    found += [words for group, each in lack.items() for words in _about_fit_or_not(group, each)]
     for group, levels in viscous.items():
         found += [_about_viscous(group, level, choice.chosen, matters) for level in levels]
     found += [_about_difference(each) for each in differences]
@@ -78,24 +88,79 @@ def _about_comparison(choice: ShapeChoice) -> list[str]:
     best = choice.scores[0]
     if best.name == choice.chosen or not choice.score.told_apart:
         return []
-    why = "no robot file can hold it" if not best.in_model else "a level of it came out below 0"
+    why = (
+        "no robot file can hold it" if not best.in_model
+        else "a level of it came out below 0" if best.at_bound else "another was asked for"
+    )  # fmt: skip
     return [
         f"{best.name} does better still, by {choice.score.behind:.2f} +- {choice.score.behind_std:.2f} N, but {why}"
     ]
 
 
-def _about_viscous(group: str, level: Viscous, chosen: str, matters: float) -> str:
+def _about_fit_or_not(group: str, lack: LackOfFit) -> list[str]:
+    """What was tested, where no lack was found: that is a result too. A lack is a warning."""
+    if lack.found:
+        return []
+    if not lack.tested:
+        return [f"{_of(group)}whether the shape fits was not tested: too few directions in which all of it moves"]
+    return [f"{_of(group)}no lack of fit is seen: nothing that was tried beside the shape does better"]
+
+
+def about_lack_of_fit(lack: Mapping[str, LackOfFit], choice: ShapeChoice) -> tuple[str, ...]:
+    """That no offered shape fits, and what would."""
+    found = []
+    for group, each in lack.items():
+        if not each.found:
+            continue
+        head = f"{_of(group)}no offered shape fits: "
+        if each.remedies:
+            best = each.remedies[0]
+            as_well = f"; as well do: {', '.join(best.same_as)}" if best.same_as else ""
+            told = (
+                f"with {best.words} beside {choice.chosen} the force in a direction left out is told within "
+                f"{best.error:.2g} N, without within {best.error_before:.2g} N{as_well}"
+            )
+        else:
+            told = f"errors repeat when a direction is driven again, {100.0 * each.share:.0f} % of their square"
+        found.append(f"{head}{told}; no robot file holds that, and the intervals of the levels do not count it")
+    return tuple(found)
+
+
+def lack_advice(lack: Mapping[str, LackOfFit]) -> tuple[str, ...]:
+    """What to do where no shape fits."""
+    if not any(each.found for each in lack.values()):
+        return ()
+    keys = {remedy.key for each in lack.values() for remedy in each.remedies}
+    if keys & {"forward and backward", "left and right", "pull"}:
+        return ("drive the same again with the robot turned half around: a floor that is not level changes its side, "
+                "friction and sensors do not",)  # fmt: skip
+    return ("look for what the shapes do not know: azimuths of the wheels in the robot file, rollers that stick, slip",)
+
+
+def _about_viscous(group: str, level: ViscousLevel, chosen: str, matters: float) -> str:
     key = Key.parse(level.key)
     name, measure = key.symbol, key.unit
     interval = f"{name} = {level.value:.3g} +- {level.std:.2g} {measure}, 95 % [{level.low:.3g}, {level.high:.3g}]"
-    speeds = f"from {level.slow:.3g} to {level.fast:.3g} m/s"
+    turning = key.axis == YAW
+    speeds, force = (
+        f"from {level.slow:.3g} to {level.fast:.3g} {'rad/s' if turning else 'm/s'}",
+        "N m" if turning else "N",
+    )
+    if level.guesses:
+        total = f"{level.value + level.back_emf:.3g} +- {level.sum_std:.2g} {measure}"
+        return (
+            f"{_of(group)}viscous friction cannot be told from back-EMF, for {' and '.join(level.guesses)} "
+            f"{'is a guess' if len(level.guesses) == 1 else 'are guesses'}: together they are {name} + "
+            f"{level.back_emf:.3g} = {total}; with the guess {interval}"
+        )
     if not level.seen:
         share = f"{100.0 * level.effect / level.level:.1f} %" if level.level > 0.0 else "a part"
         bound = f"{name} may be up to {max(level.high, 0.0):.3g} {measure}"
         size = "no more than" if level.effect <= matters * level.level else "up to"
         return (
             f"{_of(group)}viscous friction is not identifiable here: {interval} contains 0; {speeds} it changes the "
-            f"force by {size} {level.effect:.2g} N ({share} of {level.level:.3g} N); it is left at 0, {bound}"
+            f"force by {size} {level.effect:.2g} {force} ({share} of {level.level:.3g} {force}); it is left at 0, "
+            f"{bound}"
         )
     if level.value < 0.0:
         return f"{_of(group)}the force falls with speed: {interval}, {speeds}; a viscous level cannot say that"
@@ -120,7 +185,7 @@ def doubts(points: ForcePoints, choice: ShapeChoice, turning: bool) -> tuple[str
     if wrong > WRONG_WAY * max(len(along), 1):
         found.append(
             f"in {wrong} of {len(along)} points the force points against the motion, as if friction drove the robot: "
-            "the sign of the currents is lost (`current_unsigned`), or a wheel is swapped"
+            f"{LOST[points.force_from]}, or a wheel is swapped"
         )
     if points.force_from == "voltage":
         found.append("forces are from eq (11): as right as the R, K_t and K_v of the robot file")
@@ -146,8 +211,19 @@ def about_fit(fit: ShapeFit, robust: bool, kept: Mapping[str, float]) -> tuple[s
     return tuple(found)
 
 
+def about_back_emf(keys: Sequence[str], guesses: Sequence[str]) -> tuple[str, ...]:
+    """What a viscous level is worth where the back-EMF beside it is a guess."""
+    found = [key for key in keys if Key.parse(key).level == VISCOUS]
+    if not found or not guesses:
+        return ()
+    return (
+        f"{', '.join(found)}: right together with the back-EMF of this file only, for {', '.join(guesses)} "
+        f"{'is a guess' if len(guesses) == 1 else 'are guesses'}; log currents, or measure the no-load speed",
+    )
+
+
 def advice(
-    choice: ShapeChoice, viscous: Mapping[str, Sequence[Viscous]], turning: bool, force_from: str
+    choice: ShapeChoice, viscous: Mapping[str, Sequence[ViscousLevel]], turning: bool, force_from: str
 ) -> tuple[str, ...]:
     """What to measure next."""
     found = []

@@ -94,7 +94,7 @@ def draw_polar(study: SteadyStudy) -> Picture:
             way, curve = _curve(study, group, study.choice.chosen, own)
             axes.plot(np.radians(way), _along(way, curve), color=colour, linestyle=line, linewidth=2.2,  # type: ignore[arg-type]
                       label=f"{study.choice.chosen}" + ("" if group == "all" else f", {group}"))  # fmt: skip
-            top = max(top, float(np.nanmax(own.along)))
+            top = max(top, float(np.nanmax(own.along, initial=0.0)))
         _compared(study, axes, groups[0])
         _dress(axes, top)
         figure.legend(*axes.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.68, 0.5))
@@ -160,13 +160,14 @@ def _curve(study: SteadyStudy, group: str, name: str, own: ForcePoints) -> tuple
     """(direction [degree], driving wrench) of a fitted shape at the middle speed of the group, without turning."""
     fit = study.choice.fits[name][group]
     way = np.arange(-180.0, 180.0 + STEP_DEG, STEP_DEG) + 0.01  # beside the corners, not on them
-    speed = float(np.median(own.speed[own.speed > 0.0]))
+    speed = float(np.median(own.speed))
     angle = np.radians(way)
     twist = speed * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     empty = np.zeros(len(way))
     points = replace(
         own, twist=twist, still=empty, wrench=np.zeros((len(way), 3)), wrench_std=np.zeros((len(way), 3)),
-        traction=np.zeros((len(way), own.traction.shape[1])), direction=way, group=(group,) * len(way),
+        traction=np.zeros((len(way), own.traction.shape[1])), direction=way, travels=empty == 0.0, turns=empty > 0.0,
+        group=(group,) * len(way),
         run=empty.astype(np.int64), rows=empty.astype(np.int64),
     )  # fmt: skip
     turning = any(Key.parse(key).axis == YAW for key in fit.keys)
@@ -179,8 +180,8 @@ def _along(way: FloatArray, wrench: FloatArray) -> FloatArray:
 
 
 def _of(points: ForcePoints, group: str) -> ForcePoints:
-    moving = points.speed > points.still
-    return points.chosen(np.array([name == group for name in points.group]) & moving)
+    own = np.array([name == group for name in points.group])
+    return points.chosen(own & points.travels if (own & points.travels).any() else own)
 
 
 def _dress(axes: PolarAxes, top: float) -> None:

@@ -1,0 +1,48 @@
+"""One recording given twice is one recording: counted twice it would make every interval narrower by sqrt(2)."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from omnidyn.run import Run
+
+SAME_TIME = 9  # decimals of a second to which times since the first row are compared
+
+
+def count_once(runs: Sequence[Run], groups: Sequence[str]) -> tuple[list[int], tuple[str, ...]]:
+    """(places of the runs to use, what is to be said of the others). groups: of each run.
+
+    Runs are the same where all their channels are, and their times since the first row, whatever they are called. The
+    first of a group is used. One that two groups have stays in both, with a word: their difference is no evidence then.
+    """
+    seen: dict[str, int] = {}
+    kept, words = [], []
+    for place, run in enumerate(runs):
+        first = seen.setdefault(fingerprint(run), place)
+        if first == place:
+            kept.append(place)
+        elif groups[first] == groups[place]:
+            words.append(f"{_name(run, place)} is the same recording as {_name(runs[first], first)}: it counts once")
+        else:
+            kept.append(place)
+            words.append(
+                f"{_name(run, place)} in group {groups[place]} is the same recording as {_name(runs[first], first)} "
+                f"in group {groups[first]}: the groups are not independent"
+            )
+    return kept, tuple(words)
+
+
+def fingerprint(run: Run) -> str:
+    """SHA-256 of all channels of a run and its times since the first row."""
+    found = hashlib.sha256(np.round(run.t - run.t[0], SAME_TIME).tobytes())
+    for name, values in run.channels.items():
+        found.update(name.encode())
+        found.update((np.ascontiguousarray(values) + 0.0).tobytes())  # 0 and -0 are one number
+    return found.hexdigest()
+
+
+def _name(run: Run, place: int) -> str:
+    return run.source or f"run {place}"

@@ -1,0 +1,69 @@
+"""One recording given twice counts once."""
+
+import numpy as np
+import pytest
+
+from omnidyn.identification.identify import Identification, identify
+from omnidyn.identification.recordings import count_once
+from omnidyn.identification.steady.study import identify_steady
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+from tests.support.plain_world import World, fan, spoiled, steady_logs
+
+AXEBOT = load_robot("axebot")
+
+
+def fan_runs():
+    random, world = np.random.default_rng(0), World(cone=(2.0, 2.0), elements=[((0.0, 0.0, 1.0), 0.1, 0.1)])
+    logs = [spoiled(log, random) for _, log in steady_logs(world, fan())]
+    return [Run(t=t, current=i, wheel_speed=w, source=f"run{k}.csv") for k, (t, i, w) in enumerate(logs)]
+
+
+def driven(seed):
+    random = np.random.default_rng(seed)
+    voltage = np.repeat(random.uniform(-6.0, 6.0, (10, 3)), 30, axis=0)
+    run = simulate(AXEBOT, voltage, 0.01)
+    noisy = run.twist + 0.01 * random.standard_normal(run.twist.shape)
+    return Run(t=run.t, voltage=run.voltage, twist=noisy, source=f"{seed}.csv")
+
+
+def test_another_name_and_another_start_of_time_do_not_make_another_recording():
+    run = fan_runs()[0]
+    copy = run.replace(source="copy.csv", t=run.t + 100.0)
+    other = run.replace(current=run.current + 1e-9)
+    kept, words = count_once([run, copy, other], ["all"] * 3)
+    assert kept == [0, 2]
+    assert words == ("copy.csv is the same recording as run0.csv: it counts once",)
+
+
+def test_steady_state_counts_once_and_says_so():
+    runs = fan_runs()
+    once = identify_steady(runs, AXEBOT, shape="disc")
+    twice = identify_steady([*runs, *(run.replace(source="again") for run in runs)], AXEBOT, shape="disc")
+    assert twice.estimate.std == once.estimate.std
+    assert len(twice.points) == len(once.points)
+    assert sum("same recording" in words for words in twice.warnings) == len(runs)
+
+
+def test_a_recording_in_two_groups_is_no_evidence_of_their_difference():
+    runs = fan_runs()
+    study = identify_steady(runs + runs, AXEBOT, groups=["a"] * 24 + ["b"] * 24, shape="disc")
+    assert [*study.estimates] == ["a", "b"]
+    assert any("the groups are not independent" in words for words in study.warnings)
+
+
+def test_output_error_counts_once_and_says_so():
+    run = driven(1)
+    once = identify(run, AXEBOT, nuisances=())
+    twice = identify([run, run.replace(source="copy.csv")], AXEBOT, nuisances=())
+    assert twice.std == pytest.approx(once.std)
+    assert any("copy.csv is the same recording as 1.csv: it counts once" in words for words in twice.warnings)
+
+
+def test_a_held_out_copy_of_a_fitted_log_proves_nothing():
+    run = driven(1)
+    found = Identification.of(
+        [run, run.replace(source="copy.csv")], AXEBOT, hold_out=("copy.csv",), nuisances=()
+    )  # fmt: skip
+    assert any("copy.csv is held out, and the same recording as 1.csv" in words for words in found.advice)
