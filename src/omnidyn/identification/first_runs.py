@@ -37,6 +37,7 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("simulation, any friction", partial(_run, other)),
         ("acceleration, any friction", partial(acceleration, looped, np.zeros(3), np.ones(3))),
         ("fit, any friction", partial(_fit, other, "twist")),
+        ("fit of counted angles, any friction", partial(_fit, other, "wheel_angle")),
         ("fit in a speed loop", partial(_fit, looped, "twist")),
         ("simulation, inductance", partial(_run, winding)),
     ]

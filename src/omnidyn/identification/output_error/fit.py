@@ -77,7 +77,7 @@ class Fit:
 
         Raises InputError for options and logs that cannot be used, InsufficientDataError where nothing can be learnt,
         UnsupportedError for what an engine does not know. Of the nuisances, robots that need the implicit engine have
-        latencies by default; they know the others, but no position and no wheel angle as outputs.
+        latencies by default, and the others where they are asked for.
         """
         every = as_list(runs)
         names = _group_names(every, question, groups)

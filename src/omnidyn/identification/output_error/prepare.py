@@ -13,7 +13,13 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.motion import Motion, motion
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, nuisance_parameters, pieces
+from omnidyn.identification.output_error.problem.nuisances import (
+    LATENCY,
+    TRAVELS,
+    automatic,
+    nuisance_parameters,
+    pieces,
+)
 from omnidyn.identification.output_error.problem.parameters import Parameter, names_of, robot_parameters
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
@@ -31,6 +37,7 @@ from omnidyn.simulation.exact.march import why_not_exact
 EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
+FINER = 1e-6  # the same where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
 ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
@@ -171,10 +178,13 @@ def make_problem(
 
 
 def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
-    """The engine of a problem. tol [m/s]: of an implicit one, None for a step a row."""
+    """The engine of a problem. tol [m/s]: of an implicit one, finer where a path is fitted; None for a step a row."""
     if kind == EXACT:
         return ExactEngine(problem)
-    return LoopEngine(problem, tol) if kind == LOOP else ImplicitEngine(problem, tol)
+    if kind == LOOP:
+        return LoopEngine(problem, tol)
+    travels = any(name in TRAVELS for name, _ in problem.columns)
+    return ImplicitEngine(problem, tol if tol is None or not travels else min(tol, FINER))
 
 
 def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> str:

@@ -100,3 +100,16 @@ def test_any_function_may_look_on():
     Progress.of(seen.append)("a state")
     Progress.of(None)("a state")
     assert seen == ["a state"]
+
+
+def test_a_search_says_how_long_it_will_take(monkeypatch):
+    """From the second one on, where it is worth a word."""
+    heard, now = [], iter([0.0, 3.0, 9.0, 0.0, 0.1])
+    monkeypatch.setattr("omnidyn.identification.output_error.solve.progress.monotonic", lambda: next(now))
+    watch = Progress(words=heard.append)
+    for k in range(3):
+        watch.counted("trying", k, 4)
+    for k in range(2):
+        watch.counted("trying", k, 4)
+    assert heard == ["trying 1 of 4", "trying 2 of 4, about 9 s left", "trying 3 of 4, about 9 s left", "trying 1 of 4",
+                     "trying 2 of 4"]  # fmt: skip

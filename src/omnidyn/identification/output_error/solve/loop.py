@@ -157,7 +157,7 @@ def retimed(solver: Solver, point: Point, watch: Progress) -> Point:
         now, states = float(point.values[j]), []
         trials = (now, *middles[(middles > EARLIEST) & (middles < LATEST)])
         for k, each in enumerate(trials):
-            watch.doing(f"trying {problem.names[j]}, {k + 1} of {len(trials)}")
+            watch.counted(f"trying {problem.names[j]},", k, len(trials))
             values = point.values.copy()
             values[j] = each
             states.append(trial.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
@@ -187,7 +187,7 @@ def _tried(solver: Solver, which: Sequence[tuple[float, float, float]], what: st
     """The states at each (latency [s], factor of friction, factor of gains)."""
     found = []
     for k, each in enumerate(which):
-        watch.doing(f"looking for a start, {what} {k + 1} of {len(which)}")
+        watch.counted(f"looking for a start, {what}", k, len(which))
         found.append(_moved(solver, *each))
         watch(found[-1])
     return found
@@ -222,7 +222,7 @@ def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
         return solution
     gains = [j for j, p in enumerate(solver.problem.parameters) if p.part == DRIVE]
     for _ in range(ROUNDS):
-        better = next(_branches(solver, solution, gains), None)
+        better = next(_branches(solver, solution, gains, watch), None)
         found = None if better is None else solver.minimise(better.point, FEW, seen)
         if found is None or found.state.objective >= solution.state.objective - LESS:
             break
@@ -230,11 +230,13 @@ def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
     return solver.minimise(solution.state.point, watch=seen)
 
 
-def _branches(solver: Solver, solution: Solution, gains: Sequence[int]) -> Iterator[State]:
+def _branches(solver: Solver, solution: Solution, gains: Sequence[int], watch: Progress) -> Iterator[State]:
     """States at some standard errors in a gain where F has risen by less than it should have, nearest first."""
     normal = Normal(solver, solution.state)
     covariance = np.linalg.pinv(normal.information, hermitian=True)
-    for far, j in itertools.product(FAR, gains):
+    ways = [*itertools.product(FAR, gains)]
+    for k, (far, j) in enumerate(ways):
+        watch.counted("looking for a better branch, beyond jumps of the likelihood,", k, len(ways))
         step = far * covariance[:, j] / np.sqrt(max(covariance[j, j], 1e-300))
         values = solver.outer(solver.clipped(normal.inner + step))
         state = solver.state(Point(values, solution.state.point.states), _scale(solver, solution))

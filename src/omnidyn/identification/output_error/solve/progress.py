@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from time import monotonic
 
 import numpy as np
 
 from omnidyn.identification.output_error.solve.solver import State
+
+WORTH = 2.0  # [s] of a search that are told
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,7 @@ class Progress:
         self._better, self._words = better, words
         self._state: State | None = None
         self._alone: dict[str, State] = {}
+        self._begun = 0.0
 
     @classmethod
     def of(cls, watch: Callable[[State], object] | None) -> Progress:
@@ -46,6 +50,13 @@ class Progress:
         """What comes now, such as "looking for a start, 3 of 25"."""
         if self._words is not None:
             self._words(words)
+
+    def counted(self, words: str, k: int, of: int) -> None:
+        """What comes now, the k-th of `of` from 0, and how long they will take, where that is worth a word."""
+        now = monotonic()
+        self._begun = now if k == 0 else self._begun
+        left = (now - self._begun) / k * (of - k) if k else 0.0
+        self.doing(f"{words} {k + 1} of {of}" + (f", about {left:.0f} s left" if left >= WORTH else ""))
 
     def below(self, objective: float = np.inf) -> Progress:
         """The same, of a search that goes several ways: sees only states below all before, and below `objective`."""
