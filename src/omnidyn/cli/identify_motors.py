@@ -68,16 +68,22 @@ def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Ou
     """Write and show: robot file, report, JSON or the summary."""
     numbers = _into_file(study, robot, to)
     output = to.out if numbers is not None and numbers.value else ""
+    report = ""
     if to.report:
-        from omnidyn.report.motors_page import render_motors
 
-        to.write_report(render_motors(study, record))
+        def render() -> str:
+            from omnidyn.report.motors_page import render_motors
+
+            return render_motors(study, record)
+
+        report = to.write_report(render)
     if to.json:
         say_warnings(study.doubts)
         own = numbers.to_dict() if numbers is not None else None
         show_json({
-            **study.to_dict(), "robot": own, "output": output or None, "report": to.report or None, "provenance": record
+            **study.to_dict(), "robot": own, "output": output or None, "report": report or None, "provenance": record
         })  # fmt: skip
     else:
         show("\n".join([study.summary(), *(numbers.lines() if numbers is not None else [])]).rstrip("\n"))
-    say_written([output, to.report])
+    say_written([output, report])
+    to.finish()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,12 +29,27 @@ class Out:
     out: str
     force: bool
     json: bool
+    failed: list[Exception] = field(default_factory=list)
 
-    def write_report(self, page: str) -> None:
-        """Write the report, with options as the command line writes them."""
+    def write_report(self, render: Callable[[], str]) -> str:
+        """Draw and write the report, with options as the command line writes them: its name where that worked.
+
+        All else is written and shown whatever becomes of the page: `finish` raises what happened.
+        """
         from omnidyn.files import write_atomic
 
-        write_atomic(self.report, with_flags(page), self.force)
+        try:
+            write_atomic(self.report, with_flags(render()), self.force)
+        except Exception as error:
+            self.failed.append(error)
+            return ""
+        return self.report
+
+    def finish(self) -> None:
+        """Raise what kept the report from being written."""
+        for error in self.failed:
+            say("omnidyn: the report could not be made; everything else is written")
+            raise error
 
 
 def tell(found: Identification, record: dict[str, Any], to: Out) -> None:
@@ -45,16 +60,21 @@ def tell(found: Identification, record: dict[str, Any], to: Out) -> None:
         _tell_study(found, record, to)
     else:
         _tell_lines(found, record, to)
+    to.finish()
 
 
 def _tell_fit(found: Identification, record: dict[str, Any], to: Out) -> None:
     fits, validations = found.fits, found.validations or {}
-    files, report = _outputs(to.out, fits, to.force), to.report if validations else ""
-    if report:
-        from omnidyn.report.fit_page import render_fit
-
-        to.write_report(render_fit(fits, validations, found.verdicts, record, found.differences))
+    files, report = _outputs(to, fits, record), ""
     _save(fits, files, to.force)
+    if to.report and validations:
+
+        def render() -> str:
+            from omnidyn.report.fit_page import render_fit
+
+            return render_fit(fits, validations, found.verdicts, record, found.differences)
+
+        report = to.write_report(render)
     if to.json:
         say_warnings(words for fit in fits.values() for words in fit.warnings)
         groups = {
@@ -97,19 +117,23 @@ def _tell_study(found: Identification, record: dict[str, Any], to: Out) -> None:
 
     study = found.study
     assert study is not None
-    files = _outputs(to.out, found.estimates, to.force)
-    if to.report:
-        from omnidyn.report.steady_page import render_study
-
-        to.write_report(render_study(study, record))
+    files, report = _outputs(to, found.estimates, record), ""
     _save(found.estimates, files, to.force)
-    tell_document(study_document(study), to.json, record, output=files or None, report=to.report or None)
-    say_written([*files.values(), to.report])
+    if to.report:
+
+        def render() -> str:
+            from omnidyn.report.steady_page import render_study
+
+            return render_study(study, record)
+
+        report = to.write_report(render)
+    tell_document(study_document(study), to.json, record, output=files or None, report=report or None)
+    say_written([*files.values(), report])
 
 
 def _tell_lines(found: Identification, record: dict[str, Any], to: Out) -> None:
     """The lines of the axes of each group."""
-    files = _outputs(to.out, found.estimates, to.force)
+    files = _outputs(to, found.estimates, record)
     _save(found.estimates, files, to.force)
     if to.report:
         say("omnidyn: --shape line has no page; --report is not used")
@@ -145,21 +169,22 @@ def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
     say_written([to.out])
 
 
-def _outputs(out: str, groups: Iterable[str], force: bool) -> dict[str, str]:
+def _outputs(to: Out, groups: Iterable[str], record: Mapping[str, Any]) -> dict[str, str]:
     """Group -> file to write: the name given where there is one group, NAME-GROUP.toml where there are several.
 
-    Raises InputError for a file that is there, unless `force`.
+    Raises InputError for a file that is there, unless `force`, for one file of two groups, and for one that was read.
     """
-    from omnidyn.files import check_output
+    from omnidyn.files import check_output, keep_apart
 
-    if not out:
+    if not to.out:
         return {}
-    names, path = list(groups), Path(out)
+    names, path = list(groups), Path(to.out)
     plain = ["".join(c if c.isalnum() or c in "-_." else "-" for c in group) for group in names]
     several = [str(path.with_name(f"{path.stem}-{word}{path.suffix}")) for word in plain]
-    files = dict(zip(names, [out] if len(names) == 1 else several, strict=True))
+    files = dict(zip(names, [to.out] if len(names) == 1 else several, strict=True))
+    keep_apart([*files.values(), to.report], [each["name"] for each in record["inputs"]])
     for each in files.values():
-        check_output(each, force)
+        check_output(each, to.force)
     return files
 
 

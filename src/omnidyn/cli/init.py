@@ -81,6 +81,8 @@ def init(
     _refuse_numbers(given)
     name = name.removesuffix(".toml")
     path = _checked_path(name, out, force)
+    logs.keep_inputs(log, [like], [map_file], "" if path == "-" else path)
+    logs.refuse_missing(log)
     preset = _preset(like)
     told = {key for key, value in given.items() if value is not None}
     if not log and (map_file or column or assume or no_header):
@@ -135,7 +137,7 @@ def _checked_path(name: str, out: str, force: bool) -> str:
     """The file to write, refused before any question is asked. Raises InputError."""
     from omnidyn.errors import InputError
     from omnidyn.files import check_output
-    from omnidyn.model.robot_file import preset_names
+    from omnidyn.model.presets import preset_names
 
     if name in preset_names():
         raise InputError("a preset has this name", got=name, remedy="choose another one, or use --like", where="NAME")

@@ -54,11 +54,11 @@ def _ascii_locale() -> bool:
 
 
 def say(words: str) -> None:
-    """Talk, to stderr. A stderr that nobody reads, or that is not there, is no reason to stop."""
+    """Talk, to stderr. A stderr that nobody reads, that is full or that is not there is no reason to stop."""
     if sys.stderr is None:
         return
     # Not typer.echo: it overrides the encoding of an ASCII stream.
-    with contextlib.suppress(BrokenPipeError):
+    with contextlib.suppress(OSError, ValueError):
         print(with_flags(words), file=sys.stderr, flush=True)
 
 
