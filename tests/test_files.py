@@ -1,12 +1,15 @@
 """Files that are written: what is refused, what stays of the file that was there."""
 
+import contextlib
 import os
 import stat
+import time
+import tracemalloc
 
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.files import check_output, keep_apart, write_atomic
+from omnidyn.files import check_output, keep_apart, parse_toml, write_atomic
 
 posix = pytest.mark.skipif(os.name != "posix", reason="modes, links and pipes of POSIX")
 
@@ -75,3 +78,37 @@ def test_two_results_need_two_files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match="two results in one file"):
         keep_apart(["fit.toml", "./fit.toml"])
+
+
+DEEP = {
+    "dotted": "a" + ".a" * 20_000 + " = 1\n",
+    "quoted": '"a"' + " . 'a'" * 20_000 + " = 1\n",
+    "table": "[a" + ".a" * 20_000 + "]\nx = 1\n",
+    "tables": "[[ a" + ".a" * 20_000 + "]]\nx = 1\n",
+    "inline": "x = { a" + ".a" * 20_000 + " = 1 }\n",
+    "behind another": "x = { b = 1, a" + ".a" * 20_000 + " = 1 }\n",
+}
+
+
+@pytest.mark.parametrize("text", DEEP.values(), ids=DEEP)
+def test_a_key_that_nests_deeply_is_refused_before_it_is_parsed(text):
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=r"robot.toml:2: a key nests too deeply"):
+            parse_toml("# a robot\n" + text, "robot.toml")
+        assert tracemalloc.get_traced_memory()[1] < 10 * len(text) + 100_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_the_search_for_deep_keys_takes_no_time():
+    for text in ("\n" * 2**20, " " * 2**20, "[" * 2**20, "a" * 2**20, ',"' * 2**19, "a." * 15 + "\n" + "{ " * 2**19):
+        started = time.process_time()
+        with contextlib.suppress(InputError):
+            parse_toml(text, "")
+        assert time.process_time() - started < 2.0
+
+
+def test_what_stands_in_text_and_numbers_is_no_key():
+    words = ".".join("abcdefghijklmnopqrstuvwxyz")
+    assert parse_toml(f'x = "{words}"\ny = 1.5  # {words}', "") == {"x": words, "y": 1.5}

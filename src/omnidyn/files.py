@@ -10,15 +10,21 @@ import re
 import stat
 import tempfile
 import time
+import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from omnidyn.errors import InputError
 
 MAX_TEXT_BYTES = 64 * 2**20
 STALE_TEMPORARY_S = 3600.0
 TEMPORARY_PREFIX = ".tmp-omnidyn-"
+
+MAX_TOML_BYTES = 2**20
+MAX_KEY_PARTS = 16
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_DEEP_KEY = re.compile(rf"(?:^|[{{,\[])[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_KEY_PARTS}}}", re.MULTILINE)
 
 CSV_REMEDY = "export it as CSV or Parquet"
 NUMPY_REMEDY = "save it with numpy.savetxt(NAME, array, delimiter=',', header='t_s,...')"
@@ -176,6 +182,22 @@ def read_text(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> str:
         return content.decode(encoding)
     except UnicodeDecodeError:
         return content.decode("latin-1")
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """The tables of a TOML text. Raises InputError for what is none, and for a dotted key that nests too deeply.
+
+    The parser keeps every beginning of a dotted key: one of 40 kB costs gigabytes, so it is refused before.
+    """
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start() + 1) + 1
+        raise InputError("a key nests too deeply", got=deep[0].strip(" \t\n[{,"), expected=f"at most {MAX_KEY_PARTS} parts",
+                         where=f"{where}:{line}")  # fmt: skip
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise InputError("not valid TOML", got=str(error), remedy="correct that line", where=where) from None
 
 
 def check_output(path: str | os.PathLike, force: bool = False) -> Path:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.files import read_text, write_atomic
+from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
 from omnidyn.model.keys import TABLES, is_told
 from omnidyn.model.presets import PRESETS as PRESETS
 from omnidyn.model.presets import preset_names as preset_names
@@ -19,7 +18,6 @@ from omnidyn.model.presets import robot_path
 from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, SCHEMA, Origin, Prior, Robot
 from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 
-MAX_ROBOT_FILE_BYTES = 2**20
 
 # Keys of the schema for which no law exists yet. They are refused by name: never ignored, never "unknown".
 PENDING = frozenset(
@@ -41,15 +39,12 @@ def load_robot(robot: str | os.PathLike) -> Robot:
     name = os.fspath(robot)
     if not isinstance(name, str):
         raise InputError("not a robot", got=robot, expected="the name of a preset or the path of a TOML file")
-    return parse_robot(read_text(robot_path(name), MAX_ROBOT_FILE_BYTES), name)
+    return parse_robot(read_text(robot_path(name), MAX_TOML_BYTES), name)
 
 
 def parse_robot(text: str, where: str = "robot") -> Robot:
     """A robot from the text of a robot file; `where` names it in messages."""
-    try:
-        document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise InputError("not valid TOML", got=str(error), remedy="correct that line", where=where) from None
+    document = parse_toml(text, where)
     try:
         return robot_from_dict(document)
     except InputError as error:
