@@ -192,8 +192,8 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     deep = _DEEP_KEY.search(text)
     if deep is not None:
         line = text.count("\n", 0, deep.start() + 1) + 1
-        raise InputError("a key nests too deeply", got=deep[0].strip(" \t\n[{,"), expected=f"at most {MAX_KEY_PARTS} parts",
-                         where=f"{where}:{line}")  # fmt: skip
+        key, most = deep[0].strip(" \t\n[{,"), f"at most {MAX_KEY_PARTS} parts"
+        raise InputError("a key nests too deeply", got=key, expected=most, where=f"{where}:{line}")
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:

@@ -13,7 +13,7 @@ from omnidyn.cli import log_options
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import painted, say, show, show_json, width
-from omnidyn.errors import InputError, OmnidynError
+from omnidyn.errors import InputError, OmnidynError, printable
 
 if TYPE_CHECKING:
     from omnidyn.findings.finding import Finding, Verdict
@@ -233,7 +233,7 @@ def _summary(done: list[Checked], read: list[Checked]) -> str:
         logs = len({path for path, _ in members})
         path, example = members[0]
         word = painted(f"{LABELS[level]:5s}", level)
-        lines.append(f"  {word}  {code}: in {logs} log{'s' * (logs > 1)}, such as {path}: {example.message}")
+        lines.append(f"  {word}  {code}: in {logs} log{'s' * (logs > 1)}, such as {printable(path)}: {example.message}")
         if example.remedy:
             lines.append(f"         -> {example.remedy}")
     return "\n".join(lines)

@@ -16,6 +16,7 @@ from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document
+from omnidyn.errors import printable
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -331,7 +332,7 @@ def _write(robot: Robot, path: str, force: bool, json: bool, like: str) -> None:
     else:
         write_atomic(path, text, force)
     if path != "-":
-        told = Document([path], {"robot": robot.name, "output": path, "guessed": guessed(robot)})
+        told = Document([printable(path)], {"robot": robot.name, "output": path, "guessed": guessed(robot)})
         tell(told, json, provenance([robot_input(like)] if like else []))
     if robot.wheels.radii.max() > _smallest(robot):
         say("omnidyn: warning: a wheel is larger than the robot; are both radii in metres?")

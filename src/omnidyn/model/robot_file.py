@@ -18,7 +18,6 @@ from omnidyn.model.presets import robot_path
 from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, SCHEMA, Origin, Prior, Robot
 from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 
-
 # Keys of the schema for which no law exists yet. They are refused by name: never ignored, never "unknown".
 PENDING = frozenset(
     {"wheels.traction_mu"}
