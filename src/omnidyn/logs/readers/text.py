@@ -19,6 +19,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.errors import InputError
 from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.header import TABS_NOTE, FileLine, Layout, find_layout
@@ -53,6 +54,9 @@ def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterato
 
     for block in _cut(blocks, most):
         texts, lines = _kept(block, layout.first)
+        if texts and file.ends_open and lines[-1] == file.last and _is_cut(texts[-1], layout):
+            texts, lines = texts[:-1], lines[:-1]
+            file.notes.append(f"line {file.last}, the last one, ends in the middle of a row: it was left out")
         if texts:
             later = partial(_texts_from, file, layout, block.first + len(block.lines), spaced)
             yield table(*parser.parse(texts, lines, later))
@@ -105,6 +109,14 @@ def _kept(block: TextBlock, first: int) -> tuple[list[str], NDArray[np.int64]]:
     kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not _is_comment(line)]
     texts = lines if len(kept) == len(lines) else [lines[k] for k in kept]
     return texts, np.array(kept, dtype=np.int64) + (block.first + begin)
+
+
+def _is_cut(text: str, layout: Layout) -> bool:
+    """Whether a row has fewer cells than the table: the file ends where the recorder was stopped."""
+    try:
+        return len(layout.cells(text, "")) < len(layout.names)
+    except InputError:  # a quote that is never closed
+        return True
 
 
 def _is_comment(line: str) -> bool:
