@@ -91,5 +91,13 @@ def _short(value: object, limit: int = 80) -> str:
         text = value if isinstance(value, str) else repr(value)
     except ValueError:  # an integer of more digits than Python prints
         text = f"a huge {type(value).__name__}"
-    text = printable(text[: limit + 1])
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    return shortened(printable(text[: limit + 1]), limit)
+
+
+def shortened(text: str, limit: int) -> str:
+    """The text, or as many of its whole words as fit, with "..." behind them; a word too long is cut."""
+    if len(text) <= limit:
+        return text
+    start = text[: limit - 3]
+    words = start if text[limit - 3].isspace() else start.rpartition(" ")[0]
+    return (words.rstrip(" ,;:") if len(words) > limit // 2 else start) + "..."

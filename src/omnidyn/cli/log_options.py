@@ -164,5 +164,5 @@ class Maps:
         say(f"omnidyn: columns of {path}:")
         for line in lines:
             say(f"omnidyn:   {line}")
-        if columns.unused:
-            say(f"omnidyn:   not used: {', '.join(columns.unused)}")
+        if columns.passed_over:
+            say(f"omnidyn:   not used: {', '.join(columns.passed_over)}")

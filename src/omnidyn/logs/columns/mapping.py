@@ -58,6 +58,12 @@ class ColumnMap:
         doubts = tuple(words for words in self.doubts if not any(words.startswith(f"{name} ") for name in taken))
         return replace(self, columns={**kept, **more}, unused=unused, doubts=doubts)
 
+    @property
+    def passed_over(self) -> tuple[str, ...]:
+        """Columns that nobody took and no doubt names."""
+        doubted = {name for words in self.doubts for name in words.partition(" look")[0].split(", ")}
+        return tuple(name for name in self.unused if name not in doubted)
+
     def lines(self) -> list[str]:
         """The map for people, a line per channel: "wheel_speed: w1 <- m1vel [rad/s at the motor], ..."."""
         groups: dict[str, list[str]] = {}
