@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from omnidyn import identify, load_robot, simulate
+from omnidyn import Run, identify, load_robot, simulate
 from omnidyn.identification import advice
 from omnidyn.identification.identify import Identification, as_driven
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
@@ -52,3 +52,17 @@ def test_a_longer_log_is_asked_for_against_noise_only(monkeypatch, white):
     (words,) = advice._wide(fit, validation)
     assert ("times as long" in words) is white
     assert ("no longer log mends that" in words) is not white
+
+
+def test_a_fit_to_200_logs_without_noise_that_overlap_ends():
+    robot = load_robot("axebot")
+    voltage = np.repeat(np.random.default_rng(0).uniform(-6.0, 6.0, (100, 3)), 25, axis=0)
+    run = simulate(robot, voltage, 0.02)
+    cuts = [slice(k * 10, k * 10 + 400) for k in range(200)]
+    runs = [
+        Run(t=run.t[cut], voltage=run.voltage[cut], wheel_speed=run.wheel_speed[cut], source=f"log{k}.csv")
+        for k, cut in enumerate(cuts)
+    ]
+    axes = robot.friction.axes.replace(coulomb=(1.5, 1.0, 0.05))
+    fit = identify(runs, robot.replace(friction=robot.friction.replace(axes=axes)))
+    np.testing.assert_allclose(fit.robot.friction.axes.coulomb, robot.friction.axes.coulomb, rtol=1e-3)
