@@ -5,7 +5,7 @@
     python3 dev.py test [ARGS]        the tests, a process per core; ARGS go to pytest: -k WORD, -n0, --long
     python3 dev.py check              ruff, pyright and the tests of the house rules
     python3 dev.py bench [NAME ARGS]  the benchmarks
-    python3 dev.py docs               the documentation, into docs/_build/html
+    python3 dev.py docs               the documentation, into docs/_build/html; says where
     python3 dev.py setup [core]       only make .venv, with everything or with what `demo` needs
     python3 dev.py lock [--upgrade]   resolve the two lock files again
 
@@ -27,6 +27,7 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sysconfig
 import tempfile
 import time
 from collections import namedtuple
@@ -51,8 +52,8 @@ SPHINX = ["-m", "sphinx", "-q", "-W", "--keep-going", "docs", "docs/_build/html"
 TESTS = ["-m", "pytest", "-n", "auto", "--dist", "worksteal"]
 
 # level: what must be installed; there: the working directory, None = where the user stands;
-# steps: what Python is called with; open: whether arguments are passed on.
-Command = namedtuple("Command", "level there steps open")
+# steps: what Python is called with; open: whether arguments are passed on; made: what it writes, said at its end.
+Command = namedtuple("Command", "level there steps open made", defaults=[None])
 COMMANDS = {
     # -P: a file of the user's called numpy.py must not be imported by the demo.
     "demo": Command("core", None, [["-P", "-m", "omnidyn", "demo"]], True),
@@ -69,7 +70,7 @@ COMMANDS = {
         False,
     ),
     "bench": Command("everything", ROOT, [["-m", "benchmarks"]], True),
-    "docs": Command("everything", ROOT, [SPHINX], False),
+    "docs": Command("everything", ROOT, [SPHINX], False, ROOT / "docs" / "_build" / "html" / "index.html"),
 }
 
 
@@ -118,11 +119,20 @@ def fingerprint(level):
 def ready(level):
     """True if .venv holds this level or more, as the files now say it should be."""
     try:
-        held, made_of = STAMP.read_text().split()
-    except (OSError, ValueError):
+        lines = STAMP.read_text("utf-8").splitlines()
+        held, made_of = lines[0].split()
+    except (OSError, ValueError, IndexError):
         return False
     enough = held == "everything" or held == level
-    return enough and held in LOCKS and PYTHON.exists() and made_of == fingerprint(held)
+    whole = enough and held in LOCKS and PYTHON.exists() and made_of == fingerprint(held)
+    return whole and set(lines[1:]) <= set(installed())  # somebody may have deleted a package below the stamp
+
+
+def installed():
+    """What lies in the folders of packages of .venv: names, sorted."""
+    base = {"base": str(VENV), "platbase": str(VENV)}
+    folders = {sysconfig.get_path(kind, "venv", base) for kind in ("purelib", "platlib")}
+    return sorted({name for folder in folders if os.path.isdir(folder) for name in os.listdir(folder)})
 
 
 # ---- making .venv ---------------------------------------------------------------------------------------
@@ -229,7 +239,7 @@ def install(level, env):
         say("setting up .venv ({}) with {}".format(level, way.name))
         if make(way, clear, env):
             link(env)
-            STAMP.write_text("{} {}\n".format(level, fingerprint(level)))
+            STAMP.write_text("\n".join(["{} {}".format(level, fingerprint(level))] + installed()) + "\n", "utf-8")
             say("ready after {:.1f} s".format(time.monotonic() - started))
             return
         tried.append(way.name)
@@ -253,10 +263,18 @@ def seize(handle):
     return True
 
 
+def guard():
+    """The file that is held while .venv is made."""
+    try:
+        return open(GUARD, "w")
+    except OSError as problem:
+        sys.exit("dev.py: cannot write {}: {}; remove it, then call again".format(GUARD, problem.strerror))
+
+
 @contextlib.contextmanager
 def alone():
     """One dev.py makes .venv, another waits for it."""
-    with open(GUARD, "w") as handle:
+    with guard() as handle:
         waited = 0.0
         while not seize(handle):
             if waited % BEAT == 0:
@@ -270,6 +288,8 @@ def ensure(level, env):
     """Afterwards .venv holds this level. Costs nothing if it already does."""
     if ready(level):
         return
+    if os.path.lexists(VENV) and not VENV.is_dir():
+        sys.exit("dev.py: {} is no folder; remove it, then call again".format(VENV))
     with alone():
         if not ready(level):  # the one we waited for may have made it
             install(level, env)
@@ -304,7 +324,12 @@ def run(name, arguments, env):
         sys.exit("dev.py: {} takes no arguments, got {}".format(name, " ".join(arguments)))
     ensure(command.level, env)
     calls = [[str(PYTHON)] + step + arguments for step in command.steps]
-    return run_last(calls[0], env, command.there) if len(calls) == 1 else run_all(calls, env, command.there)
+    if len(calls) == 1 and not command.made:
+        return run_last(calls[0], env, command.there)
+    code = run_all(calls, env, command.there)
+    if command.made and not code:
+        say("wrote {}".format(command.made))
+    return code
 
 
 def setup(arguments, env):

@@ -12,6 +12,8 @@ A message has four parts: what is wrong, what was got, what was expected, what t
 
 from __future__ import annotations
 
+import unicodedata
+
 
 class OmnidynError(Exception):
     """Base of all errors of omnidyn: what, got, expected, remedy, and where it stands.
@@ -35,7 +37,7 @@ class OmnidynError(Exception):
             parts.append(f"expected {self.expected}")
         if self.remedy:
             parts.append(self.remedy)
-        return "; ".join(parts)
+        return printable("; ".join(parts))
 
     def at(self, where: str) -> OmnidynError:
         """The same error with the place put in front, such as a file name."""
@@ -69,11 +71,33 @@ class MissingExtraError(OmnidynError):
     exit_code = 6
 
 
+_ACTS = ("Cc", "Cf", "Cs", "Zl", "Zp")  # categories of control, format, surrogate and line separators
+
+
+def printable(text: str) -> str:
+    """The text on one line, with an escape for each character on which a terminal may act: \\u001b, \\u202e.
+
+    Names of robots, columns, files and groups come from others: they are shown as what they are, and can neither
+    colour, hide or turn around what stands beside them, nor begin a line of their own.
+    """
+    if text.isprintable():
+        return text
+    return "".join(f"\\u{ord(c):04x}" if unicodedata.category(c) in _ACTS else c for c in text)
+
+
 def _short(value: object, limit: int = 80) -> str:
     """A value as text for a message: printable, on one line, never longer than `limit`."""
     try:
         text = value if isinstance(value, str) else repr(value)
     except ValueError:  # an integer of more digits than Python prints
         text = f"a huge {type(value).__name__}"
-    text = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    return shortened(printable(text[: limit + 1]), limit)
+
+
+def shortened(text: str, limit: int) -> str:
+    """The text, or as many of its whole words as fit, with "..." behind them; a word too long is cut."""
+    if len(text) <= limit:
+        return text
+    start = text[: limit - 3]
+    words = start if text[limit - 3].isspace() else start.rpartition(" ")[0]
+    return (words.rstrip(" ,;:") if len(words) > limit // 2 else start) + "..."

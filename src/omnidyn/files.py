@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import os
 import re
 import stat
 import tempfile
 import time
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from omnidyn.errors import InputError
 
 MAX_TEXT_BYTES = 64 * 2**20
 STALE_TEMPORARY_S = 3600.0
 TEMPORARY_PREFIX = ".tmp-omnidyn-"
+
+MAX_TOML_BYTES = 2**20
+MAX_KEY_PARTS = 16
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_DEEP_KEY = re.compile(rf"(?:^|[{{,\[])[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_KEY_PARTS}}}", re.MULTILINE)
 
 CSV_REMEDY = "export it as CSV or Parquet"
 NUMPY_REMEDY = "save it with numpy.savetxt(NAME, array, delimiter=',', header='t_s,...')"
@@ -177,19 +184,34 @@ def read_text(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> str:
         return content.decode("latin-1")
 
 
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """The tables of a TOML text. Raises InputError for what is none, and for a dotted key that nests too deeply.
+
+    The parser keeps every beginning of a dotted key: one of 40 kB costs gigabytes, so it is refused before.
+    """
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start() + 1) + 1
+        key, most = deep[0].strip(" \t\n[{,"), f"at most {MAX_KEY_PARTS} parts"
+        raise InputError("a key nests too deeply", got=key, expected=most, where=f"{where}:{line}")
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise InputError("not valid TOML", got=str(error), remedy="correct that line", where=where) from None
+
+
 def check_output(path: str | os.PathLike, force: bool = False) -> Path:
     """Refuse, before any work is done, a place where the result could not be written in the end."""
     path = Path(path)
-    try:
-        os.stat(path)
-    except (OSError, ValueError) as error:  # a name that is too long, or that holds a zero byte
-        if not isinstance(error, FileNotFoundError | PermissionError | NotADirectoryError):
-            raise InputError("not a file name", got=str(path), expected="a shorter name", where=str(error)) from None
-    if path.is_dir():
+    place = _behind_links(path)
+    if place.is_dir():
         raise InputError("cannot write the result there", got="a folder", expected="a file name", where=str(path))
-    if path.exists() and not force:
+    if place.exists() and not place.is_file():
+        raise InputError("cannot write the result there", got="no regular file (a pipe, a socket or a device)",
+                         expected="a file name", where=str(path))  # fmt: skip
+    if place.exists() and not force:
         raise InputError("the file exists already", remedy="use `force` to replace it", where=str(path))
-    folder = path.parent
+    folder = place.parent
     if not folder.is_dir():
         raise InputError("the folder does not exist", got=str(folder), remedy=f"mkdir -p {folder}", where=str(path))
     if not os.access(folder, os.W_OK):
@@ -197,26 +219,66 @@ def check_output(path: str | os.PathLike, force: bool = False) -> Path:
     return path
 
 
+def _behind_links(path: Path) -> Path:
+    """The place that a path leads to: what stands behind a symbolic link, be it there or not. Raises InputError."""
+    try:
+        os.stat(path)
+    except (FileNotFoundError, PermissionError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:  # a name that is too long, or that holds a zero byte; links in a circle
+        circle = isinstance(error, OSError) and error.errno == errno.ELOOP
+        what, expected = ("links in a circle", "a file") if circle else ("not a file name", "a shorter name")
+        raise InputError(what, got=str(path), expected=expected, where=str(error)) from None
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+def keep_apart(outputs: Iterable[str | os.PathLike], inputs: Iterable[str | os.PathLike] = ()) -> None:
+    """Refuse, `force` or not, one file for two outputs, and an output that is an input of the same work.
+
+    The first would lose a result and the second what it was made from. Links are followed. Empty names are none.
+    Raises InputError.
+    """
+    replaced = {_identity(path): ("the result would replace its own input", path) for path in inputs if path}
+    for path in (path for path in outputs if path):
+        place = _identity(path)
+        if place in replaced:
+            what, other = replaced[place]
+            raise InputError(what, got=str(other), expected="another name", where=str(path))
+        replaced[place] = ("two results in one file", path)
+
+
+def _identity(path: str | os.PathLike) -> object:
+    """What two names of one file have in common."""
+    with contextlib.suppress(OSError, ValueError):
+        found = os.stat(path)
+        return (found.st_dev, found.st_ino)
+    with contextlib.suppress(OSError, ValueError):
+        return os.path.normcase(os.path.realpath(path))
+    return os.fspath(path)
+
+
 def write_atomic(path: str | os.PathLike, content: str | bytes, force: bool = False) -> Path:
     """Write a file whole or not at all: a temporary file beside it, flushed to disk, then renamed.
 
-    Raises InputError when it exists (unless `force`), its folder is missing or not writable, or the disk is full.
+    A link stays and what it leads to is written; a file that is replaced hands on who may read it. Raises InputError
+    when it exists (unless `force`), is no regular file, its folder is missing or not writable, or the disk is full.
     """
     path = check_output(path, force)
-    _remove_stale(path.parent)
+    place = _behind_links(path)
+    _remove_stale(place.parent)
     data = content.encode("utf-8") if isinstance(content, str) else content
     temporary = None
     try:
-        handle, temporary = tempfile.mkstemp(prefix=TEMPORARY_PREFIX, dir=path.parent)
+        handle, temporary = tempfile.mkstemp(prefix=TEMPORARY_PREFIX, dir=place.parent)
         with open(handle, "wb") as stream:
             stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
+        _hand_on(place, temporary)
         if force:
-            os.replace(temporary, path)
+            os.replace(temporary, place)
         else:
-            _rename_new(temporary, path)
+            _rename_new(temporary, place)
     except FileExistsError:
         raise InputError(
             "the file exists already",
@@ -231,6 +293,18 @@ def write_atomic(path: str | os.PathLike, content: str | bytes, force: bool = Fa
             with contextlib.suppress(OSError):
                 os.unlink(temporary)
     return path
+
+
+def _hand_on(place: Path, temporary: str) -> None:
+    """Give a new file the mode, and where we may the owner, of the one that it replaces; else the usual mode."""
+    try:
+        before = os.stat(place)
+    except FileNotFoundError:
+        os.chmod(temporary, 0o666 & ~_umask())
+        return
+    with contextlib.suppress(OSError, AttributeError):  # not ours to give, or a system without owners
+        os.chown(temporary, before.st_uid, before.st_gid)
+    os.chmod(temporary, stat.S_IMODE(before.st_mode))
 
 
 def _rename_new(temporary: str, path: Path) -> None:

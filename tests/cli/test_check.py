@@ -184,5 +184,5 @@ def test_a_map_never_replaces_a_log(call):
     before = Path("clean.csv").read_bytes()
     code, _, err = call(".", "--save-map", "clean.csv", "--force")
     assert code == 3
-    assert "the result would replace a log" in err
+    assert "the result would replace its own input" in err
     assert Path("clean.csv").read_bytes() == before

@@ -215,7 +215,7 @@ def test_no_result_replaces_a_log_even_when_forced(call, floors, tmp_path, optio
     before = log.read_bytes()
     code, _, err = call(str(log), "--robot", "axebot", option, str(log), "--force")
     assert code == 3
-    assert "the result would replace a log" in err
+    assert "the result would replace its own input" in err
     assert log.read_bytes() == before
 
 

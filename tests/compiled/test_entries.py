@@ -1,6 +1,8 @@
 """Entries on disk: taken where they fit, replaced where they do not, whatever has become of them."""
 
+import hashlib
 import os
+import pickle
 from dataclasses import replace
 
 import numba
@@ -70,6 +72,36 @@ def test_a_damaged_entry_is_compiled_again(folder, entry, damage):
     mended = kernel(thrice)
     assert mended(2.0) == 6.0
     assert hits(mended) == 1
+
+
+FOREIGN = {
+    "no pickle": b"not a pickle",
+    "of a module that is not here": b"cno_such_module\nthing\n.",
+    "of another shape": pickle.dumps([1, 2, 3]),
+    "nothing": pickle.dumps(None),
+}
+
+
+@pytest.mark.parametrize("content", FOREIGN.values(), ids=FOREIGN)
+def test_a_whole_entry_of_something_else_is_compiled_again(folder, entry, content):
+    """Stamp and hash are right: what stands behind them is nothing that this numba can take."""
+    entry.write_bytes(stamp.stamp(thrice).encode() + hashlib.sha256(content).digest() + content)
+    compiled = kernel(thrice)
+    assert compiled(2.0) == 6.0
+    assert hits(compiled) == 0
+    mended = kernel(thrice)
+    assert mended(2.0) == 6.0
+    assert hits(mended) == 1
+
+
+def test_an_entry_that_cannot_be_rebuilt_is_compiled_again(folder, entry):
+    whole = entry.read_bytes()
+    key, _ = pickle.loads(whole[96:])
+    content = pickle.dumps((key, ("of", "another", "numba")))
+    entry.write_bytes(whole[:64] + hashlib.sha256(content).digest() + content)
+    compiled = kernel(thrice)
+    assert compiled(2.0) == 6.0
+    assert hits(compiled) == 0
 
 
 def test_an_entry_of_another_kernel_is_not_taken(folder, entry):

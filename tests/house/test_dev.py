@@ -106,6 +106,49 @@ def test_a_venv_without_python_is_not_ready(checkout):
     assert not dev.ready("core")
 
 
+def test_a_venv_from_which_a_package_was_deleted_is_made_anew(installers):
+    site = Path(dev.sysconfig.get_path("purelib", "venv", {"base": str(dev.VENV), "platbase": str(dev.VENV)}))
+    (site / "numpy").mkdir(parents=True)
+    (site / "numpy-2.0.dist-info").mkdir()
+    dev.ensure("core", {})
+    assert dev.ready("core")
+    (site / "own").mkdir()  # what the user puts there himself is no matter
+    assert dev.ready("core")
+    (site / "numpy").rmdir()
+    assert not dev.ready("core")
+    installers[0].clear()
+    dev.ensure("core", {})
+    assert "--clear" in installers[0][0]
+
+
+@pytest.mark.parametrize("make", ["file", "link to nothing"])
+def test_a_venv_that_is_no_folder_is_told_in_one_line(checkout, make):
+    shutil.rmtree(dev.VENV)
+    if make == "file":
+        dev.VENV.write_text("")
+    else:
+        dev.VENV.symlink_to("nowhere")
+    with pytest.raises(SystemExit, match=r"^dev\.py: .*\.venv is no folder; remove it, then call again$"):
+        dev.ensure("core", {})
+
+
+def test_a_lock_that_is_a_folder_is_told_in_one_line(checkout):
+    dev.GUARD.mkdir()
+    with pytest.raises(SystemExit, match=r"^dev\.py: cannot write .*guard: Is a directory; remove it"):
+        dev.ensure("core", {})
+
+
+def test_docs_says_where_they_are(monkeypatch, capfd):
+    monkeypatch.setattr(sys, "stderr", sys.__stderr__)
+    monkeypatch.setattr(dev, "ensure", lambda level, env: None)
+    monkeypatch.setattr(dev, "run_all", lambda calls, env, there: 0)
+    assert dev.run("docs", [], {}) == 0
+    assert f"wrote {ROOT / 'docs' / '_build' / 'html' / 'index.html'}" in capfd.readouterr().err
+    monkeypatch.setattr(dev, "run_all", lambda calls, env, there: 2)
+    assert dev.run("docs", [], {}) == 2
+    assert "wrote" not in capfd.readouterr().err
+
+
 # ---- the environment ------------------------------------------------------------------------------------
 
 

@@ -83,3 +83,15 @@ def test_mecanum_wheels_are_no_omni_wheels():
     other = run.replace(wheel_speed=speed * [-1.0, 1.0, 1.0, 1.0])
     with pytest.raises(InputError, match="front left, front right, rear left, rear right"):
         as_mecanum(wheel_geometry([other]))
+
+
+def test_what_mecanum_logs_do_not_show_is_the_radius_and_not_where_they_stand():
+    t = np.arange(100) * 0.01
+    twist, speed = np.tile([0.3, 0.0, 0.0], (100, 1)), np.full((100, 4), 5.0)
+    run = Run(t=t, twist=twist, wheel_speed=speed, source="straight.csv")
+    with pytest.raises(InsufficientDataError, match="leave the logs out and give `azimuth`"):
+        wheel_geometry([run])
+    with pytest.raises(InsufficientDataError, match="leave the logs out and give --robot-radius"):
+        wheel_geometry([run], "--robot-radius")
+    with pytest.raises(InputError, match="give --robot-radius"):
+        wheel_geometry([run.replace(twist=None)], "--robot-radius")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.model.robot_file import PRESETS, parse_robot
+from omnidyn.model.robot_file import PRESETS, load_robot, parse_robot
 from omnidyn.simulation.exact.march import why_not_exact
 from omnidyn.simulation.simulate import simulate
 from tests.support.robots import table_3_voltages
@@ -187,7 +187,7 @@ def test_a_bad_start_is_refused(axebot, start):
 
 def test_a_spin_too_fast_to_integrate_is_refused_at_once(axebot):
     with pytest.raises(InputError, match=r"one step turns the robot too far; got .* rad in row 0.*use a shorter dt"):
-        simulate(axebot, ROWS, 3600.0, twist=(1.0, 0.0, 1e12))
+        simulate(axebot, ROWS, 3600.0, twist=(1.0, 0.0, 1e3))
 
 
 DRIVING = np.tile([4.0, 5.0, -3.0], (60, 1))
@@ -272,3 +272,17 @@ def test_dynamic_electrics_run_on_the_exact_engine(axebot):
     np.testing.assert_allclose(run.twist, exact.twist, atol=1e-8)
     np.testing.assert_allclose(run.current, exact.current, atol=1e-5)
     assert np.abs(exact.twist - simulate(axebot, voltage, 0.01).twist).max() > 1e-3
+
+
+@pytest.mark.parametrize("name", ["axebot", "robotino"])
+@pytest.mark.parametrize(
+    "key, start", [("twist", (1e300, 0.0, 0.0)), ("twist", (0.0, 0.0, -2e9)), ("pose", (0.0, 1e10, 0.0))]
+)
+def test_no_robot_starts_beyond_all_sense(name, key, start):
+    with pytest.raises(InputError, match=rf"^{key}: no robot starts there; got .*; expected 3 numbers within"):
+        simulate(load_robot(name), np.zeros((10, 3)), 0.01, **{key: start})
+
+
+def test_a_start_at_the_bound_comes_to_an_end():
+    run = simulate(load_robot("robotino"), np.zeros((200, 3)), 0.01, twist=(1e3, -1e3, 1e3))
+    assert not run.twist[-1].any()

@@ -23,7 +23,12 @@ def rolled(robot: Robot, voltage: np.ndarray, dt: float) -> tuple[Run, np.ndarra
     angle = np.vstack([np.zeros(speed.shape[1]), np.cumsum(steps, axis=0)])
     rows = slice(None, None, PARTS)
     held = np.vstack([voltage, voltage[-1:]])
-    return Run(t=np.linspace(0.0, dt * (len(angle) - 1), len(angle)), voltage=held, twist=true.twist[rows], pose=true.pose[rows]), angle
+    return Run(
+        t=np.linspace(0.0, dt * (len(angle) - 1), len(angle)),
+        voltage=held,
+        twist=true.twist[rows],
+        pose=true.pose[rows],
+    ), angle
 
 
 def counted_log(run: Run, angle: np.ndarray, seed: int) -> Run:

@@ -13,7 +13,7 @@ from omnidyn.cli import log_options
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import painted, say, show, show_json, width
-from omnidyn.errors import InputError, OmnidynError
+from omnidyn.errors import InputError, OmnidynError, printable
 
 if TYPE_CHECKING:
     from omnidyn.findings.finding import Finding, Verdict
@@ -36,6 +36,7 @@ class Checked:
     digest: str = ""
     sha256: str = ""
     notes: tuple[str, ...] = ()
+    log: Log | None = None  # its first block, where that is drawn
 
 
 def check(
@@ -62,15 +63,19 @@ def check(
     if picture and (len(log) > 1 or os.path.isdir(log[0])):
         raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
     refuse_picture(picture, force)
-    log_options.keep_logs(log, picture, save_map)
+    log_options.keep_inputs(log, [robot], [map_file], picture, save_map)
+    if len(log) == 1:
+        log_options.refuse_missing(log)
     options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
     maps = log_options.Maps(save_map, force)
     with progress("reading") as now:
         files = log_options.log_files(log)
         loaded = _robot(robot)
-        done = [_checked(path, loaded, options, maps, now, picture, force) for path in files]
+        done = [_checked(path, loaded, options, maps, now, bool(picture)) for path in files]
     _compare_data(done)
     _tell(done, json, full, robot)
+    if picture:
+        _draw(done[0], picture, force)
     if any(each.error is not None for each in done):
         raise typer.Exit(BAD_INPUT)
     if any(each.verdict is not None and each.verdict.fatal for each in done):
@@ -85,13 +90,9 @@ def _robot(robot: str) -> Robot | None:
 
 def _checked(
     path: str, robot: Robot | None, options: LogOptions, maps: log_options.Maps, now: Callable[[str], None],
-    picture: str, force: bool,
+    picture: bool,
 ) -> Checked:  # fmt: skip
     """One log, block by block; an error in reading it does not stop the others."""
-    from omnidyn.findings.check import check as check_log
-    from omnidyn.findings.check import check_blocks
-    from omnidyn.logs.read_log import iter_logs
-
     done, digest = Checked(path), _Digest()
     now(f"reading {path}")
 
@@ -99,19 +100,31 @@ def _checked(
         now(f"reading {path}, {100 * count // max(total, 1)} %")
 
     try:
+        log_options.refuse_missing([path])
+        from omnidyn.findings.check import check as check_log
+        from omnidyn.findings.check import check_blocks
+        from omnidyn.logs.read_log import iter_logs
+
         log, only, blocks = _first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=said)))
         if log is not None:
             maps.show(path, log.columns)
             done.notes = log.notes
         done.verdict = check_log(log, robot) if log is not None and only else check_blocks(blocks, robot)
-        if picture and log is not None:
-            from omnidyn.report.figures.raw_log import draw_raw_log
-
-            write_picture(draw_raw_log(log, done.verdict), picture, force)
+        done.log = log if picture else None
     except OmnidynError as error:
         done.error = error
     done.digest, done.sha256 = digest.value, digest.sha256
     return done
+
+
+def _draw(done: Checked, picture: str, force: bool) -> None:
+    """The picture of a log that could be read."""
+    if done.log is None or done.verdict is None:
+        return
+    with progress("drawing"):
+        from omnidyn.report.figures.raw_log import draw_raw_log
+
+        write_picture(draw_raw_log(done.log, done.verdict), picture, force)
 
 
 def _first(blocks: Iterator[Log]) -> tuple[Log | None, bool, Iterator[Log]]:
@@ -220,7 +233,7 @@ def _summary(done: list[Checked], read: list[Checked]) -> str:
         logs = len({path for path, _ in members})
         path, example = members[0]
         word = painted(f"{LABELS[level]:5s}", level)
-        lines.append(f"  {word}  {code}: in {logs} log{'s' * (logs > 1)}, such as {path}: {example.message}")
+        lines.append(f"  {word}  {code}: in {logs} log{'s' * (logs > 1)}, such as {printable(path)}: {example.message}")
         if example.remedy:
             lines.append(f"         -> {example.remedy}")
     return "\n".join(lines)

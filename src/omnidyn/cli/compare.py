@@ -49,12 +49,13 @@ def compare(
     The model runs free under the logged voltages (or duties, or set speeds through the speed loop of the robot file),
     from gap to gap. Below: how far it ends up from what was measured.
     """
-    from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
-
     if len(robot) > MOST_ROBOTS:
         raise typer.BadParameter(f"--robot may be given once or twice, not {len(robot)} times.")
     refuse_picture(picture, force)
-    log_options.keep_logs(log, picture, save_map)
+    log_options.keep_inputs(log, robot, [map_file], picture, save_map)
+    log_options.refuse_missing(log)
+    from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
+
     rules = [parse_threshold(text) for text in fail_if]
     options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows)
     maps = log_options.Maps(save_map, force)
@@ -63,10 +64,10 @@ def compare(
         runs, hashes = _runs(files, robots[0], options, sort, maps, now)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
         found = _compared(robots, runs, apply, hold, current_unsigned, now)
-        if picture:
-            now("drawing")
-            _draw(found, picture, channels, force)
     tell(found.document(segments), json, _record(robot, files, hashes))
+    if picture:
+        with progress("drawing"):
+            _draw(found, picture, channels, force)
     refuse_exceeded(found, rules)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from omnidyn.cli.log_options import keep_inputs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document
@@ -25,6 +26,7 @@ def deadzone(
 ) -> None:
     """Show at which voltage it starts to move."""
     refuse_picture(picture, force)
+    keep_inputs([], [robot], [], picture)
     from omnidyn.cli.terminal.numbers import number_list
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.model.deadzone import axis_patterns
@@ -33,11 +35,11 @@ def deadzone(
     loaded, source = load_robot(robot), robot_input(robot)
     patterns = [number_list("--pattern", pattern)] if pattern else axis_patterns(loaded).tolist()
     rows = [_row(loaded, each) for each in patterns]
-    if picture:
-        _draw(loaded, picture, force)
     head = f"{loaded.name} at rest: it starts to move when the voltages of the wheels exceed"
     told = Document([head, "", *(_line(loaded, row) for row in rows)], {"robot": loaded.name, "dead_zone": rows})
     tell(told, json, provenance([source]))
+    if picture:
+        _draw(loaded, picture, force)
 
 
 def _draw(robot: Robot, path: str, force: bool) -> None:

@@ -77,7 +77,8 @@ def identify(
     for path in (out, report):  # before any work
         if path:
             check_output(path, force)
-    options.keep_logs(logs, out, report, save_map)
+    options.keep_inputs(logs, [robot], [map_file], out, report, save_map)
+    options.refuse_missing(logs)
     if question.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
         tell_table(logs[0], robot, question, to)
         return

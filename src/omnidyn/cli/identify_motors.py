@@ -29,14 +29,18 @@ def run_motors(
     told, numbers = study.document(), _into_file(study, robot, to)
     if numbers is not None:
         told = replace(told, parts=apart(told.parts, numbers.parts()))
-    if to.report:
-        from omnidyn.report.motors_page import render_motors
-
-        to.write_report(render_motors(study, record))
+    report = to.write_report(lambda: _page(study, record)) if to.report else ""
     output = to.out if numbers is not None and numbers.value else ""
     own = numbers.to_dict() if numbers is not None else None
-    tell(told, to.json, record, robot=own, output=output or None, report=to.report or None)
-    say_written([output, to.report])
+    tell(told, to.json, record, robot=own, output=output or None, report=report or None)
+    say_written([output, report])
+    to.finish()
+
+
+def _page(study: MotorStudy, record: dict[str, Any]) -> str:
+    from omnidyn.report.motors_page import render_motors
+
+    return render_motors(study, record)
 
 
 def _into_file(study: MotorStudy, robot: Robot | None, to: Out) -> MotorNumbers | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,36 +28,52 @@ class Out:
     out: str
     force: bool
     json: bool
+    failed: list[Exception] = field(default_factory=list)
 
-    def write_report(self, page: str) -> None:
-        """Write the report, with options as the command line writes them."""
+    def write_report(self, render: Callable[[], str]) -> str:
+        """Draw and write the report, with options as the command line writes them: its name where that worked.
+
+        All else is written and shown whatever becomes of the page: `finish` raises what happened.
+        """
         from omnidyn.files import write_atomic
 
-        write_atomic(self.report, with_flags(page), self.force)
+        try:
+            write_atomic(self.report, with_flags(render()), self.force)
+        except Exception as error:
+            self.failed.append(error)
+            return ""
+        return self.report
+
+    def finish(self) -> None:
+        """Raise what kept the report from being written."""
+        for error in self.failed:
+            say("omnidyn: the report could not be made; everything else is written")
+            raise error
 
 
 def tell(found: Identification, record: dict[str, Any], to: Out) -> None:
     """Write and show an identification."""
-    files = _outputs(to.out, found.estimates, to.force)
-    page = _page(found, record) if to.report else ""
-    if page:
-        to.write_report(page)
+    files = _outputs(to, found.estimates, record)
     _save(found.estimates, files, to.force)
-    report = to.report if page else ""
+    report = to.write_report(lambda: _page(found, record)) if to.report and _has_page(found) else ""
     tell_document(found.document(), to.json, record, output=files or None, report=report or None)
     say_written([*files.values(), report])
+    to.finish()
+
+
+def _has_page(found: Identification) -> bool:
+    """Whether there is a report to write."""
+    if found.study is None and found.method != OUTPUT_ERROR:
+        say("omnidyn: --shape line has no page; --report is not used")
+    return found.study is not None or bool(found.validations)
 
 
 def _page(found: Identification, record: dict[str, Any]) -> str:
-    """The report; "" where there is none to write."""
+    """The report."""
     if found.study is not None:
         from omnidyn.report.steady_page import render_study
 
         return render_study(found.study, record)
-    if found.method != OUTPUT_ERROR:
-        say("omnidyn: --shape line has no page; --report is not used")
-    if not found.validations:
-        return ""
     from omnidyn.report.fit_page import render_fit
 
     return render_fit(found, record)
@@ -87,21 +103,22 @@ def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
     say_written([to.out])
 
 
-def _outputs(out: str, groups: Iterable[str], force: bool) -> dict[str, str]:
+def _outputs(to: Out, groups: Iterable[str], record: Mapping[str, Any]) -> dict[str, str]:
     """Group -> file to write: the name given where there is one group, NAME-GROUP.toml where there are several.
 
-    Raises InputError for a file that is there, unless `force`.
+    Raises InputError for a file that is there, unless `force`, for one file of two groups, and for one that was read.
     """
-    from omnidyn.files import check_output
+    from omnidyn.files import check_output, keep_apart
 
-    if not out:
+    if not to.out:
         return {}
-    names, path = list(groups), Path(out)
+    names, path = list(groups), Path(to.out)
     plain = ["".join(c if c.isalnum() or c in "-_." else "-" for c in group) for group in names]
     several = [str(path.with_name(f"{path.stem}-{word}{path.suffix}")) for word in plain]
-    files = dict(zip(names, [out] if len(names) == 1 else several, strict=True))
+    files = dict(zip(names, [to.out] if len(names) == 1 else several, strict=True))
+    keep_apart([*files.values(), to.report], [each["name"] for each in record["inputs"]])
     for each in files.values():
-        check_output(each, force)
+        check_output(each, to.force)
     return files
 
 

@@ -16,6 +16,7 @@ from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document
+from omnidyn.errors import printable
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -87,6 +88,8 @@ def init(
     _refuse_numbers(given)
     name = name.removesuffix(".toml")
     path = _checked_path(name, out, force)
+    logs.keep_inputs(log, [like], [map_file], "" if path == "-" else path)
+    logs.refuse_missing(log)
     preset = _preset(like)
     told = {key for key, value in given.items() if value is not None}
     if not log and (map_file or column or assume or no_header):
@@ -160,7 +163,7 @@ def _checked_path(name: str, out: str, force: bool) -> str:
     """The file to write, refused before any question is asked. Raises InputError."""
     from omnidyn.errors import InputError
     from omnidyn.files import check_output
-    from omnidyn.model.robot_file import preset_names
+    from omnidyn.model.presets import preset_names
 
     if name in preset_names():
         raise InputError("a preset has this name", got=name, remedy="choose another one, or use --like", where="NAME")
@@ -356,7 +359,7 @@ def _write(robot: Robot, path: str, force: bool, json: bool, like: str) -> None:
     else:
         write_atomic(path, text, force)
     if path != "-":
-        told = Document([path], {"robot": robot.name, "output": path, "guessed": guessed(robot)})
+        told = Document([printable(path)], {"robot": robot.name, "output": path, "guessed": guessed(robot)})
         tell(told, json, provenance([robot_input(like)] if like else []))
     if robot.wheels.radii.max() > _smallest(robot):
         say("omnidyn: warning: a wheel is larger than the robot; are both radii in metres?")

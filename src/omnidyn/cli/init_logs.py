@@ -24,7 +24,7 @@ def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanu
     for path, each in logs.load_logs(logs.log_files(log), None, options):
         maps.show(path, each.columns)
         runs.append(each.to_run())
-    seen = wheel_geometry(runs)
+    seen = wheel_geometry(runs, "--robot-radius" if mecanum else "`azimuth`")
     azimuth = [round(angle, 2) for angle in seen.azimuth_deg]
     where = "pushing towards" if mecanum else "at"
     told = f"from {seen.source} ({seen.residual:.1%} unexplained)"

@@ -99,15 +99,28 @@ def log_files(arguments: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(files))
 
 
-def keep_logs(arguments: Sequence[str], *outputs: str) -> None:
-    """Refuse, --force or not, to write a result over one of the logs: a recording cannot be made again."""
-    from omnidyn.errors import InputError
+def keep_inputs(logs: Sequence[str], robots: Sequence[str], others: Sequence[str], *outputs: str) -> None:
+    """Before anything slow is loaded: all that is read is there, and no result replaces it or another result.
 
-    there = [path for path in outputs if path and os.path.exists(path)]
-    for path in there:
-        for log in log_files(arguments):
-            if os.path.exists(log) and os.path.samefile(path, log):
-                raise InputError("the result would replace a log", got=log, expected="another name", where=path)
+    others: files that are read beside logs and robots. --force or not. Raises InputError.
+    """
+    from omnidyn.files import keep_apart, open_regular
+    from omnidyn.model.presets import robot_path
+
+    files = [robot_path(robot) for robot in robots if robot]
+    for path in (path for path in others if path):
+        with open_regular(path):
+            files.append(path)
+    keep_apart(outputs, [*log_files(logs), *files])
+
+
+def refuse_missing(logs: Sequence[str]) -> None:
+    """Logs that are not there, before anything slow is loaded. Raises InputError."""
+    from omnidyn.files import open_regular
+
+    for path in log_files(logs):
+        with open_regular(path):
+            pass
 
 
 def _natural(path: str) -> list[Any]:
@@ -151,5 +164,5 @@ class Maps:
         say(f"omnidyn: columns of {path}:")
         for line in lines:
             say(f"omnidyn:   {line}")
-        if columns.unused:
-            say(f"omnidyn:   not used: {', '.join(columns.unused)}")
+        if columns.passed_over:
+            say(f"omnidyn:   not used: {', '.join(columns.passed_over)}")

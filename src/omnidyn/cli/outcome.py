@@ -14,8 +14,8 @@ import typer
 
 from omnidyn.cli.terminal import session
 from omnidyn.cli.terminal.flags import of_place
-from omnidyn.cli.terminal.streams import prepare, say
-from omnidyn.errors import OmnidynError
+from omnidyn.cli.terminal.streams import prepare, say, say_trace
+from omnidyn.errors import OmnidynError, printable
 
 BUG, USAGE, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 
@@ -37,7 +37,7 @@ def run_guarded(arguments: list[str]) -> int:
             return code
     except BaseException as error:
         if debug and not isinstance(error, SystemExit):
-            say(traceback.format_exc().rstrip())
+            say_trace(traceback.format_exc())
         return _code_of(error, debug)
 
 
@@ -72,7 +72,7 @@ def _code_of(error: BaseException, debug: bool) -> int:
 
 def _with_flag(error: OmnidynError) -> str:
     """The message, with the place as the command line names it."""
-    return of_place(error.where) + str(error)[len(error.where) :]
+    return of_place(error.where) + str(error)[len(printable(error.where)) :]
 
 
 def _unforeseen(error: BaseException, debug: bool) -> int:

@@ -43,8 +43,7 @@ def simulate(
     # -o - and --json both want stdout
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
-    if out not in ("", "-"):
-        _refuse_early(out, force)
+    _refuse_early(robot, voltages, "" if out == "-" else out, force)
     with progress("simulating (the first run of an engine compiles it)") as now:
         run, record = _simulated(robot, voltages, duration, max_steps, start_twist, start_pose, tol)
         now("writing the run")
@@ -57,13 +56,17 @@ def simulate(
         say(f"omnidyn: wrote {out}" if out else "omnidyn: nothing written; -o FILE writes the run")
 
 
-def _refuse_early(out: str, force: bool) -> None:
-    """Before any work: a place where the run could not be written in the end."""
+def _refuse_early(robot: str, voltages: str, out: str, force: bool) -> None:
+    """Before any work: an input that is not there, a place where the run could not be written in the end."""
+    from omnidyn.cli.log_options import keep_inputs
     from omnidyn.files import check_output
-    from omnidyn.logs.run_file import check_format
 
-    check_format(out)
-    check_output(out, force)
+    keep_inputs([], [robot], [voltages], out)
+    if out:
+        from omnidyn.logs.run_file import check_format
+
+        check_format(out)
+        check_output(out, force)
 
 
 def _simulated(

@@ -51,8 +51,13 @@ class Entries(_Cache):
         target_context.refresh()
         key = self._key(sig, target_context.codegen())
         content = self._content(self._file(key)) if self._enabled else None
-        found, reduced = pickle.loads(content) if content is not None else (None, None)
-        return self._impl.rebuild(target_context, reduced) if found == key else None
+        if content is None:
+            return None
+        try:
+            found, reduced = pickle.loads(content)
+            return self._impl.rebuild(target_context, reduced) if found == key else None
+        except Exception:  # whole, but of another numba or system: whatever that means, it is compiled again
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled function. A disk that refuses is no reason to stop: it will be compiled again."""

@@ -7,7 +7,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.logs.log import MAX_MISSING, Log
+from omnidyn.logs.log import MAX_MISSING, Log, back_remedy
 from omnidyn.logs.segments import GAP, segments
 from omnidyn.model.robot import Robot
 from omnidyn.statistics import robust_std
@@ -96,7 +96,7 @@ def _backward(log: Log, rows: IntArray) -> list[Finding]:
     return [
         Finding(
             "time_back", FATAL, "t", f"time goes back {count} times, by up to {farthest:.4g} s",
-            "sort the rows (`sort`) where they were written out of order; split the file where two logs were joined",
+            back_remedy(count, len(rows), "sort them, or give identify and compare `sort`"),
             spans_of(bad, log.lines[rows]), count, {"farthest_s": farthest},
         )
     ]  # fmt: skip

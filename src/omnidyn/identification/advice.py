@@ -24,7 +24,7 @@ FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
 
 def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]:
     """What to measure or to ask for next, gravest first."""
-    words = [*_not_seen(fit), *_guesses(fit, validation), *_together(fit), *_wide(fit)]
+    words = [*_not_seen(fit), *_guesses(fit, validation), *_together(fit), *_wide(fit, validation)]
     words += _from_validation(fit, validation)
     return list(dict.fromkeys(words))
 
@@ -95,7 +95,8 @@ def _together(fit: OutputErrorEstimate) -> Iterator[str]:
         yield f"{', '.join(pairs)}: measure {one} otherwise, or drive at more different speeds"
 
 
-def _wide(fit: Estimate) -> Iterator[str]:
+def _wide(fit: Estimate, validation: Validation | None) -> Iterator[str]:
+    """What is known too roughly. A longer log helps against noise only: not where the model itself misses something."""
     shares = {
         name: fit.std[name] / abs(value) for name, value in fit.value.items()
         if value and math.isfinite(fit.std[name]) and name not in fit.at_bound
@@ -104,6 +105,10 @@ def _wide(fit: Estimate) -> Iterator[str]:
     if wide:
         known = ", ".join(f"{name} is known within {100.0 * share:.0f} % only" for name, share in wide.items())
         longer = (max(wide.values()) / GOAL) ** 2
+        if validation is not None and coloured(validation.scores[FITTED]):
+            them = "it" if len(wide) == 1 else "them"
+            yield f"{known}: what the model misses widens {them}, and no longer log mends that"
+            return
         enough = f"a log {longer:.0f} times as long" if longer <= LONGEST else "no log of a usual length"
         yield (
             f"{known}: {enough} would bring {'it' if len(wide) == 1 else 'all of them'} to {100.0 * GOAL:.0f} %; more "

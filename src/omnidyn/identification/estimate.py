@@ -8,6 +8,7 @@ from typing import Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Points, Table, interval_cell, plain
+from omnidyn.errors import shortened
 from omnidyn.model.keys import unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
@@ -97,6 +98,6 @@ class Estimate:
 
 def identified(std: float | None, source: str) -> Prior:
     """The prior of an identified number: its standard error, where it is one, and from what it was identified."""
-    text = source if source.isprintable() else "".join(c if c.isprintable() else " " for c in source)
+    text = shortened("".join(c if c.isprintable() else " " for c in source), SOURCE_LENGTH)
     known = std is not None and 0.0 < std <= 1e9
-    return Prior(std=float(std) if known else None, source=text[:SOURCE_LENGTH], origin=IDENTIFIED)  # type: ignore[arg-type]
+    return Prior(std=float(std) if known else None, source=text, origin=IDENTIFIED)  # type: ignore[arg-type]

@@ -43,9 +43,10 @@ class Geometry:
     source: str
 
 
-def wheel_geometry(runs: Sequence[Run]) -> Geometry:
+def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:
     """Fit the geometry to commands of body and wheels where both are logged, else to what was measured.
 
+    instead: what says what these logs cannot; of mecanum wheels the radius, for where they stand is known.
     Raises InputError where no run has such a pair of channels or wheels do not follow an omni wheel's law, and
     InsufficientDataError where the runs go in one direction only.
     """
@@ -55,11 +56,11 @@ def wheel_geometry(runs: Sequence[Run]) -> Geometry:
         usable = [pair for pair in usable if len(pair[0])]
         if usable:
             twist, speed = (np.concatenate(parts) for parts in zip(*usable, strict=True))
-            return _fit(twist, speed, f"{body} and {wheels}")
+            return _fit(twist, speed, f"{body} and {wheels}", instead)
     raise InputError(
         "cannot tell where the wheels stand", got=", ".join(runs[0].channels) if runs else "no log",
         expected="twist_command and wheel_speed_command, or twist and wheel_speed, all components of them",
-        remedy="say which columns they are (`column` w1=NAME), or give `azimuth`",
+        remedy=f"say which columns they are (`column` w1=NAME), or leave the logs out and give {instead}",
     )  # fmt: skip
 
 
@@ -90,14 +91,15 @@ def _rows(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]
     return twist[keep], speed[keep]
 
 
-def _fit(twist: FloatArray, speed: FloatArray, source: str) -> Geometry:
+def _fit(twist: FloatArray, speed: FloatArray, source: str, instead: str) -> Geometry:
     turned = bool(np.any(np.abs(twist[:, 2]) > STILL))
     design = twist if turned else twist[:, :2]
     size = np.sqrt(np.mean(design**2, axis=0))
     if (size == 0.0).any() or np.linalg.cond(design / size) > MAX_CONDITION:
         raise InsufficientDataError(
             "the logs do not show where the wheels stand", got=f"{len(twist)} rows in motion, all alike",
-            expected="motion along x and along y", remedy="add logs in other directions, or give `azimuth`",
+            expected="motion along x and along y",
+            remedy=f"add logs in other directions, or leave the logs out and give {instead}",
         )  # fmt: skip
     rows, *_ = np.linalg.lstsq(design, speed, rcond=None)
     rest = speed - design @ rows
@@ -106,7 +108,8 @@ def _fit(twist: FloatArray, speed: FloatArray, source: str) -> Geometry:
         raise InputError(
             "the wheels do not follow the body as omni wheels do",
             got=f"{residual:.0%} of the wheel speeds unexplained", expected=f"at most {MAX_RESIDUAL:.0%}",
-            remedy="check the columns with omnidyn check, or give `azimuth`" if turned else "a turn rate is not in the "
+            remedy=f"check the columns with omnidyn check, or leave the logs out and give {instead}"
+            if turned else "a turn rate is not in the "
             "logs, or 0: where the robot turned say which column it is (`column` omega=NAME:UNIT)",
         )  # fmt: skip
     scale = np.hypot(rows[0], rows[1])

@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, printable
 
 
 def matches(path: str, pattern: str) -> bool:
@@ -59,4 +59,4 @@ def _pair(text: str, option: str) -> tuple[str, str]:
     if not equals or not name.strip() or not pattern.strip():
         raise InputError("cannot read the group", got=text, expected="NAME=GLOB, such as gray=gray_surface",
                          where=option)  # fmt: skip
-    return name.strip(), pattern.strip()
+    return printable(name.strip()), pattern.strip()

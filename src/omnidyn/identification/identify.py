@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from omnidyn.document import Document, apart
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.check import check
@@ -29,8 +31,8 @@ from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.logs.log import Log
-from omnidyn.model.drive import SPEED
-from omnidyn.model.robot import Robot
+from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
+from omnidyn.model.robot import MEASURED, Prior, Robot
 from omnidyn.run import Run, as_list
 
 Tell = Callable[[str], object]
@@ -51,6 +53,7 @@ def identify(runs: Run | Sequence[Run], robot: Robot, *, question: Question | No
     cannot answer.
     """
     every = as_list(runs)
+    robot = as_driven(robot, every)
     asked = Question.for_method("", question, options)
     method, why = (
         choose_method(every, robot, [*options, *asked.given()]) if asked.method == AUTO else (asked.method, "")
@@ -60,6 +63,23 @@ def identify(runs: Run | Sequence[Run], robot: Robot, *, question: Question | No
         return fit_output_error(every, robot, question=asked)
     estimate = identify_steady(every, robot, question=asked).estimate
     return replace(estimate, warnings=(why, *estimate.warnings)) if why else estimate
+
+
+def as_driven(robot: Robot, runs: Sequence[Run]) -> Robot:
+    """The robot with the drive that its logs show: one of duties where they hold duties and no voltage.
+
+    A file without it would take the next set of duties for volts. The supply is the median of the logged one, where
+    the file has none.
+    """
+    if robot.drive.kind != VOLTAGE or not runs or any(run.duty is None or run.voltage is not None for run in runs):
+        return robot
+    drive, priors = robot.drive.replace(kind=DUTY), robot.priors
+    supplies = [run.supply[np.isfinite(run.supply)] for run in runs if run.supply is not None]
+    logged = np.concatenate(supplies) if supplies else np.zeros(0)
+    if drive.supply is None and logged.size and float(np.median(logged)) > 0.0:
+        drive = drive.replace(supply=round(float(np.median(logged)), 3))
+        priors = {**priors, "drive.supply_V": Prior(source="median of the logs", origin=MEASURED)}
+    return robot.replace(drive=drive, priors=priors)
 
 
 def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()) -> tuple[str, str]:
@@ -123,6 +143,7 @@ class Identification:
         Errors: as `identify` raises.
         """
         every = as_list(runs)
+        robot = as_driven(robot, every)
         asked = (question or Question()).but(options)
         heard = _Heard(progress or _silent, tell or _silent, keep_best)
         if asked.what == MOTORS:

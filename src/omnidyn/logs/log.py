@@ -17,6 +17,7 @@ from omnidyn.logs.channels import components, place
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 
+OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share is recorded on change
 HELD = ("voltage", "duty", "wheel_speed_command", "twist_command")  # what is commanded holds until the next value
@@ -181,9 +182,19 @@ class Log:
             row = int(back[0]) + 1
             raise InputError(
                 "time goes back", got=f"{self.t[row]:.9g} s after {self.t[row - 1]:.9g} s ({back.size} times)",
-                expected="times that increase", remedy="sort the rows, or use `sort`",
+                expected="times that increase", remedy=back_remedy(back.size, len(self.t), "sort them, or use `sort`"),
                 where=f"{self.source}:{self.lines[row]}",
             )  # fmt: skip
+
+
+def back_remedy(times: int, rows: int, sort: str) -> str:
+    """What to do about a time that goes back; sort: how to sort. Over and over, the clock is wrong: never sort."""
+    if times > OFTEN_BACK * rows:
+        return (
+            "do not sort the rows: look at how the time is written (milliseconds without leading zeros?), and whether "
+            "another column is the clock (`column` t=NAME:UNIT)"
+        )
+    return f"split the file where two logs were joined; where rows were written out of order, {sort}"
 
 
 def _held(values: FloatArray) -> FloatArray:

@@ -88,13 +88,12 @@ def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOp
 
 def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> ColumnMap:
     """The map of a table: given or guessed, with the overrides on top. Raises InputError for a column it lacks."""
-    columns = options.columns
+    columns, more = options.columns, dict(parse_column(text, table.names) for text in options.overrides)
     if columns is None:
-        columns = guess_columns(table, robot, options.assume)
+        columns = guess_columns(table, robot, options.assume, {column.name: key for key, column in more.items()})
     else:
         used = {column.name for column in columns.columns.values()}
         columns = replace(columns, unused=tuple(name for name in table.names if name not in used))
-    more = dict(parse_column(text, table.names) for text in options.overrides)
     columns = _delayed(columns.with_columns(more), options.latency)
     for component, column in columns.columns.items():
         if column.name not in table.names:

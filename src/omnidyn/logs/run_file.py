@@ -30,6 +30,11 @@ from omnidyn.run import CHANNELS, SCALAR, Run
 from omnidyn.units import DUTY, known_unit, parse_unit
 
 _SUFFIXES = ("rad_s", "m_s", "duty", "rad", "V", "A", "m", "s")  # as channels.si_suffix gives them, long before short
+_SHEETS = frozenset((".xlsx", ".xls", ".xlsm", ".ods"))
+_OTHERS = _SHEETS | frozenset(
+    (".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".mcap", ".bag", ".db3", ".wpilog", ".ulg", ".json", ".toml",
+     ".html", ".pdf", ".png", ".svg", ".pkl", ".pickle", ".feather", ".arrow", ".zip", ".gz", ".bz2", ".xz", ".zst")
+)  # fmt: skip
 _UNIT_OF_DUTY = ("duty", "-", "1")
 
 
@@ -50,9 +55,15 @@ def write_run(run: Run, path: str | os.PathLike, force: bool = False) -> Path:
 
 
 def check_format(path: str | os.PathLike) -> None:
-    """Raises MissingExtraError for the name of a Parquet file where pyarrow is not installed."""
+    """Raises InputError for the name of another format, and MissingExtraError for a Parquet file without pyarrow."""
     if _is_parquet(path):
         import_pyarrow(str(path))
+    suffix = Path(path).suffix.lower()
+    if suffix in _OTHERS:
+        raise InputError(
+            "a run is not written in this format", got=suffix, expected=".csv or .parquet",
+            remedy="spreadsheets open CSV" if suffix in _SHEETS else "", where=str(path),
+        )  # fmt: skip
 
 
 def _is_parquet(path: str | os.PathLike) -> bool:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from omnidyn.errors import printable
 from omnidyn.model.drive import Drive
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor
@@ -54,7 +55,7 @@ class Robot(Value):
     priors: key of the robot file, such as "motor.resistance_ohm" or "friction.axes.coulomb[0]", -> Prior.
     """
 
-    name: Annotated[Text, Field(min_length=1)]
+    name: Annotated[Text, Field(min_length=1), AfterValidator(printable)]
     source: Text = ""
     body: Body
     wheels: Wheels

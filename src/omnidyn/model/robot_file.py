@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.files import read_text, write_atomic
+from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
 from omnidyn.model.keys import TABLES, is_told
+from omnidyn.model.presets import PRESETS as PRESETS
+from omnidyn.model.presets import preset_names as preset_names
+from omnidyn.model.presets import robot_path
 from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, SCHEMA, Origin, Prior, Robot
 from omnidyn.model.value import from_validation, key_path, keys_of, table_at
-
-PRESETS = Path(__file__).parent / "presets"
-MAX_ROBOT_FILE_BYTES = 2**20
 
 # Keys of the schema for which no law exists yet. They are refused by name: never ignored, never "unknown".
 PENDING = frozenset(
@@ -30,11 +29,6 @@ PENDING = frozenset(
 )
 
 
-def preset_names() -> list[str]:
-    """Names of the robots that come with omnidyn."""
-    return sorted(file.stem for file in PRESETS.glob("*.toml"))
-
-
 def load_robot(robot: str | os.PathLike) -> Robot:
     """A robot by the name of a preset, such as "axebot", or by the path of its TOML file.
 
@@ -44,24 +38,12 @@ def load_robot(robot: str | os.PathLike) -> Robot:
     name = os.fspath(robot)
     if not isinstance(name, str):
         raise InputError("not a robot", got=robot, expected="the name of a preset or the path of a TOML file")
-    if name in preset_names():
-        return parse_robot(read_text(PRESETS / f"{name}.toml", MAX_ROBOT_FILE_BYTES), name)
-    looks_like_a_name = os.path.basename(name) == name and not name.endswith(".toml")
-    if looks_like_a_name and not os.path.exists(name):
-        beside = f"{name}.toml" if os.path.exists(f"{name}.toml") else ""
-        raise InputError(
-            "no such robot", got=name, expected=f"a TOML file or a preset: {', '.join(preset_names())}",
-            remedy=f"did you mean {beside}?" if beside else "",
-        )  # fmt: skip
-    return parse_robot(read_text(name, MAX_ROBOT_FILE_BYTES), name)
+    return parse_robot(read_text(robot_path(name), MAX_TOML_BYTES), name)
 
 
 def parse_robot(text: str, where: str = "robot") -> Robot:
     """A robot from the text of a robot file; `where` names it in messages."""
-    try:
-        document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise InputError("not valid TOML", got=str(error), remedy="correct that line", where=where) from None
+    document = parse_toml(text, where)
     try:
         return robot_from_dict(document)
     except InputError as error:

@@ -107,7 +107,10 @@ Flag = Annotated[bool, Strict()]
 def from_validation(error: ValidationError, model: type[BaseModel]) -> InputError:
     """The first fault of a pydantic check as an InputError: where, what, got, expected, remedy."""
     faults = error.errors(include_url=False)
+    # A key that is not known before one that is missing: often it is the same one, spelled right.
     first = faults[0]
+    if first["type"] == "missing":
+        first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), first)
     path = [part for part in first["loc"] if part not in ("one", "many")]
     kind, more = first["type"], f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     where = key_path(path)

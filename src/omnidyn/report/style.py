@@ -54,6 +54,7 @@ LOOK = {
     "text.color": INK,
     "xtick.color": INK,
     "ytick.color": INK,
+    "text.parse_math": False,  # a name may hold a $, and is shown as it is
     "svg.hashsalt": "omnidyn",
     "svg.fonttype": "path",  # looks the same where the font is missing
     "path.simplify": True,

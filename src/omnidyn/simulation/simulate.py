@@ -22,6 +22,8 @@ from omnidyn.simulation.implicit.march import Outcome, capped, run_implicit
 from omnidyn.simulation.speed_loop import loop_of, no_loop
 
 TOLERANCE = 1e-6
+# Beyond these a step has no meaning and the implicit engine no end: [m/s, rad/s], [m, rad], [A].
+FARTHEST = {"twist": 1e3, "pose": 1e9, "current": 1e6}
 
 
 def simulate(
@@ -49,8 +51,8 @@ def simulate(
     engine, used wherever the robot allows it, needs no tolerance; Run.source says which engine ran.
     Returns a Run of n + 1 samples: t, voltage (the last row repeats), current, wheel_speed, twist, pose.
     What is at rest within its dead zone has a speed of exactly 0.0.
-    Raises InputError for wrong shapes, NaN or infinite values, dt outside 1e-9..3600 s, a missing supply,
-    or a tol outside 1e-10..1 m/s.
+    Raises InputError for wrong shapes, NaN, infinite values, a start beyond 1e3 m/s, dt outside 1e-9..3600 s, a missing
+    supply, or a tol outside 1e-10..1 m/s.
     """
     given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
     start = as_start("twist", twist, 3), as_start("pose", pose, 3)
@@ -81,6 +83,9 @@ def as_start(name: str, value: ArrayLike, size: int) -> FloatArray:
     array = as_floats(name, value)
     if array.shape != (size,) or not np.isfinite(array).all():
         raise InputError("cannot start there", got=value, expected=f"{size} finite numbers", where=name)
+    if (np.abs(array) > FARTHEST[name]).any():
+        expected = f"{size} numbers within -{FARTHEST[name]:g} to {FARTHEST[name]:g}, in SI units"
+        raise InputError("no robot starts there", got=value, expected=expected, where=name)
     return array
 
 

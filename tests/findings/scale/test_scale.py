@@ -7,6 +7,8 @@ import pytest
 
 from omnidyn.findings.check import check
 from omnidyn.findings.signal.robust import clusters, slope
+from omnidyn.logs.log import Log
+from omnidyn.simulation.simulate import simulate
 
 
 def test_noise_in_both_channels_does_not_pull_a_slope_down():
@@ -121,3 +123,30 @@ def test_one_wheel_with_another_scale(log, robot, with_channels):
     (finding,) = check(with_channels(wheel_speed=speed, pose=None), robot).of("wheel_scale")
     assert finding.where == "w2"
     assert finding.numbers["ratio"] == pytest.approx(1.07, abs=0.01)
+
+
+# ---- logs without noise ---------------------------------------------------------------------------------
+
+
+def exact_log(robot, voltage, rate=100.0):
+    run = simulate(robot, voltage, 1.0 / rate, tol=None)
+    channels = {name: getattr(run, name) for name in ("voltage", "current", "wheel_speed", "twist", "pose")}
+    return Log(run.t, channels, np.arange(len(run)) + 2, source="run.csv")
+
+
+@pytest.mark.parametrize("turning", [40, 100, 200])
+@pytest.mark.parametrize("without", [(), ("twist",), ("current",), ("twist", "current")])
+def test_a_short_turn_of_our_own_exact_log_is_no_outlier(robot, with_channels, grave, turning, without):
+    straight = [(0.0, level, -level) for level in (3, -3, 4, -4, 5, -5) for _ in range(200)]
+    rows = [*straight, *[(0.0, 0.0, 0.0)] * 100, *[(5.5, 5.5, 5.5)] * turning]
+    log = with_channels(exact_log(robot, np.array(rows)), **dict.fromkeys(without))
+    assert grave(check(log, robot)) == set()
+
+
+def test_a_slope_is_not_made_of_what_rounding_left():
+    ids, count = clusters(1000, 0.01)
+    x = np.full(1000, 1e-17)
+    x[900:] = 3.0
+    y = np.where(x > 1.0, 2.0 * x, 0.0)
+    line = slope(y, x, ids, count)
+    assert line.value == pytest.approx(2.0)

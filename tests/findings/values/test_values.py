@@ -193,3 +193,44 @@ def test_a_simulated_speed_that_settles_is_not_stuck():
     speed = np.outer(share, [8.0, -5.0, 3.0])
     drive = np.where(t < 5.0, 0.5, -0.5)[:, None] * [1.0, -0.7, 0.4]
     assert not check(_recorded(t, drive, speed)).of("stuck")
+
+
+# ---- a heading that was held ----------------------------------------------------------------------------
+
+
+def straight_log(robot, wobble):
+    """Forward and back; `wobble` [V] turns the robot a little to and fro at 3 Hz."""
+    t = np.arange(2000) * 0.01
+    voltage = np.zeros((2000, 3))
+    voltage[:, 1] = 3.5 * np.sign(np.sin(2.0 * np.pi * t / 4.0))
+    voltage[:, 2] = -voltage[:, 1]
+    run = simulate(robot, voltage + wobble * np.sin(6.0 * np.pi * t)[:, None], 0.01, tol=None)
+    channels = {name: getattr(run, name) for name in ("voltage", "wheel_speed", "twist", "pose")}
+    return Log(run.t, channels, np.arange(len(run)) + 2, source="run.csv")
+
+
+@pytest.mark.parametrize("wobble", [0.0, 0.8, 1.5])
+@pytest.mark.parametrize("gyro", [True, False])
+def test_a_heading_that_was_held_is_not_dead(robot, with_channels, wobble, gyro):
+    log = straight_log(robot, wobble)
+    pose = np.full_like(log.channels["pose"], np.nan)
+    assert np.ptp(log.channels["pose"][:, 2]) < 0.25
+    pose[:, 2] = 0.25  # a compass in steps of a quarter, to which the robot is held
+    twist = log.channels["twist"] * [np.nan, np.nan, 1.0] + [0.0, 0.0, 0.01] if gyro else None
+    verdict = check(with_channels(log, pose=pose, twist=twist), robot)
+    assert not verdict.of("dead")
+
+
+def test_a_heading_that_was_not_recorded_is_dead_still(robot, with_channels):
+    turning = exact_turn(robot)
+    pose = np.full_like(turning.channels["pose"], np.nan)
+    pose[:, 2] = 0.25
+    for twist in (turning.channels["twist"], None):
+        (finding,) = check(with_channels(turning, pose=pose, twist=twist), robot).of("dead")
+        assert finding.where == "heading"
+
+
+def exact_turn(robot):
+    run = simulate(robot, np.tile([3.0, 3.0, 3.0], (1000, 1)), 0.01, tol=None)
+    channels = {name: getattr(run, name) for name in ("voltage", "wheel_speed", "twist", "pose")}
+    return Log(run.t, channels, np.arange(len(run)) + 2, source="run.csv")

@@ -397,7 +397,7 @@ def test_a_map_comes_back_equal(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[w1", "not a TOML file"),
+        ("[w1", "not valid TOML"),
         ("schema = 7", "unknown schema"),
         ("[w1]\ncolumn = 'a'", "a column is not described"),
         ("[w1]\ncolumn = 'a'\nunit = 'rpm'\ncolour = 'red'", "unknown key; got colour"),

@@ -280,3 +280,40 @@ def test_memory_is_bounded_by_the_piece(tmp_path, ending):  # 40
         parquet.write_table(pa.table(columns), path, use_dictionary=False)
     run = subprocess.run([sys.executable, "-c", LIMITED, str(path)], capture_output=True, text=True)
     assert run.stdout == f"{rows}\n", run.stderr[-2000:]
+
+
+# ---- much of nothing ------------------------------------------------------------------------------------
+
+ROWS_OF_HEAD = "".join(f"{k / 10},{k}\n" for k in range(200))
+NOTHING = {"blank": "\n", "spaces": "   \n", "comments": "# a logger says so and so\n", "both": "#\n\n% x\n"}
+
+
+@pytest.mark.parametrize("nothing", NOTHING.values(), ids=NOTHING)
+@pytest.mark.parametrize("place", ["first", "under the header", "among the rows", "last"])
+def test_megabytes_of_nothing_are_passed_over(tmp_path, nothing, place):
+    size = 5 * 2**20 // len(nothing)
+    head, rows = "t_s,x_m\n", ROWS_OF_HEAD
+    half = rows.index("10.0,100\n")
+    some, more = rows[:half], rows[half:]
+    text = {
+        "first": nothing * size + head + rows,
+        "under the header": head + nothing * size + rows,
+        "among the rows": head + some + nothing * size + more,
+        "last": head + rows + nothing * size,
+    }[place]
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    table = read_table(path)
+    assert len(table) == 200
+    assert table.numbers("x_m").tolist() == list(range(200))
+    above = text[: text.index("\n0.0,0\n")].count("\n") + 2
+    assert table.lines[0] == above
+
+
+def test_names_in_the_last_of_many_comments_are_found(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("# so and so\n" * 300_000 + "# t_s,x_m\n# s,m\n" + ROWS_OF_HEAD)
+    table = read_table(path)
+    assert table.names == ("t_s", "x_m")
+    assert table.units == {"t_s": "s", "x_m": "m"}
+    assert len(table) == 200

@@ -8,7 +8,7 @@ from functools import cache
 # Options beside those of a Question, and those whose flag is not their name.
 OTHERS = (
     "assume", "azimuth", "column", "current_unsigned", "duration", "fail_if", "force", "map", "max_bytes", "max_steps",
-    "no_header", "skip_bad_rows", "sort", "tol",
+    "no_header", "pose", "skip_bad_rows", "sort", "tol", "twist",
 )  # fmt: skip
 _NAMED = re.compile(r"`([a-z_]+)`")
 

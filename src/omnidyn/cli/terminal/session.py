@@ -30,7 +30,6 @@ def input_file(role: str, path: str, max_bytes: int = MAX_TEXT_BYTES) -> dict[st
 
 def robot_input(robot: str) -> dict[str, str]:
     """The record of a robot given by the name of a preset or by a path."""
-    from omnidyn.model.robot_file import PRESETS, preset_names
+    from omnidyn.model.presets import preset_names, robot_path
 
-    path = str(PRESETS / f"{robot}.toml") if robot in preset_names() else robot
-    return {**input_file("robot", path), "name": robot if robot in preset_names() else str(Path(robot))}
+    return {**input_file("robot", robot_path(robot)), "name": robot if robot in preset_names() else str(Path(robot))}

@@ -6,6 +6,7 @@ import codecs
 import contextlib
 import json
 import os
+import re
 import shutil
 import sys
 from typing import Any
@@ -14,6 +15,7 @@ import typer
 
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.document import plain
+from omnidyn.errors import printable
 
 MIN_WIDTH, WIDTH_WITHOUT_TERMINAL = 20, 110
 COLOURS = {
@@ -25,6 +27,8 @@ _PLAIN = {
     "±": "+-", "≤": "<=", "≥": ">=", "≈": "~", "–": "-", "—": "-", "−": "-", "→": "->", "×": "x", "·": " ", "⋅": " ",
     "°": " deg", "²": "^2", "√": "sqrt", "…": "...", "ω": "omega", "θ": "theta", "τ": "tau", "Ω": "ohm",
 }  # fmt: skip
+
+_coloured: set[str] = set()  # words that we coloured: no other escape code is let through
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:
@@ -55,17 +59,32 @@ def _ascii_locale() -> bool:
 
 
 def say(words: str) -> None:
-    """Talk, to stderr. A stderr that nobody reads, or that is not there, is no reason to stop."""
+    """Talk, to stderr. A stderr that nobody reads, that is full or that is not there is no reason to stop."""
     if sys.stderr is None:
         return
     # Not typer.echo: it overrides the encoding of an ASCII stream.
-    with contextlib.suppress(BrokenPipeError):
-        print(with_flags(words), file=sys.stderr, flush=True)
+    with contextlib.suppress(OSError, ValueError):
+        print(printable(with_flags(words)), file=sys.stderr, flush=True)
+
+
+def say_trace(lines: str) -> None:
+    """Talk of several lines, to stderr: a traceback."""
+    for line in lines.splitlines():
+        say(line)
 
 
 def show(text: str) -> None:
     """The result, to stdout."""
-    print(with_flags(text), flush=True)
+    print(_escaped(with_flags(text)), flush=True)
+
+
+def _escaped(text: str) -> str:
+    """The text with an escape for what a terminal acts on, but for line breaks and our own colours."""
+    if not _coloured:
+        return "\n".join(map(printable, text.split("\n")))
+    ours = re.compile("(" + "|".join(map(re.escape, sorted(_coloured))) + ")")
+    parts = ours.split(text)
+    return "".join(part if k % 2 else "\n".join(map(printable, part.split("\n"))) for k, part in enumerate(parts))
 
 
 def show_json(document: dict[str, Any]) -> None:
@@ -91,4 +110,8 @@ def painted(word: str, tone: str) -> str:
         and not os.environ.get("NO_COLOR")
         and os.environ.get("TERM") != "dumb"
     )
-    return typer.style(word, fg=COLOURS[tone]) if wanted and tone else word
+    if not wanted or not tone:
+        return word
+    styled = typer.style(printable(word), fg=COLOURS[tone])
+    _coloured.add(styled)
+    return styled

@@ -19,7 +19,7 @@ from omnidyn.findings.scale.mistakes import (
 )
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import Ground, electric_speed, expected_wheel_speed, ground, wheels_twist
-from omnidyn.findings.signal.robust import Slope, quantum, slope, smooth
+from omnidyn.findings.signal.robust import HELD, Slope, quantum, slope, smooth, turned_by
 from omnidyn.logs.channels import components
 from omnidyn.units import TURN
 
@@ -149,7 +149,7 @@ def _against(work: LogUnderCheck, floor: Slope) -> list[Finding]:
     names = {"twist": ("vx", "vy", "omega"), "pose": ("x", "y", "heading")}[seen.name]
     where = " ".join(names[k] for k in seen.axes)
     if floor.value > -4.0 * floor.error:
-        if abs(floor.value) > 0.1 or floor.error > 0.03:
+        if abs(floor.value) > 0.1 or floor.error > 0.03 or _held(work, seen):
             return []
         return [Finding(
             "dead", WARN, where,
@@ -164,6 +164,13 @@ def _against(work: LogUnderCheck, floor: Slope) -> list[Finding]:
         "set `invert` for that column in the mapping, or turn the wheels' signs", (), 0,
         {"ratio": floor.value, "error": floor.error},
     )]  # fmt: skip
+
+
+def _held(work: LogUnderCheck, seen: Ground) -> bool:
+    """Whether a heading alone is known, and the wheels turn the robot by next to nothing: it was held."""
+    speed = work.full("wheel_speed")
+    own = None if speed is None else wheels_twist(work, speed, seen.width)
+    return tuple(seen.axes) == (2,) and own is not None and turned_by(own[:, 2], work.t) < HELD
 
 
 def _joined(lines: list[Slope]) -> Slope | None:

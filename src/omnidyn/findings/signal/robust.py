@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.statistics import robust_std
 
+ROUNDING = 1e-9  # of the largest: nothing that was measured
+GYRO_OFFSET = 0.05  # [rad/s]
+HELD = 0.3  # [rad] a heading that should have changed by less may have been held, or be too coarse to show it
 SAMPLE = 40_000  # rows that are enough to learn a noise or a quantum from
 
 
@@ -128,9 +131,10 @@ def ratio(top: FloatArray, below: FloatArray) -> Slope:
     weight = np.sqrt(np.maximum(below, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.where(weight > 0.0, (top - value * below) / weight, 0.0)
-    limit = 6.0 * spread(off)
+    # Where most windows stand still and nothing is noisy, the few that move are no outliers but all that is known.
+    limit = max(6.0 * spread(off), ROUNDING * abs(value) * float(weight.max()))
     keep = np.abs(off) <= limit if limit > 0.0 else np.ones(len(off), dtype=bool)
-    if keep.sum() > 0.7 * len(keep) and below[keep].sum() > 0.0:
+    if keep.sum() > 0.7 * len(keep) and below[keep].sum() > ROUNDING * below.sum():
         top, below = top[keep], below[keep]
         value = top.sum() / below.sum()
     # Windows count by what they weigh: one start of a run is one witness.
@@ -154,6 +158,16 @@ def smooth(values: FloatArray, width: int) -> FloatArray:
     low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
     with np.errstate(invalid="ignore", divide="ignore"):
         return (total[high] - total[low]) / (number[high] - number[low])
+
+
+def turned_by(rate: FloatArray, t: FloatArray) -> float:
+    """How far a turn rate [rad/s] leads away, at most, from one heading to another [rad], its offset apart."""
+    good = np.isfinite(rate)
+    if good.sum() < 2:
+        return 0.0
+    angle = np.concatenate([[0.0], np.cumsum(np.where(good, rate, 0.0)[:-1] * np.diff(t))])
+    drift = float(np.clip(angle[-1] / max(t[-1] - t[0], 1e-9), -GYRO_OFFSET, GYRO_OFFSET))
+    return float(np.ptp(angle - drift * (t - t[0])))
 
 
 def central_rate(values: FloatArray, t: FloatArray, half: int) -> FloatArray:

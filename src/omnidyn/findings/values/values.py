@@ -8,7 +8,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
-from omnidyn.findings.signal.robust import quantum, smooth, white_noise
+from omnidyn.findings.signal.robust import HELD, quantum, smooth, turned_by, white_noise
 from omnidyn.findings.values.codes import check_codes
 from omnidyn.findings.values.spikes import check_spikes, recorded
 from omnidyn.findings.values.stuck import check_stuck
@@ -185,12 +185,13 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
     if channel == "pose" and k == 2:
         twist, speed, robot = work.get("twist"), work.full("wheel_speed"), work.geometry
         if twist is not None and _moves(twist[:, 2]):
-            return "omega says it turns"
+            return "omega says it turns" if turned_by(twist[:, 2], work.t) > HELD else ""
         if speed is None or robot is None:
             return ""
         own = smooth(twist_from_wheel_speed(robot.wheels, speed), work.width(0.3))
         turning = spread_of_motion(own[:, 2]) * float(np.mean(robot.wheels.robot_radius))
-        if turning > 0.3 * max(spread_of_motion(own[:, 0]), spread_of_motion(own[:, 1])):
+        straight = max(spread_of_motion(own[:, 0]), spread_of_motion(own[:, 1]))
+        if turning > 0.3 * straight and turned_by(own[:, 2], work.t) > HELD:
             return "the wheels say that the robot turns: the heading was not recorded, or the wheels ran in the air"
     return ""
 

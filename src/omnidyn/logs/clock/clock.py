@@ -19,6 +19,13 @@ HALF_A_DAY = timedelta(hours=12)
 DATES = "a date and time such as 2026-11-20T10:00:00.125"
 
 _TIME = r"(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)"
+_STEP_NAME = re.compile(
+    r"(?:d|delta|Δ)[ _]?t(?:ime)?|(?:time|loop|cycle|sample|sampling|step)[ _]?(?:step|time|period)|step|period",
+    re.IGNORECASE,
+)
+_STEP_UNIT = re.compile(r"_(?:s|ms|us|ns|sec|secs|seconds|millis|micros)$", re.IGNORECASE)
+MOSTLY = 0.8  # of the rows
+_FRACTION = re.compile(r"(?<=:\d\d)[.,](\d{1,3})(?!\d)", re.ASCII)
 _OF_DAY = re.compile(_TIME, re.ASCII)
 _WITH_POINTS = re.compile(rf"(\d{{1,2}})\.(\d{{1,2}})\.(\d{{4}})[ T]+{_TIME}", re.ASCII)  # day, month, year
 
@@ -31,6 +38,8 @@ class Clock:
         self._count: float | None = None  # the last one read
         self._passed = 0.0  # counts that a clock which started over has lost
         self._last: datetime | None = None
+        self._steps: bool | None = None  # whether the column holds steps of time
+        self._bare = False  # whether milliseconds stand without leading zeros
         self._days = 0  # midnights passed since the first time of day
 
     def times(self, table: Table, column: Column, notes: list[str]) -> FloatArray:
@@ -40,8 +49,13 @@ class Clock:
         """
         cells = table.columns[column.name]
         if isinstance(cells, tuple) and (isinstance(self._start, datetime) or is_dates(cells)):
-            return self._from_dates(table, column.name, cells)
-        counts = self._going_on(table.numbers(column.name, missing=True), column, notes)
+            return self._from_dates(table, column.name, cells, notes)
+        counts = table.numbers(column.name, missing=True)
+        if self._steps is None:
+            self._steps = are_steps(column.name, counts)
+        if self._steps:
+            return self._summed(counts, column, notes)
+        counts = self._going_on(counts, column, notes)
         known = counts[np.isfinite(counts)]
         if self._start is None and known.size:
             self._start = float(known[0]) if abs(known[0] * column.factor) > EPOCH else 0.0
@@ -50,6 +64,16 @@ class Clock:
             notes.append(f"time starts at {start:.6f} s, counted from an epoch: it begins at 0 here")
             return (counts - self._start) * column.factor
         return counts * column.factor
+
+    def _summed(self, steps: FloatArray, column: Column, notes: list[str]) -> FloatArray:
+        """Times from steps of time: the first row is at 0, each further one its step later than the row before."""
+        notes.append(f"{column.name} holds the time since the row before: it is summed up")
+        steps = np.nan_to_num(steps)
+        if self._start is None:
+            self._start, steps = 0.0, np.append(0.0, steps[1:])
+        sums = self._passed + np.cumsum(steps)
+        self._passed = float(sums[-1]) if sums.size else self._passed
+        return sums * column.factor
 
     def _going_on(self, counts: FloatArray, column: Column, notes: list[str]) -> FloatArray:
         """The counts of a clock that starts over when its counter is full, or at midnight, as if it did not."""
@@ -71,7 +95,11 @@ class Clock:
                 return counts
         return counts + self._passed
 
-    def _from_dates(self, table: Table, name: str, cells: tuple[str, ...]) -> FloatArray:
+    def _from_dates(self, table: Table, name: str, cells: tuple[str, ...], notes: list[str]) -> FloatArray:
+        self._bare = self._bare or _are_bare(cells)
+        if self._bare:
+            notes.append(f"{name} has milliseconds without leading zeros: .5 is 5 ms")
+            cells = tuple(map(_padded, cells))
         t = np.full(len(cells), np.nan)
         for row, cell in enumerate(cells):
             date = _date(cell) if cell else None
@@ -91,6 +119,40 @@ class Clock:
         if not isinstance(self._start, datetime):
             self._start = date
         return (date - self._start).total_seconds()
+
+
+def are_steps(name: str, values: FloatArray) -> bool:
+    """Whether a column holds the time from row to row, as it is called: all alike, above 0, and no clock."""
+    known = values[np.isfinite(values)]
+    if not _STEP_NAME.fullmatch(_STEP_UNIT.sub("", name.strip())) or len(known) < 2 or (known < 0.0).any():
+        return False
+    usual = float(np.median(known))
+    alike = float(np.mean((known > 0.5 * usual) & (known < 2.0 * usual)))
+    return usual > 0.0 and alike > MOSTLY and float(np.mean(np.diff(known) > 0.0)) < MOSTLY
+
+
+def _are_bare(cells: tuple[str, ...]) -> bool:
+    """Whether times go back again and again as they stand, and never with their fractions read as milliseconds.
+
+    printf("%d.%d", seconds, milliseconds) writes 19.8, 19.82 and 19.141 for 8, 82 and 141 ms.
+    """
+    fractions = [match[1] for cell in cells if (match := _FRACTION.search(cell))]
+    if not fractions or max(map(len, fractions)) != 3 or min(map(len, fractions)) == 3:
+        return False
+    if not (np.diff(_instants(cells)) < 0.0).any():
+        return False
+    return not (np.diff(_instants(tuple(map(_padded, cells)))) < 0.0).any()
+
+
+def _instants(cells: tuple[str, ...]) -> FloatArray:
+    """Seconds of the cells that hold a time; a jump to the next day is none."""
+    dates = [date for cell in cells if cell and (date := _date(cell)) is not None]
+    seconds = np.array([(date - dates[0]).total_seconds() for date in dates])
+    return seconds + DAY * np.cumsum(np.append(0.0, np.diff(seconds) < -0.5 * DAY)) if len(seconds) else seconds
+
+
+def _padded(cell: str) -> str:
+    return _FRACTION.sub(lambda found: f"{found[0][0]}{found[1]:0>3}", cell, count=1)
 
 
 def is_dates(cells: FloatArray | tuple[str, ...]) -> bool:

@@ -5,7 +5,8 @@ the words that would settle it. What was guessed is always shown.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,12 +26,14 @@ from omnidyn.model.wheels import MAX_WHEELS, per_wheel, wheel_speed
 from omnidyn.units import COUNT, Unit, known_unit, parse_unit
 from omnidyn.units import CURRENT as CURRENT_UNIT
 from omnidyn.units import DUTY as DUTY_UNIT
+from omnidyn.units import SPEED as SPEED_UNIT
 from omnidyn.units import TURN_RATE as TURN_RATE_UNIT
 from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
 
 Numbers = Mapping[tuple[str, int], int]  # (letter of a component, number in the file) -> number of the wheel from 1
 
 SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
+_LETTER = re.compile(r"([a-z])\d{1,3}")
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
 
 # Kinds of columns that have a number: role -> letter of the component. The first that fits counts.
@@ -42,15 +45,22 @@ NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPL
 _BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
 
 
-def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str, str] | None = None) -> ColumnMap:
+def guess_columns(
+    table: Table,
+    robot: Robot | None = None,
+    assume: Mapping[str, str] | None = None,
+    taken: Mapping[str, str] | None = None,
+) -> ColumnMap:
     """Guess the map of a table. robot: settles what a name leaves open (volts or duty, which side of the gear).
 
     assume: name of a column or letter of a component ("u", "w1", "vx") -> unit, where the file gives none. A name that
-    a units row or its own ending gives a unit needs none. Raises InputError for an unknown unit in `assume`.
+    a units row or its own ending gives a unit needs none. taken: column -> component, where the user says it
+    himself: nothing is doubted of them. Raises InputError for an unknown unit in `assume`.
     """
     assumed = {name: parse_unit(text).text for name, text in (assume or {}).items()}
     found = Guess()
     names = [name for name in table.names if is_numeric(table.columns[name])]
+    table = replace(table, units={**_units_of_letters(names, assumed, table.units), **table.units})
     numbers = _wheel_numbers(table, names, found)
     for name in names:
         _take(table, name, numbers, assumed, robot, found)
@@ -60,10 +70,38 @@ def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str,
     if not numbers:
         _take_bench(table, names, assumed, found)
     _settle_side(table, robot, found)
+    found.doubts = [doubt for doubt in found.doubts if doubt.name not in (taken or {})]
     used = {column.name for column in found.columns.values()}
     unused = tuple(name for name in table.names if name not in used)
     ordered = dict(sorted(found.columns.items(), key=lambda item: _order(item[0])))
-    return ColumnMap(ordered, unused, found.doubt_words(), found.note_words())
+    idle = tuple(
+        f"`assume` {name}={unit} is used for no column: there is none of this name or kind"
+        for name, unit in assumed.items()
+        if not _is_used(
+            name, table, (*found.columns, *(each.component for each in found.doubts), *(taken or {}).values())
+        )
+    )
+    return ColumnMap(ordered, unused, (*found.doubt_words(), *idle), found.note_words())
+
+
+def _is_used(name: str, table: Table, components: Iterable[str]) -> bool:
+    """Whether an assumed unit meets a column: by its name, or as a component or the letter of one."""
+    known = {each for component in components for each in (component, letter_of(component))}
+    # u stands for commands of motors in any unit: a duty is one that is no voltage.
+    kin = {"u": "d", "d": "u"}
+    return name in table.names or name in known or kin.get(name[:1], "") + name[1:] in known
+
+
+def _units_of_letters(names: Sequence[str], assumed: Mapping[str, str], units: Mapping[str, str]) -> dict[str, str]:
+    """Units of columns a1, a2, .. that are called like a component and nothing else, by what is assumed of a."""
+    found = {}
+    for name in names:
+        match = _LETTER.fullmatch(name)
+        text = assumed.get(match[1], "") if match and name not in units and name not in assumed else ""
+        unit = known_unit(text) if text else None
+        if match and unit is not None and _BY_UNIT.get(unit.quantity) == match[1]:
+            found[name] = text
+    return found
 
 
 def _order(component: str) -> tuple[int, str, int]:
@@ -232,6 +270,10 @@ def _enter(name: str, component: str, unit: Unit, parts: NameParts, found: Guess
         component = "u" + component[1:]
     elif unit.quantity == COUNT:
         found.doubts.append(Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
+        return
+    elif unit.quantity == SPEED_UNIT and wanted == TURN_RATE_UNIT and component.startswith("w"):
+        why = f"but {unit.text} is the speed of its rim: divide it by the radius of the wheel, to log rad/s"
+        found.doubts.append(Doubt(name, component, why, ()))
         return
     elif unit.quantity != wanted:
         found.doubts.append(Doubt(name, component, f"{unit.text} is no unit of a {wanted}"))

@@ -8,7 +8,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import TIME
-from omnidyn.logs.clock.clock import is_dates
+from omnidyn.logs.clock.clock import are_steps, is_dates
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, floats, is_numeric
@@ -40,6 +40,10 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
         cell = first_word(table.columns[wordy[0]])
         found.doubts.append(Doubt(wordy[0], TIME, f"but cells such as {cell} are no numbers and no known dates", ()))
         return
+    steps = [name for name in table.names if is_numeric(table.columns[name]) and _are_steps(table, name)]
+    if steps and (not candidates or candidates == steps):
+        _take_steps(table, steps[0], assumed, found)
+        return
     if not candidates:
         increasing = [name for name in table.names if _increases(table.columns[name])]
         if increasing:
@@ -50,6 +54,21 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
     unit = known_unit(text) or read_name(name).unit
     if unit is None:
         unit = _plausible_time(floats(table.columns[name]), name, text, found)
+    if unit is not None and unit.quantity == TIME_UNIT:
+        found.columns[TIME] = Column(name, unit.text)
+    elif unit is not None:
+        found.doubts.append(Doubt(name, TIME, f"{unit.text} is no unit of time"))
+
+
+def _are_steps(table: Table, name: str) -> bool:
+    return are_steps(name, floats(table.columns[name]))
+
+
+def _take_steps(table: Table, name: str, assumed: Mapping[str, str], found: Guess) -> None:
+    """A column that holds the time from row to row, where there is no other clock: it is summed up."""
+    text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
+    values = floats(table.columns[name])
+    unit = known_unit(text) or read_name(name).unit or _plausible_time(np.cumsum(values), name, text, found)
     if unit is not None and unit.quantity == TIME_UNIT:
         found.columns[TIME] = Column(name, unit.text)
     elif unit is not None:

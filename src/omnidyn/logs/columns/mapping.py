@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from omnidyn.errors import InputError
-from omnidyn.files import read_text, write_atomic
+from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.model.robot_file import toml_literal
@@ -58,6 +57,12 @@ class ColumnMap:
         unused = tuple(name for name in self.unused if name not in taken)
         doubts = tuple(words for words in self.doubts if not any(words.startswith(f"{name} ") for name in taken))
         return replace(self, columns={**kept, **more}, unused=unused, doubts=doubts)
+
+    @property
+    def passed_over(self) -> tuple[str, ...]:
+        """Columns that nobody took and no doubt names."""
+        doubted = {name for words in self.doubts for name in words.partition(" look")[0].split(", ")}
+        return tuple(name for name in self.unused if name not in doubted)
 
     def lines(self) -> list[str]:
         """The map for people, a line per channel: "wheel_speed: w1 <- m1vel [rad/s at the motor], ..."."""
@@ -142,10 +147,7 @@ _KEYS = {"column": str, "unit": str, "side": str, "invert": bool, "latency_s": (
 
 def load_map(path: str | os.PathLike) -> ColumnMap:
     """Read a map from TOML. Raises InputError with file and table for what it cannot take."""
-    try:
-        tables = tomllib.loads(read_text(path))
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise InputError("not a TOML file", got=str(error), where=str(path)) from None
+    tables = parse_toml(read_text(path, MAX_TOML_BYTES), str(path))
     schema = tables.pop("schema", SCHEMA)
     if schema != SCHEMA:
         raise InputError("unknown schema", got=schema, expected=f"schema = {SCHEMA}", where=str(path))

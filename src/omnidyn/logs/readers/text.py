@@ -19,30 +19,32 @@ from itertools import chain
 import numpy as np
 
 from omnidyn.arrays import IntArray
+from omnidyn.errors import InputError
 from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.table import dialect
-from omnidyn.logs.table.header import TABS_NOTE, Layout, find_layout
+from omnidyn.logs.table.header import TABS_NOTE, FileLine, Layout, find_layout
 from omnidyn.logs.table.rows import Column, RowParser
 from omnidyn.logs.table.spaced import NOTE, is_spaced, tabbed
 from omnidyn.logs.table.table import MAX_CELLS, ROWS, Table
 from omnidyn.logs.table.text_file import TextBlock, TextFile
 
 HEAD_ROWS = 100  # the first rows are looked at together to tell how a file is written
-MAX_HEAD_LINES = 100_000  # without a row, it is no table
+KEPT_COMMENTS = 2  # right above a row: names, and perhaps their units
 
 
 def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
     """The tables of a text file; see the head of this file for what is taken and refused, and the contract."""
     file = TextFile(path, options.progress, options.max_bytes)
     head, blocks = _head(file.blocks(rows))
-    spaced = is_spaced(head)
+    spaced = is_spaced([line.text for line in head])
     if spaced:
-        head, blocks = [tabbed(line) for line in head], _tabbed(blocks)
+        head, blocks = [FileLine(line.number, tabbed(line.text)) for line in head], _tabbed(blocks)
     layout = find_layout(head, file.source, options.header)
     if spaced:
         notes = [NOTE if note == TABS_NOTE else note for note in layout.notes]
         layout = replace(layout, notes=tuple(notes))
-    sample = _kept(TextBlock(1, head), layout.first)[0][: dialect.SAMPLE_ROWS]
+    rows_of_head = [text for number, text in head if number >= layout.first and not _is_comment(text)]
+    sample = rows_of_head[: dialect.SAMPLE_ROWS]
     parser = RowParser(layout, file.source, options.skip_bad_rows, sample)
     most = max(1, min(rows, MAX_CELLS // len(layout.names)))
 
@@ -52,6 +54,9 @@ def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterato
 
     for block in _cut(blocks, most):
         texts, lines = _kept(block, layout.first)
+        if texts and file.ends_open and lines[-1] == file.last and _is_cut(texts[-1], layout):
+            texts, lines = texts[:-1], lines[:-1]
+            file.notes.append(f"line {file.last}, the last one, ends in the middle of a row: it was left out")
         if texts:
             later = partial(_texts_from, file, layout, block.first + len(block.lines), spaced)
             yield table(*parser.parse(texts, lines, later))
@@ -61,21 +66,30 @@ def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterato
 TEXT = Reader("", "text", (), text_tables, "at least one row under the header")
 
 
-def _head(blocks: Iterator[TextBlock]) -> tuple[list[str], Iterator[TextBlock]]:
-    """The first lines of a file, enough to tell how it is written, and all its blocks."""
+def _head(blocks: Iterator[TextBlock]) -> tuple[list[FileLine], Iterator[TextBlock]]:
+    """The first lines of a file, enough to tell how it is written, and all its blocks.
+
+    Blank lines, all comments of a run but its last two, and blocks of nothing else are let go of: a file may begin
+    with more of them than fit into memory.
+    """
     taken: list[TextBlock] = []
-    lines: list[str] = []
-    rows = 0
+    lines: list[FileLine] = []
+    rows = comments = 0
     for block in blocks:
-        taken.append(block)
-        for line in block.lines:
-            lines.append(line)
-            rows += bool(line) and not _is_comment(line)
+        before = rows
+        for number, text in enumerate(block.lines, block.first):
+            if not text or text.isspace():
+                continue
+            comments = comments + 1 if _is_comment(text) else 0
+            rows += not comments
+            lines.append(FileLine(number, text))
+            if comments > KEPT_COMMENTS:
+                del lines[-1 - KEPT_COMMENTS]
             if rows > HEAD_ROWS:
-                return lines, chain(taken, blocks)
-        if len(lines) > MAX_HEAD_LINES:
-            break
-    return lines, chain(taken, blocks)
+                return lines, chain([*taken, block], blocks)
+        if rows > before:
+            taken.append(block)
+    return lines, iter(taken)
 
 
 def _cut(blocks: Iterable[TextBlock], rows: int) -> Iterator[TextBlock]:
@@ -95,6 +109,14 @@ def _kept(block: TextBlock, first: int) -> tuple[list[str], IntArray]:
     kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not _is_comment(line)]
     texts = lines if len(kept) == len(lines) else [lines[k] for k in kept]
     return texts, np.array(kept, dtype=np.int64) + (block.first + begin)
+
+
+def _is_cut(text: str, layout: Layout) -> bool:
+    """Whether a row has fewer cells than the table: the file ends where the recorder was stopped."""
+    try:
+        return len(layout.cells(text, "")) < len(layout.names)
+    except InputError:  # a quote that is never closed
+        return True
 
 
 def _is_comment(line: str) -> bool:

@@ -56,13 +56,14 @@ class Layout:
         return cells
 
 
-def find_layout(lines: Sequence[str], source: str, header: bool = True) -> Layout:
-    """The layout of a file from its first lines, more than SAMPLE_ROWS of them where the file has as many.
+def find_layout(lines: Sequence[FileLine], source: str, header: bool = True) -> Layout:
+    """The layout of a file from its first lines, more than SAMPLE_ROWS rows of them where the file has as many.
 
+    lines: without blank ones; of comments that follow each other the last two are enough.
     `header` False: there are no names, the columns are called c1, c2, ...
     Raises InputError when there is no header, or one that cannot be used.
     """
-    kept = [FileLine(k + 1, line) for k, line in enumerate(lines) if line.strip() and not dialect.is_comment(line)]
+    kept = [line for line in lines if line.text.strip() and not dialect.is_comment(line.text)]
     told = _SEPARATOR_LINE.fullmatch(kept[0].text.strip()) if kept else None
     kept = kept[1:] if told else kept
     if not kept:
@@ -106,9 +107,9 @@ def _numbered(count: int) -> tuple[str, ...]:
     return tuple(f"c{k + 1}" for k in range(count))
 
 
-def _commented_header(lines: Sequence[str], row: FileLine) -> list[FileLine]:
+def _commented_header(lines: Sequence[FileLine], row: FileLine) -> list[FileLine]:
     """Names, or names and units, that stand as comments right above the first row (`numpy.savetxt` puts them there)."""
-    above = [FileLine(k + 1, line) for k, line in enumerate(lines[: row.number - 1]) if line.strip()][-2:]
+    above = [line for line in lines if line.number < row.number and line.text.strip()][-2:]
     comments = [
         FileLine(line.number, line.text.lstrip()[1:].strip()) for line in above if dialect.is_comment(line.text)
     ]

@@ -10,7 +10,7 @@ from itertools import chain
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, printable
 from omnidyn.files import too_large
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.rows import Column
@@ -42,9 +42,24 @@ class Table:
     titles: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        shown = {name: printable(name) for name in self.names if not name.isprintable()}
+        if any(name != told for name, told in shown.items()) or not self.source.isprintable():
+            self._rename(shown)
         for values in (self.lines, *self.columns.values()):
             if not isinstance(values, tuple):
                 values.flags.writeable = False
+
+    def _rename(self, shown: Mapping[str, str]) -> None:
+        """Call columns and file by names that can be shown; two that look alike then are told apart by a number."""
+        taken: dict[str, str] = {}
+        for name in self.names:
+            told = shown.get(name, name)
+            taken[name] = told if told not in taken.values() else f"{told} ({len(taken) + 1})"
+        object.__setattr__(self, "names", tuple(taken.values()))
+        object.__setattr__(self, "source", printable(self.source))
+        for field_name in ("columns", "units", "titles"):
+            old = getattr(self, field_name)
+            object.__setattr__(self, field_name, {taken.get(name, name): value for name, value in old.items()})
 
     def __len__(self) -> int:
         return len(self.lines)

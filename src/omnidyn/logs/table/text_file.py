@@ -17,6 +17,8 @@ from omnidyn.files import file_format, open_regular, text_format, too_large
 BLOCK_BYTES = 2**20
 START_BYTES = 256  # enough to tell a format and an encoding
 MAX_LINE_BYTES = 4 * 2**20
+MOST_CONTROLS = 0.01  # of the bytes of a file that is damaged text
+_NO_CONTROLS = bytes([0, 9, 10, 12, 13, *range(32, 127), *range(128, 256)])  # zero is judged by itself
 TOO_LARGE_REMEDY = "cut it, allow more with `max_bytes`, or read it in pieces with iter_tables"
 
 Progress = Callable[[int, int], None]
@@ -41,6 +43,8 @@ class TextFile:
         self.notes: list[str] = []
         self._progress, self._max_bytes, self._hash = progress, max_bytes, hashlib.sha256()
         self._latin_line = 0
+        self.last = 0  # number of the last line, once it was given out
+        self.ends_open = False  # whether that one lacks its line end
 
     @property
     def sha256(self) -> str:
@@ -50,12 +54,14 @@ class TextFile:
     def blocks(self, rows: int) -> Iterator[TextBlock]:
         """All lines, at most `rows` of them at once."""
         first, pending = 1, []
+        self.ends_open = False
         for block in self._whole_lines():
             pending += self._decoded(block, first + len(pending)).split("\n")
             while len(pending) > rows:
                 yield TextBlock(first, pending[:rows])
                 first, pending = first + rows, pending[rows:]
         if pending:
+            self.last = first + len(pending) - 1
             yield TextBlock(first, pending)
 
     def _whole_lines(self) -> Iterator[bytes]:
@@ -73,6 +79,7 @@ class TextFile:
                     expected="lines of cells", where=self.source,
                 )  # fmt: skip
         if rest:
+            self.ends_open = True
             yield rest
 
     def _blocks(self) -> Iterator[bytes]:
@@ -116,6 +123,11 @@ class TextFile:
             if decoder is not None:
                 block = self._from_utf16(decoder, block)
             text = block.rstrip(b"\0")
+            if b"\0" in text and _is_binary(text):
+                raise InputError(
+                    "this is not a text file", got="bytes that are no text", expected="text with a row for each moment",
+                    remedy="give the file that the logger wrote, or export it as CSV", where=self.source,
+                )  # fmt: skip
             if b"\0" in text or (zeros and text):
                 raise InputError(
                     "this is not a text file", got="zero bytes in it", expected="text",
@@ -164,6 +176,12 @@ class TextFile:
                 self._latin_line = number
                 self.notes.append(f"line {number} is not UTF-8: read as Latin-1")
             return line.decode("latin-1")
+
+
+def _is_binary(block: bytes) -> bool:
+    """Whether a part of a file with zero bytes holds much else that stands in no text: other control characters."""
+    controls = block[:BLOCK_BYTES].translate(None, _NO_CONTROLS)
+    return len(controls) > MOST_CONTROLS * len(block[:BLOCK_BYTES])
 
 
 def _begin(block: bytes) -> tuple[bytes, str]:

@@ -66,6 +66,7 @@ def _histogram(axes, scaled: FloatArray) -> None:
     axes.bar(middle, density, width=edges[1] - edges[0], color=BLUE, alpha=0.75)
     axes.plot(middle, np.exp(-0.5 * middle**2) / np.sqrt(2.0 * np.pi), "--", color=VERMILLION, linewidth=1.6)
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")  # matplotlib's own writes formulas
     axes.set_ylim(1e-4, 1.0)
     axes.set_xlim(-SPAN, SPAN)
     axes.set_yticks([1e-4, 1e-2, 1.0])

@@ -1,0 +1,157 @@
+"""What readers said of logs and was not so: clocks, steps of time, rows cut off, columns and units."""
+
+import numpy as np
+import pytest
+
+from omnidyn.errors import InputError
+from omnidyn.findings.check import check
+from omnidyn.logs.read_log import LogOptions, iter_logs, load_log, read_log
+from omnidyn.logs.readers.read_table import iter_tables, read_table
+
+VOLTS = "u1_V,u2_V,u3_V"
+
+
+def text(head, rows):
+    return f"{head},{VOLTS}\n" + "".join(f"{each},1,{k % 7},-2\n" for k, each in enumerate(rows))
+
+
+# ---- milliseconds without leading zeros -----------------------------------------------------------------
+
+
+def bare(seconds):
+    """19:18:19.82 for 82 ms, as printf("%02d:%02d:%02d.%d") writes it."""
+    whole, ms = divmod(round(seconds * 1000), 1000)
+    return f"{19 + whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}.{ms}"
+
+
+def test_milliseconds_without_leading_zeros_are_understood(write):
+    seconds = 1118.0 + 0.0591 * np.arange(400)
+    path = write(text("time", map(bare, seconds)))
+    run = read_log(path)
+    np.testing.assert_allclose(run.t, seconds - seconds[0], atol=1e-3)
+    assert any("milliseconds without leading zeros" in words for words in run.warnings)
+    pieces = list(iter_logs(path, rows=100))
+    np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), run.t, atol=1e-9)
+
+
+def test_tenths_of_a_second_stay_what_they_are(write):
+    run = read_log(write(text("time", [f"12:00:{k // 4:02d}{('', '.25', '.5', '.75')[k % 4]}" for k in range(100)])))
+    np.testing.assert_allclose(run.t, 0.25 * np.arange(100), atol=1e-9)
+
+
+def test_a_clock_that_goes_back_over_and_over_is_not_to_be_sorted(write):
+    path = write(text("t_s", [f"{k // 10}.{k % 10 * 100}" if k % 10 else f"{k // 10}.90" for k in range(200)]))
+    with pytest.raises(InputError, match=r"time goes back; .*do not sort the rows") as error:
+        read_log(path)
+    assert "`sort`" not in str(error.value)
+    (finding,) = check(load_log(path)).of("time_back")
+    assert "do not sort the rows" in finding.remedy
+
+
+# ---- a column of steps ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name, step",
+    [("dt", 0.02), ("dt_s", 0.02), ("dt_ms", 20.0), ("delta_t", 0.02), ("loop_time_ms", 20.0), ("Δt", 0.02)],
+)
+def test_a_column_of_step_times_is_summed_up(write, name, step):
+    steps = step * (1.0 + 0.05 * (np.arange(300) % 3))
+    path = write(text(name, [f"{each:.6g}" for each in steps]))
+    run = read_log(path)
+    size = 0.02 / step
+    np.testing.assert_allclose(run.t, size * (np.cumsum(steps) - steps[0]), atol=1e-6)
+    assert any("it is summed up" in words for words in run.warnings)
+    pieces = list(iter_logs(path, rows=64))
+    np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), run.t, atol=1e-9)
+
+
+def test_a_clock_beside_steps_is_the_clock(write):
+    run = read_log(write(text("t_s,dt", [f"{0.01 * k:.2f},0.02" for k in range(100)])))
+    np.testing.assert_allclose(run.t, 0.01 * np.arange(100), atol=1e-9)
+
+
+def test_a_clock_that_is_called_dt_is_a_clock(write):
+    run = read_log(write(text("dt_s", [f"{0.01 * k:.2f}" for k in range(100)])), columns={"t": "dt_s:s"})
+    np.testing.assert_allclose(run.t, 0.01 * np.arange(100), atol=1e-9)
+
+
+# ---- a last row that was cut off ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rest", ["25.0,1", "25.0", '25.0,"1', "25.0,1,"])
+@pytest.mark.parametrize("rows", [50, 10_000])
+def test_a_last_row_cut_in_mid_write_is_left_out(write, rest, rows):
+    whole = "t_s,x_m,y_m,heading_rad\n" + "".join(f"{k / 10},{k},{2 * k},0\n" for k in range(250))
+    path = write(whole + rest)
+    pieces = list(iter_tables(path, rows))
+    assert sum(map(len, pieces)) == 250
+    assert "line 252, the last one, ends in the middle of a row: it was left out" in read_table(path).notes
+    with pytest.raises(InputError, match=":252: "):
+        read_table(write(whole + rest + "\n"))
+
+
+def test_a_row_cut_off_in_the_middle_of_a_file_is_refused(write):
+    with pytest.raises(InputError, match=":3: row 2 has another number of cells"):
+        read_table(write("t_s,x_m\n0,1\n0.1\n0.2,3"))
+
+
+# ---- bytes that are no text -----------------------------------------------------------------------------
+
+
+def test_random_bytes_are_called_what_they_are(write):
+    content = b"x" + np.random.default_rng(0).bytes(5000)
+    with pytest.raises(InputError, match="not a text file; got bytes that are no text") as error:
+        read_table(write(content))
+    assert "zero" not in str(error.value)
+
+
+def test_zero_bytes_in_text_are_zero_bytes(write):
+    rows = "".join(f"{k},{k}\n" for k in range(500)).encode()
+    with pytest.raises(InputError, match="got zero bytes in it"):
+        read_table(write(b"t_s,x_m\n" + rows + bytes(100) + rows))
+
+
+# ---- columns and units ----------------------------------------------------------------------------------
+
+
+def three(names, rows=60):
+    return f"t_s,{names}\n" + "".join(f"{k / 50},{13 * k},{17 * k},{7 * k}\n" for k in range(rows))
+
+
+def test_a_column_that_is_mapped_is_no_longer_called_not_taken(write):
+    path = write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))
+    plain = load_log(path).columns.doubts
+    assert any("speed_m1, speed_m2, speed_m3" in words for words in plain)
+    one = load_log(path, options=LogOptions(overrides=("w1=speed_m1:rad/s",))).columns.doubts
+    assert any("speed_m2, speed_m3" in words for words in one)
+    assert not any("speed_m1" in words for words in one)
+
+
+def test_the_speed_of_a_rim_is_called_that(write):
+    (words,) = load_log(write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))).columns.doubts
+    assert "m/s is the speed of its rim: divide it by the radius of the wheel" in words
+    assert "`assume`" not in words
+
+
+def test_an_assumed_unit_of_nothing_is_said(write):
+    path = write(three("w1,w2,w3"))
+    doubts = load_log(path, options=LogOptions(assume={"z": "rpm", "w": "rpm"})).columns.doubts
+    assert doubts == ("`assume` z=rpm is used for no column: there is none of this name or kind",)
+    for fine in ({"w": "rpm"}, {"w2": "rpm"}):
+        assert load_log(path, options=LogOptions(assume=fine)).columns.doubts == ()
+
+
+def test_counts_called_a1_are_taken_where_their_unit_is_said(write):
+    path = write(three("a1,a2,a3"))
+    log = load_log(path, options=LogOptions(assume={"a": "ticks/2000"}))
+    assert [column.unit for key, column in log.columns.columns.items() if key != "t"] == ["ticks/2000"] * 3
+    assert log.channels["wheel_angle"][10, 0] == pytest.approx(130 / 2000 * 2 * np.pi)
+    assert log.columns.unused == ()
+    assert load_log(path).columns.unused == ("a1", "a2", "a3")  # of accelerations nothing is assumed
+
+
+def test_a_doubtful_column_is_listed_once(write):
+    columns = load_log(write(three("speed_m1 [m/s],speed_m2 [m/s],mood"))).columns
+    assert columns.unused == ("speed_m1", "speed_m2", "mood")
+    assert columns.passed_over == ("mood",)
