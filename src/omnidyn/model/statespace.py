@@ -4,7 +4,8 @@
 
 A, B and K are not typed from the printed (13) but derived from the forces of dynamics.py, which are linear in twist
 and voltage: A = -M^-1 (k G G^T + B_viscous), k = (l K_t)(l K_v)/(R r^2); B = M^-1 g G, g = l K_t/(R r);
-K = -M^-1 C_coulomb. sgn is set-valued at 0: K sgn(x) balances what drives an axis at rest, up to its breakaway.
+K = -M^-1 C_coulomb; M, the mass matrix, counts what spins too (mass.py). sgn is set-valued at 0: K sgn(x) balances
+what drives an axis at rest, up to its breakaway.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from omnidyn.model.dynamics import drive_wrench, linear_part, mass_matrix
+from omnidyn.model.dynamics import drive_wrench, linear_part
+from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
 
 FloatArray = NDArray[np.float64]
@@ -45,15 +47,14 @@ def state_space(robot: Robot) -> StateSpace:
     """
     count = robot.wheels.count
     at_rest, no_voltage = np.zeros(3), np.zeros(count)
-    mass = mass_matrix(robot)
     viscous, coulomb, _ = robot.friction.axes.levels
     linear = linear_part(robot)
     braking = drive_wrench(linear, np.eye(3), no_voltage)
     driving = drive_wrench(linear, at_rest, np.eye(count))
     return StateSpace(
-        A=(braking.T - np.diag(viscous)) / mass[:, None] + 0.0,
-        B=driving.T / mass[:, None] + 0.0,
-        K=np.diag(-coulomb / mass),
+        A=per_mass(robot, braking - np.diag(viscous)).T + 0.0,
+        B=per_mass(robot, driving).T + 0.0,
+        K=per_mass(robot, np.diag(-coulomb)).T,
         C=np.eye(3),
     )
 

@@ -17,7 +17,7 @@ from omnidyn.identification.output_error.problem.starts import (
     window_rows,
 )
 from omnidyn.logs.steady_table import AXES
-from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 
@@ -58,7 +58,7 @@ def motion(records: Sequence[Record], robot: Robot) -> Motion:
         seen |= known | others
         moved |= others & ~known
         for first, last in record.pieces:
-            wrench = record.voltage[first:last] @ drive.T * mass
+            wrench = record.voltage[first:last] @ drive.T @ mass
             held = np.maximum(held, np.where(known, np.abs(wrench).max(axis=0), 0.0))
             for axis in np.flatnonzero(known).tolist():
                 moved[axis] |= _moved(record.t, twist, axis, first, last)

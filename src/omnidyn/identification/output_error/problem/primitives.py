@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.identification.output_error.problem.parameters import Parameter, robot_at
-from omnidyn.model.dynamics import mass_matrix, settled_currents
+from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.keys import BOX, Key
+from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
@@ -58,7 +59,7 @@ def primitives(robot: Robot) -> Primitives:
         wheel_speed(robot.wheels, np.eye(3)).T,
         settled_currents(robot, np.eye(3), np.zeros(count)).T,
         np.diag(settled_currents(robot, np.zeros(3), np.eye(count))).copy(),
-        1.0 / mass_matrix(robot),
+        1.0 / axis_masses(robot),
     )  # fmt: skip
 
 
@@ -105,7 +106,7 @@ class Mapping:
 
     def _held(self, now: Primitives, robot: Robot) -> Primitives:
         """With the breakaway of this mapping; never below coulomb."""
-        return replace(now, hold=np.fmax(now.coulomb, self.breakaway / mass_matrix(robot)))
+        return replace(now, hold=np.fmax(now.coulomb, self.breakaway / axis_masses(robot)))
 
     def _friction_slopes(self) -> Primitives:
         return self._friction_at(self.robot)
