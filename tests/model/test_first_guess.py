@@ -54,6 +54,8 @@ def test_the_numbers_by_hand():
     assert MINI.motor.torque_constant == MINI.motor.emf_constant == 12.0 / 600.0
     assert MINI.motor.gear_ratio == pytest.approx(600.0 * 0.04 / no_load, rel=5e-3)
     assert MINI.motor.resistance == pytest.approx(12.0**2 / (no_load * stall / 1.5), rel=5e-3)
+    assert 1.5 * MINI.motor.rotor_inertia * (MINI.motor.gear_ratio / 0.04) ** 2 == pytest.approx(0.1 * 8.0, rel=5e-3)
+    assert MINI.priors["motor.rotor_inertia_kg_m2"] == Prior(std=MINI.motor.rotor_inertia, origin=GUESS)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +99,8 @@ def test_every_number_says_where_it_comes_from_and_every_guess_how_wide():
 
 
 def test_what_is_given_is_no_guess():
-    names = ["inertia", "resistance", "torque constant", "emf constant", "gear ratio", "voltage limit", "friction"]
+    names = ["inertia", "resistance", "torque constant", "emf constant", "gear ratio", "voltage limit"]
+    names += ["rotor inertia", "friction"]
     assert guessed(MINI) == names
     names.remove("voltage limit")
     assert guessed(first_guess("mini", omni(), 8.0, 11.1)) == names
