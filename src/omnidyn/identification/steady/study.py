@@ -18,10 +18,11 @@ from scipy.linalg import null_space
 
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
+from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.question import STEADY_STATE, Question
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
-from omnidyn.identification.steady.operating_points import ForcePoints, force_points
+from omnidyn.identification.steady.operating_points import CURRENT, ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
@@ -97,7 +98,10 @@ def identify_steady(
     return SteadyStudy(
         robot=robot, points=points, choice=choice, estimates=estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
-        statements=words.statements(choice, viscous, differences, internal, MATTERS),
+        statements=(
+            *words.statements(choice, viscous, differences, internal, MATTERS),
+            scale_of_traction(robot, points.force_from == CURRENT),
+        ),
         warnings=(*points.notes, *words.doubts(points, choice, turning)),
         advice=words.advice(choice, viscous, turning, points.force_from),
     )  # fmt: skip
@@ -155,6 +159,7 @@ def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str
         warnings=words.about_fit(fit, robust, kept),
         method=words.method(points, fit, robust),
         data=data,
+        scale=scale_of_traction(robot, points.force_from == CURRENT),
     )
 
 
