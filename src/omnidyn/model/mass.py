@@ -28,8 +28,10 @@ def mass_matrix(robot: Robot) -> FloatArray:
 
 def added_mass(robot: Robot) -> FloatArray:
     """What rotors and wheels add by their spin: G diag(`mass_at_rim`) G^T [kg, kg m, kg m^2]. Shape (3, 3)."""
-    wrench = robot.wheels.wrench_matrix
-    added = (wrench * mass_at_rim(robot.motor, robot.wheels)) @ wrench.T
+    wrench, each = robot.wheels.wrench_matrix, mass_at_rim(robot.motor, robot.wheels)
+    if not each.any():
+        return np.zeros((3, 3))
+    added = (wrench * each) @ wrench.T
     added = 0.5 * (added + added.T)  # symmetric to the last bit
     along = np.sqrt(np.abs(np.diag(added)))
     return np.where(np.abs(added) <= ROUNDING * np.outer(along, along), 0.0, added)
@@ -48,13 +50,17 @@ def axis_masses(robot: Robot) -> FloatArray:
 
 def masses_couple(robot: Robot) -> bool:
     """Whether a force along one axis speeds up another one: the mass matrix is not diagonal."""
-    mass = mass_matrix(robot)
-    return bool(np.any(mass != np.diag(np.diag(mass))))
+    return _couples(mass_matrix(robot))
 
 
 def per_mass(robot: Robot, wrench: ArrayLike) -> FloatArray:
     """Acceleration M^-1 wrench [m/s^2, m/s^2, rad/s^2]. `wrench` [N, N, N m], shape (*batch, 3); returns the same."""
     mass, wrench = mass_matrix(robot), np.asarray(wrench, dtype=float)
-    if masses_couple(robot):
-        return np.linalg.solve(mass, wrench[..., None])[..., 0]
+    if _couples(mass):
+        return np.asarray(np.linalg.solve(mass, wrench[..., None])[..., 0], dtype=float)
     return wrench / np.diag(mass)
+
+
+def _couples(mass: FloatArray) -> bool:
+    """Whether anything stands beside the diagonal."""
+    return bool(mass[0, 1] != 0.0 or mass[0, 2] != 0.0 or mass[1, 2] != 0.0)
