@@ -24,8 +24,8 @@ from scipy.optimize import least_squares
 from benchmarks.identify_log import cpu, cramer_rao, fit_output_error
 from benchmarks.table import Table
 from benchmarks.tanh import run_tanh
-from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.keys import BOX
+from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.run import Run
@@ -191,7 +191,7 @@ def by_sysid(robot: Robot, log: Run, fair: bool) -> np.ndarray:
     assert log.voltage is not None
     assert log.twist is not None
     start, rows = np.array(list(truth(robot).values())), round(1.0 / RATE / STEP)
-    system, mass = state_space(robot), mass_matrix(robot)
+    system, mass = state_space(robot), axis_masses(robot)
     braking = -np.diag(system.A) * mass - start[:3]  # back-EMF
     friction = JOINT.format(2.0 * STEP)
     spec = mujoco.MjSpec.from_string(XML.format(

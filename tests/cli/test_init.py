@@ -16,6 +16,7 @@ from omnidyn import Run, write_run
 from omnidyn.cli import main
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import Key
+from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 
@@ -48,7 +49,8 @@ def test_azimuths_radii_and_a_mass_are_enough(call, here):
     code, out, err = call("init", "mini", "--wheels", "3", *MINI)
     assert (code, out) == (0, "mini.toml\n")
     assert err == (
-        "omnidyn: guessed: inertia, resistance, torque constant, emf constant, gear ratio, voltage limit, friction\n"
+        "omnidyn: guessed: inertia, resistance, torque constant, emf constant, gear ratio, voltage limit, "
+        "rotor inertia, friction\n"
     )
     robot = load_robot(here / "mini.toml")
     assert robot.name == "mini"
@@ -98,6 +100,58 @@ def test_the_file_to_stdout_or_elsewhere(call, here):
     assert (here / "other.toml").read_text() == out
     assert call("init", "mini.toml", *MINI)[1] == "mini.toml\n"
     assert load_robot(here / "mini.toml").name == "mini"
+
+
+def test_a_rotor_from_its_data_sheet(call, here):
+    """At the motor shaft, behind a gear that is known: 1.1 kg of a 6.2 kg robot."""
+    known = ["--azimuth", "45,135,225,315", "--wheel-radius", "0.05", "--robot-radius", "0.18", "--mass", "6.2"]
+    code, _, err = call("init", "mini", *known, "--rotor-inertia", "1.5e-6", "--gear-ratio", "30")
+    assert code == 0
+    assert "rotor" not in err
+    assert "gear" not in err
+    robot = load_robot(here / "mini.toml")
+    assert (robot.motor.rotor_inertia, robot.motor.gear_ratio) == (1.5e-6, 30.0)
+    assert robot.priors["motor.rotor_inertia_kg_m2"] == robot.priors["motor.gear_ratio"] == Prior(origin="given")
+    assert mass_matrix(robot)[0, 0] == pytest.approx(6.2 + 1.08, rel=1e-9)
+    guess = first_guess("mini", robot.wheels, 6.2)
+    assert robot.motor.torque_constant * 30.0 == pytest.approx(
+        guess.motor.torque_constant * guess.motor.gear_ratio, rel=1e-5
+    )
+
+
+def test_a_known_gear_leaves_what_a_guessed_rotor_weighs(call, here):
+    call("init", "guess", *MINI)
+    call("init", "known", *MINI, "--gear-ratio", "100")
+    guess, known = (load_robot(here / f"{name}.toml") for name in ("guess", "known"))
+    assert mass_matrix(known)[0, 0] == pytest.approx(mass_matrix(guess)[0, 0], rel=1e-4)
+    prior = known.priors["motor.rotor_inertia_kg_m2"]
+    assert prior.origin == "guess"
+    assert prior.std == pytest.approx(known.motor.rotor_inertia, rel=1e-2)
+
+
+def test_gear_and_rotor_beside_a_preset(call, here):
+    code, _, _ = call("init", "mine", "--like", "robotino", "--rotor-inertia", "7.1e-6", "--gear-ratio", "16")
+    robot, preset = load_robot(here / "mine.toml"), load_robot("robotino")
+    assert code == 0
+    assert (robot.motor.rotor_inertia, robot.motor.gear_ratio) == (7.1e-6, 16.0)
+    assert robot.motor.torque_constant == preset.motor.torque_constant
+    assert call("init", "other", "--like", "robotino", "--rotor-inertia", "7.1e-6")[0] == 0
+
+
+@pytest.mark.parametrize(
+    "more, words",
+    [
+        (["--rotor-inertia", "1.5e-6"], "give --gear-ratio too"),
+        (["--rotor-inertia", "15", "--gear-ratio", "30"], "1 g cm2 = 1e-7 kg m2"),
+        (["--rotor-inertia", "-1e-6", "--gear-ratio", "30"], "rotor_inertia"),
+        (["--gear-ratio", "0"], "more than 0, such as 30"),
+    ],
+)
+def test_a_rotor_that_cannot_be_is_refused(call, here, more, words):
+    code, _, err = call("init", "mini", *MINI, *more)
+    assert code == 3
+    assert words in err
+    assert not (here / "mini.toml").exists()
 
 
 def test_mecanum_wheels_need_no_azimuths(call, here):

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.friction import AxesFriction
+from omnidyn.model.mass import mass_matrix
 from omnidyn.model.wheels import per_wheel, rim_speed, wheel_speed, wrench_from_traction
 from omnidyn.simulation.simulate import simulate
 from tests.support.strategies import SMALL, any_robot, any_wheels, volts
@@ -71,7 +71,7 @@ def test_without_voltage_a_robot_only_slows_down(robot, twist):
     start = np.array(twist)
     run = simulate(robot, np.zeros((400, robot.wheels.count)), 2e-3, twist=start)
     speed = np.abs(run.twist)
-    energy = (run.twist**2 * mass_matrix(robot)).sum(axis=1)
+    energy = (run.twist * (run.twist @ mass_matrix(robot))).sum(axis=1)
     moving = speed[:-1] > 0.0
     assert (np.diff(speed, axis=0)[moving] < 0.0).all()
     assert (speed[1:][~moving] == 0.0).all()
@@ -93,7 +93,7 @@ def test_energy_balance_of_a_driven_robot(robot, seed):
     jump = np.diff(fine.voltage, axis=0) / robot.motor.resistance * robot.motor.torque_constant * robot.motor.gear_ratio
     ends = power[1:] - jump * fine.wheel_speed[1:]
     work = np.cumsum((power[:-1] + ends).sum(axis=1) / 2 * 1e-4)
-    energy = (fine.twist**2 * mass_matrix(robot)).sum(axis=1) / 2
+    energy = (fine.twist * (fine.twist @ mass_matrix(robot))).sum(axis=1) / 2
     assert (energy[1:] <= work + 1e-5 * (1.0 + np.abs(work))).all()
     assert energy[1:].max() > 0.0
 

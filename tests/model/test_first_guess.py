@@ -54,6 +54,8 @@ def test_the_numbers_by_hand():
     assert MINI.motor.torque_constant == MINI.motor.emf_constant == 12.0 / 600.0
     assert MINI.motor.gear_ratio == pytest.approx(600.0 * 0.04 / no_load, rel=5e-3)
     assert MINI.motor.resistance == pytest.approx(12.0**2 / (no_load * stall / 1.5), rel=5e-3)
+    assert 1.5 * MINI.motor.rotor_inertia * (MINI.motor.gear_ratio / 0.04) ** 2 == pytest.approx(0.1 * 8.0, rel=5e-3)
+    assert MINI.priors["motor.rotor_inertia_kg_m2"] == Prior(std=MINI.motor.rotor_inertia, origin=GUESS)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +86,8 @@ def test_it_rests_up_to_its_friction():
 
 
 def test_every_number_says_where_it_comes_from_and_every_guess_how_wide():
-    for robot in (MINI, first_guess("box", omni(), 8.0, shape=AXES), first_guess("known", omni(), 8.0, 11.1)):
+    looped = first_guess("looped", omni(), 8.0, speed_loop=(100.0,))
+    for robot in (MINI, first_guess("box", omni(), 8.0, shape=AXES), first_guess("known", omni(), 8.0, 11.1), looped):
         for key in map(Key.parse, all_keys(robot)):
             prior, value = robot.priors.get(str(key)) or robot.priors[key.name], key.get(robot)
             assert (prior.std is not None) == (prior.origin == GUESS)
@@ -92,12 +95,13 @@ def test_every_number_says_where_it_comes_from_and_every_guess_how_wide():
         assert {key for key, _ in reasons(robot)} <= set(WHY)
         assert len(reasons(robot)) == len({Key.parse(key).name for key, p in robot.priors.items() if p.std})
     assert set(WHY) == {
-        key for robot in (MINI, first_guess("box", omni(), 8.0, shape=AXES)) for key, _ in reasons(robot)
+        key for robot in (MINI, first_guess("box", omni(), 8.0, shape=AXES), looped) for key, _ in reasons(robot)
     }
 
 
 def test_what_is_given_is_no_guess():
-    names = ["inertia", "resistance", "torque constant", "emf constant", "gear ratio", "voltage limit", "friction"]
+    names = ["inertia", "resistance", "torque constant", "emf constant", "gear ratio", "voltage limit"]
+    names += ["rotor inertia", "friction"]
     assert guessed(MINI) == names
     names.remove("voltage limit")
     assert guessed(first_guess("mini", omni(), 8.0, 11.1)) == names

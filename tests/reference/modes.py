@@ -3,7 +3,7 @@
 Only parameter values and the wrench matrix of omnidyn are used. With rim speeds s_i = g_i . nu, K = l K_t / r
 [N/A] and E = l K_v / r [V s/m]:
 
-    M nu' = sum g_i f_i + M omega (v_y, -v_x, 0) + friction
+    M nu' = sum g_i f_i + m omega (v_y, -v_x, 0) + friction,   M = diag(m, m, I) + sum (J l^2 + J_w)/r^2 g_i g_i^T
     settled currents   i = clip(soft(u - E s, V_d) / R, +-i_max)
     dynamic currents   L i' = u - E s - R i - V_d sgn i, and i' = 0 while pushed outward at +-i_max
     gear               f = eta K i (i s > 0), K i / eta (i s < 0)
@@ -92,7 +92,7 @@ class Mode:
         self.gauge = Gauge(p.direction[sorted(stuck)], p.hold_ellipse if ellipse_stuck else None)
         N = null(self.gauge.basis)
         self.N = N
-        self.W = N @ np.linalg.solve(N.T @ (N * p.mass[:, None]), N.T) if N.shape[1] else np.zeros((3, 3))
+        self.W = N @ np.linalg.solve(N.T @ p.M @ N, N.T) if N.shape[1] else np.zeros((3, 3))
         self.flows = np.array([r in (LINEAR, PLUS, MINUS) for r in regime], dtype=float)
         self.size = 6 + (n if p.dynamic else 0) + (1 if energy else 0)
         self._make_rows()
@@ -219,7 +219,7 @@ class Mode:
         """1 - gauge of what holds; z (size, k)."""
         p, stuck = self.plant, sorted(self.stuck)
         f = self.force(z)
-        held = f - p.mass[:, None] * (self.W @ f)
+        held = f - p.M @ (self.W @ f)
         extra = self.gear_level(self.currents(z))[stuck]
         return 1.0 - self.gauge(held, p.hold[stuck, 0, None] + extra, p.hold[stuck, 1, None] + extra)
 
@@ -572,7 +572,7 @@ def reference(
         out["pose"].append(z[3:6].copy())
         out["current"].append(mode.currents(z).copy())
         out["stuck"].append([*flags[:3], flags[0] and flags[1], *flags[3:]])
-        stored = 0.5 * (p.mass * z[:3]) @ z[:3]
+        stored = 0.5 * z[:3] @ p.M @ z[:3]
         if p.dynamic:
             stored += 0.5 * (p.L * z[6 : 6 + p.wheels]) @ z[6 : 6 + p.wheels]
         out["energy"].append(stored - (z[-1] if energy else 0.0))

@@ -206,7 +206,9 @@ class Problem:
     def __init__(self, plant, force, at_rest, ellipse_at_rest, forward, backward, ellipse):
         self.plant, self.force, self.levels = plant, force, (forward, backward)
         self.at_rest, self.ellipse_at_rest, self.ellipse = sorted(at_rest), ellipse_at_rest, ellipse
-        self.scale = np.abs(force / plant.mass).max() + 1e-9
+        self.M, self.inverse = plant.M, np.linalg.inv(plant.M)
+        self.flat = 1.0 / np.linalg.eigvalsh(self.inverse[:2, :2])[-1]  # [kg] a step of the ellipse that converges
+        self.scale = np.abs(self.inverse @ force).max() + 1e-9
 
     def solve(self) -> tuple[np.ndarray, dict, bool, float]:
         """(accelerations, sign of each element that moves, whether the ellipse moves, margin)."""
@@ -241,19 +243,19 @@ class Problem:
 
     def _sweep(self, sweeps, state):
         p, (forward, backward) = self.plant, self.levels
-        size = [d @ (d / p.mass) for d in p.direction]
+        size = [d @ self.inverse @ d for d in p.direction]
         rho, push = state if state is not None else (np.zeros(len(p.direction)), np.zeros(2))
-        a = (self.force - p.direction.T @ rho - np.array([*push, 0.0])) / p.mass
+        a = self.inverse @ (self.force - p.direction.T @ rho - np.array([*push, 0.0]))
         for _ in range(sweeps):
             before = a.copy()
             for e in self.at_rest:
                 d = p.direction[e]
                 new = min(max(rho[e] + (d @ a) / size[e], -backward[e]), forward[e])
-                a = a - d / p.mass * (new - rho[e])
+                a = a - self.inverse @ d * (new - rho[e])
                 rho[e] = new
             if self.ellipse_at_rest:
-                new = self._project(push + p.mass[:2] * a[:2])
-                a[:2] -= (new - push) / p.mass[:2]
+                new = self._project(push + self.flat * a[:2])
+                a = a - self.inverse[:, :2] @ (new - push)
                 push = new
             if np.abs(a - before).max() < 1e-15 * self.scale:
                 break
@@ -288,7 +290,7 @@ class Problem:
         if margin <= 0:
             return None
         if gauge.rank:
-            load = (force - p.mass * a)[:, None]
+            load = (force - self.M @ a)[:, None]
             held = float(gauge(load, forward[stuck, None], backward[stuck, None])[0])
             if held > 1.0:
                 return None
@@ -297,8 +299,7 @@ class Problem:
 
     def _motion(self, N, force, guess):
         """Accelerations in the columns of N; `guess` starts Newton's iteration where the ellipse moves."""
-        p = self.plant
-        A, b = N.T @ (N * p.mass[:, None]), N.T @ force
+        A, b = N.T @ self.M @ N, N.T @ force
         if N.shape[1] == 0:
             return np.zeros(3)
         if guess is None or self.ellipse.max() == 0:

@@ -35,7 +35,9 @@ CLOSE = 1e-9  # a margin below this is a tie
 
 def key(robot, voltage, dt) -> str:
     """What the numbers of a robot and its program hash to, to ten digits: the same on every platform."""
-    numbers = [getattr(plant_of(robot), f.name) for f in fields(plant_of(robot)) if f.name != "names"]
+    plant = plant_of(robot)
+    left_out = ("names",) if plant.spin.any() else ("names", "spin")  # as before there was any
+    numbers = [getattr(plant, f.name) for f in fields(plant) if f.name not in left_out]
     flat = [*(n for n in numbers if n is not None), voltage, dt]
     text = " ".join(f"{x + 0.0:.10g}" for n in flat for x in np.where(np.abs(n) < 1e-12, 0.0, n).ravel().tolist())
     return hashlib.sha256(text.encode()).hexdigest()

@@ -13,7 +13,8 @@ class Plant:
     """The numbers of a robot, SI units. Scalar elements in rows: direction, levels, wheel (whose gear
     adds)."""
 
-    mass: np.ndarray
+    mass: np.ndarray  # of the body: (M, M, I)
+    spin: np.ndarray  # (wheels,) [kg] of what spins: (J l^2 + J_w)/r^2
     turning: bool
     dynamic: bool
     G: np.ndarray
@@ -38,6 +39,11 @@ class Plant:
     def wheels(self) -> int:
         """Number of wheels."""
         return self.G.shape[1]
+
+    @property
+    def M(self) -> np.ndarray:
+        """Mass matrix: 1/2 nu M nu = 1/2 (m v^2 + I omega^2) + 1/2 sum spin (g . nu)^2."""
+        return np.diag(self.mass) + sum(m * np.outer(g, g) for m, g in zip(self.spin, self.G.T, strict=True))
 
     @property
     def middle(self) -> np.ndarray:
@@ -80,6 +86,7 @@ def plant_of(robot) -> Plant:
     holds = way.coulomb if way.breakaway is None else way.breakaway
     return Plant(
         mass=np.array([robot.body.mass, robot.body.mass, robot.body.inertia]),
+        spin=(each(m.rotor_inertia) * gear**2 + each(robot.wheels.wheel_inertia)) / radius**2,
         turning=robot.body.rotating_frame,
         dynamic=m.electrical == "dynamic",
         G=G,

@@ -34,15 +34,14 @@ def _on_ellipse(x, y, a, b):
 
 
 @njit(cache=True)
-def _solve(v, free, mass, d, size, level, ellipse, rho, push):
+def _solve(v, free, inverse, flat, d, size, level, ellipse, rho, push):
     """v with M (v - free) = -(impulses of friction); impulses rho in [-level_1, level_0], push in the
     ellipse."""
     for k in range(3):
         v[k] = free[k]
         for e in range(len(rho)):
-            v[k] -= d[e, k] * rho[e] / mass[k]
-    v[0] -= push[0] / mass[0]
-    v[1] -= push[1] / mass[1]
+            v[k] -= (inverse[k, 0] * d[e, 0] + inverse[k, 1] * d[e, 1] + inverse[k, 2] * d[e, 2]) * rho[e]
+        v[k] -= inverse[k, 0] * push[0] + inverse[k, 1] * push[1]
     for _ in range(3000):
         change = 0.0
         for e in range(len(rho)):
@@ -51,13 +50,13 @@ def _solve(v, free, mass, d, size, level, ellipse, rho, push):
             delta = new - rho[e]
             rho[e] = new
             for k in range(3):
-                v[k] -= d[e, k] * delta / mass[k]
+                v[k] -= (inverse[k, 0] * d[e, 0] + inverse[k, 1] * d[e, 1] + inverse[k, 2] * d[e, 2]) * delta
             change = max(change, abs(delta) * size[e])
         if ellipse[0] > 0.0:
-            x, y = _on_ellipse(push[0] + mass[0] * v[0], push[1] + mass[1] * v[1], ellipse[0], ellipse[1])
-            change = max(change, abs(x - push[0]) / mass[0], abs(y - push[1]) / mass[1])
-            v[0] -= (x - push[0]) / mass[0]
-            v[1] -= (y - push[1]) / mass[1]
+            x, y = _on_ellipse(push[0] + flat * v[0], push[1] + flat * v[1], ellipse[0], ellipse[1])
+            change = max(change, abs(x - push[0]) / flat, abs(y - push[1]) / flat)
+            for k in range(3):
+                v[k] -= inverse[k, 0] * (x - push[0]) + inverse[k, 1] * (y - push[1])
             push[0], push[1] = x, y
         if change < 1e-15:
             break
@@ -75,6 +74,8 @@ def _run(
     dynamic,
     turning,
     mass,
+    inverse,
+    flat,
     G,
     K,
     E,
@@ -96,18 +97,20 @@ def _run(
     out_i,
 ):
     n, m = G.shape[1], len(d)
-    rho, push, free, new = np.zeros(m), np.zeros(2), np.zeros(3), np.zeros(3)
+    rho, push, free, new, force = np.zeros(m), np.zeros(2), np.zeros(3), np.zeros(3), np.zeros(3)
     level, size, weak = np.zeros((m, 2)), np.zeros(m), np.zeros(m + 1)
     for e in range(m):
-        size[e] = d[e, 0] ** 2 / mass[0] + d[e, 1] ** 2 / mass[1] + d[e, 2] ** 2 / mass[2]
+        for j in range(3):
+            for k in range(3):
+                size[e] += d[e, j] * inverse[j, k] * d[e, k]
     for row in range(len(rows)):
         for _ in range(steps[row]):
             dt = h[row]
             for k in range(3):
-                free[k] = v[k] - dt / mass[k] * (B[k, 0] * v[0] + B[k, 1] * v[1] + B[k, 2] * v[2])
+                force[k] = -(B[k, 0] * v[0] + B[k, 1] * v[1] + B[k, 2] * v[2])
             if turning:
-                free[0] += dt * v[2] * v[1]
-                free[1] -= dt * v[2] * v[0]
+                force[0] += mass[0] * v[2] * v[1]
+                force[1] -= mass[0] * v[2] * v[0]
             for k in range(n):
                 w = rows[row, k] - E[k] * (G[0, k] * v[0] + G[1, k] * v[1] + G[2, k] * v[2])
                 if dynamic:
@@ -118,7 +121,9 @@ def _run(
                 w = math.copysign(max(abs(w) - fade, 0.0), w) / over
                 i[k] = 0.0 if coast[row, k] else min(max(w, -limit[k]), limit[k])
                 for j in range(3):
-                    free[j] += dt / mass[j] * G[j, k] * K[k] * mid[k] * i[k]
+                    force[j] += G[j, k] * K[k] * mid[k] * i[k]
+            for k in range(3):
+                free[k] = v[k] + dt * (inverse[k, 0] * force[0] + inverse[k, 1] * force[1] + inverse[k, 2] * force[2])
             weak[:] = 0.0
             for e in range(m):
                 s = d[e, 0] * v[0] + d[e, 1] * v[1] + d[e, 2] * v[2]
@@ -129,7 +134,9 @@ def _run(
                     gear = K[wheel[e]] * dry[wheel[e]] * abs(i[wheel[e]]) if wheel[e] >= 0 else 0.0
                     level[e, 0] = dt * (gear + (slide[e, 0] if weak[e] in (1.0, 2.0) else hold[e, 0]))
                     level[e, 1] = dt * (gear + (slide[e, 1] if weak[e] in (-1.0, 2.0) else hold[e, 1]))
-                _solve(new, free, mass, d, size, level, dt * (slide_e if weak[m] == 1.0 else hold_e), rho, push)
+                _solve(
+                    new, free, inverse, flat, d, size, level, dt * (slide_e if weak[m] == 1.0 else hold_e), rho, push
+                )
                 done = True
                 for e in range(m):
                     s = d[e, 0] * new[0] + d[e, 1] * new[1] + d[e, 2] * new[2]
@@ -156,7 +163,7 @@ def stepped(plant, voltage, dt, h, twist=(0.0, 0.0, 0.0), open_circuit=None):
     dt = np.broadcast_to(np.asarray(dt, dtype=float), (len(rows),))
     steps = np.maximum(np.round(dt / h).astype(np.int64), 1)
     coast = np.zeros(rows.shape, dtype=np.bool_) if open_circuit is None else np.asarray(open_circuit, dtype=np.bool_)
-    none = np.zeros(2)
+    none, inverse = np.zeros(2), np.linalg.inv(p.M)
     out = np.zeros((len(rows), 3)), np.zeros((len(rows), 3)), np.zeros(rows.shape)
     _run(
         rows,
@@ -169,6 +176,8 @@ def stepped(plant, voltage, dt, h, twist=(0.0, 0.0, 0.0), open_circuit=None):
         p.dynamic,
         p.turning,
         p.mass,
+        inverse,
+        1.0 / np.linalg.eigvalsh(inverse[:2, :2])[-1],
         np.ascontiguousarray(p.G),
         p.K,
         p.E,

@@ -69,6 +69,21 @@ def random_robot(seed: int) -> Robot:
     )
 
 
+def with_spin(robot: Robot, seed: int, heavy: float = 1.0) -> Robot:
+    """The robot with rotors and wheels, each its own, of about 5 and 3 % of its mass a wheel, `heavy` times as much."""
+    random, n = Random(f"spin {seed}"), robot.wheels.count
+
+    def each(share: float, gear: float) -> tuple[float, ...]:
+        one = heavy * share * robot.body.mass * (0.035 / gear) ** 2
+        return tuple(float(f"{one * random.uniform(0.2, 2.0):.6g}") for _ in range(n))
+
+    gear = float(np.mean(robot.motor.gear_ratio))
+    return robot.replace(
+        motor=robot.motor.replace(rotor_inertia=each(0.05, gear)),
+        wheels=robot.wheels.replace(wheel_inertia=each(0.03, 1.0)),
+    )
+
+
 def _wheels(random, around, some) -> Wheels:
     """3 to 6 wheels at random azimuths, or four mecanum wheels."""
     radius = some(0.035, 0.2, 4)

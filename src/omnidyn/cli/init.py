@@ -28,6 +28,7 @@ DEFAULTS = {"wheel_radius": 0.05, "robot_radius": 0.15, "mass": 3.0}  # [m], [m]
 KEYS = {
     "azimuth": "wheels.azimuth_deg", "wheel_radius": "wheels.wheel_radius_m", "robot_radius": "wheels.robot_radius_m",
     "mass": "body.mass_kg", "voltage_limit": "motor.voltage_limit_V", "roller": "wheels.roller_angle_deg",
+    "gear_ratio": "motor.gear_ratio", "rotor_inertia": "motor.rotor_inertia_kg_m2",
 }  # fmt: skip
 QUESTIONS = {
     "azimuth": "where the wheels stand, counter-clockwise from forward [degree]",
@@ -58,6 +59,10 @@ def init(
     ),
     mass: float | None = typer.Option(None, help="Mass of the robot [kg]."),
     voltage_limit: float | None = typer.Option(None, help="Most the driver gives to a motor [V]; default: a guess."),
+    gear_ratio: float | None = typer.Option(None, help="Turns of the motor per turn of the wheel; default: a guess."),
+    rotor_inertia: float | None = typer.Option(
+        None, help="Of one motor's rotor, at its shaft [kg m2]: 1 g cm2 is 1e-7. Default: a guess."
+    ),
     log: list[str] = typer.Option(
         [], "--log", metavar="LOG", help="Logs that show where the wheels stand. Repeatable."
     ),
@@ -83,6 +88,7 @@ def init(
         "wheels": wheels, "azimuth": _listed("azimuth", azimuth), "wheel_radius": _radii("wheel_radius", wheel_radius),
         "robot_radius": _radii("robot_radius", robot_radius), "mass": mass, "voltage_limit": voltage_limit,
         "speed_loop": _listed("speed_loop", speed_loop),
+        "gear_ratio": gear_ratio, "rotor_inertia": rotor_inertia,
     }  # fmt: skip
     _refuse_words(given, mecanum, friction, like, out, json)
     _refuse_numbers(given)
@@ -98,7 +104,7 @@ def init(
     seen = from_logs(given, log, options, mecanum) if log else None
     found = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
     answers = _complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
-    robot = as_seen(_robot(name, answers, preset, mecanum, friction), seen, found)
+    robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))
     _write(robot, path, force, json, like)
 
 
@@ -145,6 +151,11 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
             "no motor turns at this voltage", got=f"{limit:g} V", expected="more than 0 V, such as 12",
             remedy="leave it out for a guess", where="--voltage-limit",
         )  # fmt: skip
+    gear = given["gear_ratio"]
+    if gear is not None and not 0.0 < gear < float("inf"):
+        raise InputError(
+            "no gear has this ratio", got=f"{gear:g}", expected="more than 0, such as 30", where="--gear-ratio"
+        )
 
 
 def _listed(key: str, text: str) -> list[float] | None:
@@ -332,6 +343,32 @@ def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, fri
         ) from None
     accepted = {KEYS[key]: value[key] for key in answers.accepted if key in value}
     return robot.replace(priors=robot.priors | {key: default_prior(key, one) for key, one in accepted.items()})
+
+
+def _with_motor(robot: Robot, given: dict[str, Any], copied: bool) -> Robot:
+    """The robot with the gear and the rotor that were given. copied: from a preset, whose motors stay as they are.
+
+    Raises InputError for a rotor behind a gear that is only guessed: at the wheel it counts with its square.
+    """
+    from omnidyn.errors import InputError
+    from omnidyn.model.first_guess import GEAR, with_gear, with_rotor
+    from omnidyn.model.robot import GIVEN, GUESS, Prior
+
+    gear, rotor = given["gear_ratio"], given["rotor_inertia"]
+    if gear is not None and copied:
+        known = {key: prior for key, prior in robot.priors.items() if not key.startswith(GEAR)}
+        motor = robot.motor.replace(gear_ratio=gear)
+        robot = robot.replace(motor=motor, priors=known | {GEAR: Prior(origin=GIVEN)})
+    elif gear is not None:
+        robot = with_gear(robot, gear, "", GIVEN)
+    if rotor is None:
+        return robot
+    if GEAR in robot.priors and robot.priors[GEAR].origin == GUESS:
+        raise InputError(
+            "a rotor needs its gear: at the wheel its inertia is J l^2", got=f"{rotor:g} kg m2 and no gear ratio",
+            expected="both", remedy="give --gear-ratio too", where="--rotor-inertia",
+        )  # fmt: skip
+    return with_rotor(robot, rotor)
 
 
 def _wheels(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Wheels:

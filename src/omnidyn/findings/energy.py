@@ -13,8 +13,8 @@ from omnidyn.findings.finding import FATAL, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import white_noise
-from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.keys import EMF
+from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import back_emf, settled_current, wheel_torque
 from omnidyn.model.robot import GUESS, Robot
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
@@ -106,12 +106,13 @@ def _windows(work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: Floa
     done, size, whole = (np.concatenate([[0.0], np.cumsum(np.nan_to_num(each))]) for each in
                          (power * length, scale * length, np.where(good, 0.0, 1.0)))  # fmt: skip
     twist = twist_from_wheel_speed(robot.wheels, speed)
-    kinetic = 0.5 * (twist**2 * mass_matrix(robot)).sum(axis=1)
+    mass = mass_matrix(robot)
+    momentum = twist @ mass
+    kinetic = 0.5 * (twist * momentum).sum(axis=1)
     noise = np.array([white_noise(column) for column in twist.T])
     change = kinetic[high] - kinetic[low]
-    unsure = 4.0 * np.sqrt((twist[low] ** 2 * (mass_matrix(robot) * noise) ** 2).sum(axis=1)
-                           + (twist[high] ** 2 * (mass_matrix(robot) * noise) ** 2).sum(axis=1)) + (
-        mass_matrix(robot) * noise**2).sum() * 6.0  # fmt: skip
+    unsure = 4.0 * np.sqrt(((momentum[low] * noise) ** 2).sum(axis=1) + ((momentum[high] * noise) ** 2).sum(axis=1))
+    unsure += (np.diag(mass) * noise**2).sum() * 6.0
     spent = done[high] - done[low]
     wrong = (spent - change < -MARGIN * (size[high] - size[low]) - unsure - MARGIN * np.abs(change)) & (
         whole[high] - whole[low] == 0.0)  # fmt: skip

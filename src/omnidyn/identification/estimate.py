@@ -38,6 +38,7 @@ class Estimate:
     at_bound: names of what a bound holds (a friction that came out negative). std is then that of the free fit.
     lower_bound: name -> what the number is at least, where the data say no more (breakaway from rows at rest).
     warnings: what a reader must know, in words. method, data: how it was made, and from what (name, SHA-256).
+    scale: what all forces scale with, in words: numbers that were taken as they stand.
     """
 
     robot: Robot
@@ -51,6 +52,7 @@ class Estimate:
     warnings: tuple[str, ...] = ()
     method: str = ""
     data: str = ""
+    scale: str = ""
 
     def summary(self) -> str:
         """The estimate as a plain table, for reading. ASCII only."""
@@ -64,7 +66,8 @@ class Estimate:
         """Its words and its table, in the order of reading."""
         bounds = [f"{name} is at least {bound:.4g} {unit(name)}" for name, bound in self.lower_bound.items()]
         head = [f"{self.robot.name}: {self.method}", f"data: {self.data}", ""]
-        return [*head, self._table(), *bounds, Points(self.warnings, "warning:")]
+        scale = [self.scale] if self.scale else []
+        return [*head, self._table(), *bounds, *scale, Points(self.warnings, "warning:")]
 
     def _table(self) -> Table:
         rows = []
@@ -92,6 +95,7 @@ class Estimate:
             "warnings": self.warnings,
             "method": self.method,
             "data": self.data,
+            "scale": self.scale,
             "robot": robot_to_toml(self.robot),
         })  # fmt: skip
 

@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import acceleration, axes_hold_alone, drive_wrench, linear_part, mass_matrix
+from omnidyn.model.dynamics import acceleration, axes_hold_alone, axes_move_alone, drive_wrench, linear_part
+from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
 
 HIGHEST = 1e6  # [V] beyond which a pattern counts as one that never moves the robot
@@ -22,10 +23,10 @@ def moves(robot: Robot, voltage: ArrayLike) -> BoolArray:
     """
     voltage = _patterns(robot, voltage)
     at_rest = np.zeros((*voltage.shape[:-1], 3))
-    if axes_hold_alone(robot):
+    if axes_move_alone(robot):
         return ~robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage))
     length = np.array([1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
-    driven = np.abs(drive_wrench(robot, at_rest, voltage)) / mass_matrix(robot) * length
+    driven = np.abs(per_mass(robot, drive_wrench(robot, at_rest, voltage))) * length
     least = ROUNDING * driven.max(axis=-1, keepdims=True)  # a push along y is 1e-16 of itself along x too
     return np.abs(acceleration(robot, at_rest, voltage)) * length > least
 

@@ -4,6 +4,8 @@
     M v'_y = F_y - B_y v_y - C_y sgn v_y   (- M omega v_x)
     I omega' = T - B_w omega - C_w sgn omega
 
+without what spins with motors and wheels; with it, the mass matrix of mass.py stands on the left.
+
 The terms in brackets belong to a turning body frame; eqs (4) (5) leave them out, `rotating_frame` keeps them.
 """
 
@@ -15,16 +17,12 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.layout import LENGTH, N_AXES
+from omnidyn.model.mass import masses_couple, per_mass
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import accelerations, moving_states
 from omnidyn.model.wheels import wheel_speed, wrench_from_traction
-
-
-def mass_matrix(robot: Robot) -> FloatArray:
-    """Diagonal of the mass matrix (M, M, I_n) [kg, kg, kg m^2]. Shape (3,)."""
-    return np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
 
 
 def settled_currents(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
@@ -74,9 +72,9 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
     """
     twist, voltage = _vectors("twist", twist, N_AXES), _vectors("voltage", voltage, robot.wheels.count)
     batch, n = _batch(twist, voltage), robot.wheels.count
-    if axes_hold_alone(robot):
+    if axes_move_alone(robot):
         applied = drive_wrench(robot, twist, voltage) + frame_wrench(robot, twist)
-        return (applied + robot.friction.axes.wrench(twist, applied)) / mass_matrix(robot)
+        return per_mass(robot, applied + robot.friction.axes.wrench(twist, applied))
     twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
     volts = np.ascontiguousarray(np.broadcast_to(voltage, (*batch, n)).reshape(-1, n))
     numbers = plant(robot.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
@@ -110,3 +108,8 @@ def _batch(twist: FloatArray, voltage: FloatArray) -> tuple[int, ...]:
 def axes_hold_alone(robot: Robot) -> bool:
     """Whether nothing but the friction of each body axis, for itself, can hold the robot: the paper's case."""
     return robot.friction.only_axes and bool(np.all(np.asarray(robot.motor.gear_efficiency) == 1.0))
+
+
+def axes_move_alone(robot: Robot) -> bool:
+    """Whether, besides, no axis at rest has to hold against another one that speeds up."""
+    return axes_hold_alone(robot) and not masses_couple(robot)

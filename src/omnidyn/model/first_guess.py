@@ -6,6 +6,10 @@ overrules it at once. What is known, by stall force per mass, friction per weigh
     axebot (2012)    11 m/s^2    0.10..0.15    0.45
     axebot-lab       7.6 m/s^2   0.01..0.02    0.31
     robotino         15 m/s^2    0.46..0.54    not measured
+
+Rotors behind a gear weigh: of 5 to 100 g cm^2 behind 15:1 to 30:1, as such robots have them, their spin adds 5 to 20 %
+of the mass along x and y. That may be nothing (1:1) or as much as the robot itself (100:1): the guess is as wide as
+it is large.
 """
 
 from __future__ import annotations
@@ -17,9 +21,9 @@ import numpy as np
 
 from omnidyn.model.drive import SPEED, Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.keys import EMF, FRICTION, GAINS, TORQUE, Key, all_keys
+from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, Key, all_keys
 from omnidyn.model.motor import Motor
-from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Prior, Robot
+from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Origin, Prior, Robot
 from omnidyn.model.wheels import PerWheel, Wheels
 
 DIRECTION, AXES = "direction", "axes"
@@ -33,6 +37,7 @@ MOTOR_SPEED = 600.0  # [rad/s] no-load speed of the motor shaft: small brushed m
 FRICTION_SHARE = 0.2  # of the weight: Coulomb friction; 0.02 to 0.5 are known
 VISCOUS_SHARE = 0.2  # of the Coulomb friction, added at 1 m/s
 LOOP_TIME = 0.2  # [s] of a speed loop, kp/ki
+ROTOR_SHARE = 0.1  # of the mass, that the spin of all rotors adds in the direction where it adds least
 YAW_SHARE = 0.5  # of Coulomb friction * b: turning on the spot omni wheels roll, and hardly scrub
 
 # Standard deviations over values. 0.5: a factor of about 2 either way; 1: only the order of magnitude is known.
@@ -43,6 +48,7 @@ SPREAD = {
     "motor.emf_constant_Vs_rad": 0.5,
     "motor.gear_ratio": 0.5,
     "motor.voltage_limit_V": 0.5,
+    ROTOR: 1.0,
 }
 FRICTION_SPREAD = 1.0
 LIKE_SPREAD = 0.3  # of what is taken over from another robot
@@ -59,6 +65,7 @@ WHY = {
     "motor.gear_ratio": f"the robot reaches {TOP_SPEED:g} m/s at the voltage limit",
     "drive.kp_V_s_rad": "the whole voltage for an error of half the no-load speed",
     "drive.ki_V_rad": f"kp / {LOOP_TIME:g} s",
+    ROTOR: f"the spin of all rotors adds {ROTOR_SHARE:g} M: at a wheel J l^2/r^2",
     "friction.axes.coulomb": f"{_COULOMB}, C; about yaw {_YAW}",
     "friction.axes.viscous": f"{_VISCOUS}, B; about yaw B b^2",
     "friction.direction.coulomb": f"{_COULOMB}, C, the same in every direction",
@@ -128,21 +135,34 @@ def _speed_loop(motor: Motor, given: Sequence[float]) -> Drive:
     return Drive(kind=SPEED, kp=kp, ki=_round(kp / LOOP_TIME), rate=given[0])
 
 
-def with_gear(robot: Robot, gear_ratio: float, source: str) -> Robot:
-    """The robot with a gear ratio that was measured, and the same wheels under the same voltage: K l stays."""
+def with_gear(robot: Robot, gear_ratio: float, source: str, origin: Origin = MEASURED) -> Robot:
+    """The robot with a gear ratio that is known, and the same wheels under the same voltage: K l stays.
+
+    So does J l^2 where the rotor is a guess, which says what it weighs at the wheels.
+    """
     share = float(np.mean(robot.motor.gear_ratio)) / gear_ratio
     motor = robot.motor.replace(
         gear_ratio=gear_ratio,
         torque_constant=_times(robot.motor.torque_constant, share),
         emf_constant=_times(robot.motor.emf_constant, share),
     )
+    shares = {TORQUE: share, EMF: share}
+    if ROTOR in robot.priors and robot.priors[ROTOR].origin == GUESS:
+        motor, shares = motor.replace(rotor_inertia=_times(motor.rotor_inertia, share**2)), shares | {ROTOR: share**2}
     spreads = {
-        key: prior.replace(std=_round(prior.std * share))
+        key: prior.replace(std=_round(prior.std * shares[Key.parse(key).name]))
         for key, prior in robot.priors.items()
-        if Key.parse(key).name in (TORQUE, EMF) and prior.std is not None
+        if Key.parse(key).name in shares and prior.std is not None
     }
     priors = {key: prior for key, prior in robot.priors.items() if Key.parse(key).name != GEAR}
-    return robot.replace(motor=motor, priors=priors | spreads | {GEAR: Prior(source=source, origin=MEASURED)})
+    return robot.replace(motor=motor, priors=priors | spreads | {GEAR: Prior(source=source, origin=origin)})
+
+
+def with_rotor(robot: Robot, rotor_inertia: float) -> Robot:
+    """The robot with the inertia of a rotor as its maker gives it, at the motor shaft [kg m^2]."""
+    motor = robot.motor.replace(rotor_inertia=rotor_inertia)
+    priors = {key: prior for key, prior in robot.priors.items() if Key.parse(key).name != ROTOR}
+    return robot.replace(motor=motor, priors=priors | {ROTOR: Prior(origin=GIVEN)})
 
 
 def default_prior(key: str, value: Any) -> Prior:
@@ -182,16 +202,19 @@ def _motor(wheels: Wheels, mass: float, friction: DirectionFriction, voltage_lim
         top speed  F (1 - v/v0) = C + B v   =>   v0 = v F/(F - C - B v)
 
     v0 = U r/(K l) and f0 = l K U/(R r) then give  l = w0 r/v0,  K = U/w0,  R = U^2/(v0 f0),  w0 the motor's speed.
+    The rotors J add lambda J l^2/r^2 = 0.1 M in that direction.
     """
     stall = mass * STALL_ACCELERATION
     held = friction.coulomb[0] + friction.viscous * TOP_SPEED
     no_load = TOP_SPEED * stall / (stall - held)
     plane = wheels.wrench_matrix[:2]
-    one = stall / float(np.linalg.eigvalsh(plane @ plane.T)[0])
-    constant = _round(voltage_limit / MOTOR_SPEED)
+    weakest, radius = float(np.linalg.eigvalsh(plane @ plane.T)[0]), float(wheels.radii.mean())
+    one, constant = stall / weakest, _round(voltage_limit / MOTOR_SPEED)
+    gear = _round(MOTOR_SPEED * radius / no_load)
     return Motor(
         resistance=_round(voltage_limit**2 / (no_load * one)), torque_constant=constant, emf_constant=constant,
-        gear_ratio=_round(MOTOR_SPEED * float(wheels.radii.mean()) / no_load), voltage_limit=voltage_limit,
+        gear_ratio=gear, voltage_limit=voltage_limit,
+        rotor_inertia=_round(ROTOR_SHARE * mass * (radius / gear) ** 2 / weakest),
     )  # fmt: skip
 
 

@@ -28,6 +28,7 @@ VISCOUS, COULOMB, BREAKAWAY = "viscous", "coulomb", "breakaway"
 BOX = tuple(f"{AXES}.{level}[{axis}]" for level in (VISCOUS, COULOMB) for axis in range(3))
 """The six numbers of friction on the body axes, the paper's."""
 TORQUE, EMF = "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad"
+ROTOR, WHEEL = "motor.rotor_inertia_kg_m2", "wheels.inertia_kg_m2"
 GAINS = ("drive.kp_V_s_rad", "drive.ki_V_rad")
 
 _UNITS = {

@@ -26,6 +26,7 @@ class Motor(Value):
     resistance [ohm], torque_constant [N m/A], emf_constant [V s/rad], both at the motor shaft; gear_ratio [-];
     voltage_limit [V]; inductance [H]; current_limit [A], None means no limit.
     voltage_drop [V]: lost in brushes and driver, against the current. gear_efficiency [-]: of power through the gear.
+    rotor_inertia [kg m^2]: J of what spins with the motor shaft; at the wheel it is J l^2 (mass.py).
     electrical: "quasi-static" leaves L di/dt out of eq (11), "dynamic" keeps it.
     """
 
@@ -55,6 +56,11 @@ class Motor(Value):
     gear_efficiency: Annotated[
         PerWheel, per_wheel_number(0.05, 1.0), Field(description="of power through the gear, either way")
     ] = 1.0
+    rotor_inertia: Annotated[
+        PerWheel,
+        per_wheel_number(0.0, 100.0),
+        Field(alias="rotor_inertia_kg_m2", description="J at the motor shaft; 1 g cm^2 = 1e-7"),
+    ] = 0.0
     electrical: Annotated[Literal["quasi-static", "dynamic"], Field(description="dynamic keeps L di/dt of eq (11)")] = (
         QUASI_STATIC
     )
@@ -101,6 +107,13 @@ def wheel_torque(motor: Motor, current: ArrayLike) -> FloatArray:
 def traction(motor: Motor, wheels: Wheels, current: ArrayLike) -> FloatArray:
     """Traction force T / r [N] of wheels that do not slip, eq (10). `current` [A], shape (*batch, wheels)."""
     return wheel_torque(motor, current) / wheels.radii
+
+
+def mass_at_rim(motor: Motor, wheels: Wheels) -> FloatArray:
+    """(J l^2 + J_w)/r^2 [kg] of each wheel: what a force at its rim has to speed up beside the body. (wheels,)."""
+    count = wheels.count
+    rotor, gear = per_wheel(motor.rotor_inertia, count), per_wheel(motor.gear_ratio, count)
+    return (rotor * gear**2 + per_wheel(wheels.wheel_inertia, count)) / wheels.radii**2
 
 
 def no_load_speed(motor: Motor, voltage: ArrayLike) -> FloatArray:

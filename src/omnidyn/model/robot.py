@@ -9,16 +9,19 @@ from pydantic import AfterValidator, Field, model_validator
 from omnidyn.errors import printable
 from omnidyn.model.drive import Drive
 from omnidyn.model.friction import Friction
-from omnidyn.model.motor import Motor
+from omnidyn.model.motor import Motor, mass_at_rim
 from omnidyn.model.value import Flag, Text, Value, number
 from omnidyn.model.wheels import Wheels, check_count
 
 SCHEMA = 1
+MOST_SPINNING = 1000.0  # times the body, at the rim: more is a unit that was mistaken
 
 
 class Body(Value):
     """The rigid body: mass M [kg], inertia I_n about the vertical axis [kg m^2].
 
+    Of all there is, wheels and motors included, as if no wheel turned about its axle: what their spin adds is the
+    motor's rotor_inertia and the wheels' wheel_inertia.
     rotating_frame: keep the terms M omega v of a turning body frame, which eqs (4) (5) leave out.
     """
 
@@ -70,4 +73,15 @@ class Robot(Value):
         for table, value in tables.items():
             for name in type(value).model_fields:
                 check_count(f"[{table}] {name}", getattr(value, name), self.wheels.count)
+        return self
+
+    @model_validator(mode="after")
+    def _spins_no_more_than_it_can(self) -> Robot:
+        spinning = float(mass_at_rim(self.motor, self.wheels).max())
+        if spinning > MOST_SPINNING * self.body.mass:
+            raise ValueError(
+                f"[motor] rotor_inertia_kg_m2 and [wheels] inertia_kg_m2 weigh {spinning:.3g} kg at the rim of a "
+                f"wheel; expected at most {MOST_SPINNING:g} times the mass of the robot. Data sheets give a rotor in "
+                "g cm2: 1 g cm2 = 1e-7 kg m2"
+            )
         return self

@@ -4,7 +4,8 @@
 
 A, B and K are not typed from the printed (13) but derived from the forces of dynamics.py, which are linear in twist
 and voltage: A = -M^-1 (k G G^T + B_viscous), k = (l K_t)(l K_v)/(R r^2); B = M^-1 g G, g = l K_t/(R r);
-K = -M^-1 C_coulomb. sgn is set-valued at 0: K sgn(x) balances what drives an axis at rest, up to its breakaway.
+K = -M^-1 C_coulomb; M, the mass matrix, counts what spins too (mass.py). sgn is set-valued at 0: K sgn(x) balances
+what drives an axis at rest, up to its breakaway.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.dynamics import drive_wrench, linear_part, mass_matrix
+from omnidyn.model.dynamics import drive_wrench, linear_part
+from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
 
 
@@ -64,12 +66,11 @@ def state_space(robot: Robot, motors: MotorWrench | None = None) -> StateSpace:
     motors: its `motor_wrench`, where that is known.
     """
     motors = motors or motor_wrench(robot)
-    mass = mass_matrix(robot)
     viscous, coulomb, _ = robot.friction.axes.levels
     return StateSpace(
-        A=(motors.braking.T - np.diag(viscous)) / mass[:, None] + 0.0,
-        B=motors.driving.T / mass[:, None] + 0.0,
-        K=np.diag(-coulomb / mass),
+        A=per_mass(robot, motors.braking - np.diag(viscous)).T + 0.0,
+        B=per_mass(robot, motors.driving).T + 0.0,
+        K=per_mass(robot, np.diag(-coulomb)).T,
         C=np.eye(3),
     )
 

@@ -33,7 +33,8 @@ class Wheels(Value):
 
     azimuth_deg: where each wheel stands, seen from the centre, counter-clockwise from forward [degree].
     robot_radius: distance b from the centre to the wheels [m]. wheel_radius: r [m].
-    roller_angle_deg: 0 for omni wheels, +-45 for mecanum wheels [degree].
+    roller_angle_deg: 0 for omni wheels, +-45 for mecanum wheels [degree]. wheel_inertia: of a wheel about its axle
+    [kg m^2].
     """
 
     azimuth_deg: Annotated[
@@ -48,10 +49,15 @@ class Wheels(Value):
     roller_angle_deg: Annotated[
         PerWheel, per_wheel_number(-80.0, 80.0), Field(description="0 = omni, +-45 = mecanum")
     ] = 0.0
+    wheel_inertia: Annotated[
+        PerWheel,
+        per_wheel_number(0.0, 1e4),
+        Field(alias="inertia_kg_m2", description="J_w, of one wheel about its axle"),
+    ] = 0.0
 
     @model_validator(mode="after")
     def _moves_in_every_direction(self) -> Wheels:
-        for name in ("robot_radius", "wheel_radius", "roller_angle_deg"):
+        for name in ("robot_radius", "wheel_radius", "roller_angle_deg", "wheel_inertia"):
             check_count(name, getattr(self, name), self.count)
         scaled = self.wrench_matrix / np.array([[1.0], [1.0], [np.mean(self.robot_radius)]])
         if np.linalg.cond(scaled) > MAX_CONDITION:

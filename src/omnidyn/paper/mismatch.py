@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.paper.claim import SPEED_TOLERANCE, Claim, ClaimVerdict, judge, listed, plain
@@ -98,7 +98,7 @@ def _each(trials: Sequence[Reconciliation]) -> str:
 
 def _mpc(robot: Robot) -> Claim:
     """The controller of Araujo et al. 2011, as read by the project; it is not part of this paper."""
-    system, mass = state_space(robot), mass_matrix(robot)
+    system, mass = state_space(robot), axis_masses(robot)
     ours = system.B[2, 0]
     theirs = ours * mass[2] / mass[0]
     growth = float(np.abs(np.linalg.eigvals(system.A)).max())

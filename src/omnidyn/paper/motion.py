@@ -6,7 +6,8 @@ import numpy as np
 from scipy.optimize import root
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench, mass_matrix
+from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench
+from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.paper.claim import ROUNDING, Claim, judge, listed, plain, tiny
@@ -35,7 +36,7 @@ def motion_claims(robot: Robot) -> tuple[Claim, ...]:
 def _balance(robot: Robot) -> Claim:
     """Power: what the motors give is what the body gains and friction takes."""
     plain_frame = turning_frame(robot, False)
-    gained = (mass_matrix(robot) * TWIST) @ acceleration(plain_frame, TWIST, VOLTAGE)
+    gained = (axis_masses(robot) * TWIST) @ acceleration(plain_frame, TWIST, VOLTAGE)
     given = drive_wrench(robot, TWIST, VOLTAGE) @ TWIST
     taken = robot.friction.axes.sliding_wrench(TWIST) @ TWIST
     error = float(abs(gained - given - taken))
@@ -102,7 +103,7 @@ def creep(robot: Robot, voltage: FloatArray, duration: float, step: float) -> fl
 
 def _sign_at_rest(robot: Robot) -> Claim:
     voltage = np.array([0.0, SMALL_VOLTAGE, -SMALL_VOLTAGE])
-    literal = drive_wrench(robot, np.zeros(3), voltage)[0] / mass_matrix(robot)[0]
+    literal = drive_wrench(robot, np.zeros(3), voltage)[0] / axis_masses(robot)[0]
     ours = acceleration(robot, np.zeros(3), voltage)[0]
     moved = creep(robot, voltage, CREEP_SECONDS, CREEP_STEP)
     finer = creep(robot, voltage, CREEP_SECONDS, CREEP_STEP / 10.0)

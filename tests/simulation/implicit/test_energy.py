@@ -18,6 +18,7 @@ MOTORS = {
         "voltage_drop": (0.3, 0.2, 0.25), "gear_efficiency": (0.8, 0.9, 0.75), "current_limit": 1.4,
         "resistance": (1.69, 1.6, 1.8),
     },
+    "unequal rotors": {"rotor_inertia": (4e-7, 9e-7, 2e-7)},
     "dynamic": {"electrical": "dynamic", "inductance": 4e-3},
     "dynamic, drop, gear, limit": {
         "electrical": "dynamic", "inductance": (4e-3, 3e-3, 5e-3), "voltage_drop": 0.3, "gear_efficiency": 0.8,
@@ -67,7 +68,8 @@ def missing(robot, levels, block, rows, tol):
     h = block / rows
     run = simulate(robot, np.repeat(levels, rows, axis=0), h, tol=tol)
     mass = np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
-    stored = (0.5 * mass * run.twist**2).sum(axis=1)
+    spin = np.array(robot.motor.rotor_inertia) * robot.motor.gear_ratio**2 + robot.wheels.wheel_inertia
+    stored = (0.5 * mass * run.twist**2).sum(axis=1) + (0.5 * spin * run.wheel_speed**2).sum(axis=1)
     dynamic = robot.motor.electrical == "dynamic"
     if dynamic:
         stored = stored + (0.5 * np.array(robot.motor.inductance) * run.current**2).sum(axis=1)

@@ -12,6 +12,7 @@ from scipy.special import ndtri
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified
+from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
@@ -23,6 +24,7 @@ from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, 
 from omnidyn.model.keys import with_priors
 from omnidyn.model.robot import Robot
 
+IN_METRES = (("twist", 0), ("twist", 1), ("position", 0), ("position", 1))  # outputs that know of no wheel radius
 LEAST_SHARE = 1e-4  # of a lost direction that a number lost with it must have to be named
 HALF, ROUGH = 0.5, 3.0  # of an output's spread, and times its noise from row to row: errors beyond are no noise
 SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted to Gaussian noise of std 1
@@ -67,6 +69,12 @@ def conclude(
         method=f"output error, maximum likelihood, {loss}, {known.kind} covariance",
         lower_bound=dict(lower_bound),
         data=data,
+        scale=scale_of_motion(
+            problem.robot,
+            names[:own],
+            any(name == "current" for name, _ in problem.columns),
+            any(column in IN_METRES for column in problem.columns),
+        ),
         nuisances={
             name: Nuisance(float(values[own + j]), std[name], ci95[name], _unit(name))
             for j, name in enumerate(names[own:])

@@ -19,7 +19,8 @@ from omnidyn.identification.recordings import count_once
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
 from omnidyn.model.actuation import asked_voltage
-from omnidyn.model.dynamics import frame_wrench, mass_matrix
+from omnidyn.model.dynamics import frame_wrench
+from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wrench_from_traction
@@ -212,8 +213,7 @@ def _inertial_wrench(robot: Robot, each: Plateau) -> tuple[FloatArray, FloatArra
         one = twist_from_wheel_speed(robot.wheels, np.eye(len(rate)))  # of 1 rad/s^2 at each wheel, (wheels, 3)
         rate, std = rate @ one, np.sqrt(std**2 @ one**2)
     mass = mass_matrix(robot)
-    full = np.diag(mass) if mass.ndim == 1 else mass
-    return full @ rate, np.sqrt(full**2 @ std**2)
+    return mass @ rate, np.sqrt(mass**2 @ std**2)
 
 
 def _current(run: Run, robot: Robot, each: Plateau, origin: str) -> tuple[FloatArray, FloatArray]:

@@ -9,7 +9,7 @@ currents or from voltages (points.py); B and C of each axis from weighted least 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
+from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.steady.doubts import ORIGIN, about_line, about_points
 from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
 from omnidyn.logs.steady_table import AXES, SteadyTable
@@ -78,7 +79,10 @@ def fit_steady_state(
     if data.force_from == "voltage":
         found.warnings.append(f"forces are from {ORIGIN['voltage']}: as right as the R, K_t and K_v of the robot file")
     friction = _friction(robot.friction.axes, found)
-    return _estimate(robot, friction, found, _method(data, rest, absolute_std), _data(data))
+    estimate = _estimate(robot, friction, found, _method(data, rest, absolute_std), _data(data))
+    if data.force_from == "table":
+        return estimate
+    return replace(estimate, scale=scale_of_traction(robot, data.force_from == "current"))
 
 
 def _options(rest: str, rest_speed: Sequence[float], absolute_std: bool, data: SteadyTable) -> FloatArray:

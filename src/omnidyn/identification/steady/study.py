@@ -18,11 +18,12 @@ from scipy.linalg import null_space
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
+from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.question import STEADY_STATE, Question
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
-from omnidyn.identification.steady.operating_points import VOLTAGE, ForcePoints, force_points
+from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
@@ -103,7 +104,10 @@ def identify_steady(
         robot=robot, points=points, choice=choice, estimates=estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
         lack_of_fit=lack,
-        statements=words.statements(choice, viscous, differences, internal, lack, MATTERS),
+        statements=(
+            *words.statements(choice, viscous, differences, internal, lack, MATTERS),
+            scale_of_traction(robot, points.force_from == CURRENT),
+        ),
         warnings=(*points.notes, *words.doubts(points, choice, turning), *words.about_lack_of_fit(lack, choice)),
         advice=words.lack_advice(lack) + words.advice(choice, viscous, turning, points.force_from),
     )  # fmt: skip
@@ -209,6 +213,7 @@ def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str
         warnings=(*words.about_fit(fit, robust, kept), *words.about_back_emf(fit.keys, emf.guesses)),
         method=words.method(points, fit, robust),
         data=data,
+        scale=scale_of_traction(robot, points.force_from == CURRENT),
     )
 
 

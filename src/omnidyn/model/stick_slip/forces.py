@@ -35,6 +35,7 @@ from omnidyn.model.layout import (
     SLIDE,
     SLIDE_X,
     SLIDE_Y,
+    SPIN,
     TAU,
     THRUST,
     TURNING,
@@ -143,11 +144,16 @@ def residual(body, element, x, s):
 
     A motor stays on its BRANCH where it has one.
     """
-    stiff = body[MASS] / body[TAU]
-    r0 = stiff * (x[0] - body[GOAL]) - body[PUSH]
-    r1 = stiff * (x[1] - body[GOAL + 1]) - body[PUSH + 1]
-    r2 = stiff * (x[2] - body[GOAL + 2]) - body[PUSH + 2]
+    stiff, d0, d1, d2 = body[MASS] / body[TAU], x[0] - body[GOAL], x[1] - body[GOAL + 1], x[2] - body[GOAL + 2]
+    r0, r1, r2 = stiff * d0 - body[PUSH], stiff * d1 - body[PUSH + 1], stiff * d2 - body[PUSH + 2]
     j00, j11, j22, j01, j02, j12 = stiff, stiff, stiff, 0.0, 0.0, 0.0
+    if body[SPIN + 2] != 0.0:  # turning on the spot, every wheel spins
+        often = 1.0 / body[TAU]
+        s00, s11, s22 = often * body[SPIN], often * body[SPIN + 1], often * body[SPIN + 2]
+        s01, s02, s12 = often * body[SPIN + 3], often * body[SPIN + 4], often * body[SPIN + 5]
+        r0, r1 = r0 + s00 * d0 + s01 * d1 + s02 * d2, r1 + s01 * d0 + s11 * d1 + s12 * d2
+        r2 += s02 * d0 + s12 * d1 + s22 * d2
+        j00, j11, j22, j01, j02, j12 = j00 + s00, j11 + s11, j22 + s22, s01, s02, s12
     for e in range(len(element)):
         g0, g1, g2, sign = element[e, GX], element[e, GY], element[e, GZ], element[e, SIGN]
         speed = g0 * x[0] + g1 * x[1] + g2 * x[2] if sign != 0.0 else 0.0

@@ -38,6 +38,7 @@ from omnidyn.model.layout import (
     SLIDE,
     SLIDE_X,
     SLIDE_Y,
+    SPIN,
     TAU,
 )
 from omnidyn.model.stick_slip.active_set import (
@@ -259,7 +260,8 @@ def solve(body, element, x, s):
     The currents at the solution stand in CURRENT. A return of CAP means that the last digits are not there: say so.
     """
     set_losses(body, element)
-    inertia = body[MASS] / body[TAU] * max(abs(body[GOAL]), abs(body[GOAL + 1]), abs(body[GOAL + 2]))
+    heaviest = body[MASS] + max(body[SPIN], body[SPIN + 1], body[SPIN + 2])
+    inertia = heaviest / body[TAU] * max(abs(body[GOAL]), abs(body[GOAL + 1]), abs(body[GOAL + 2]))
     tight = TIGHT * (inertia + forces_at_work(body, element))
     stale, known, rank = True, False, 0
     for iteration in range(CAP):

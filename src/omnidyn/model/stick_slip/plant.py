@@ -28,10 +28,12 @@ from omnidyn.model.layout import (
     N_AXES,
     RESISTANCE,
     SIGN,
+    SPIN,
     THRUST,
     TURNING,
     VISCOUS,
 )
+from omnidyn.model.mass import added_mass
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
@@ -58,6 +60,8 @@ def plant(robot: Robot) -> Plant:
     length = float(np.sqrt(robot.body.inertia / robot.body.mass))
     body, element = np.zeros(BODY_SIZE), np.zeros((N_AXES + robot.wheels.count, ELEMENT_SIZE))
     body[[MASS, LENGTH]] = robot.body.mass, length
+    spin = added_mass(robot) / np.outer([1.0, 1.0, length], [1.0, 1.0, length])
+    body[SPIN : SPIN + 6] = spin[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     body[TURNING] = robot.body.mass / length if robot.body.rotating_frame else 0.0
     element[:N_AXES, GX : GZ + 1] = np.eye(N_AXES)
     element[N_AXES:, GX : GZ + 1] = robot.wheels.wrench_matrix.T * [1.0, 1.0, 1.0 / length]
@@ -68,12 +72,13 @@ def plant(robot: Robot) -> Plant:
     element[:, ACTIVE] = (element[:, HOLD] > 0.0) | (element[:, HOLD + 1] > 0.0)
     element[N_AXES:, ACTIVE] += element[N_AXES:, EFFICIENCY] < 1.0  # a lossy gear holds too
     element[:, SIGN] = np.where(element[:, ACTIVE] > 0.0, 0.0, 2.0)
-    body[MEMORY], body[MEMORY + 1] = _memory(body[MASS], element, True), _memory(body[MASS], element, False)
+    heaviest = float(body[MASS] + np.linalg.eigvalsh(spin)[-1])
+    body[MEMORY], body[MEMORY + 1] = _memory(heaviest, element, True), _memory(heaviest, element, False)
     return Plant(body, element)
 
 
 def _memory(mass: float, element: FloatArray, driven: bool) -> float:
-    """M over the least eigenvalue of sum_e g g^T (b + K E/R), plus the longest L/R of a motor [s]."""
+    """Mass over the least eigenvalue of sum_e g g^T (b + K E/R), plus the longest L/R of a motor [s]."""
     motors, damping = element[N_AXES:], element[:, VISCOUS].copy()
     if driven:
         damping[N_AXES:] += motors[:, THRUST] * motors[:, EMF] / motors[:, RESISTANCE]

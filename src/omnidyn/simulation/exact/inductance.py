@@ -14,7 +14,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import drive_wrench, mass_matrix, wrench_from_currents
+from omnidyn.model.dynamics import drive_wrench, wrench_from_currents
+from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.simulation.exact.inductance_position import GAUSS, step_poses
@@ -34,7 +35,7 @@ def simulate_exact_inductance(
     """
     laws = axis_laws(robot)
     drive = drive_acceleration(state_space(robot), voltage)
-    start = wrench_from_currents(robot, current) / mass_matrix(robot)
+    start = wrench_from_currents(robot, current) / axis_masses(robot)
     twists, accelerations, eventful, chatters = _twists(drive, dt, laws, twist, start)
     if chatters >= 0:
         raise InputError(
@@ -50,7 +51,7 @@ def simulate_exact_inductance(
 
 def axis_laws(robot: Robot) -> FloatArray:
     """The AxisLaw of each axis, one per row. Shape (3, 5)."""
-    mass, (resistance, inductance) = mass_matrix(robot), _winding(robot)
+    mass, (resistance, inductance) = axis_masses(robot), _winding(robot)
     braking = drive_wrench(robot, np.eye(3), np.zeros(robot.wheels.count))
     viscous, coulomb, breakaway = robot.friction.axes.levels
     columns = [
@@ -71,7 +72,7 @@ def _winding(robot: Robot) -> tuple[float, float]:
 
 def current_gain(robot: Robot) -> FloatArray:
     """Acceleration of the axes per ampere of each motor, M^-1 G l K_t/r, eqs (4)-(10). Shape (3, wheels)."""
-    return wrench_from_currents(robot, np.eye(robot.wheels.count)).T / mass_matrix(robot)[:, None]
+    return wrench_from_currents(robot, np.eye(robot.wheels.count)).T / axis_masses(robot)[:, None]
 
 
 def _currents(

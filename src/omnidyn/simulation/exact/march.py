@@ -1,7 +1,7 @@
 """The paper's law, exact: twist by `exact_step`, heading in closed form, position by Gauss nodes between events.
 
-It serves robots whose axes do not couple: equal motors, G G^T diagonal, friction on the body axes, no turning frame,
-no current limit. `why_not_exact` says by name what stands against it. Winding inductance: inductance.py.
+It serves robots whose axes do not couple: equal motors, G G^T and mass matrix diagonal, friction on the body axes, no
+turning frame, no current limit. `why_not_exact` says by name what stands against it. Winding inductance: inductance.py.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, maker, part
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.mass import axis_masses, masses_couple, without_spin
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import StateSpace, discretise, is_decoupled, state_space
@@ -49,8 +49,10 @@ def why_not_exact(robot: Robot) -> list[str]:
         per_wheel.append(motor.inductance or 0.0)
     if any(isinstance(value, tuple) and len(set(value)) > 1 for value in (*per_wheel, robot.wheels.wheel_radius)):
         reasons.append("unequal motors or wheel radii (a list in [motor] or [wheels])")
-    elif not is_decoupled(state_space(robot)):
+    elif not is_decoupled(state_space(without_spin(robot))):
         reasons.append("a wheel layout whose axes couple (G G^T is not diagonal)")
+    elif masses_couple(robot):
+        reasons.append("unequal inertias that couple the axes ([motor] rotor_inertia_kg_m2, [wheels] inertia_kg_m2)")
     return reasons
 
 
@@ -75,7 +77,7 @@ def simulate_exact(
 
 def axis_levels(robot: Robot, system: StateSpace) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(rate a [1/s], coulomb c, breakaway S [m/s^2, m/s^2, rad/s^2]) of the three axes. Shape (3,) each."""
-    return -np.diag(system.A), -np.diag(system.K), robot.friction.axes.levels[2] / mass_matrix(robot)
+    return -np.diag(system.A), -np.diag(system.K), robot.friction.axes.levels[2] / axis_masses(robot)
 
 
 def drive_acceleration(system: StateSpace, voltage: FloatArray) -> FloatArray:

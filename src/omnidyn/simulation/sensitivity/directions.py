@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
-from omnidyn.model.keys import Key
+from omnidyn.model.keys import ROTOR, WHEEL, Key
 from omnidyn.model.layout import ACTIVE, EFFICIENCY, ELLIPSE, GX, GZ, HOLD, N_AXES, SLIDE, SLIDE_X, SLIDE_Y
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant, plant
@@ -108,8 +108,17 @@ def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
 
 
 def _scale(robot: Robot, key: str) -> float:
-    """The size of a parameter, 1 where it is 0: changes are relative to it."""
-    return abs(Key.parse(key).get(robot)) or 1.0
+    """The size of a parameter: changes are relative to it."""
+    place = Key.parse(key)
+    return abs(place.get(robot)) or _size_of_none(place, robot)
+
+
+def _size_of_none(key: Key, robot: Robot) -> float:
+    """The size beside which a number that is 0 is small: 1, but of an inertia that spins what weighs as the body."""
+    if key.name not in (ROTOR, WHEEL):
+        return 1.0
+    radius, gear = float(np.mean(robot.wheels.radii)), float(np.mean(robot.motor.gear_ratio))
+    return robot.body.mass * (radius / (gear if key.name == ROTOR else 1.0)) ** 2
 
 
 def _moved(robot: Robot, key: str, scale: float, side: float) -> Robot:

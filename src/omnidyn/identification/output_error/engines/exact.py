@@ -36,9 +36,9 @@ from omnidyn.identification.output_error.kernel.march_axis import (
 from omnidyn.identification.output_error.problem.primitives import Mapping, Primitives
 from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import at_motors
-from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.frames import body_to_world
 from omnidyn.model.layout import N_AXES
+from omnidyn.model.mass import axis_masses
 from omnidyn.simulation.exact.position import PLACE_SIZE
 
 VECTOR = 4  # rows of slopes are padded to a multiple
@@ -92,7 +92,7 @@ class ExactEngine:
     def drives(self, point: Point) -> list[FloatArray]:
         """Drive of the axes [N, N, N m] in every row of every piece but the last, shape (rows, 3)."""
         robot = self.problem.robot_at(point.values)
-        matrix = self.mapping.at(point.values[: self.problem.robot_count])[0].drive * mass_matrix(robot)[:, None]
+        matrix = self.mapping.at(point.values[: self.problem.robot_count])[0].drive * axis_masses(robot)[:, None]
         driver, _ = driver_of(self.problem, point.values)
         found = []
         for piece in self.problem.pieces:

@@ -17,7 +17,7 @@ from omnidyn.identification.output_error.problem.starts import (
     window_rows,
 )
 from omnidyn.logs.steady_table import AXES
-from omnidyn.model.dynamics import mass_matrix
+from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 
@@ -69,7 +69,7 @@ def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot:
     drive, mass, most = state_space(robot).B, mass_matrix(robot), np.zeros(3)
     for record, known in zip(records, measured, strict=True):
         for first, last in record.pieces:
-            wrench = record.voltage[first:last] @ drive.T * mass
+            wrench = record.voltage[first:last] @ drive.T @ mass
             most = np.maximum(most, np.where(known, np.abs(wrench).max(axis=0), 0.0))
     return most
 

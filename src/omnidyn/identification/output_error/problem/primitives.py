@@ -14,8 +14,9 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.parameters import Parameter, robot_at
-from omnidyn.model.dynamics import mass_matrix, settled_currents
+from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.keys import BOX, Key
+from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import MotorWrench, motor_wrench, state_space
 from omnidyn.model.wheels import wheel_speed
@@ -56,7 +57,7 @@ def primitives(robot: Robot, motors: MotorWrench | None = None) -> Primitives:
         wheel_speed(robot.wheels, np.eye(3)).T,
         settled_currents(robot, np.eye(3), np.zeros(count)).T,
         np.diag(settled_currents(robot, np.zeros(3), np.eye(count))).copy(),
-        1.0 / mass_matrix(robot),
+        1.0 / axis_masses(robot),
     )  # fmt: skip
 
 
@@ -105,7 +106,7 @@ class Mapping:
 
     def _held(self, now: Primitives, robot: Robot, rate: FloatArray, coulomb: FloatArray) -> Primitives:
         """At this rate and coulomb, with the breakaway of this mapping; never below coulomb."""
-        hold = np.fmax(coulomb, self.breakaway / mass_matrix(robot))
+        hold = np.fmax(coulomb, self.breakaway / axis_masses(robot))
         return replace(now, rate=rate, coulomb=coulomb, hold=hold)
 
     def _friction_slopes(self, robot: Robot, base: Primitives, motors: MotorWrench) -> Primitives:
