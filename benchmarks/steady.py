@@ -121,7 +121,7 @@ def _study(table: Table, robot: Robot, runs: dict[str, list[Run]], read: float) 
 
 
 def _motors(table: Table, data: Path) -> None:
-    free = identify_motors(logs.robotino_motors(data), kind="current", steady=True)
+    free = identify_motors(logs.robotino_motors(data), input="current", steady=True)
     for line, told in zip(free.motors, ("0.170", "0.142", "0.164", "0.159 +- 0.004"), strict=True):
         _band(table, "free motors: Coulomb [A]", line, told, abs(line.value["dead_band"] - float(told[:5])) < 0.005)
     slope = free.motors[-1]

@@ -113,6 +113,11 @@ class Document:
         return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
 
 
+def apart(*blocks: Sequence[Part]) -> list[Part]:
+    """The parts of all blocks that have any, with an empty line between the blocks."""
+    return [part for block in blocks if block for part in ("", *block)][1:]
+
+
 def cell(value: float | None, form: str) -> str:
     """A number of a table; "-" where there is none."""
     return "-" if value is None else f"{value:{form}}"

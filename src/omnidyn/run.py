@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 
-FloatArray = NDArray[np.float64]
 WHEEL, AXIS, SCALAR = "wheel", "axis", "scalar"
 
 # What the columns of a channel are: one per wheel, one per axis (x, y, yaw), or none.
@@ -59,7 +59,7 @@ class Run:
     supply: FloatArray | None = None
     source: str = ""
     warnings: tuple[str, ...] = ()
-    interpolated: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    interpolated: Mapping[str, BoolArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         time = _read_only("t", self.t, None)

@@ -10,12 +10,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 
 MAD_TO_STD = 1.4826  # of a normal distribution: standard deviation / median absolute deviation, 1 / 0.6745
 UPPER_TAIL = 0.975  # below it lies all but the upper end of a 95 % interval

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.logs.plateaus import ANGLE, SPEED, find_plateaus, holds, live_angle, plateau, pool
+from omnidyn.logs.plateaus import ANGLE, SPEED, find_plateaus, holds, live_angle, pool
 from omnidyn.run import Run
 
 DT, TAU = 0.02, 0.15
@@ -86,7 +86,7 @@ def test_without_a_stepped_command_windows_have_a_fixed_length():
 def test_the_angle_is_finer_than_a_quantised_speed():
     t = np.arange(200) * DT
     run = Run(t=t, wheel_angle=0.7 * t[:, None], wheel_speed=np.where(t[:, None] % 0.1 < 0.05, 2.8, 0.0))
-    each = plateau(run, slice(0, 200))
+    each = find_plateaus(run, start=0.0, end=1.0)[0]
     assert each.speed_from == ANGLE
     assert each.mean["wheel_speed"][0] == pytest.approx(0.7, rel=1e-12)
 
@@ -98,18 +98,11 @@ def test_an_angle_that_stands_still_while_its_wheel_turns_is_not_used():
     assert find_plateaus(run)[0].speed_from == SPEED
 
 
-def test_the_side_of_a_wheel_that_reads_0_is_that_of_its_command():
-    t = np.arange(100) * DT
-    speed = np.tile([0.0, 3.0, 0.0], (100, 1))
-    run = Run(t=t, wheel_speed=speed, wheel_speed_command=np.tile([-0.2, 3.0, 0.0], (100, 1)))
-    assert plateau(run, slice(0, 100)).wheel_side.tolist() == [-1.0, 1.0, 0.0]
-
-
 def test_the_twist_comes_from_a_pose_that_turns():
     """A robot that drives straight ahead in its own frame while it turns: v_x = 0.5 m/s, omega = 1 rad/s."""
     t = np.arange(400) * 0.005
     pose = np.stack([0.5 * np.sin(t), 0.5 * (1.0 - np.cos(t)), t], axis=1)
-    each = plateau(Run(t=t, pose=pose), slice(0, 400))
+    each = find_plateaus(Run(t=t, pose=pose), start=0.0, end=1.0)[0]
     assert each.mean["twist"] == pytest.approx([0.5, 0.0, 1.0], abs=1e-5)
 
 

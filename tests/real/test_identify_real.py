@@ -134,7 +134,7 @@ def test_the_floors_differ_and_it_says_by_how_much(study):
 
 def test_free_motors(data):
     """README: |i| = 0.159+-0.004 + (3.9+-0.3)e-4 |w| at the motor; Coulomb 0.170, 0.142, 0.164 A."""
-    study = identify_motors(logs.robotino_motors(data), kind="current", steady=True)
+    study = identify_motors(logs.robotino_motors(data), input="current", steady=True)
     lines = {line.motor: line for line in study.motors}
     assert lines[None].value["dead_band"] == pytest.approx(0.159, abs=0.005)
     assert lines[None].value["slope"] / 16.0 == pytest.approx(3.9e-4, abs=0.3e-4)

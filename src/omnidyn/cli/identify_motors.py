@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.cli.identify_logs import Loaded
-from omnidyn.cli.identify_show import Out, say_warnings, say_written
-from omnidyn.cli.terminal.streams import say, show, show_json
-from omnidyn.identification.question import AUTO, STEADY_STATE, Question
+from omnidyn.cli.identify_show import Out, say_written
+from omnidyn.cli.terminal.streams import say
+from omnidyn.cli.terminal.telling import tell
+from omnidyn.document import apart
+from omnidyn.identification.question import Question
 
 if TYPE_CHECKING:
     from omnidyn.identification.motors.into_robot import MotorNumbers
@@ -18,32 +21,22 @@ if TYPE_CHECKING:
 def run_motors(
     question: Question, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, now: Any
 ) -> None:
-    """Fit, write, tell."""
-    from omnidyn.identification.grouping import held_out
+    """Fit; write robot file and report; show the result."""
     from omnidyn.identification.motors.study import identify_motors
 
-    out = held_out([run.source for run in loaded.runs], question.hold_out)
-    runs = [run for run, away in zip(loaded.runs, out, strict=True) if not away]
-    held = [run for run, away in zip(loaded.runs, out, strict=True) if away]
-    method = STEADY_STATE if question.method == AUTO else question.method
-    study = identify_motors(
-        runs, method=method, kind=question.input, speed=question.speed, robot=robot, share=question.window,
-        between=question.between, latency=_latency(question), loss=question.loss, held_out=held, now=now,
-    )  # fmt: skip
+    study = identify_motors(loaded.runs, robot, question=question, now=now)
     now("writing")
-    _tell(study, robot, record, to)
+    told, numbers = study.document(), _into_file(study, robot, to)
+    if numbers is not None:
+        told = replace(told, parts=apart(told.parts, numbers.parts()))
+    if to.report:
+        from omnidyn.report.motors_page import render_motors
 
-
-def _latency(question: Question) -> bool | None:
-    """Whether to fit a latency; None is where the logs show one."""
-    from omnidyn.errors import InputError
-
-    if question.nuisances is None:
-        return None
-    for name in question.nuisances:
-        if name.partition(".")[0] != "latency":
-            raise InputError("of the motors only latency can be fitted", got=name, where="nuisances")
-    return bool(question.nuisances)
+        to.write_report(render_motors(study, record))
+    output = to.out if numbers is not None and numbers.value else ""
+    own = numbers.to_dict() if numbers is not None else None
+    tell(told, to.json, record, robot=own, output=output or None, report=to.report or None)
+    say_written([output, to.report])
 
 
 def _into_file(study: MotorStudy, robot: Robot | None, to: Out) -> MotorNumbers | None:
@@ -62,22 +55,3 @@ def _into_file(study: MotorStudy, robot: Robot | None, to: Out) -> MotorNumbers 
     else:
         say("omnidyn: the logs determine no number of a robot file; -o is not used")
     return numbers
-
-
-def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out) -> None:
-    """Write and show: robot file, report, JSON or the summary."""
-    numbers = _into_file(study, robot, to)
-    output = to.out if numbers is not None and numbers.value else ""
-    if to.report:
-        from omnidyn.report.motors_page import render_motors
-
-        to.write_report(render_motors(study, record))
-    if to.json:
-        say_warnings(study.doubts)
-        own = numbers.to_dict() if numbers is not None else None
-        show_json({
-            **study.to_dict(), "robot": own, "output": output or None, "report": to.report or None, "provenance": record
-        })  # fmt: skip
-    else:
-        show("\n".join([study.summary(), *(numbers.lines() if numbers is not None else [])]).rstrip("\n"))
-    say_written([output, to.report])

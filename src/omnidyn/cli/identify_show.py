@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ import typer
 
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.progress import progress
-from omnidyn.cli.terminal.streams import say, show, show_json
+from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.identification.question import OUTPUT_ERROR, Question
 
@@ -39,86 +38,29 @@ class Out:
 
 def tell(found: Identification, record: dict[str, Any], to: Out) -> None:
     """Write and show an identification."""
-    if found.method == OUTPUT_ERROR:
-        _tell_fit(found, record, to)
-    elif found.study is not None:
-        _tell_study(found, record, to)
-    else:
-        _tell_lines(found, record, to)
-
-
-def _tell_fit(found: Identification, record: dict[str, Any], to: Out) -> None:
-    fits, validations = found.fits, found.validations or {}
-    files, report = _outputs(to.out, fits, to.force), to.report if validations else ""
-    if report:
-        from omnidyn.report.fit_page import render_fit
-
-        to.write_report(render_fit(fits, validations, found.verdicts, record, found.differences))
-    _save(fits, files, to.force)
-    if to.json:
-        say_warnings(words for fit in fits.values() for words in fit.warnings)
-        groups = {
-            g: {**fit.to_dict(), "validation": validations[g].to_dict() if g in validations else None}
-            for g, fit in fits.items()
-        }
-        show_json({
-            "method": OUTPUT_ERROR, **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
-            "differences": [{**vars(d), "differs": d.differs} for d in found.differences], "next": found.advice,
-            "check": [{"source": v.source, "fatal": v.fatal, "counts": v.counts} for v in found.verdicts],
-            "output": files or None, "report": report or None, "provenance": record,
-        })  # fmt: skip
-    else:
-        show(_fit_text(found))
+    files = _outputs(to.out, found.estimates, to.force)
+    page = _page(found, record) if to.report else ""
+    if page:
+        to.write_report(page)
+    _save(found.estimates, files, to.force)
+    report = to.report if page else ""
+    tell_document(found.document(), to.json, record, output=files or None, report=report or None)
     say_written([*files.values(), report])
 
 
-def _fit_text(found: Identification) -> str:
-    from omnidyn.identification.advice import DIFFERENCE_HEAD, difference_rows
-    from omnidyn.identification.steady.study_table import table_text
-
-    lines = []
-    for group, fit in found.estimates.items():
-        lines += [f"group {group}", ""] if len(found.estimates) > 1 else []
-        lines += [fit.summary().rstrip("\n"), ""]
-        if found.validations and group in found.validations:
-            lines += [found.validations[group].summary(), ""]
-    if found.differences:
-        lines += [*table_text(DIFFERENCE_HEAD, difference_rows(found.differences)), ""]
-    if found.advice:
-        lines.append("next:")
-        for words in found.advice:
-            lines += textwrap.wrap(f"- {with_flags(words)}", 100, subsequent_indent="  ")
-    return "\n".join(line.encode("ascii", "backslashreplace").decode() for line in lines).rstrip("\n")
-
-
-def _tell_study(found: Identification, record: dict[str, Any], to: Out) -> None:
-    """Friction and its shape."""
-    from omnidyn.identification.steady.study_table import study_document
-
-    study = found.study
-    assert study is not None
-    files = _outputs(to.out, found.estimates, to.force)
-    if to.report:
+def _page(found: Identification, record: dict[str, Any]) -> str:
+    """The report; "" where there is none to write."""
+    if found.study is not None:
         from omnidyn.report.steady_page import render_study
 
-        to.write_report(render_study(study, record))
-    _save(found.estimates, files, to.force)
-    tell_document(study_document(study), to.json, record, output=files or None, report=to.report or None)
-    say_written([*files.values(), to.report])
-
-
-def _tell_lines(found: Identification, record: dict[str, Any], to: Out) -> None:
-    """The lines of the axes of each group."""
-    files = _outputs(to.out, found.estimates, to.force)
-    _save(found.estimates, files, to.force)
-    if to.report:
+        return render_study(found.study, record)
+    if found.method != OUTPUT_ERROR:
         say("omnidyn: --shape line has no page; --report is not used")
-    if to.json:
-        groups = {group: estimate.to_dict() for group, estimate in found.estimates.items()}
-        show_json({"shape": found.question.shape, "groups": groups, "output": files or None, "provenance": record})
-    else:
-        show("\n".join(estimate.summary() for estimate in found.estimates.values()).rstrip("\n"))
-    say_written([*files.values()])
+    if not found.validations:
+        return ""
+    from omnidyn.report.fit_page import render_fit
+
+    return render_fit(found, record)
 
 
 def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
@@ -168,12 +110,6 @@ def _save(estimates: Mapping[str, Estimate], files: Mapping[str, str], force: bo
 
     for group, path in files.items():
         save_robot(estimates[group].robot, path, force)
-
-
-def say_warnings(warnings: Iterable[str]) -> None:
-    """Beside JSON: every warning once."""
-    for warning in dict.fromkeys(warnings):
-        say(f"omnidyn: warning: {warning}")
 
 
 def say_written(paths: Iterable[str]) -> None:

@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.comparison.traces import Trace
-
-FloatArray = NDArray[np.float64]
 
 FORGOTTEN = 0.6  # [s] four time constants of the robots known, about 0.15 s
 MOST = 0.25  # of a piece is left out at most

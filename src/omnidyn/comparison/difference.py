@@ -10,12 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.comparison.traces import Trace
 from omnidyn.statistics import block_length, bootstrap_error, t_quantile
-
-FloatArray = NDArray[np.float64]
 
 DRAWS = 400  # of the bootstrap
 ALPHA = 0.05  # chance of calling any component better by noise, all components together

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from omnidyn.comparison.traces import Trace
-
-FloatArray = NDArray[np.float64]
 
 REACH = 0.5  # [s] lags looked for, both signs
 GRID, ROUNDS = 21, 4  # lags tried at a time; each round looks closer

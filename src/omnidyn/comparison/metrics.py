@@ -13,13 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.comparison.lag import lag_of
 from omnidyn.comparison.traces import Trace
 from omnidyn.comparison.whiteness import whiteness
-
-FloatArray = NDArray[np.float64]
 
 CONSTANT = 1e-9  # a measured signal that changes by less than this share of its size is constant
 NOTHING = 1e-150  # what is smaller has no square

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.comparison.start import start_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
@@ -26,8 +26,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.simulate import TOLERANCE, simulate
 from omnidyn.statistics import stretches
-
-FloatArray = NDArray[np.float64]
 
 INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
 SET_SPEEDS = INPUTS[2:]
@@ -166,7 +164,7 @@ def _prepared(run: Run, applied: str, hold: float) -> tuple[list[slice], FloatAr
     return kept, held[:, :width], held[:, width] if supply is not None else None, doubts
 
 
-def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatArray, NDArray[np.bool_]]:
+def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatArray, BoolArray]:
     """Inputs with missing values (NaN) held, and which rows may be simulated from their start to the next row.
 
     A value holds over its row, and after that for at most `hold` [s] until another is known. t [s], shape (n,);
@@ -181,7 +179,7 @@ def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatAr
     return filled, ((last >= 0) & ((last == rows[:, None]) | (age <= hold))).all(axis=1)
 
 
-def _usable_pieces(rows: slice, usable: NDArray[np.bool_]) -> Iterator[slice]:
+def _usable_pieces(rows: slice, usable: BoolArray) -> Iterator[slice]:
     """The longest runs of rows whose inputs are known; the row after the last one belongs to it as its end."""
     inside = usable[rows.start : max(rows.start, rows.stop - 1)]
     for first, end in stretches(inside) + rows.start:

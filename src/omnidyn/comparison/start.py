@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import robust_std
-
-FloatArray = NDArray[np.float64]
 
 WINDOW = 0.05  # [s] the first samples: well below the time constants of a robot, about 0.15 s
 FEWEST, MOST = 5, 65  # samples of a line through the first ones; each try doubles them

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.comparison.replay import SET_SPEEDS
 from omnidyn.logs.channels import components, place, si_suffix
 from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
 
 COMPARED = ("twist", "wheel_speed", "current", "pose")
 TURN = 2.0 * np.pi

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-FloatArray = NDArray[np.float64]
+from omnidyn.arrays import FloatArray
 
 LAGS = 10
 FEWEST = 30  # samples

@@ -7,8 +7,8 @@ integral of T w dt >= change of M v^2/2. Where that fails, voltage, speed and ro
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.finding import FATAL, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
@@ -18,8 +18,6 @@ from omnidyn.model.keys import EMF
 from omnidyn.model.motor import back_emf, settled_current, wheel_torque
 from omnidyn.model.robot import GUESS, Robot
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
-
-FloatArray = NDArray[np.float64]
 
 MARGIN = 0.08  # of the power that turns with the back-EMF: K, R and the gear are not known better
 WINDOW = 0.4  # [s]
@@ -81,7 +79,7 @@ def _excess(robot: Robot, voltage: FloatArray, speed: FloatArray) -> float:
     return float(np.nansum(np.abs(counter)) / max(np.nansum(np.abs(voltage)), 1e-12))
 
 
-def _points(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[NDArray[np.bool_], float]:
+def _points(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[BoolArray, float]:
     """Each row a steady state of its own."""
     power, scale = _power(robot, voltage, speed)
     counter = np.sqrt((back_emf(robot.motor, speed) ** 2).sum(axis=1))
@@ -90,9 +88,7 @@ def _points(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[NDArr
     return bad, float(-power[bad].min()) if bad.any() else 0.0
 
 
-def _windows(
-    work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: FloatArray
-) -> tuple[NDArray[np.bool_], float]:
+def _windows(work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[BoolArray, float]:
     """Balance over windows: work of the motors, change of kinetic energy."""
     none = np.zeros(len(work), dtype=bool), 0.0
     width = max(4, round(WINDOW / work.step))

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import NOTE, SECTORS, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.model.wheels import twist_from_wheel_speed
 
-FloatArray = NDArray[np.float64]
 AXES = ("x", "y", "yaw")
 HARDLY = 0.1  # of the motion along the axis that moves most
 SPEEDS = 2.0  # fastest over slowest motion, below which viscous and dry friction look alike

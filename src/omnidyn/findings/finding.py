@@ -7,9 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.document import Document, Words
 from omnidyn.statistics import stretches
 
@@ -110,7 +108,7 @@ def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda finding: LEVELS.index(finding.level)))
 
 
-def spans_of(bad: NDArray[np.bool_], lines: NDArray[np.int64]) -> tuple[Span, ...]:
+def spans_of(bad: BoolArray, lines: IntArray) -> tuple[Span, ...]:
     """The first stretches of rows where `bad` holds, as (first line, last line). Shapes (rows,)."""
     return tuple((int(lines[a]), int(lines[b - 1])) for a, b in stretches(bad)[:MAX_SPANS])
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, smooth, white_noise
 from omnidyn.logs.channels import components
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.model.wheels import per_wheel
-
-FloatArray = NDArray[np.float64]
 
 AT_LIMIT = 0.003  # of the limit
 LEAST_SHARE = 0.005  # of the rows

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
@@ -13,8 +13,6 @@ from omnidyn.logs.channels import components
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.statistics import stretches
-
-FloatArray = NDArray[np.float64]
 
 SETTLE, HELD = 0.4, 0.3  # [s]
 DROOP = 0.05
@@ -34,7 +32,7 @@ def check_motion(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return _start_up(work, still) + _blocked(work, still) + _droop(work), work
 
 
-def _start_up(work: LogUnderCheck, still: NDArray[np.bool_]) -> list[Finding]:
+def _start_up(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
     """A log that begins with its command already set: the first rows are the start, not the motion asked for."""
     rows = int(np.argmin(still))
     if rows < 2:
@@ -52,7 +50,7 @@ def _start_up(work: LogUnderCheck, still: NDArray[np.bool_]) -> list[Finding]:
     return []
 
 
-def _still(work: LogUnderCheck) -> NDArray[np.bool_] | None:
+def _still(work: LogUnderCheck) -> BoolArray | None:
     """Rows in which nothing moves beyond noise; None where no motion was recorded."""
     speed, seen = work.get("wheel_speed"), ground(work)
     if speed is None and seen is not None and len(seen.axes) == 3:
@@ -94,7 +92,7 @@ def _never_moved(work: LogUnderCheck) -> Finding:
     )  # fmt: skip
 
 
-def _blocked(work: LogUnderCheck, still: NDArray[np.bool_]) -> list[Finding]:
+def _blocked(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
     """At rest although the motors are driven as they are elsewhere where the robot moves."""
     voltage, robot = volts(work), work.geometry
     current = work.get("current")
@@ -125,7 +123,7 @@ def _blocked(work: LogUnderCheck, still: NDArray[np.bool_]) -> list[Finding]:
     )]  # fmt: skip
 
 
-def _long(bad: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+def _long(bad: BoolArray, least: int) -> BoolArray:
     """Only the stretches of at least so many rows, without their first half second of starting."""
     out = np.zeros_like(bad)
     for a, b in stretches(bad):
@@ -134,7 +132,7 @@ def _long(bad: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
     return out
 
 
-def held(work: LogUnderCheck, command: FloatArray, seconds: float = HELD) -> NDArray[np.bool_]:
+def held(work: LogUnderCheck, command: FloatArray, seconds: float = HELD) -> BoolArray:
     """Rows whose command has been the same for so long. Shape (rows,)."""
     change = np.concatenate([[True], (np.diff(command, axis=0) != 0.0).any(axis=1)])
     last = np.maximum.accumulate(np.where(change, np.arange(len(change)), 0))

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import products, slope, smooth
 from omnidyn.logs.channels import components
 from omnidyn.statistics import robust_std
-
-FloatArray = NDArray[np.float64]
 
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
 LEAST, SURE = 0.025, 5.5  # of the ratio; standard errors, over all stretches that are looked at
@@ -51,7 +49,7 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return found, work
 
 
-def _worst(work: LogUnderCheck) -> tuple[NDArray[np.bool_], float, float, float] | None:
+def _worst(work: LogUnderCheck) -> tuple[BoolArray, float, float, float] | None:
     """(rows, ratio inside, ratio outside, error of their quotient) of the stretch that differs most, if it is sure."""
     speed, seen = work.full("wheel_speed"), ground(work)
     if speed is None or seen is None or work.geometry is None or len(work) < 3 * MIN_ROWS:
@@ -87,7 +85,7 @@ def _levelled(work: LogUnderCheck, floor: FloatArray, own: FloatArray, length: F
 
 def _contrast(
     work: LogUnderCheck, floor: FloatArray, own: FloatArray, axes: list[int]
-) -> tuple[NDArray[np.bool_], float, float, float] | None:
+) -> tuple[BoolArray, float, float, float] | None:
     ids, count = work.windows(WINDOW)
     top, below = products(floor[:, axes], own[:, axes], ids, count)
     if count > MAX_WINDOWS or below.sum() <= 0.0:
@@ -130,7 +128,7 @@ def _contrast(
     return rows, float(inside), float(outside), float(error[k] / outside)
 
 
-def _noise(top: FloatArray, below: FloatArray, overall: float, moving: NDArray[np.bool_], size: int) -> float:
+def _noise(top: FloatArray, below: FloatArray, overall: float, moving: BoolArray, size: int) -> float:
     """Noise of the ratio for one unit of `below`, from groups of `size` windows.
 
     From one group to the next slip does not change, noise does; where the robot speeds up there is more of it. Errors
@@ -145,7 +143,7 @@ def _noise(top: FloatArray, below: FloatArray, overall: float, moving: NDArray[n
     return max(float(robust_std(changes, 0.0)), float(np.quantile(changes, 0.9)) / 2.0)
 
 
-def _at_edges(values: FloatArray, ids: NDArray[np.int64], count: int) -> FloatArray:
+def _at_edges(values: FloatArray, ids: IntArray, count: int) -> FloatArray:
     """Values where the windows begin, and at the end. Shape (count + 1,)."""
     first = np.searchsorted(ids, np.arange(count))
     return smooth(values[:, None], 3)[np.append(first, len(values) - 1), 0]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.logs.log import MAX_MISSING, Log
@@ -58,7 +58,7 @@ def _with_speed(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck:
     return work.replace(wheel_speed=speed)
 
 
-def _empty_rows(log: Log, empty: NDArray[np.bool_]) -> list[Finding]:
+def _empty_rows(log: Log, empty: BoolArray) -> list[Finding]:
     count = int(empty.sum())
     if not count:
         return []
@@ -72,7 +72,7 @@ def _empty_rows(log: Log, empty: NDArray[np.bool_]) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _padded(log: Log, rows: NDArray[np.int64]) -> list[Finding]:
+def _padded(log: Log, rows: IntArray) -> list[Finding]:
     if not rows.size:
         return []
     bad = np.zeros(len(log), dtype=bool)
@@ -86,7 +86,7 @@ def _padded(log: Log, rows: NDArray[np.int64]) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _backward(log: Log, rows: NDArray[np.int64]) -> list[Finding]:
+def _backward(log: Log, rows: IntArray) -> list[Finding]:
     back = np.diff(log.t[rows]) < 0.0
     count = int(back.sum())
     if not count:
@@ -102,7 +102,7 @@ def _backward(log: Log, rows: NDArray[np.int64]) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _repeated(log: Log, rows: NDArray[np.int64], again: NDArray[np.bool_]) -> list[Finding]:
+def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
     count = int(again.sum())
     if not count:
         return []

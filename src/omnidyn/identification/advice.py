@@ -1,66 +1,25 @@
-"""What a fit to whole logs says in words and tables: numbers, doubts, and what to measure next."""
+"""What to measure, to mend or to ask for next, after a fit to whole logs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
 
-from omnidyn.findings.finding import FATAL, WARN, Verdict
+from omnidyn.findings.finding import FATAL, Verdict
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.shape_residual import between_axes
-from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import FITTED, HELD_OUT, Validation, coloured
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
 from omnidyn.model.robot import GUESS
 
-NUMBER_HEAD = ("number", "value", "std error", "95 % interval", "unit", "")
-DIFFERENCE_HEAD = ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "")
-VERDICT_HEAD = ("log", "rows", "length s", "rate Hz", "fatal", "to heed", "what")
 WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
 LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
-SHOWN = 6
 # Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
 GOES_WITH_TORQUE = (EMF, "motor.gear_ratio")
 FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
-
-
-def number_rows(fit: OutputErrorEstimate) -> list[tuple[str, ...]]:
-    """Every fitted number, those of the log too, as cells under NUMBER_HEAD."""
-    rows = []
-    for name, value in fit.value.items():
-        mark = "not identifiable" if name in fit.unidentifiable else "at bound" if name in fit.at_bound else ""
-        rows.append((name, f"{value:.5g}", f"{fit.std[name]:.2g}", interval(fit.ci95[name]), unit(name), mark))
-    for name, own in fit.nuisances.items():
-        mark = "not identifiable" if name in fit.unidentifiable else "of the log"
-        rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval(own.ci95), own.unit, mark))
-    return rows
-
-
-def difference_rows(differences: Sequence[Difference]) -> list[tuple[str, ...]]:
-    """Cells under DIFFERENCE_HEAD."""
-    return [
-        (d.key, f"{d.first} {d.values[0]:.4g}", f"{d.second} {d.values[1]:.4g}", f"{d.difference:+.4g}", f"{d.std:.2g}",
-         interval((d.low, d.high)), unit(d.key), "differs" if d.differs else "no difference seen")
-        for d in differences
-    ]  # fmt: skip
-
-
-def verdict_rows(verdicts: Sequence[Verdict]) -> list[tuple[str, ...]]:
-    """What `check` says of each log, as cells under VERDICT_HEAD."""
-    rows = []
-    for each in verdicts:
-        what = [f"{f.code} {f.where}".rstrip() for f in each.findings if f.level in (FATAL, WARN)]
-        words = ", ".join(what[:SHOWN]) + (", ..." if len(what) > SHOWN else "")
-        rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[FATAL]),
-                     str(each.counts[WARN]), words or "fit for use"))  # fmt: skip
-    return rows
-
-
-def interval(pair: tuple[float, float]) -> str:
-    return f"[{pair[0]:.4g}, {pair[1]:.4g}]"
 
 
 def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
 from omnidyn.identification.output_error.problem.primitives import primitives
@@ -17,8 +17,6 @@ from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import GAINS, Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
 
 LATE = (
     "twist",
@@ -114,9 +112,7 @@ def mean_before(t: FloatArray, voltage: FloatArray, late: float, before: float =
     return np.diff(summed, axis=0) / np.diff(edges)[:, None]
 
 
-def _extended(
-    at: FloatArray, t: FloatArray, total: FloatArray, voltage: FloatArray, before: float
-) -> FloatArray:  # fmt: skip
+def _extended(at: FloatArray, t: FloatArray, total: FloatArray, voltage: FloatArray, before: float) -> FloatArray:
     """The integral of a held voltage at any time."""
     inside = np.interp(at, t, total)
     return inside + np.minimum(at - t[0], 0.0) * before * voltage[0] + np.maximum(at - t[-1], 0.0) * voltage[-1]

@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Points, Table, interval_cell
 from omnidyn.model.keys import unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
@@ -23,7 +21,7 @@ class Correlation:
     """Correlations of the estimates: matrix[i, j] between names[i] and names[j]. Shape (names, names)."""
 
     names: tuple[str, ...]
-    matrix: NDArray[np.float64]
+    matrix: FloatArray
 
     def between(self, first: str, second: str) -> float:
         """The correlation of two parameters."""

@@ -13,13 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.read_log import STILL
 from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
 
 MAX_CONDITION = 50.0  # of the directions driven: beyond it, one of them is only noise
 MAX_RESIDUAL = 0.2  # share of the wheel speeds that the fit may leave: beyond it these are not omni wheels

@@ -7,11 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from omnidyn.document import Document, apart
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.check import check
 from omnidyn.findings.finding import FATAL, Verdict
 from omnidyn.identification.advice import advice, verdict_advice
 from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit, fit_output_error
@@ -23,6 +25,7 @@ from omnidyn.identification.steady.axis_lines import identify_lines
 from omnidyn.identification.steady.settling import why_no_transient
 from omnidyn.identification.steady.study import SteadyStudy, identify_steady
 from omnidyn.identification.steady.study_parts import Difference
+from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import SPEED
@@ -135,6 +138,16 @@ class Identification:
     def estimate(self) -> Estimate:
         """The estimate of the first group; the only one where there are no groups."""
         return next(iter(self.estimates.values()))
+
+    def document(self) -> Document:
+        """All of it, as text, page and machines have it."""
+        if self.study is not None:
+            return study_document(self.study)
+        if self.method == OUTPUT_ERROR:
+            return fit_document(self.fits, self.validations or {}, self.differences, self.verdicts, self.advice)
+        lines = {group: estimate.document() for group, estimate in self.estimates.items()}
+        data = {"shape": self.question.shape, "groups": {group: each.data for group, each in lines.items()}}
+        return Document(apart(*(each.parts for each in lines.values())), data, ascii=True)
 
     @property
     def fits(self) -> dict[str, OutputErrorEstimate]:

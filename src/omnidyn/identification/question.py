@@ -135,6 +135,10 @@ class Question:
         None, "Use these shares of each command's rows, such as 0.4,0.95.", "None: the steady rows found.",
         of=(STEADY, MOTOR_LINES), metavar="A,B",
     )  # fmt: skip
+    steady: bool = _option(
+        False, "Of the motors: only rows that are steady.", "Else windows that need not be, start-ups too.",
+        of=(MOTOR_LINES,), flag=None,
+    )  # fmt: skip
     group: tuple[str, ...] = _option(
         (), "Logs of one floor or load.", "NAME=GLOB each, of the sources of runs.", of=(STEADY,), metavar="NAME=GLOB"
     )

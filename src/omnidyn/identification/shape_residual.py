@@ -9,15 +9,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.comparison.result import Comparison
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import t_quantile
-
-FloatArray = NDArray[np.float64]
 
 TRAVELS = 0.2  # of the fastest speed along the floor, from which a row has a direction
 NEAR, FAR = np.radians(15.0), np.radians(30.0)  # of an axis: along it; between the axes

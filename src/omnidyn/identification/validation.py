@@ -110,7 +110,11 @@ class Validation:
 
     def summary(self) -> str:
         """A plain table, for reading."""
-        return Document([self.table(), *(f"- {words}" for words in self.statements())]).to_text()
+        return self.document().to_text()
+
+    def document(self) -> Document:
+        """The scores, and what they say."""
+        return Document([self.table(), *(f"- {words}" for words in self.statements())], self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.run_file import columns_of, refuse_other_units
 from omnidyn.logs.table.table import Table
 
-FloatArray = NDArray[np.float64]
 MAX_STEPS = 10_000_000
 KINDS = ("voltage", "duty", "wheel_speed_command", "twist_command")
 

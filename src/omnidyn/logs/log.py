@@ -11,12 +11,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import components, place
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
-
-FloatArray = NDArray[np.float64]
 
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share is recorded on change
@@ -37,7 +36,7 @@ class Log:
 
     t: FloatArray
     channels: Mapping[str, FloatArray]
-    lines: NDArray[np.int64]
+    lines: IntArray
     columns: ColumnMap = field(default_factory=ColumnMap)
     source: str = ""
     sha256: str = ""
@@ -129,7 +128,7 @@ class Log:
                 warnings.append(f"{component} was moved back by its latency of {late:g} s")
         return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
 
-    def interpolated(self, channel: str) -> NDArray[np.bool_]:
+    def interpolated(self, channel: str) -> BoolArray:
         """Which values of `aligned` lie between measurements, where no sensor gave any. Shape as in the channel."""
         columns = self.channels[channel].reshape(len(self), -1)
         made_up = np.zeros(columns.shape, dtype=bool)
@@ -141,7 +140,7 @@ class Log:
             made_up[:, k] = _far_from(self.t + late, self.t[~blank], self.t) if late else blank
         return made_up[:, 0] if CHANNELS[channel] == SCALAR else made_up
 
-    def empty_rows(self) -> NDArray[np.bool_]:
+    def empty_rows(self) -> BoolArray:
         """Rows without a time or without any number. Shape (rows,)."""
         nothing = np.isnan(self.t)
         if self.channels:
@@ -151,7 +150,7 @@ class Log:
             nothing |= ~numbers
         return nothing
 
-    def padding_rows(self) -> NDArray[np.bool_]:
+    def padding_rows(self) -> BoolArray:
         """Rows at the end that all repeat the last one while time has gone back."""
         padding = np.zeros(len(self), dtype=bool)
         table = np.column_stack([self.t, *(values.reshape(len(self), -1) for values in self.channels.values())])
@@ -162,7 +161,7 @@ class Log:
             padding[first:] = True
         return padding
 
-    def _without(self, bad: NDArray[np.bool_], words: str, warnings: list[str], bound: float = MAX_MISSING) -> Log:
+    def _without(self, bad: BoolArray, words: str, warnings: list[str], bound: float = MAX_MISSING) -> Log:
         """The other rows, with a warning; refused where more than a share of `bound` would go."""
         count = int(bad.sum())
         if not count:
@@ -199,7 +198,7 @@ def _interpolated(t: FloatArray, values: FloatArray) -> FloatArray:
     return np.interp(t, t[known], values[known], left=np.nan, right=np.nan)
 
 
-def _far_from(at: FloatArray, known: FloatArray, t: FloatArray) -> NDArray[np.bool_]:
+def _far_from(at: FloatArray, known: FloatArray, t: FloatArray) -> BoolArray:
     """Which times `at` have no time of `known` within half a row of `t`. Shape of `at`."""
     near = 0.5 * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
     after = np.clip(np.searchsorted(known, at), 1, max(len(known) - 1, 1))

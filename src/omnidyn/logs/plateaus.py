@@ -13,15 +13,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.segments import segments
 from omnidyn.model.frames import world_to_body
 from omnidyn.run import Run
 from omnidyn.statistics import robust_mean, robust_std
-
-FloatArray = NDArray[np.float64]
 
 MIN_ROWS, MIN_DURATION = 12, 0.4  # [s]
 WINDOW = 0.5  # [s] length where no command comes in steps
@@ -54,17 +52,6 @@ class Plateau:
     speed_from: str = ""
     hold: int = 0
     count: int = 0
-
-    @property
-    def wheel_side(self) -> FloatArray:
-        """The way each wheel turns: -1, 0, 1. Shape (wheels,). From the command where the speed reads 0."""
-        speed, command = self.mean.get("wheel_speed"), self.mean.get("wheel_speed_command")
-        if speed is None:
-            speed = command
-        if speed is None:
-            raise InputError("no speed of wheels", got=", ".join(self.mean), expected="wheel_speed or wheel_angle")
-        side = np.sign(np.nan_to_num(speed))
-        return side if command is None else np.where(side == 0.0, np.sign(np.nan_to_num(command)), side)
 
 
 def find_plateaus(run: Run, *, start: float | None = None, end: float | None = None) -> tuple[Plateau, ...]:
@@ -103,11 +90,6 @@ def _pooled(windows: Sequence[Plateau]) -> Plateau:
     }
     rows, count = slice(first.rows.start, last.rows.stop), sum(each.count for each in windows)
     return replace(first, rows=rows, end=last.end, mean=mean, std=std, count=count)
-
-
-def plateau(run: Run, rows: slice) -> Plateau:
-    """The point of the given rows, which the caller knows to lie between two gaps."""
-    return _plateau(run, rows, live_angle(run))
 
 
 def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
@@ -154,7 +136,7 @@ def _between_gaps(run_segments: Sequence[slice], hold: slice) -> list[slice]:
     return [segment for segment in cut if segment.stop > segment.start]
 
 
-def _changes(run: Run) -> NDArray[np.bool_] | None:
+def _changes(run: Run) -> BoolArray | None:
     """Rows with another command than the row before; None where no command comes in steps."""
     changed, known = np.zeros(len(run), dtype=bool), False
     if len(run) < 2:

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock.clock import Clock
@@ -25,8 +25,6 @@ from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
-
-FloatArray = NDArray[np.float64]
 
 STILL = 1e-6  # [rad/s] a commanded speed below counts as none
 

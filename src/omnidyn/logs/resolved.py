@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.logs.plateaus import STEPWISE
 from omnidyn.statistics import stretches
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 CONTEXT_ROWS = 24
 JITTER, JITTER_SIZE = 0.15, 0.2  # an input that changes so much from row to row is not resolved by the log

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
 from omnidyn.logs.channels import components, si_suffix
@@ -28,8 +28,6 @@ from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
 from omnidyn.run import CHANNELS, SCALAR, Run
 from omnidyn.units import DUTY, known_unit, parse_unit
-
-FloatArray = NDArray[np.float64]
 
 _SUFFIXES = ("rad_s", "m_s", "duty", "rad", "V", "A", "m", "s")  # as channels.si_suffix gives them, long before short
 _UNIT_OF_DUTY = ("duty", "-", "1")

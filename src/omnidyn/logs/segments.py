@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from omnidyn.arrays import FloatArray
 
 GAP = 3.5  # a step so many times the usual one is a gap: three samples or more are lost
 
 
-def segments(t: NDArray[np.float64], gap: float = GAP) -> list[slice]:
+def segments(t: FloatArray, gap: float = GAP) -> list[slice]:
     """The segments of a log, which lie between its gaps, in order. t [s], shape (n,), increasing.
 
     A gap is a step longer than `gap` times the median step, and than twice the step that 95 % of all stay below:

@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
-
-FloatArray = NDArray[np.float64]
 
 AXES = ("x", "y", "yaw")
 ALIASES = {"v": "x", "v_n": "y", "vn": "y", "w": "yaw", "omega": "yaw"}  # the paper's letters
@@ -61,7 +60,7 @@ class SteadyTable:
     source: str = ""
     sha256: str = ""
     notes: tuple[str, ...] = ()
-    lines: NDArray[np.int64] | None = None
+    lines: IntArray | None = None
 
     def __post_init__(self) -> None:
         _set(self, "speed", _array("speed", self.speed, 1))
@@ -104,7 +103,7 @@ class SteadyTable:
         if self.force_from not in FORCE_SOURCES:
             raise InputError("unknown origin of the force", got=self.force_from, expected=", ".join(FORCE_SOURCES))
 
-    def _refuse(self, name: str, wrong: NDArray[np.bool_], expected: str) -> None:
+    def _refuse(self, name: str, wrong: BoolArray, expected: str) -> None:
         for row in np.flatnonzero(wrong)[:1]:
             got = float(getattr(self, name)[row])
             raise InputError("number out of range", got=got, expected=expected, where=self.place(int(row), name))
@@ -118,7 +117,7 @@ class SteadyTable:
         return len(self.speed)
 
     @property
-    def axis_index(self) -> NDArray[np.int64]:
+    def axis_index(self) -> IntArray:
         """0, 1, 2 for x, y, yaw. Shape (points,)."""
         return np.array([AXES.index(name) for name in self.axis], dtype=np.int64)
 

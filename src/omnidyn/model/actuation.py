@@ -11,13 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.motor import Motor
 from omnidyn.model.wheels import per_wheel
-
-FloatArray = NDArray[np.float64]
 
 
 class Driver(NamedTuple):

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import acceleration, axes_hold_alone, drive_wrench, linear_part, mass_matrix
 from omnidyn.model.robot import Robot
 
-FloatArray = NDArray[np.float64]
 HIGHEST = 1e6  # [V] beyond which a pattern counts as one that never moves the robot
 BISECTIONS = 60
 ROUNDING = 1e-12  # of what drives the robot: less is none
 
 
-def moves(robot: Robot, voltage: ArrayLike) -> NDArray[np.bool_]:
+def moves(robot: Robot, voltage: ArrayLike) -> BoolArray:
     """Which axes of a robot at rest start to move under a held voltage [V].
 
     `voltage` has shape (*batch, wheels); returns (*batch, 3) for x, y, yaw. The voltage limit is not applied.
@@ -105,7 +105,7 @@ def _patterns(robot: Robot, pattern: ArrayLike) -> FloatArray:
     return pattern
 
 
-def _held(robot: Robot, voltage: FloatArray) -> NDArray[np.bool_]:
+def _held(robot: Robot, voltage: FloatArray) -> BoolArray:
     """Whether nothing at all moves, to the last bit. voltage: (k, n). Shape (k,)."""
     at_rest = np.zeros((len(voltage), 3))
     if axes_hold_alone(robot):

@@ -10,8 +10,9 @@ The terms in brackets belong to a turning body frame; eqs (4) (5) leave them out
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.layout import LENGTH
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.robot import Robot
@@ -20,12 +21,12 @@ from omnidyn.model.stick_slip.release import accelerations, moving_states
 from omnidyn.model.wheels import wheel_speed, wrench_from_traction
 
 
-def mass_matrix(robot: Robot) -> NDArray[np.float64]:
+def mass_matrix(robot: Robot) -> FloatArray:
     """Diagonal of the mass matrix (M, M, I_n) [kg, kg, kg m^2]. Shape (3,)."""
     return np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
 
 
-def settled_currents(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[np.float64]:
+def settled_currents(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
     """Motor currents [A] with settled windings (L di/dt = 0), eq (11).
 
     `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, wheels).
@@ -33,12 +34,12 @@ def settled_currents(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDAr
     return settled_current(robot.motor, voltage, wheel_speed(robot.wheels, twist))
 
 
-def wrench_from_currents(robot: Robot, current: ArrayLike) -> NDArray[np.float64]:
+def wrench_from_currents(robot: Robot, current: ArrayLike) -> FloatArray:
     """Wrench of the motors on the body [N, N, N m], eqs (7)-(10). `current` [A], shape (*batch, wheels)."""
     return wrench_from_traction(robot.wheels, traction(robot.motor, robot.wheels, current))
 
 
-def drive_wrench(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[np.float64]:
+def drive_wrench(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
     """Wrench of the motors on the body [N, N, N m], eqs (7)-(11), currents settled.
 
     `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
@@ -52,7 +53,7 @@ def linear_part(robot: Robot) -> Robot:
     return robot.model_copy(update={"motor": motor})
 
 
-def frame_wrench(robot: Robot, twist: ArrayLike) -> NDArray[np.float64]:
+def frame_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
     """Apparent wrench M omega (v_y, -v_x, 0) of the turning body frame; zero where the robot leaves it out."""
     twist = np.asarray(twist, dtype=float)
     if not robot.body.rotating_frame:
@@ -61,7 +62,7 @@ def frame_wrench(robot: Robot, twist: ArrayLike) -> NDArray[np.float64]:
     return robot.body.mass * np.stack([omega * y, -omega * x, np.zeros_like(omega)], axis=-1)
 
 
-def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> NDArray[np.float64]:
+def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
     """Acceleration of the twist [m/s^2, m/s^2, rad/s^2], eqs (4)-(6), currents settled.
 
     Friction at rest balances what drives it; where several parts hold at once, stick_slip/inclusion.py decides.

@@ -8,10 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from omnidyn.arrays import FloatArray
 
 
-def body_to_world(heading: ArrayLike) -> NDArray[np.float64]:
+def body_to_world(heading: ArrayLike) -> FloatArray:
     """Rotation that takes a body twist to the world frame: pose' = body_to_world(heading) @ twist.
 
     Inverse of eq (2). `heading` [rad], shape (*batch,). Returns shape (*batch, 3, 3).
@@ -25,7 +27,7 @@ def body_to_world(heading: ArrayLike) -> NDArray[np.float64]:
     return rotation
 
 
-def world_to_body(heading: ArrayLike) -> NDArray[np.float64]:
+def world_to_body(heading: ArrayLike) -> FloatArray:
     """Rotation R(theta) of eqs (1) (2): twist = world_to_body(heading) @ pose'.
 
     `heading` [rad], shape (*batch,). Returns shape (*batch, 3, 3).
@@ -33,7 +35,7 @@ def world_to_body(heading: ArrayLike) -> NDArray[np.float64]:
     return np.swapaxes(body_to_world(heading), -1, -2)
 
 
-def unwrapped(angle: NDArray[np.float64], period: float = 2.0 * math.pi) -> NDArray[np.float64]:
+def unwrapped(angle: FloatArray, period: float = 2.0 * math.pi) -> FloatArray:
     """The angle without its jumps by a period, same unit. Shape (rows,); what is missing (NaN) stays missing."""
     known = np.isfinite(angle)
     smooth = angle.copy()

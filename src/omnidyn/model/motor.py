@@ -10,9 +10,10 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.value import PerWheel, Value, per_wheel_number
 from omnidyn.model.wheels import Wheels, per_wheel
 
@@ -65,14 +66,14 @@ class Motor(Value):
         return self
 
 
-def back_emf(motor: Motor, wheel_speed: ArrayLike) -> NDArray[np.float64]:
+def back_emf(motor: Motor, wheel_speed: ArrayLike) -> FloatArray:
     """Back-EMF K_v l w [V] of motors whose wheels turn at `wheel_speed` [rad/s], eq (11). Shape (*batch, wheels)."""
     speed = np.asarray(wheel_speed, dtype=float)
     count = speed.shape[-1]
     return per_wheel(motor.emf_constant, count) * per_wheel(motor.gear_ratio, count) * speed
 
 
-def settled_current(motor: Motor, voltage: ArrayLike, wheel_speed: ArrayLike) -> NDArray[np.float64]:
+def settled_current(motor: Motor, voltage: ArrayLike, wheel_speed: ArrayLike) -> FloatArray:
     """Current [A] of eq (11) with di/dt = 0: soft(u - K_v l w, V_d) / R, within the current limit of eq (12).
 
     soft takes the voltage drop V_d off towards 0. `voltage` [V] and `wheel_speed` [rad/s], shape (*batch, wheels).
@@ -90,19 +91,19 @@ def settled_current(motor: Motor, voltage: ArrayLike, wheel_speed: ArrayLike) ->
     return np.clip(current, -limit, limit)
 
 
-def wheel_torque(motor: Motor, current: ArrayLike) -> NDArray[np.float64]:
+def wheel_torque(motor: Motor, current: ArrayLike) -> FloatArray:
     """Torque l K_t i at the wheel [N m], eq (10). `current` [A], shape (*batch, wheels)."""
     current = np.asarray(current, dtype=float)
     count = current.shape[-1]
     return per_wheel(motor.gear_ratio, count) * per_wheel(motor.torque_constant, count) * current
 
 
-def traction(motor: Motor, wheels: Wheels, current: ArrayLike) -> NDArray[np.float64]:
+def traction(motor: Motor, wheels: Wheels, current: ArrayLike) -> FloatArray:
     """Traction force T / r [N] of wheels that do not slip, eq (10). `current` [A], shape (*batch, wheels)."""
     return wheel_torque(motor, current) / wheels.radii
 
 
-def no_load_speed(motor: Motor, voltage: ArrayLike) -> NDArray[np.float64]:
+def no_load_speed(motor: Motor, voltage: ArrayLike) -> FloatArray:
     """Wheel speed u / (K_v l) [rad/s] at which the back-EMF eats the whole voltage [V]. Shape (*batch, wheels)."""
     voltage = np.asarray(voltage, dtype=float)
     count = voltage.shape[-1]

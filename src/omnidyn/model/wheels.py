@@ -17,9 +17,10 @@ from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field, model_validator
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, to_list
 
 MIN_WHEELS, MAX_WHEELS = 3, 16
@@ -63,23 +64,23 @@ class Wheels(Value):
         return len(self.azimuth_deg)
 
     @property
-    def azimuth(self) -> NDArray[np.float64]:
+    def azimuth(self) -> FloatArray:
         """Wheel azimuths [rad]. Shape (wheels,)."""
         return np.radians(self.azimuth_deg)
 
     @property
-    def radii(self) -> NDArray[np.float64]:
+    def radii(self) -> FloatArray:
         """Wheel radius of each wheel [m]. Shape (wheels,)."""
         return per_wheel(self.wheel_radius, self.count)
 
     @property
-    def wrench_matrix(self) -> NDArray[np.float64]:
+    def wrench_matrix(self) -> FloatArray:
         """G of eqs (7)-(9): wrench = G @ traction. Shape (3, wheels), read-only. Exact zeros at multiples of 30 deg."""
         return _wrench_matrix(self)  # pyright: ignore[reportArgumentType]
 
 
 @lru_cache(maxsize=256)
-def _wrench_matrix(wheels: Wheels) -> NDArray[np.float64]:
+def _wrench_matrix(wheels: Wheels) -> FloatArray:
     sin, cos = sin_cos_deg(wheels.azimuth_deg)
     roller_sin, roller_cos = sin_cos_deg(per_wheel(wheels.roller_angle_deg, wheels.count))
     tan = roller_sin / roller_cos
@@ -88,7 +89,7 @@ def _wrench_matrix(wheels: Wheels) -> NDArray[np.float64]:
     return matrix
 
 
-def per_wheel(value: PerWheel, count: int) -> NDArray[np.float64]:
+def per_wheel(value: PerWheel, count: int) -> FloatArray:
     """`value` as an array with one entry per wheel. Shape (count,)."""
     return np.full(count, value, dtype=float)
 
@@ -99,7 +100,7 @@ def check_count(name: str, value: PerWheel | None, count: int) -> None:
         raise ValueError(f"{name} has {len(value)} values; expected 1, or one per wheel ({count})")
 
 
-def sin_cos_deg(angle: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def sin_cos_deg(angle: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Sine and cosine of an angle in degrees, exact where they are 0, 1/2 or 1. Shape (*batch,) each.
 
     A wheel that should not turn must not turn: sin(radians(180)) is 1.2e-16, here it is 0.
@@ -112,7 +113,7 @@ def sin_cos_deg(angle: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float
     return np.where(negative, -sin, sin) + 0.0, np.where(half > 90.0, -cos, cos) + 0.0
 
 
-def _quarter_sin_cos(angle: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _quarter_sin_cos(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sine and cosine of angles in [0, 90] degrees; folded, so that mirrored wheels get equal numbers."""
     sin, cos = np.sin(np.radians(angle)), np.cos(np.radians(angle))
     known = {0.0: (0.0, 1.0), 30.0: (0.5, SIN_60), 45.0: (SIN_45, SIN_45), 60.0: (SIN_60, 0.5), 90.0: (1.0, 0.0)}
@@ -121,7 +122,7 @@ def _quarter_sin_cos(angle: NDArray[np.float64]) -> tuple[NDArray[np.float64], N
     return sin, cos
 
 
-def rim_speed(wheels: Wheels, twist: ArrayLike) -> NDArray[np.float64]:
+def rim_speed(wheels: Wheels, twist: ArrayLike) -> FloatArray:
     """Speed of the wheel rims over the floor, G^T twist [m/s]; the rows of eq (3) times r.
 
     `twist` [m/s, m/s, rad/s], shape (*batch, 3). Returns shape (*batch, wheels).
@@ -129,7 +130,7 @@ def rim_speed(wheels: Wheels, twist: ArrayLike) -> NDArray[np.float64]:
     return _product(np.asarray(twist, dtype=float), wheels.wrench_matrix.T)
 
 
-def wheel_speed(wheels: Wheels, twist: ArrayLike) -> NDArray[np.float64]:
+def wheel_speed(wheels: Wheels, twist: ArrayLike) -> FloatArray:
     """Angular speed of the wheels, G^T twist / r [rad/s], eq (3) solved for the wheels.
 
     `twist` [m/s, m/s, rad/s], shape (*batch, 3). Returns shape (*batch, wheels).
@@ -137,7 +138,7 @@ def wheel_speed(wheels: Wheels, twist: ArrayLike) -> NDArray[np.float64]:
     return rim_speed(wheels, twist) / wheels.radii
 
 
-def twist_from_wheel_speed(wheels: Wheels, speed: ArrayLike) -> NDArray[np.float64]:
+def twist_from_wheel_speed(wheels: Wheels, speed: ArrayLike) -> FloatArray:
     """Twist of the robot from its wheel speeds, eq (3); least squares where there are more than three wheels.
 
     The printed row of v_n has the wrong sign for wheel 1; this is the pseudo-inverse of G^T instead.
@@ -147,7 +148,7 @@ def twist_from_wheel_speed(wheels: Wheels, speed: ArrayLike) -> NDArray[np.float
     return _product(np.asarray(speed, dtype=float) * wheels.radii, inverse)
 
 
-def wrench_from_traction(wheels: Wheels, traction: ArrayLike) -> NDArray[np.float64]:
+def wrench_from_traction(wheels: Wheels, traction: ArrayLike) -> FloatArray:
     """Wrench on the body, G f, eqs (7)-(9).
 
     `traction` [N], shape (*batch, wheels). Returns (F_x, F_y, T) [N, N, N m], shape (*batch, 3).
@@ -155,7 +156,7 @@ def wrench_from_traction(wheels: Wheels, traction: ArrayLike) -> NDArray[np.floa
     return _product(np.asarray(traction, dtype=float), wheels.wrench_matrix)
 
 
-def _product(vectors: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _product(vectors: FloatArray, matrix: FloatArray) -> FloatArray:
     """matrix @ vector for each vector of a batch, summed in a fixed order: equal inputs give equal zeros anywhere."""
     total = np.zeros((*vectors.shape[:-1], matrix.shape[0]))
     for column in range(matrix.shape[1]):

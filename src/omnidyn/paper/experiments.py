@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import breakaway_voltage
 from omnidyn.model.robot import Robot
 from omnidyn.paper.steady import measured_speed, pattern_of, settled_speed
@@ -14,8 +14,6 @@ from omnidyn.paper.tables import AXES, DEAD_ZONE_TEXT, TABLE_1, TABLE_4, Three
 from omnidyn.run import Run
 from omnidyn.simulation.programs import ramp, steps
 from omnidyn.simulation.simulate import simulate
-
-FloatArray = NDArray[np.float64]
 
 STEP_SECONDS, DT = 1.5, 1e-3  # ten time constants of the paper's robot
 RAMP_SECONDS, RAMP_PEAK = 10.0, 1.5  # the ramp ends at RAMP_PEAK times the printed dead zone

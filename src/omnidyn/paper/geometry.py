@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.frames import body_to_world, world_to_body
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
@@ -12,8 +12,6 @@ from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wheel_speed,
 from omnidyn.paper.claim import ROUNDING, Claim, judge, listed, plain, tiny
 from omnidyn.paper.steady import printed_speed, printed_voltage
 from omnidyn.paper.tables import AXES, EQ_3, NOISE_SENTENCE
-
-FloatArray = NDArray[np.float64]
 
 TWIST = np.array([0.4, 0.7, 2.0])  # any twist and traction will do: the balance of power is an identity
 TRACTION = np.array([1.0, -2.0, 3.0])

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench, mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.paper.claim import ROUNDING, Claim, judge, listed, plain, tiny
 from omnidyn.paper.steady import settled_twist
 from omnidyn.paper.tables import EQ_13_POWER_OF_GEAR, EQ_13_SYMBOLS_OF_A33, INERTIA_SENTENCE
-
-FloatArray = NDArray[np.float64]
 
 DIAGONAL_RUN = (1.5, 5.5, -2.5)  # [V] drives forward and turns
 TURNING = (1.0, 0.0, 5.0)  # [m/s, m/s, rad/s]

@@ -13,16 +13,14 @@ from functools import cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from omnidyn.paper.claim import SPEED_TOLERANCE, listed
 from omnidyn.paper.steady import printed_speed, printed_voltage, rms, settled_twist
 from omnidyn.paper.tables import AXES
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -156,7 +154,7 @@ def reconcile(robot: Robot, freed: tuple[str, ...], axes: tuple[str, ...] = AXES
     return _result(freed, axes, found, _changed_speeds(robot, changes, found), at_bound)
 
 
-def _on_bounds(values: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _on_bounds(values: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Fitted values, put exactly on a bound they all but reach, and which did."""
     near = NEAR * np.where(np.isfinite(high), high - low, 1.0)
     values = np.where(values - low < near, low, np.where(high - values < near, high, values))
@@ -195,7 +193,7 @@ def _result(
     axes: tuple[str, ...],
     values: FloatArray,
     speeds: FloatArray,
-    at_bound: NDArray[np.bool_] | tuple[bool, ...] = (),
+    at_bound: BoolArray | tuple[bool, ...] = (),
 ) -> Reconciliation:
     off = speeds - SPEED
     return Reconciliation(

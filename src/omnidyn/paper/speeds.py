@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import breakaway_voltage, moves
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.keys import Key
@@ -28,8 +28,6 @@ from omnidyn.paper.tables import (
     SPEED_UNIT,
     TABLE_3,
 )
-
-FloatArray = NDArray[np.float64]
 
 
 def speed_claims(robot: Robot) -> tuple[Claim, ...]:

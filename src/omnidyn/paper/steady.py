@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import moves
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.paper.tables import AXES, TABLE_1, TABLE_4, Three
-
-FloatArray = NDArray[np.float64]
 
 
 def settled_twist(robot: Robot, voltage: ArrayLike) -> FloatArray:

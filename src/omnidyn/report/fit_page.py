@@ -2,58 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from omnidyn.findings.finding import Verdict
-from omnidyn.identification.advice import (
-    DIFFERENCE_HEAD,
-    NUMBER_HEAD,
-    VERDICT_HEAD,
-    advice,
-    difference_rows,
-    number_rows,
-    verdict_advice,
-    verdict_rows,
-)
+from omnidyn.document import Points
+from omnidyn.identification.fit_document import difference_table, number_table, verdict_table
+from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import Validation, output_name
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.residuals import draw_residuals
-from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, table
+from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, section
 from omnidyn.report.style import Picture
 
 Fits = Mapping[str, OutputErrorEstimate]
 
 
-def render_fit(
-    fits: Fits, validations: Mapping[str, Validation], verdicts: Sequence[Verdict], provenance: Mapping[str, Any],
-    differences: Sequence[Difference] = (),
-) -> str:  # fmt: skip
-    """The page of a fit, as HTML. fits, validations: by group; one group is the whole."""
-    first = next(iter(fits.values()))
+def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
+    """The page of an identification by output error, as HTML."""
+    fits, validations = found.fits, found.validations or {}
+    first = found.estimate
     robot = first.robot.name
     introduction = (
         f"Numbers of {robot} for which the model, run freely under the logged inputs, comes nearest to all that was "
         f"measured: {first.method}. Data: {'; '.join(f.data for f in fits.values())}."
     )
-    sections = [Section("findings", "What the data say", bullets(_findings(fits, validations)))]
-    sections.append(Section("numbers", "Numbers, with 95 % intervals", _each(fits, _numbers)))
-    if differences:
-        sections.append(
-            Section("differences", "Between the groups", table(DIFFERENCE_HEAD, difference_rows(differences)))
-        )
-    sections += [
-        Section("data", "The logs, and what check says of them", _verdicts(verdicts)),
+    between = [section("differences", "Between the groups", difference_table(found.differences))]
+    unchecked = paragraph("The logs are too long to be checked on the way: see omnidyn check.")
+    checked = content(verdict_table(found.verdicts)) if found.verdicts else unchecked
+    doubts, advice = list(dict.fromkeys(_doubts(fits, validations))), list(dict.fromkeys(found.advice))
+    residuals = "".join(_residuals(g, fits[g], v) for g, v in validations.items())
+    numbers = _each(fits, lambda group, fit: content(number_table(fit)))
+    sections = [
+        section("findings", "What the data say", Points(_findings(fits, validations))),
+        Section("numbers", "Numbers, with 95 % intervals", numbers),
+        *(between if found.differences else []),
+        Section("data", "The logs, and what check says of them", checked),
         Section("runs", "Measured and model", _each(validations, _runs)),
-        Section(
-            "residuals", "What the model leaves", "".join(_residuals(g, fits[g], v) for g, v in validations.items())
-        ),
+        Section("residuals", "What the model leaves", residuals),
         Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
-        Section("doubts", "Doubts", _doubts(fits, validations)),
-        Section("next", "What to measure next", _next(fits, validations, verdicts)),
+        section("doubts", "Doubts", Points(doubts), none="None."),
+        section("next", "What to measure next", Points(advice), none="Nothing: every number is well determined."),
     ]
     return page(f"{robot}: identified from whole logs", introduction, sections, provenance)
 
@@ -65,7 +55,7 @@ def _named(group: str, words: str, fits: Mapping[str, Any]) -> str:
 def _findings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
     found = []
     for group, fit in fits.items():
-        for name, value, _, interval, unit, mark in number_rows(fit):
+        for name, value, _, interval, unit, mark in number_table(fit).rows:
             text = f"{name} = {value} {unit}, 95 % {interval}".replace("  ", " ")
             found.append(_named(group, f"{text}{f' ({mark})' if mark else ''}", fits))
     for group, each in validations.items():
@@ -73,20 +63,10 @@ def _findings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
     return found
 
 
-def _each(parts: Mapping[str, Any], content) -> str:
+def _each(parts: Mapping[str, Any], content: Callable[[str, Any], str]) -> str:
     if len(parts) == 1:
         return "".join(content("", each) for each in parts.values())
     return "".join(paragraph(f"{group}:") + content(group, each) for group, each in parts.items())
-
-
-def _numbers(group: str, fit: OutputErrorEstimate) -> str:
-    return table(NUMBER_HEAD, number_rows(fit))
-
-
-def _verdicts(verdicts: Sequence[Verdict]) -> str:
-    if not verdicts:
-        return paragraph("The logs are too long to be checked on the way: see omnidyn check.")
-    return table(VERDICT_HEAD, verdict_rows(verdicts))
 
 
 def _runs(group: str, validation: Validation) -> str:
@@ -126,16 +106,9 @@ def _correlations(fits: Fits) -> list[str]:
     return found
 
 
-def _doubts(fits: Fits, validations: Mapping[str, Validation]) -> str:
+def _doubts(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
     words = [_named(group, each, fits) for group, fit in fits.items() for each in fit.warnings]
     for each in validations.values():
         for comparison in (each.fitted, each.held_out):
             words += comparison.warnings if comparison is not None else ()
-    return bullets(list(dict.fromkeys(words))) or paragraph("None.")
-
-
-def _next(fits: Fits, validations: Mapping[str, Validation], verdicts: Sequence[Verdict]) -> str:
-    words = verdict_advice(verdicts)
-    for group, fit in fits.items():
-        words += [_named(group, each, fits) for each in advice(fit, validations.get(group))]
-    return bullets(list(dict.fromkeys(words))) or paragraph("Nothing: every number is well determined.")
+    return words

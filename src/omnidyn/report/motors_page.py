@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from omnidyn.identification.motors.estimate import HEAD
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.report.figures.motor_lines import draw_motor_lines
-from omnidyn.report.html import Section, bullets, figure, page, paragraph, table
+from omnidyn.report.html import page, section
 
 WINDOWS = (
     "What each motor needs to turn: slope, dead band and inertia, from windows in integral form: the integral of the "
@@ -23,11 +22,12 @@ FREE_RUNS = (
 
 def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     """The page of the motors, as HTML."""
+    told = study.document()
+    pictures = [] if study.windows is None else [draw_motor_lines(study.motors, study.windows)]
     sections = [
-        Section("findings", "What the data say", bullets(study.statements)),
-        Section("numbers", "Numbers, with 95 % intervals", table(HEAD, study.rows())),
+        section("findings", "What the data say", told["statements"]),
+        section("numbers", "Numbers, with 95 % intervals", told["motors"]),
+        *([section("figures", "Figures", *pictures)] if pictures else []),
+        section("doubts", "Doubts", told["doubts"], none="None."),
     ]
-    if study.windows is not None:
-        sections.append(Section("figures", "Figures", figure(draw_motor_lines(study.motors, study.windows))))
-    sections.append(Section("doubts", "Doubts", bullets(study.doubts) or paragraph("None.")))
     return page("Motors from logs", WINDOWS if study.windows is not None else FREE_RUNS, sections, provenance)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.actuation import clip_voltage, voltage_of_duty
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
 
-FloatArray = NDArray[np.float64]
 MIN_DT, MAX_DT = 1e-9, 3600.0
 
 
@@ -27,7 +27,7 @@ class Commands:
 
     dt: FloatArray
     voltage: FloatArray | None
-    open_circuit: NDArray[np.bool_] | None = None
+    open_circuit: BoolArray | None = None
     set_point: FloatArray | None = None
     duty: FloatArray | None = None
     twist: FloatArray | None = None
@@ -91,7 +91,7 @@ def _from_duty(robot: Robot, rows: FloatArray, steps: FloatArray, supply: ArrayL
     return Commands(steps, held, open_circuit=coasts, duty=duty, supply=battery, warnings=warnings)
 
 
-def on_ticks(robot: Robot, given: Commands) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.intp]]:
+def on_ticks(robot: Robot, given: Commands) -> tuple[FloatArray, FloatArray, BoolArray, NDArray[np.intp]]:
     """A speed loop's own time grid: rows cut at the ticks of the loop.
 
     Returns (dt, set point, whether the loop runs at the start of the row, index where each original row begins, and

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
 
 
 def steps(levels: ArrayLike, duration: float, dt: float) -> FloatArray:
@@ -27,27 +25,6 @@ def prbs(amplitude: ArrayLike, clock: float, duration: float, dt: float, seed: i
     n, hold = _count(duration, dt), _count(clock, dt)
     signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(-(-n // hold), len(amplitude)))
     return np.repeat(signs * amplitude, hold, axis=0)[:n]
-
-
-def chirp(amplitude: ArrayLike, start: float, end: float, duration: float, dt: float) -> FloatArray:
-    """Sine of `amplitude` [V], shape (wheels,), whose frequency rises evenly from `start` to `end` [Hz].
-
-    The wheels are spread over one turn of phase, so that all three axes move.
-    """
-    amplitude = np.atleast_1d(np.asarray(amplitude, dtype=float))
-    t = np.arange(_count(duration, dt))[:, None] * dt
-    cycles = start * t + (end - start) * t**2 / (2.0 * duration)
-    return amplitude * np.sin(2.0 * np.pi * (cycles + np.arange(len(amplitude)) / len(amplitude)))
-
-
-def from_run(run: Run) -> tuple[FloatArray, FloatArray]:
-    """(voltage, dt) of a Run, to simulate what was applied: n rows from n + 1 samples.
-
-    Raises InputError when no voltage was recorded.
-    """
-    if run.voltage is None:
-        raise InputError("the run has no voltage", got=", ".join(run.channels) or "no channels", expected="voltage")
-    return run.voltage[:-1], np.diff(run.t)
 
 
 def _count(duration: float, dt: float) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.layout import LENGTH, N_AXES
@@ -20,7 +21,6 @@ from omnidyn.simulation.exact.march import simulate_exact, why_not_exact
 from omnidyn.simulation.implicit.march import Outcome, capped, run_implicit
 from omnidyn.simulation.speed_loop import loop_of, no_loop
 
-FloatArray = NDArray[np.float64]
 TOLERANCE = 1e-6
 
 

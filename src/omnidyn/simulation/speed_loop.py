@@ -11,15 +11,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import GX, GY, GZ, N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.release import SIGNS
 from omnidyn.simulation.commands import loop_gains
-
-FloatArray = NDArray[np.float64]
 
 
 class Loop(NamedTuple):
@@ -30,7 +28,7 @@ class Loop(NamedTuple):
     limit: FloatArray  # (n,) [V]
     radius: FloatArray  # (n,) [m]
     command: FloatArray  # (rows, n) [rad/s], or (0, n)
-    tick: NDArray[np.bool_]  # (rows,) whether the loop runs at the start of the row; else its voltage stays
+    tick: BoolArray  # (rows,) whether the loop runs at the start of the row; else its voltage stays
     period: float  # [s]
     sum: FloatArray  # (n,) integral so far [V]
 
@@ -41,7 +39,7 @@ def no_loop(wheels: int) -> Loop:
     return Loop(zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy())
 
 
-def loop_of(robot: Robot, set_point: FloatArray, tick: NDArray[np.bool_]) -> Loop:
+def loop_of(robot: Robot, set_point: FloatArray, tick: BoolArray) -> Loop:
     """The loop of a robot at rest. set_point [rad/s], shape (rows, n), and tick, shape (rows,): see `on_ticks`."""
     return Loop(*loop_gains(robot), set_point, tick, 1.0 / (robot.drive.rate or np.inf), np.zeros(robot.wheels.count))
 

@@ -58,7 +58,8 @@ def tied():
 @pytest.mark.parametrize("method", ["steady-state", "output-error"])
 def test_the_numbers_come_back(method):
     """Within four standard errors, and what steps of 0.5 ms are off by."""
-    numbers = motors_into_robot(identify_motors([log()], method=method, between="hold", latency=False), tied())
+    how = {"between": "hold", "nuisances": "none"} if method == "output-error" else {}
+    numbers = motors_into_robot(identify_motors([log()], method=method, **how), tied())
     for m, (constant, coulomb) in enumerate(TRUE):
         for key, true in ((EMF, constant), (TORQUE, constant), (COULOMB, coulomb)):
             own = f"{key}[{m}]"
@@ -118,7 +119,7 @@ def test_a_current_gives_friction_alone():
     """From steady windows, by the torque constant of the file."""
     robot = tied().replace(motor=tied().motor.replace(torque_constant=0.05))
     run = log("current", motors=((0.05, 3.0),) * 3, viscous=10.0, noise=0.0, hold=100)
-    numbers = motors_into_robot(identify_motors([run], kind="current", share=(0.5, 1.0)), robot)
+    numbers = motors_into_robot(identify_motors([run], input="current", window=(0.5, 1.0)), robot)
     for m in range(3):
         assert numbers.value[f"{COULOMB}[{m}]"] == pytest.approx(3.0, rel=0.05)
         assert numbers.value[f"{VISCOUS}[{m}]"] == pytest.approx(10.0, rel=0.15)

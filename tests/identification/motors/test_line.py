@@ -148,9 +148,13 @@ def test_the_same_data_give_the_same_intervals():
 @pytest.mark.parametrize(
     "how, words",
     [
-        ({"kind": "luck"}, r"no such input; got luck; expected voltage, duty, current"),
-        ({"kind": "current"}, r"input is not in the log; got voltage, wheel_angle.*expected current"),
-        ({"speed": "light"}, r"no such speed; got light; expected wheel or ground"),
+        ({"input": "luck"}, r"no such input; got luck; expected voltage, duty, current"),
+        ({"input": "current"}, r"input is not in the log; got voltage, wheel_angle.*expected current"),
+        ({"speed": "light"}, r"no such speed; got light; expected wheel, set or ground"),
+        ({"speed": "set"}, r"no such speed; got set; expected wheel or ground"),
+        ({"shape": "disc"}, r"not an option of the motors; got `shape`"),
+        ({"between": "hold", "method": "steady-state"}, r"steady-state has no such option; got `between`"),
+        ({"nuisances": "gain", "between": "hold"}, r"of the motors only latency can be fitted; got gain"),
         ({"speed": "ground"}, r"the heading is not known"),
     ],
 )
@@ -161,6 +165,6 @@ def test_wrong_options_are_refused(how, words):
 
 def test_too_few_windows_are_refused():
     run = bench(0.4)
-    short = Run(t=run.t[:30], voltage=run.voltage[:30] + 2.0, wheel_angle=run.t[:30, None] * 4.0)
+    short = Run(t=run.t[:60], voltage=run.voltage[:60] + 2.0, wheel_angle=run.t[:60, None] * 4.0)
     with pytest.raises(InsufficientDataError, match=r"too few windows for a line with intervals.*6 or more"):
-        identify_motors([short], length=0.1)
+        identify_motors([short])

@@ -6,11 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.identification.steady.points import points_from_currents, points_from_run, points_from_voltage
+from omnidyn.identification.steady.points import points_from_currents, points_from_voltage
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents
 from omnidyn.model.robot_file import load_robot
-from omnidyn.run import Run
 
 ROBOT = load_robot("axebot")
 TURNING = ROBOT.replace(body=ROBOT.body.replace(rotating_frame=True))
@@ -145,22 +144,6 @@ def test_a_lossy_gear_is_refused():
     lossy = ROBOT.replace(motor=ROBOT.motor.replace(gear_efficiency=0.9))
     with pytest.raises(UnsupportedError, match=r"no such loss yet; got gear_efficiency below 1"):
         points_from_currents(lossy, [[1, 0, 0]], [[0, 1, -1]])
-
-
-def test_points_from_a_run():
-    voltage = steady_voltage(ROBOT, TWIST)
-    run = Run(
-        t=np.arange(9.0), twist=TWIST, voltage=voltage, current=settled_currents(ROBOT, TWIST, voltage), source="r.csv"
-    )
-    for origin in ("current", "voltage"):
-        points = points_from_run(ROBOT, run, force_from=origin)
-        assert points.force_from == origin
-        assert points.source == "r.csv"
-        check(fit_steady_state(ROBOT, points))
-    with pytest.raises(InputError, match=r"r\.csv: the run lacks a channel; got voltage, twist; expected current"):
-        points_from_run(ROBOT, run.replace(current=None))
-    with pytest.raises(InputError, match="unknown origin of the force; got twist; expected current or voltage"):
-        points_from_run(ROBOT, run, force_from="twist")
 
 
 @pytest.mark.parametrize(

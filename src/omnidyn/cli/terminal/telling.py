@@ -16,7 +16,7 @@ def as_json(document: Document, record: dict[str, Any], **written: Any) -> dict[
 def tell(document: Document, json: bool, record: dict[str, Any], *, width: int = WIDTH, **written: Any) -> None:
     """The result, to stdout. What a reader of the JSON alone must know is said on stderr too."""
     if json:
-        for warning in document.warnings:
+        for warning in dict.fromkeys(document.warnings):
             say(f"omnidyn: warning: {warning}")
         show_json(as_json(document, record, **written))
     else:

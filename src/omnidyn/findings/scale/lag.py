@@ -6,15 +6,13 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import electric_speed, emf, ground, ohmic, volts, wheels_twist
 from omnidyn.findings.signal.robust import Slope, central_rate, clusters, ratio, smooth, windowed
 from omnidyn.model.frames import unwrapped
-
-FloatArray = NDArray[np.float64]
 
 FARTHEST = 8  # rows that are searched to either side
 WARN_FROM, NOTE_FROM = 0.75, 0.35  # rows

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, WARN, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import BEYOND, beyond_stall, emf, stall_current, volts
@@ -14,8 +14,6 @@ from omnidyn.findings.signal.robust import central_rate, slope, smooth, windowed
 from omnidyn.logs.channels import components
 from omnidyn.model.frames import unwrapped
 from omnidyn.units import DEGREE, TURN
-
-FloatArray = NDArray[np.float64]
 
 UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file is not exact either
 

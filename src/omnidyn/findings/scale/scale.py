@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.scale.mistakes import (
     TURN_UNITS,
@@ -22,8 +22,6 @@ from omnidyn.findings.signal.reference import Ground, electric_speed, expected_w
 from omnidyn.findings.signal.robust import Slope, quantum, slope, smooth
 from omnidyn.logs.channels import components
 from omnidyn.units import TURN
-
-FloatArray = NDArray[np.float64]
 
 LEAST = 0.02  # a scale that is off by less is not worth a word
 NOTHING = 0.003  # of the motion: no unit mistake makes as little of it

@@ -16,16 +16,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.findings.finding import Span, spans_of
 from omnidyn.findings.signal.robust import clusters, quantum, white_noise
 from omnidyn.logs.channels import components
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL
-
-FloatArray = NDArray[np.float64]
 
 INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
 SENSORS = ("current", "wheel_speed", "twist")
@@ -43,7 +41,7 @@ class LogUnderCheck:
 
     log: Log
     robot: Robot | None
-    rows: NDArray[np.int64]
+    rows: IntArray
     t: FloatArray
     step: float
     segments: tuple[slice, ...]
@@ -85,11 +83,11 @@ class LogUnderCheck:
         table = values.reshape(len(values), -1)
         return [(name, table[:, k]) for k, name in enumerate(names) if np.isfinite(table[:, k]).any()]
 
-    def lines(self, bad: NDArray[np.bool_]) -> tuple[Span, ...]:
+    def lines(self, bad: BoolArray) -> tuple[Span, ...]:
         """Lines of the file where `bad`, shape (rows kept,), holds."""
         return spans_of(bad, self.log.lines[self.rows])
 
-    def windows(self, seconds: float = 0.2) -> tuple[NDArray[np.int64], int]:
+    def windows(self, seconds: float = 0.2) -> tuple[IntArray, int]:
         """(window of each row, number of windows)."""
         return clusters(len(self), self.step, seconds)
 
@@ -98,7 +96,7 @@ class LogUnderCheck:
         return max(3, round(seconds / self.step) | 1) if self.step > 0.0 else 3
 
     @property
-    def everywhere(self) -> NDArray[np.bool_]:
+    def everywhere(self) -> BoolArray:
         """True in every row."""
         return np.ones(len(self), dtype=bool)
 
@@ -118,7 +116,7 @@ class LogUnderCheck:
         """The log with more facts known."""
         return replace(self, known={**self.known, **facts})
 
-    def masked(self, channel: str, column: int, bad: NDArray[np.bool_]) -> LogUnderCheck:
+    def masked(self, channel: str, column: int, bad: BoolArray) -> LogUnderCheck:
         """The log without the values of one component where `bad` holds."""
         if not bad.any():
             return self

@@ -6,13 +6,11 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import ground
-
-FloatArray = NDArray[np.float64]
 
 FOLDS = 10  # of the log; each is predicted by what the others taught
 MEMORY = (0.05, 0.15, 0.5)  # [s] over which a robot forgets what its motors were given
@@ -42,7 +40,7 @@ class WheelPredictor:
         parts += [] if seen is None else [seen.twist]
         return np.hstack(parts)
 
-    def wheel_speed(self, k: int, without: NDArray[np.bool_]) -> FloatArray:
+    def wheel_speed(self, k: int, without: BoolArray) -> FloatArray:
         """Speed of wheel k by the other columns, shape (rows,); NaN where they do not tell.
 
         Nothing is taken from the rows `without`.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.robust import central_rate, smooth
 from omnidyn.model.actuation import asked_voltage
@@ -15,7 +15,6 @@ from omnidyn.model.motor import back_emf, no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed, wheel_speed
 
-FloatArray = NDArray[np.float64]
 MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # sources that say what a wheel did
 BEYOND = 20.0
 POSE_WINDOW = 0.12  # [s] over which a speed is taken from a pose

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.statistics import robust_std
 
-FloatArray = NDArray[np.float64]
 SAMPLE = 40_000  # rows that are enough to learn a noise or a quantum from
 
 
@@ -72,14 +72,14 @@ def quantum(values: FloatArray) -> float:
     return step if off.min() < 0.1 else 0.0
 
 
-def clusters(n: int, step: float, seconds: float = 0.2) -> tuple[NDArray[np.int64], int]:
+def clusters(n: int, step: float, seconds: float = 0.2) -> tuple[IntArray, int]:
     """(window of each row, number of windows): at least 8 rows and `seconds` long, at most 400, for honest errors."""
     length = max(8, round(seconds / step) if step > 0.0 else 8, -(-n // 400))
     ids = np.arange(n) // length
     return ids, int(ids[-1]) + 1 if n else 0
 
 
-def windowed(ids: NDArray[np.int64], count: int, values: NDArray) -> FloatArray:
+def windowed(ids: IntArray, count: int, values: NDArray) -> FloatArray:
     """Sum of `values` over each window; missing values count 0. `ids` as from `clusters`: windows in order."""
     starts = np.searchsorted(ids, np.arange(count))
     values = np.nan_to_num(values) if values.dtype.kind == "f" else values.astype(float)
@@ -88,7 +88,7 @@ def windowed(ids: NDArray[np.int64], count: int, values: NDArray) -> FloatArray:
     return np.where(np.diff(full) > 0, sums, 0.0)
 
 
-def slope(y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int) -> Slope:
+def slope(y: FloatArray, x: FloatArray, ids: IntArray, count: int) -> Slope:
     """y = a x where both are noisy, from means over windows.
 
     In each window the mean of every second row of x is the instrument for the mean of the others: white noise of x
@@ -98,7 +98,7 @@ def slope(y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int) -> S
     return ratio(*products(y, x, ids, count))
 
 
-def products(y: FloatArray, x: FloatArray, ids: NDArray[np.int64], count: int) -> tuple[FloatArray, FloatArray]:
+def products(y: FloatArray, x: FloatArray, ids: IntArray, count: int) -> tuple[FloatArray, FloatArray]:
     """(sum of y x, sum of x x without the square of its noise) of each window. Shapes (count,)."""
     y, x = y.reshape(len(y), -1), x.reshape(len(x), -1)
     odd = (np.arange(len(x)) & 1).astype(bool)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.logs.channels import place
 from omnidyn.logs.column import MOTOR_SIDE
 from omnidyn.logs.log import MAX_MISSING
-
-FloatArray = NDArray[np.float64]
 
 CODES = frozenset((999, 9999, 99999, 999999, 32767, 32768, 65535, 2147483647, 2147483648, 4294967295))
 FAR = 3.0  # times all other values: what stands for no value lies so far out

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, sample, spread
 from omnidyn.logs.channels import place
 from omnidyn.logs.log import ON_CHANGE
 from omnidyn.statistics import robust_std
-
-FloatArray = NDArray[np.float64]
 
 MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
 SPIKE = 10.0  # a single value so many times the noise away from both its neighbours
@@ -43,7 +41,7 @@ def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return found, work
 
 
-def _changed(work: LogUnderCheck) -> NDArray[np.int64]:
+def _changed(work: LogUnderCheck) -> IntArray:
     """How often a command has changed up to each row."""
     changed = np.zeros(len(work), dtype=bool)
     for channel in INPUTS:
@@ -53,7 +51,7 @@ def _changed(work: LogUnderCheck) -> NDArray[np.int64]:
     return np.cumsum(changed)
 
 
-def _kicked(changed: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _kicked(changed: IntArray) -> BoolArray:
     """Rows just after a change of a command, where a kick is no error; none where commands change all the time."""
     near = np.diff(changed, prepend=changed[:1]) > 0
     if near.mean() > 0.2:
@@ -64,7 +62,7 @@ def _kicked(changed: NDArray[np.int64]) -> NDArray[np.bool_]:
     return near
 
 
-def _isolated(values: FloatArray) -> NDArray[np.bool_]:
+def _isolated(values: FloatArray) -> BoolArray:
     n = len(values)
     bad = np.zeros(n, dtype=bool)
     if n < MIN_ROWS:
@@ -84,7 +82,7 @@ def _isolated(values: FloatArray) -> NDArray[np.bool_]:
     return bad
 
 
-def recorded(work: LogUnderCheck, channel: str, k: int) -> NDArray[np.int64]:
+def recorded(work: LogUnderCheck, channel: str, k: int) -> IntArray:
     """Rows in which a component was recorded; those between are no measurements where it is recorded on change."""
     logged = work.log.channels.get(channel)
     if logged is None:

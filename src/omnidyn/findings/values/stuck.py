@@ -7,9 +7,9 @@ from collections.abc import Callable
 from functools import cached_property, lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.predicted_wheel import WheelPredictor
@@ -17,8 +17,6 @@ from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.findings.signal.robust import quantum, smooth
 from omnidyn.logs.channels import place
 from omnidyn.statistics import robust_std, stretches
-
-FloatArray = NDArray[np.float64]
 
 LONG = 5  # rows
 FOLLOWS = 0.5  # [s] after which a wheel follows its command
@@ -63,12 +61,12 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return found, work
 
 
-def _repeats(values: FloatArray) -> NDArray[np.int64]:
+def _repeats(values: FloatArray) -> IntArray:
     """(start, end) of each stretch of rows with one value. Shape (stretches, 2)."""
     return stretches(np.diff(values) == 0.0) + np.array([0, 1])
 
 
-def _longest(values: FloatArray, repeats: NDArray[np.int64]) -> int:
+def _longest(values: FloatArray, repeats: IntArray) -> int:
     """Rows in the longest repeat of a value that is not 0."""
     return int(np.diff(repeats, axis=1)[values[repeats[:, 0]] != 0.0].max(initial=0))
 
@@ -76,12 +74,12 @@ def _longest(values: FloatArray, repeats: NDArray[np.int64]) -> int:
 class _Judge:
     """Which of the repeats of one channel are too long for chance, or go on while something else changes."""
 
-    predict: Callable[[NDArray[np.bool_]], FloatArray] | None = None  # the channel by all others
+    predict: Callable[[BoolArray], FloatArray] | None = None  # the channel by all others
     expected: _Away | None = None
     steady: Callable[[int, int], bool] | None = None  # whether nothing in the log changes, commands least of all
     measured = False  # expected is what the wheel did; a command it follows later, or, at rest, not at all
 
-    def __init__(self, work: LogUnderCheck, values: FloatArray, repeats: NDArray[np.int64]) -> None:
+    def __init__(self, work: LogUnderCheck, values: FloatArray, repeats: IntArray) -> None:
         self.values, self.repeats, self.slow = values, repeats, max(10, round(FOLLOWS / work.step))
         self.lengths = repeats[:, 1] - repeats[:, 0]
         self.long = self.lengths >= LONG
@@ -93,7 +91,7 @@ class _Judge:
         return None if self.predict is None else _Walk(self.values, self.predict(self.repeated), self.repeated)
 
     @cached_property
-    def repeated(self) -> NDArray[np.bool_]:
+    def repeated(self) -> BoolArray:
         """Rows in repeats that are asked about: nothing is taken from them."""
         edges = np.zeros(len(self.values) + 1, dtype=np.int64)
         asked = self.repeats[self.lengths >= max(LONG, self.slow // 2)]
@@ -101,7 +99,7 @@ class _Judge:
         np.add.at(edges, asked[:, 1], -1)
         return np.cumsum(edges[:-1]) > 0
 
-    def frozen(self) -> NDArray[np.bool_]:
+    def frozen(self) -> BoolArray:
         """Rows that stick."""
         bad = np.zeros(len(self.values), dtype=bool)
         if not self.long.any():
@@ -181,16 +179,16 @@ class _Steady:
 class _Walk:
     """How far a reference walks away during repeats, beside all other stretches of that length in the log."""
 
-    def __init__(self, values: FloatArray, reference: FloatArray, repeated: NDArray[np.bool_]) -> None:
+    def __init__(self, values: FloatArray, reference: FloatArray, repeated: BoolArray) -> None:
         off = values - reference
         self.good = np.isfinite(off)
         self.sums = np.concatenate([[0.0], np.cumsum(np.where(self.good, off, 0.0))])
         self.gaps = np.concatenate([[0], np.cumsum(~self.good)])
         self.holes = self.gaps + np.concatenate([[0], np.cumsum(repeated)])
         self.step, self.top = quantum(values), float(np.nanmax(np.abs(values)))
-        self.known: dict[int, tuple[float, NDArray[np.int64], FloatArray, FloatArray]] = {}
+        self.known: dict[int, tuple[float, IntArray, FloatArray, FloatArray]] = {}
 
-    def _range(self, starts: NDArray[np.int64], length: int) -> FloatArray:
+    def _range(self, starts: IntArray, length: int) -> FloatArray:
         """Range of the means over parts of each stretch."""
         edges = starts[:, None] + np.round(np.linspace(0, length, PARTS + 1)).astype(np.int64)
         means = np.diff(self.sums[edges], axis=1) / np.diff(edges, axis=1)
@@ -213,7 +211,7 @@ class _Walk:
             return math.inf
         return max(float(before[first - 1]) if first else 0.0, float(behind[last]) if last < len(starts) else 0.0)
 
-    def _others(self, length: int) -> tuple[float, NDArray[np.int64], FloatArray, FloatArray]:
+    def _others(self, length: int) -> tuple[float, IntArray, FloatArray, FloatArray]:
         """(largest range without repeats, starts of all stretches, largest range up to each and from each)."""
         step = max(1, length // 8)
         starts = np.arange(0, len(self.good) - length + 1, step)
@@ -258,7 +256,7 @@ class _Away:
         return bool(others.size) and bool(high - low > 6.0 * float(np.quantile(others, 0.95)) / 1.6)
 
 
-def _chance_of_a_repeat(lengths: NDArray[np.int64]) -> tuple[float, float]:
+def _chance_of_a_repeat(lengths: IntArray) -> tuple[float, float]:
     """(chance that a value is repeated once more, length of the fourth longest stretch), the longest left out.
 
     Repeats after repeats tell how the noise compares with the step of the sensor, the less the fewer there are: the

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
@@ -17,8 +17,6 @@ from omnidyn.logs.column import MOTOR_SIDE
 from omnidyn.logs.log import MAX_MISSING
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.units import known_unit
-
-FloatArray = NDArray[np.float64]
 
 SAME = 0.03  # a scale so near 1 is 1, within what noise makes of it
 
@@ -224,7 +222,7 @@ def _moves(values: FloatArray) -> bool:
     return spread_of_motion(values) > 5.0 * noise and float(np.nanstd(values)) > 0.0
 
 
-def _told(work: LogUnderCheck, source: str) -> NDArray[np.int64]:
+def _told(work: LogUnderCheck, source: str) -> IntArray:
     """Rows in which what tells the speed of a wheel was recorded."""
     if source not in MEASUREMENTS:
         return np.arange(len(work))

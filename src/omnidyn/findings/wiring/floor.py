@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
@@ -16,8 +16,6 @@ from omnidyn.findings.wiring.orders import BETTER, WINDOWS, Answer, Wiring, choo
 from omnidyn.logs.channels import components
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
-
-FloatArray = NDArray[np.float64]
 
 Moments = tuple[FloatArray, FloatArray, FloatArray]  # sums of v v', v w', w w'
 

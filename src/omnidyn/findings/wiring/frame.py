@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import pose_twist, wheels_twist
 from omnidyn.findings.wiring.orders import means
 from omnidyn.model.wheels import wheel_speed
-
-FloatArray = NDArray[np.float64]
 
 
 def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnderCheck]:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import emf, ohmic, volts
 from omnidyn.findings.wiring.orders import Answer, Wiring, choose, code_of, means, rivals_of, wirings
 from omnidyn.logs.channels import components
-
-FloatArray = NDArray[np.float64]
 
 HOLDS = 0.25  # of the voltage: where more is left of it under every wiring, a scale is wrong, and no wiring is told
 EXACT = 0.004  # of the voltage: what less is left of it is the noise of an exact relation

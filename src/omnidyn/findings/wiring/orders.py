@@ -7,12 +7,10 @@ from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.robust import windowed
-
-FloatArray = NDArray[np.float64]
 
 BETTER = 0.35  # the right wiring leaves at most so much of what the logged one leaves
 POOR = 0.02  # a wiring that leaves less than this share of the motion unexplained is not doubted

@@ -8,17 +8,12 @@ only where it explains the log much better than the wiring as logged; wirings th
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.wiring.floor import axes_finding, by_floor, mended_axes, wheels_finding
 from omnidyn.findings.wiring.frame import check_frame
 from omnidyn.findings.wiring.motors import by_circuit, by_drive, by_likeness, motor_finding, motor_known
 from omnidyn.findings.wiring.orders import Wiring
-
-FloatArray = NDArray[np.float64]
 
 MOTOR = ("voltage", "duty", "current", "wheel_angle", "wheel_speed", "wheel_speed_command")
 

@@ -12,16 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtri
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.motors.engine import SPEED, MotorEngine, MotorProblem
 from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, SLOPE
 from omnidyn.identification.output_error.problem.problem import Piece, Point
 from omnidyn.identification.output_error.solve.solver import Solver, State
 from omnidyn.statistics import t_quantile
-
-FloatArray = NDArray[np.float64]
 
 BLOCKS, LEAST_BLOCK = 60, 8  # blocks of rows in all, rows of one at least
 SURE = 0.95
@@ -86,7 +84,7 @@ def bend(solver: Solver[MotorProblem], state: State) -> Bend | None:
     )  # fmt: skip
 
 
-def _regression(solver: Solver[MotorProblem], point: Point) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+def _regression(solver: Solver[MotorProblem], point: Point) -> tuple[FloatArray, FloatArray, IntArray]:
     """(residual (N,), slopes (N, P + starts + BENDS), number of the piece (N,)) of the rows where a speed was measured.
 
     Slopes by the parameters, by the speed at which each piece starts, and by the bends.
@@ -135,7 +133,7 @@ def _bent(t: FloatArray, speed: FloatArray, slope: float, lag: float) -> list[Fl
     return found
 
 
-def _sandwich(scores: FloatArray, inverse: FloatArray, number: NDArray[np.int64]) -> tuple[FloatArray, int]:
+def _sandwich(scores: FloatArray, inverse: FloatArray, number: IntArray) -> tuple[FloatArray, int]:
     """(covariance, blocks): scores summed over blocks of rows, none of which reaches over the end of a piece."""
     length = max(LEAST_BLOCK, -(-len(scores) // BLOCKS))
     first = [

@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from omnidyn.arrays import FloatArray
 from omnidyn.logs.plateaus import STEPWISE
 
-FloatArray = NDArray[np.float64]
 Rows = Sequence[tuple[int, int]]  # first and last row of what has no gap and no row without an input
 
 HOLD, MEAN, CURVE = "hold", "mean", "curve"

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.motors.estimate import BAND, LATENCY
 from omnidyn.identification.output_error.engines.exact import Weighting, march_piece, padded, used_by
 from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, Slopes
@@ -19,8 +19,6 @@ from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
 from omnidyn.model.actuation import Driver
 from omnidyn.model.layout import N_AXES, YAW
-
-FloatArray = NDArray[np.float64]
 
 SPEED, ANGLE = ("wheel_speed", 0), ("wheel_angle", 0)  # columns
 
@@ -59,7 +57,7 @@ class MotorEngine:
             for piece, state in zip(self.problem.pieces, point.states, strict=True)
         ]
 
-    def _numbers(self, piece: Piece, values: FloatArray) -> tuple[Physics, Slopes, NDArray[np.int64]]:
+    def _numbers(self, piece: Piece, values: FloatArray) -> tuple[Physics, Slopes, IntArray]:
         """Physics and slopes of the outputs of one piece; each output is a group for its latency."""
         problem, columns, count = self.problem, piece.record.columns, len(self.problem.parameters)
         width, room = len(columns), padded(used_by(piece, count))

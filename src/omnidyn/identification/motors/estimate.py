@@ -10,12 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import finite_or_none
-
-FloatArray = NDArray[np.float64]
 
 SLOPE, BAND, LAG, INERTIA, LATENCY = "slope", "dead_band", "lag", "inertia", "latency"
 WINDOWS, FREE_RUN = "windows", "free run"

@@ -9,7 +9,7 @@ With a duty in place of the voltage the units of slope and dead band are % s/rad
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,21 +24,19 @@ from omnidyn.identification.motors.problem import begin, motor_problem, motor_re
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.fit import degrees
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
+from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
-from omnidyn.identification.question import GAUSS, STUDENT
+from omnidyn.identification.question import AUTO, GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
 
-AUTO = "auto"
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
 FREE_RUN_INPUTS = ("voltage", "duty")
 
 
 def fit_motor(
     runs: Run | Sequence[Run], motor: int = 0, *, dead_band: bool = True, kind: str = "", between: str = AUTO,
-    latency: bool = False, angle: bool = False, loss: str = GAUSS, covariance: str = "auto",
-    watch: Callable[[State], None] | None = None,
+    latency: bool = False, angle: bool = False, loss: str = GAUSS,
 ) -> MotorEstimate:  # fmt: skip
     """Fit slope, dead band and lag of one motor to whole logs by output error.
 
@@ -62,11 +60,12 @@ def fit_motor(
     for way in WORDS:
         problem = motor_problem([motor_record(log, motor, way, angle) for log in logs], dead_band, latency)
         solver = Solver(problem, MotorEngine(problem), degrees(loss))
-        ends = [solver.minimise(begin(problem, lag), watch=watch) for lag in LAGS]
+        ends = [solver.minimise(begin(problem, lag)) for lag in LAGS]
         found[way] = solver, min(ends, key=lambda end: end.state.objective)
     cost = {way: end.state.objective for way, (_, end) in found.items()}
     chosen = between if between != AUTO else min(cost, key=lambda way: cost[way])
-    known = {way: trust(*pair, _colour(covariance, way)) for way, pair in found.items()}
+    # rows of a refined log have no measured neighbours, so that auto would not see whether these resemble
+    known = {way: trust(*pair, SANDWICH if way == CURVE else AUTO) for way, pair in found.items()}
     answers = {way: _answer(*pair, known[way], logs, motor, way) for way, pair in found.items()}
     fit = answers[chosen]
     rise = RISE * max(known[chosen].widening, 1.0) ** 2  # coloured residuals make every likelihood too steep
@@ -80,11 +79,6 @@ def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
     """Runs as a free run takes them: what was interpolated in between does not count."""
     every = [runs] if isinstance(runs, Run) else runs
     return motor_logs([run.as_measured() for run in every], kind, kinds=FREE_RUN_INPUTS)
-
-
-def _colour(covariance: str, way: str) -> str:
-    """Rows of a refined log have no measured neighbours, so that auto would not see whether these resemble."""
-    return SANDWICH if (covariance, way) == ("auto", CURVE) else covariance
 
 
 def _with_bend(fit: MotorEstimate, bent: Bend | None) -> MotorEstimate:

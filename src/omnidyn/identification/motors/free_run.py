@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.motors.between import CURVE, SUB
 from omnidyn.identification.motors.engine import SPEED, MotorEngine
 from omnidyn.identification.motors.estimate import BAND, MotorEstimate
@@ -16,8 +16,6 @@ from omnidyn.identification.motors.problem import motor_problem, motor_record
 from omnidyn.identification.output_error.problem.record import SHORTEST
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
 
 
 def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]:

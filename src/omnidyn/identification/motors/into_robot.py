@@ -19,18 +19,18 @@ are those of the file, as if they were exact.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from omnidyn.document import Part, Points, Table, apart
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import finite_or_none, identified
 from omnidyn.identification.motors.estimate import BAND, INERTIA, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import HEADING
 from omnidyn.identification.motors.study import MotorStudy
-from omnidyn.identification.steady.study_table import bullet, table_text
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.wheels import per_wheel
@@ -51,11 +51,10 @@ class MotorNumbers:
     std: dict[str, float]
     words: tuple[str, ...]
 
-    def lines(self) -> list[str]:
-        """A table of the numbers, and the words, as plain text."""
+    def parts(self) -> list[Part]:
+        """A table of the numbers, and the words."""
         rows = [(key, f"{value:.5g}", f"{self.std[key]:.2g}", unit(key)) for key, value in self.value.items()]
-        table = [*table_text(("number", "value", "+-", "unit"), rows), ""] if rows else []
-        return [*table, *(line for words in self.words for line in bullet("-", words))]
+        return apart([Table(("number", "value", "+-", "unit"), rows)] if rows else [], [Points(self.words)])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -131,11 +130,8 @@ class _Wheel:
             return float(per_wheel(value, count)[wheel])
 
         self.wheel, self.kind = wheel, kind
-        self.gear, self.radius, self.resistance = (
-            own(motor.gear_ratio),
-            own(robot.wheels.wheel_radius),
-            own(motor.resistance),
-        )
+        self.gear, self.radius = own(motor.gear_ratio), own(robot.wheels.wheel_radius)
+        self.resistance = own(motor.resistance)
         self.torque, self.efficiency = own(motor.torque_constant), own(motor.gear_efficiency)
         self.tied = self.torque == own(motor.emf_constant)
         self.drop, self.viscous = own(motor.voltage_drop), own(robot.friction.wheels.viscous)
@@ -152,30 +148,34 @@ class _Wheel:
         covariance = np.outer(spread, spread) * np.array([[1.0, line.correlation], [line.correlation, 1.0]])
         found: dict[str, tuple[float, float]] = {}
         words: list[str] = []
-
-        def add(name: str, of: Callable[[float, float], float], why: str = "") -> None:
-            number, slopes = float(of(*at)), np.zeros(2)
-            for k in range(2):
-                step = np.eye(2)[k] * STEP * spread[k]
-                slopes[k] = (of(*(at + step)) - of(*(at - step))) / (2.0 * STEP * spread[k]) if spread[k] > 0.0 else 0.0
+        for name, of, why in self._laws(line.dead_band_seen):
+            if name == COULOMB and not found:  # how hard a volt pushes is not known either
+                continue
+            number = float(of(*at))
             if number > 0.0:
+                slopes = np.array([
+                    (of(*(at + step)) - of(*(at - step))) / (2.0 * step[k]) if step[k] > 0.0 else 0.0
+                    for k, step in enumerate(np.diag(STEP * spread))
+                ])  # fmt: skip
                 found[self.key(name)] = number, float(np.sqrt(slopes @ covariance @ slopes))
             else:
                 words.append(f"{name} is not written: {why}")
+        if not line.dead_band_seen:
+            words.append(f"{COULOMB} is not written: no dead band is seen")
+        return found, words + self._of_inertia(line, at[0], scale)
 
+    def _laws(self, with_band: bool) -> Iterator[tuple[str, Callable[[float, float], float], str]]:
+        """(key, its number of slope and dead band, why there is none where that is not above 0)."""
         if self.kind == "current":
-            add(VISCOUS, lambda slope, _: self._push(self.torque) * slope / self.radius)
+            yield VISCOUS, lambda slope, _: self._push(self.torque) * slope / self.radius, ""
         else:
             why = f"{VISCOUS} of the file explains all of the slope"
             for name in (EMF, TORQUE) if self.tied else (EMF,):
-                add(name, lambda slope, _: self._emf(slope), why)
-        if line.dead_band_seen and self.key(VISCOUS if self.kind == "current" else EMF) in found:
+                yield name, lambda slope, _: self._emf(slope), why
+        if with_band:
             drop = 0.0 if self.kind == "current" else self.drop
-            add(COULOMB, lambda slope, band: self._push(self._torque(slope)) * (band - drop),
-                "motor.voltage_drop_V of the file explains all of the dead band")  # fmt: skip
-        elif not line.dead_band_seen:
-            words.append(f"{COULOMB} is not written: no dead band is seen")
-        return found, words + self._of_inertia(line, at[0], scale)
+            why = "motor.voltage_drop_V of the file explains all of the dead band"
+            yield COULOMB, lambda slope, band: self._push(self._torque(slope)) * (band - drop), why
 
     def _emf(self, slope: float) -> float:
         """K_v [V s/rad] from the slope [V s/rad]; 0 where the viscous friction of the file leaves none."""

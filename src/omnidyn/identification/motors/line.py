@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, WINDOWS, MotorEstimate
 from omnidyn.identification.motors.windows import MotorWindows
@@ -27,8 +27,6 @@ from omnidyn.statistics import (
     t_quantile,
 )
 
-FloatArray = NDArray[np.float64]
-
 DRAWS, SEED, BLOCK = 1000, 20121, 3
 ITERATIONS, SETTLED = 200, 1e-8
 HUBER = 2.5
@@ -36,7 +34,7 @@ MIN_WINDOWS = 6
 ALIKE = 1e-3  # share of a column that the others leave over: below it they say the same
 
 
-def fit_line(windows: MotorWindows, motor: int | None, source: str, *, draws: int = DRAWS) -> MotorEstimate:
+def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEstimate:
     """The line of one motor (its number from 0), or of all. Raises InsufficientDataError below six windows."""
     put_in, speed, speed_std, side, change, block = windows.of(motor)
     block = block.astype(np.int64)
@@ -49,9 +47,9 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str, *, draws: in
     design = np.stack([speed, side, change], axis=1)
     used = _columns(design, windows.settled)
     fit = _fit(design[:, used], put_in, speed_std)
-    drawn = np.full((draws + 1, 3), np.nan)  # the fit itself first
+    drawn = np.full((DRAWS + 1, 3), np.nan)  # the fit itself first
     drawn[0, used] = fit.parameters
-    drawn[1:, used] = _bootstrap(design[:, used], put_in, speed_std, fit, block, draws, windows.settled)
+    drawn[1:, used] = _bootstrap(design[:, used], put_in, speed_std, fit, block, windows.settled)
     numbers = dict(zip((SLOPE, BAND, INERTIA), drawn.T, strict=True)) | {LAG: drawn[:, 2] / drawn[:, 0]}
     residual = put_in - design[:, used] @ fit.parameters
     slope = float(fit.parameters[0])
@@ -140,10 +138,9 @@ def _york(
 
 
 def _bootstrap(
-    design: FloatArray, put_in: FloatArray, speed_std: FloatArray, fit: _Fit, block: NDArray[np.int64], draws: int,
-    settled: bool,
-) -> FloatArray:  # fmt: skip
-    """Parameters of fits to windows drawn anew, in blocks of neighbours. Shape (draws, p).
+    design: FloatArray, put_in: FloatArray, speed_std: FloatArray, fit: _Fit, block: IntArray, settled: bool
+) -> FloatArray:
+    """Parameters of fits to windows drawn anew, in blocks of neighbours. Shape (DRAWS, p).
 
     A block is twice as long as the residuals remember, and three windows at least, one where each is a step of its own.
     The draws are widened as Student's t is, for a bootstrap of few blocks is too narrow.
@@ -152,9 +149,9 @@ def _bootstrap(
     residual = np.bincount(own, put_in - design @ fit.parameters) / np.bincount(own)
     memory = int(np.ceil(2.0 * autocorrelation_time(residual)))
     length = min(max(1 if settled else BLOCK, memory), max(1, len(blocks) // 2))
-    times = drawn_times(len(blocks), length, draws, np.random.default_rng(SEED))
+    times = drawn_times(len(blocks), length, DRAWS, np.random.default_rng(SEED))
     found = []
-    for part in np.array_split(times, max(1, draws * len(put_in) // 100_000)):
+    for part in np.array_split(times, max(1, DRAWS * len(put_in) // 100_000)):
         weight = fit.weight * part[:, own]
         shape = (len(part), *design.shape)
         found.append(

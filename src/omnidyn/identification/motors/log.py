@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.plateaus import live_angle
 from omnidyn.logs.segments import segments
@@ -16,8 +16,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import stretches
-
-FloatArray = NDArray[np.float64]
 
 INPUTS = {"voltage": ("V", 1.0), "duty": ("%", 100.0), "current": ("A", 1.0)}  # unit, and how many of it in one SI unit
 WHEEL, GROUND = "wheel", "ground"
@@ -102,6 +100,6 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces)
 
 
-def rows_with(known: NDArray[np.bool_], pieces: Sequence[slice]) -> list[tuple[int, int]]:
+def rows_with(known: BoolArray, pieces: Sequence[slice]) -> list[tuple[int, int]]:
     """(first, last) rows between gaps throughout which `known` (rows,) holds."""
     return [(p.start + a, p.start + b - 1) for p in pieces for a, b in stretches(known[p]).tolist()]

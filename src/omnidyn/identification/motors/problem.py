@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors.between import CURVE, MEAN, SUB, refined
@@ -19,8 +18,6 @@ from omnidyn.identification.output_error.problem.problem import Piece, Point
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.model.layout import N_AXES, YAW
-
-FloatArray = NDArray[np.float64]
 
 
 def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> Record:

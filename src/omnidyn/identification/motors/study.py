@@ -9,16 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
+from omnidyn.identification.grouping import held_out
 from omnidyn.identification.motors.choice import is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
-from omnidyn.identification.motors.fit import AUTO, fit_motor, logs_of_free_runs
+from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.free_run import fit_rmse
-from omnidyn.identification.motors.line import DRAWS, fit_line
-from omnidyn.identification.motors.log import WHEEL, MotorLog, motor_logs
+from omnidyn.identification.motors.line import fit_line
+from omnidyn.identification.motors.log import MotorLog, motor_logs
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
-from omnidyn.identification.question import GAUSS, OUTPUT_ERROR, STEADY_STATE
-from omnidyn.identification.steady.study_table import bullet, table_text
+from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -65,24 +66,19 @@ class MotorStudy:
             words += [f"{each.name}: {text}" for text in own]
         return tuple(words)
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Cells under HEAD, a motor after the other."""
-        pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((each,) for each in self.motors)
-        return [each.row() for several in pairs for each in several]
-
-    def summary(self) -> str:
-        """The study as plain text."""
+    def document(self) -> Document:
+        """What the study says: a row per motor, with a dead band and without, then words."""
         how = "free runs of whole logs"
         if self.windows is not None:
             long = f"windows of {self.windows.length:g} s in integral form"
             how = "steady windows" if self.windows.settled else long
-        lines = [f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", ""]
-        lines += [*table_text(HEAD, self.rows()), ""]
-        for words in self.statements:
-            lines += bullet("-", words)
-        for words in self.doubts:
-            lines += bullet("warning:", words)
-        return "\n".join(lines) + "\n"
+        pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((each,) for each in self.motors)
+        parts = [
+            f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", "",
+            Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
+            Points(self.statements, name="statements"), Points(self.doubts, "warning:", "doubts"),
+        ]  # fmt: skip
+        return Document(parts, self.to_dict(), self.doubts)
 
     def to_dict(self) -> dict[str, Any]:
         """The study as JSON can hold it."""
@@ -97,59 +93,60 @@ class MotorStudy:
 
 
 def identify_motors(
-    runs: Run | Sequence[Run], *, method: str = STEADY_STATE, kind: str = "", speed: str = WHEEL,
-    robot: Robot | None = None, length: float | None = None, steady: bool = False,
-    share: tuple[float, float] | None = None, draws: int = DRAWS, between: str = AUTO, latency: bool | None = None,
-    loss: str = GAUSS, held_out: Sequence[Run] = (), now: Callable[[str], None] | None = None,
+    runs: Run | Sequence[Run], robot: Robot | None = None, *, question: Question | None = None,
+    now: Callable[[str], object] = lambda words: None, **options: Any,
 ) -> MotorStudy:  # fmt: skip
     """Slope, dead band, lag and inertia of every motor of some logs.
 
-    method: "steady-state" takes windows in integral form, and gives the line of all motors together too; "output-error"
-    free runs of whole logs, with and without a dead band. kind: "voltage", "duty" or "current" (of free runs not);
-    "" takes the first of them that all runs have.
-    Of windows: speed, "wheel" or "ground" (by the heading of `robot`, turning on the spot); length [s], steady, share:
-    see `motor_windows`; draws: of the bootstrap. Of free runs: between, loss: see `fit_motor`; latency: None fits one
-    where the logs show it; held_out: logs for free runs that are not fitted. now: is told what is done.
-    Raises InputError for a run without the channels, InsufficientDataError where the motors say nothing.
+    Steady state, which is the default, takes windows in integral form and gives the line of all motors together too;
+    output error takes free runs of whole logs, with and without a dead band. question, options: see `Question`, such as
+    method=, input=, window= or hold_out=. robot: whose heading is the speed, where that is "ground". now: is told what
+    is done.
+    Raises InputError for options of another method and for a run without the channels, InsufficientDataError where the
+    motors say nothing.
     """
-    if method not in (STEADY_STATE, OUTPUT_ERROR):
-        raise InputError("no such method", got=method, expected=f"{OUTPUT_ERROR} or {STEADY_STATE}", where="method")
-    if method == OUTPUT_ERROR:
-        if speed != WHEEL:
-            raise InputError(f"{OUTPUT_ERROR} has no such option", got="speed", expected=f"with {STEADY_STATE}")
-        return _free_runs(runs, kind, between, latency, loss, held_out, now or _silent)
-    logs = motor_logs(runs, kind, speed, robot)
-    windows = motor_windows(logs, length=length, steady=steady, share=share)
+    every = [runs] if isinstance(runs, Run) else list(runs)
+    asked = (question or Question()).but({**options, "what": MOTORS})
+    if asked.method_asked() == OUTPUT_ERROR:
+        return _free_runs(every, asked, now)
+    return _lines(motor_logs(every, asked.input, asked.speed, robot), asked)
+
+
+def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
+    windows = motor_windows(logs, steady=asked.steady, share=asked.window)
     source = named([log.run.source for log in logs])
     motors = [int(motor) for motor in np.unique(windows.motor)]
-    lines = [fit_line(windows, motor, source, draws=draws) for motor in (*motors, *([None] if motors[1:] else []))]
+    lines = tuple(fit_line(windows, motor, source) for motor in (*motors, *([None] if motors[1:] else [])))
     return MotorStudy(
-        method, windows.kind, windows.unit, windows.speed_from, tuple(lines), (), windows, _supply(logs),
+        STEADY_STATE, windows.kind, windows.unit, windows.speed_from, lines, (), windows, _supply(logs),
         tuple(_of_windows(windows, lines)),
     )  # fmt: skip
 
 
-def _silent(words: str) -> None:
-    pass
-
-
-def _free_runs(
-    runs: Run | Sequence[Run], kind: str, between: str, latency: bool | None, loss: str, held_out: Sequence[Run],
-    now: Callable[[str], None],
-) -> MotorStudy:  # fmt: skip
-    logs = logs_of_free_runs(runs, kind)
+def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object]) -> MotorStudy:
+    away = held_out([run.source for run in runs], asked.hold_out)
+    kept = [run for run, out in zip(runs, away, strict=True) if out]
+    logs = logs_of_free_runs([run for run, out in zip(runs, away, strict=True) if not out], asked.input)
     own: list[Run] = [log.run for log in logs]
-    how: dict[str, Any] = {"kind": logs[0].kind, "between": between, "loss": loss}
+    how: dict[str, Any] = {"kind": logs[0].kind, "between": asked.between, "loss": asked.loss}
     motors = [m for m in range(min(log.motors for log in logs)) if all(_driven(log, m) for log in logs)] or [0]
-    pairs = []
+    latency, pairs = _latency(asked.nuisances), []
     for motor in motors:
         now(f"fitting motor {motor + 1} of {len(motors)}")
         late = is_late(own, motor, **how) if latency is None else latency
         fits = [fit_motor(own, motor, dead_band=band, latency=late, **how) for band in (True, False)]
-        pairs.append([replace(fit, held_out=fit_rmse(fit, held_out)) if held_out else fit for fit in fits])
+        pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
     return MotorStudy(OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, supply=_supply(logs))
+
+
+def _latency(nuisances: Sequence[str] | None) -> bool | None:
+    """Whether to fit a latency; None is where the logs show one."""
+    for name in nuisances or ():
+        if name.partition(".")[0] != "latency":
+            raise InputError("of the motors only latency can be fitted", got=name, where="nuisances")
+    return None if nuisances is None else bool(nuisances)
 
 
 def _supply(logs: Sequence[MotorLog]) -> float:

@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.between import InputIntegral
 from omnidyn.identification.motors.log import MotorLog, rows_with
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus
 from omnidyn.logs.resolved import unresolved_input
 from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step
-
-FloatArray = NDArray[np.float64]
 
 LENGTHS = (0.05, 0.1, 0.2, 0.5)  # [s] the shortest whose mean speed is sharp enough is taken
 SHARP = 0.02  # of the spread of the speeds: a mean speed with this error needs no longer window
@@ -51,8 +49,8 @@ class MotorWindows:
     speed_std: FloatArray
     side: FloatArray
     change: FloatArray
-    motor: NDArray[np.int64]
-    block: NDArray[np.int64]
+    motor: IntArray
+    block: IntArray
     unit: str
     kind: str
     speed_from: str
@@ -70,20 +68,18 @@ class MotorWindows:
 
 
 def motor_windows(
-    logs: Sequence[MotorLog], *, length: float | None = None, steady: bool = False,
-    share: tuple[float, float] | None = None,
-) -> MotorWindows:  # fmt: skip
+    logs: Sequence[MotorLog], *, steady: bool = False, share: tuple[float, float] | None = None
+) -> MotorWindows:
     """Windows of the motors in logs.
 
-    length [s]: of the windows; None takes the shortest that gives a sharp mean speed; where none does and the input
-    comes in steps, a window is the last two thirds of each step. steady: take the steady windows of `find_plateaus`
-    instead; share: with these shares of each command's rows. Raises InsufficientDataError where no window is left.
+    They are as short as gives a sharp mean speed; where nothing does and the input comes in steps, a window is the last
+    two thirds of each step. steady: take the steady windows of `find_plateaus` instead; share: with these shares of
+    each command's rows. Raises InsufficientDataError where no window is left.
     """
     usual = _usual_speed(logs)
-    if length is None:
-        length, sharp = _length(logs, usual)
-        if not sharp and not steady and share is None and all(map(_in_steps, logs)):
-            share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
+    length, sharp = _length(logs, usual)
+    if not sharp and not steady and share is None and all(map(_in_steps, logs)):
+        share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
     every = max(1, -(-sum(map(len, windows)) // MAX_WINDOWS))
     block, readers = 0, []

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
@@ -22,9 +22,6 @@ from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
 from omnidyn.model.keys import with_priors
 from omnidyn.model.robot import Robot
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 LEAST_SHARE = 1e-4  # of a lost direction that a number lost with it must have to be named
 HALF, ROUGH = 0.5, 3.0  # of an output's spread, and times its noise from row to row: errors beyond are no noise

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.prepare import EXACT, FINE, LOOP, Group, make_engine
@@ -21,8 +21,6 @@ from omnidyn.identification.output_error.solve.solver import Engine, Solution, S
 from omnidyn.identification.output_error.trust.uncertainty import SHARE, Trust
 from omnidyn.model.keys import find_key
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 T = TypeVar("T")
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
@@ -27,8 +27,6 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
-
-FloatArray = NDArray[np.float64]
 
 EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
@@ -52,7 +50,7 @@ class Group:
     question: Question
     engine: str
     usual: tuple[str, ...]
-    moved: NDArray[np.bool_]
+    moved: BoolArray
     bounds: dict[str, float]
     warnings: tuple[str, ...]
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import Estimate
 from omnidyn.statistics import t_quantile
-
-FloatArray = NDArray[np.float64]
 
 
 def confidence_band(estimate: Estimate, axis: int, speed: FloatArray) -> tuple[FloatArray, FloatArray]:

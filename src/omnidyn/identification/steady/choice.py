@@ -18,8 +18,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shape_fit import (
@@ -34,8 +34,6 @@ from omnidyn.identification.steady.shape_fit import (
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS
 from omnidyn.model.robot import Robot
 from omnidyn.statistics import huber_loss
-
-FloatArray = NDArray[np.float64]
 
 AUTO = "auto"
 APART = 2.0  # standard errors from which two shapes are told apart
@@ -186,7 +184,7 @@ def _capped(squares: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     return {name: huber_loss(each, limit) for name, each in squares.items()}
 
 
-def _difference(first: FloatArray, second: FloatArray, fold: NDArray[np.int64]) -> tuple[float, float]:
+def _difference(first: FloatArray, second: FloatArray, fold: IntArray) -> tuple[float, float]:
     """rms(first) - rms(second) and its standard error, from squared errors at the same points."""
     sizes = float(np.sqrt(np.mean(first))) + float(np.sqrt(np.mean(second)))
     if sizes == 0.0:
@@ -198,7 +196,7 @@ def _joined(parts: Sequence[FloatArray]) -> FloatArray:
     return np.concatenate(list(parts))
 
 
-def _folds(fits) -> NDArray[np.int64]:
+def _folds(fits) -> IntArray:
     """Numbers of the folds of all groups, one group after the other."""
     found, first = [], 0
     for fit in fits:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtr
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.steady.line import Line
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, wrench_from_currents
@@ -13,8 +14,6 @@ from omnidyn.model.keys import unit
 from omnidyn.model.motor import back_emf
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
-
-FloatArray = NDArray[np.float64]
 
 FEW_DEGREES = 2
 AGREEMENT = 0.05  # forces that differ by less than this share of their size agree

@@ -12,12 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.statistics import FittedLine, errors_in_variables, t_quantile
-
-FloatArray = NDArray[np.float64]
 
 PARAMETERS = 2
 MAX_ITERATIONS, TOLERANCE = 500, 1e-12

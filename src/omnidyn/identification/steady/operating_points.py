@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
@@ -21,8 +22,6 @@ from omnidyn.model.motor import settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wrench_from_traction
 from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
 
 WHEEL, SET, GROUND = "wheel", "set", "ground"
 SPEEDS = {
@@ -55,8 +54,8 @@ class ForcePoints:
     still: FloatArray
     direction: FloatArray
     group: tuple[str, ...]
-    run: NDArray[np.int64]
-    rows: NDArray[np.int64]
+    run: IntArray
+    rows: IntArray
     speed_from: str
     force_from: str
     notes: tuple[str, ...] = ()

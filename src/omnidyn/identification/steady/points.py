@@ -11,16 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents, wrench_from_currents
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-from omnidyn.run import Run
-
-FloatArray = NDArray[np.float64]
 
 # An axis slower than this share of the row's fastest is not driven: its speed and force are noise around zero.
 DRIVEN_SHARE = 0.1
@@ -104,25 +102,7 @@ def points_from_voltage(
     )
 
 
-def points_from_run(
-    robot: Robot, run: Run, *, force_from: str = "current", axis: str | Sequence[str] | None = None
-) -> SteadyTable:
-    """Points from a Run with one row per steady point; force_from: "current" or "voltage".
-
-    Raises InputError when the run lacks the twist or the channel asked for.
-    """
-    needed = {"current": ("twist", "current"), "voltage": ("twist", "voltage")}.get(force_from)
-    if needed is None:
-        raise InputError("unknown origin of the force", got=force_from, expected="current or voltage")
-    for name in needed:
-        if getattr(run, name) is None:
-            raise InputError("the run lacks a channel", got=", ".join(run.channels), expected=name, where=run.source)
-    if force_from == "voltage":
-        return points_from_voltage(robot, run.twist, run.voltage, axis=axis, source=run.source)  # type: ignore[arg-type]
-    return points_from_currents(robot, run.twist, run.current, axis=axis, voltage=run.voltage, source=run.source)  # type: ignore[arg-type]
-
-
-def driven_axes(robot: Robot, twist: FloatArray, wrench: FloatArray) -> NDArray[np.bool_]:
+def driven_axes(robot: Robot, twist: FloatArray, wrench: FloatArray) -> BoolArray:
     """Which axes a row is about. Shape (rows, 3).
 
     A moving row: the axes that carry a tenth or more of the fastest rim speed (v_x, v_y, b omega). A row at rest:
@@ -174,7 +154,7 @@ def _points(
     )
 
 
-def _chosen(axis: str | Sequence[str], rows: int) -> NDArray[np.bool_]:
+def _chosen(axis: str | Sequence[str], rows: int) -> BoolArray:
     names = SteadyTable(axis, np.zeros(rows), np.zeros(rows)).axis  # checks names and their number
     return np.array([[name == each for each in AXES] for name in names])
 

@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shapes import Shape
 from omnidyn.model.robot import Robot
 from omnidyn.statistics import huber_weight, standard_error
-
-FloatArray = NDArray[np.float64]
 
 VECTOR, ALONG = "vector", "along"
 HUBER = 2.0  # scales of a two-dimensional residual
@@ -46,7 +44,7 @@ class ShapeFit:
     free: FloatArray
     covariance: FloatArray
     weight: FloatArray
-    fold: NDArray[np.int64]
+    fold: IntArray
     error: FloatArray
     along_error: FloatArray
 
@@ -96,7 +94,7 @@ def fit_shape(
     )  # fmt: skip
 
 
-def fold_numbers(points: ForcePoints) -> NDArray[np.int64]:
+def fold_numbers(points: ForcePoints) -> IntArray:
     """What is left out together: points of one direction of travel, numbered in the order of the direction; with fewer
     than six directions, or where the robot turns on the spot, each run and command for itself. Shape (points,).
     """
@@ -106,13 +104,13 @@ def fold_numbers(points: ForcePoints) -> NDArray[np.int64]:
     return folds.astype(np.int64)
 
 
-def rms_and_error(squares: FloatArray, fold: NDArray[np.int64]) -> tuple[float, float]:
+def rms_and_error(squares: FloatArray, fold: IntArray) -> tuple[float, float]:
     """Root of the mean of squared errors, and its standard error."""
     root = float(np.sqrt(np.mean(squares)))
     return root, mean_error(squares, fold) / (2.0 * root) if root > 0.0 else 0.0
 
 
-def mean_error(values: FloatArray, fold: NDArray[np.int64]) -> float:
+def mean_error(values: FloatArray, fold: IntArray) -> float:
     """Standard error of a mean over points, from the sums over the folds, which may correlate with their neighbours."""
     sums = np.asarray(np.bincount(fold, values - np.mean(values)), dtype=float)
     return standard_error(sums) * len(sums) / len(values) if len(sums) > 1 else float("nan")
@@ -161,7 +159,7 @@ class _Problem:
             start[:2] = max(float(np.median(np.hypot(*self.points.wrench[:, :2].T))), 1e-6)
         return start
 
-    def solve(self, weight: FloatArray, level: FloatArray, held: NDArray[np.bool_] | None = None) -> FloatArray | None:
+    def solve(self, weight: FloatArray, level: FloatArray, held: BoolArray | None = None) -> FloatArray | None:
         """The levels of weighted least squares, from `level` on; `held` levels stay 0. None: not determined."""
         free = np.ones(self.count, dtype=bool) if held is None else ~held
         for _ in range(ITERATIONS):
@@ -173,7 +171,7 @@ class _Problem:
                 break
         return level
 
-    def _step(self, weight: FloatArray, level: FloatArray, free: NDArray[np.bool_]) -> FloatArray | None:
+    def _step(self, weight: FloatArray, level: FloatArray, free: BoolArray) -> FloatArray | None:
         force, slope = self.table(level)
         slope, residual = self._aimed(slope)[:, :, free], self.target - self._aimed(force)
         normal = np.einsum("n,nca,ncb->ab", weight, slope, slope)
@@ -205,9 +203,7 @@ class _Problem:
                 break
         return weight, level
 
-    def left_out(
-        self, weight: FloatArray, level: FloatArray, fold: NDArray[np.int64]
-    ) -> tuple[FloatArray, FloatArray] | None:
+    def left_out(self, weight: FloatArray, level: FloatArray, fold: IntArray) -> tuple[FloatArray, FloatArray] | None:
         """(levels without each fold, error on its points in all components); None where not determined."""
         error, levels = np.empty_like(self.wrench), []
         for number in range(int(fold.max()) + 1):

@@ -17,15 +17,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.model.friction import Friction
 from omnidyn.model.keys import AXES, DIRECTION, WHEELS, Key, expand
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import rim_speed, sin_cos_deg
 
-FloatArray = NDArray[np.float64]
 Columns = Callable[[Robot, ForcePoints], FloatArray]
 
 VISCOUS = "+viscous"

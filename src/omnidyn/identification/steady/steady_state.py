@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.steady.doubts import ORIGIN, about_line, about_points
@@ -23,8 +23,6 @@ from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.friction import AxesFriction
 from omnidyn.model.keys import unit, with_priors
 from omnidyn.model.robot import Robot
-
-FloatArray = NDArray[np.float64]
 
 REST = ("bound", "line", "ignore")
 MAX_FRICTION = 1e6  # what a robot file takes

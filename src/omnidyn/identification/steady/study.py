@@ -13,9 +13,9 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.question import STEADY_STATE, Question
@@ -30,8 +30,6 @@ from omnidyn.model.keys import AXES, DIRECTION, Key
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.run import Run
 from omnidyn.statistics import t_quantile
-
-FloatArray = NDArray[np.float64]
 
 MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
 

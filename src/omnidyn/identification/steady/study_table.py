@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -11,11 +10,6 @@ from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_words import FORCES
 from omnidyn.model.keys import Key
-
-
-def table_text(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned columns, the first to the left, the others to the right."""
-    return Document([Table(head, rows)]).to_text().split("\n")
 
 
 def study_document(study: SteadyStudy) -> Document:
@@ -35,11 +29,6 @@ def study_document(study: SteadyStudy) -> Document:
         Points(doubts, "warning:", "doubts"),
     ]  # fmt: skip
     return Document(parts, _data(study), study.warnings)
-
-
-def bullet(head: str, words: str) -> list[str]:
-    """One point of a list, wrapped."""
-    return Document([Points([words], head)]).to_text().split("\n")
 
 
 def _travel_table(study: SteadyStudy) -> Table:

@@ -6,12 +6,10 @@ import re
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.logs.column import Column
 from omnidyn.logs.table.table import Table
-
-FloatArray = NDArray[np.float64]
 
 EPOCH = 1e8  # [s]; a later time counts from 1970: the start of the log is taken off, so that no digits are lost
 DAY = 86_400.0  # [s]

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.frames import unwrapped
 from omnidyn.units import TURN, parse_unit
-
-FloatArray = NDArray[np.float64]
 
 COUNTERS = (2.0**16, 2.0**32)  # counts that fit into two and four bytes
 WHOLE = 1.01  # readings of what starts over stay within this many periods

@@ -8,8 +8,8 @@ import re
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
@@ -28,7 +28,6 @@ from omnidyn.units import DUTY as DUTY_UNIT
 from omnidyn.units import TURN_RATE as TURN_RATE_UNIT
 from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
 
-FloatArray = NDArray[np.float64]
 Numbers = Mapping[tuple[str, int], int]  # (letter of a component, number in the file) -> number of the wheel from 1
 
 SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only

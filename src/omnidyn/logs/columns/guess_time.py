@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import is_dates
 from omnidyn.logs.column import Column
@@ -16,8 +16,6 @@ from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.table.table import Table
 from omnidyn.units import TIME as TIME_UNIT
 from omnidyn.units import Unit, known_unit, parse_unit
-
-FloatArray = NDArray[np.float64]
 
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0  # [s] between rows: what a log of a robot may have
 TIME_NAMES = ("s", "ms", "us", "ns")

@@ -5,16 +5,14 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import si_suffix
 from omnidyn.logs.columns.guessed import Doubt, Guess, floats
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.units import Unit, parse_unit
-
-FloatArray = NDArray[np.float64]
 
 MOST_VOLTS = 100.0  # [V] of a motor's driver; more are steps of a converter
 FEW_VALUES = 10  # whole numbers beyond so many different ones are counts

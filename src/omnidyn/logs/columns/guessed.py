@@ -7,12 +7,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.logs.column import Column
 from omnidyn.logs.table.dialect import is_number_or_missing, looks_like_number, to_float
-
-FloatArray = NDArray[np.float64]
 
 
 class Doubt(NamedTuple):

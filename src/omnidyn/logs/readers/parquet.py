@@ -15,12 +15,13 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.files import open_regular, too_large
 from omnidyn.logs.readers.parquet_pages import declared_bytes
 from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.table.header import MAX_COLUMNS, check_name, split_units
-from omnidyn.logs.table.rows import INFINITE, Column, FloatArray, column_of, refuse_infinite, skip_note
+from omnidyn.logs.table.rows import INFINITE, Column, column_of, refuse_infinite, skip_note
 from omnidyn.logs.table.table import MAX_CELLS, Table
 from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
 

@@ -17,8 +17,8 @@ from functools import partial
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import IntArray
 from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.header import TABS_NOTE, Layout, find_layout
@@ -46,7 +46,7 @@ def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterato
     parser = RowParser(layout, file.source, options.skip_bad_rows, sample)
     most = max(1, min(rows, MAX_CELLS // len(layout.names)))
 
-    def table(columns: dict[str, Column], lines: NDArray[np.int64], sha256: str = "") -> Table:
+    def table(columns: dict[str, Column], lines: IntArray, sha256: str = "") -> Table:
         notes = (*layout.notes, *file.notes, *parser.notes)
         return Table(layout.names, columns, lines, layout.units, file.source, sha256, notes, layout.titles)
 
@@ -88,7 +88,7 @@ def _tabbed(blocks: Iterable[TextBlock]) -> Iterator[TextBlock]:
         yield TextBlock(first, [tabbed(line) if line else line for line in lines])
 
 
-def _kept(block: TextBlock, first: int) -> tuple[list[str], NDArray[np.int64]]:
+def _kept(block: TextBlock, first: int) -> tuple[list[str], IntArray]:
     """The rows in a block, without blank lines, comments and what stands above line `first`; and their lines."""
     begin = max(0, first - block.first)
     lines = block.lines[begin:]

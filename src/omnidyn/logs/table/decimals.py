@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.logs.table import dialect
 
-Column = NDArray[np.float64] | tuple[str, ...]
+Column = FloatArray | tuple[str, ...]
 THOUSAND = 1000
 
 
@@ -41,7 +41,7 @@ class Points:
     def look(
         self,
         texts: Sequence[str],
-        lines: NDArray[np.int64],
+        lines: IntArray,
         columns: Mapping[str, Column],
         later: Callable[[], Iterable[str]],
     ) -> None:

@@ -11,16 +11,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.table import dialect
-from omnidyn.logs.table.decimals import Points
+from omnidyn.logs.table.decimals import Column, Points
 from omnidyn.logs.table.header import Layout
 
-FloatArray = NDArray[np.float64]
-Column = FloatArray | tuple[str, ...]
-Lines = NDArray[np.int64]
+Lines = IntArray
 
 RAGGED, NOT_A_NUMBER, INFINITE = "another number of cells", "no number where one is due", "an infinite number"
 BROKEN_QUOTE = "a broken quote"

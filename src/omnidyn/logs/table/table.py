@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.files import too_large
 from omnidyn.logs.table import dialect
-from omnidyn.logs.table.rows import Column, FloatArray
+from omnidyn.logs.table.rows import Column
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
 
 ROWS = 500_000
@@ -34,7 +34,7 @@ class Table:
 
     names: tuple[str, ...]
     columns: Mapping[str, Column]
-    lines: NDArray[np.int64]
+    lines: IntArray
     units: Mapping[str, str]
     source: str
     sha256: str

@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.model.layout import HOLD, N_AXES, SLIDE, VISCOUS
 from omnidyn.model.value import Levels, Value, per_axis_number
 
@@ -35,12 +36,12 @@ class AxesFriction(Value):
         return self
 
     @property
-    def levels(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def levels(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(viscous, coulomb, breakaway) as arrays. Shape (3,) each; breakaway = coulomb where none is given."""
         coulomb = np.array(self.coulomb)
         return np.array(self.viscous), coulomb, coulomb if self.breakaway is None else np.array(self.breakaway)
 
-    def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
+    def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
         """Add the levels of the three axes; see FrictionLaw."""
         viscous, coulomb, breakaway = self.levels
         units = np.array([1.0, 1.0, length])
@@ -49,19 +50,19 @@ class AxesFriction(Value):
             element[:N_AXES, SLIDE + side] += coulomb / units
             element[:N_AXES, HOLD + side] += breakaway / units
 
-    def sliding_wrench(self, twist: ArrayLike) -> NDArray[np.float64]:
+    def sliding_wrench(self, twist: ArrayLike) -> FloatArray:
         """-(B v + C sgn v) of the axes that move; 0 for an axis at rest. Shape (*batch, 3)."""
         viscous, coulomb, _ = self.levels
         twist = np.asarray(twist, dtype=float)
         return -(viscous * twist + coulomb * np.sign(twist))
 
-    def wrench(self, twist: ArrayLike, applied: ArrayLike) -> NDArray[np.float64]:
+    def wrench(self, twist: ArrayLike, applied: ArrayLike) -> FloatArray:
         """Friction under an applied wrench: slides, holds, or gives way to C against what drives it."""
         _, coulomb, _ = self.levels
         twist, applied = np.asarray(twist, dtype=float), np.asarray(applied, dtype=float)
         at_rest = np.where(self.holds(applied), -applied, -coulomb * np.sign(applied))
         return np.where(twist == 0.0, at_rest, self.sliding_wrench(twist))
 
-    def holds(self, applied: ArrayLike) -> NDArray[np.bool_]:
+    def holds(self, applied: ArrayLike) -> BoolArray:
         """|applied| <= S, per axis. Shape (*batch, 3)."""
         return np.abs(np.asarray(applied, dtype=float)) <= self.levels[2]

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.layout import HOLD, HOLD_X, HOLD_Y, N_AXES, SLIDE, SLIDE_X, SLIDE_Y, VISCOUS, YAW
 from omnidyn.model.value import Value, number, to_list
 
@@ -37,7 +36,7 @@ class DirectionFriction(Value):
     yaw_breakaway: Annotated[Level | None, Field(description=">= yaw_coulomb [N m]")] = None
     yaw_viscous: Annotated[Level, Field(description="[N m s]")] = 0.0
 
-    def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
+    def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
         """Add the ellipse, the same damping in every direction, and what resists turning; see FrictionLaw."""
         body[[SLIDE_X, SLIDE_Y]] += self.coulomb
         body[[HOLD_X, HOLD_Y]] += self.coulomb if self.breakaway is None else self.breakaway

@@ -17,14 +17,13 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from omnidyn.arrays import FloatArray
 
 
 class FrictionLaw(Protocol):
     """What every family of friction provides: a frozen value type (its ranges checked) with this function."""
 
-    def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
+    def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
         """Add the levels to the tables of a plant, in place.
 
         body: shape (BODY_SIZE,), element: shape (3 + wheels, ELEMENT_SIZE), entries named in layout.py. `length` is

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.layout import HOLD, N_AXES, SLIDE, VISCOUS
 from omnidyn.model.value import PerWheel, Value, per_wheel_number
 
@@ -48,7 +47,7 @@ class WheelFriction(Value):
             return self.breakaway_backward
         return self.backward if self.breakaway is None or self.coulomb_backward is not None else self.breakaway
 
-    def add_to(self, body: NDArray[np.float64], element: NDArray[np.float64], length: float) -> None:
+    def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
         """Add the levels of each wheel, forward and backward; see FrictionLaw."""
         wheels = element[N_AXES:]
         levels = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.layout import (
     ACTIVE,
     BODY_SIZE,
@@ -35,8 +35,6 @@ from omnidyn.model.layout import (
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-
-FloatArray = NDArray[np.float64]
 
 
 class Plant(NamedTuple):

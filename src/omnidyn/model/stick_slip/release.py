@@ -8,8 +8,8 @@ the ellipse, the currents of the motors [A].
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import (
     BOUND,
@@ -37,11 +37,10 @@ from omnidyn.model.stick_slip.inclusion import solve
 from omnidyn.model.stick_slip.plant import Plant
 from omnidyn.model.stick_slip.workspace import RESIDUAL, workspace
 
-FloatArray = NDArray[np.float64]
 SIGNS = 3  # where the signs begin in a state
 
 
-def new_state(plant: Plant) -> NDArray[np.float64]:
+def new_state(plant: Plant) -> FloatArray:
     """A state of rest without currents: every element that can stick is stuck."""
     return np.concatenate([np.zeros(3), plant.element[:, SIGN], plant.body[[ELLIPSE]], np.zeros(plant.wheels)])
 

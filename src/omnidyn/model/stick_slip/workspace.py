@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import part
 
 RESIDUAL, NEWTON, TRIAL, WORST, SPARE, LINE = 0, 1, 2, 3, 4, 5
@@ -12,7 +12,7 @@ BASIS, ROW, JACOBIAN, MATRIX = 6, 9, 12, 15  # three rows each
 PIVOT, ROWS = 18, 19
 
 
-def workspace() -> NDArray[np.float64]:
+def workspace() -> FloatArray:
     """A fresh workspace array."""
     return np.zeros((ROWS, 4))
 

@@ -8,8 +8,8 @@ from typing import cast
 import numpy as np
 from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import dead_zone_force, dead_zone_map
 from omnidyn.model.robot import Robot
 from omnidyn.report.style import (
@@ -26,7 +26,6 @@ from omnidyn.report.style import (
     picture,
 )
 
-FloatArray = NDArray[np.float64]
 STEP_DEG = 1.0
 COLOURS, LINES = (BLUE, VERMILLION, GREEN, PURPLE), ("-", "--", "-.", (0, (1, 1)))
 AROUND = {0.0: "x\nforward", 45.0: "45°", 90.0: "y\nleft", 135.0: "135°", 180.0: "180°", 225.0: "-135°",

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.steady.band import confidence_band
 from omnidyn.paper.tables import AXES, FORCE_UNIT, SPEED_UNIT, TABLE_1, TABLE_2_COULOMB, TABLE_2_VISCOUS
@@ -22,8 +22,6 @@ from omnidyn.report.style import (
     look,
     picture,
 )
-
-FloatArray = NDArray[np.float64]
 
 TREATMENTS = {
     "line": (BLUE, "-", "fit to all four rows (the paper), 95 % band"),

@@ -7,13 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.comparison.result import Comparison, Segment
 from omnidyn.comparison.traces import unit
 from omnidyn.report.style import BLUE, GREY, INK, MEASURED, PALE, VERMILLION, WIDTH, Picture, look, new_figure, picture
-
-FloatArray = NDArray[np.float64]
 
 MOST_PANELS = 6
 USUAL_PANELS = 3

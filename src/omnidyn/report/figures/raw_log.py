@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, Verdict
 from omnidyn.logs.channels import components
 from omnidyn.logs.log import Log
@@ -30,8 +30,6 @@ from omnidyn.report.style import (
     picture,
     thin_out,
 )
-
-FloatArray = NDArray[np.float64]
 
 UNITS = {"voltage": "V", "duty": "1", "current": "A", "wheel_angle": "rad", "wheel_speed": "rad/s",
          "wheel_speed_command": "rad/s", "twist": "m/s, rad/s", "twist_command": "m/s, rad/s", "pose": "m, rad",

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.comparison.aligned import errors_for_whiteness
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import unit
 from omnidyn.comparison.whiteness import whiteness
 from omnidyn.report.style import BLUE, GREY, INK, PALE, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
-
-FloatArray = NDArray[np.float64]
 
 MOST, LAGS, BINS, SPAN = 4, 20, 41, 4.5
 HEIGHT = 1.55  # inch, of a row

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, FancyBboxPatch
 from matplotlib.transforms import Affine2D
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import Wheels, per_wheel, sin_cos_deg
 from omnidyn.report.style import AXIS_COLOUR, GREY, INK, PALE, Picture, look, new_figure, note, picture
@@ -46,7 +46,7 @@ def _caption(robot: Robot) -> str:
     return text
 
 
-def _shared(wheels: Wheels) -> NDArray[np.bool_]:
+def _shared(wheels: Wheels) -> BoolArray:
     """Which wheels have the azimuth and the distance of another one: the file does not say where each stands."""
     sin, cos = sin_cos_deg(wheels.azimuth_deg)
     place = per_wheel(wheels.robot_radius, wheels.count) * np.stack([cos, sin])
@@ -54,7 +54,7 @@ def _shared(wheels: Wheels) -> NDArray[np.bool_]:
     return (apart < 1e-9).sum(axis=0) > 1
 
 
-def wheel_places(wheels: Wheels) -> NDArray[np.float64]:
+def wheel_places(wheels: Wheels) -> FloatArray:
     """Where each wheel is drawn in body coordinates [m]. Shape (wheels, 2).
 
     At its distance b along its azimuth. A wheel that would stand on another one is moved along its rolling direction
@@ -78,7 +78,7 @@ def _seen(point: np.ndarray) -> tuple[float, float]:
     return -float(point[1]), float(point[0])
 
 
-def _body(axes: Axes, places: NDArray[np.float64]) -> None:
+def _body(axes: Axes, places: FloatArray) -> None:
     distance = float(np.mean(np.linalg.norm(places, axis=1)))
     axes.add_patch(Circle((0.0, 0.0), distance, facecolor="#F6F6F6", edgecolor=GREY, linewidth=1.2, zorder=0))
     for place in places:
@@ -86,7 +86,7 @@ def _body(axes: Axes, places: NDArray[np.float64]) -> None:
         axes.plot([0.0, end[0]], [0.0, end[1]], color=PALE, linewidth=1.5, zorder=0.5)
 
 
-def _wheel(axes: Axes, robot: Robot, wheel: int, place: NDArray[np.float64]) -> None:
+def _wheel(axes: Axes, robot: Robot, wheel: int, place: FloatArray) -> None:
     """The wheel as a box standing across its axle, its number, and the way it pushes."""
     radius = robot.wheels.radii[wheel]
     left, bottom = -radius, -0.5 * WHEEL_WIDTH * radius

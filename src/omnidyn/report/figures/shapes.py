@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.steady.operating_points import SPEEDS, ForcePoints
 from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.identification.steady.study import SteadyStudy
@@ -32,8 +32,6 @@ from omnidyn.report.style import (
     picture,
     thin_out,
 )
-
-FloatArray = NDArray[np.float64]
 
 GROUP_COLOURS, GROUP_MARKS = (BLUE, VERMILLION, GREEN, PURPLE), ("o", "s", "^", "D")
 LINES = ("-", "--", "-.", (0, (1, 1)))

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import drive_wrench, mass_matrix, wrench_from_currents
@@ -20,8 +20,6 @@ from omnidyn.model.statespace import state_space
 from omnidyn.simulation.exact.inductance_position import GAUSS, step_poses
 from omnidyn.simulation.exact.inductance_step import forces, half_period, law_of, response, segment, settled, slid
 from omnidyn.simulation.exact.march import drive_acceleration, refuse_spin
-
-FloatArray = NDArray[np.float64]
 
 MAX_EVENTS = 100_000  # of one axis in one step: an axis that sticks and slips that often is chattering
 

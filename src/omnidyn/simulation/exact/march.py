@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, maker, part
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import mass_matrix
@@ -19,8 +19,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import StateSpace, discretise, is_decoupled, state_space
 from omnidyn.simulation.exact.step import exact_step, pieces, speed_within, turned_within
 from omnidyn.simulation.pose import put_next_pose, rotated
-
-FloatArray = NDArray[np.float64]
 
 # 4 Gauss-Legendre nodes on [0, 1]; a piece is at most PIECE / (fastest rate) long: 2e-13 m over 10 s of 20 ms steps.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)

@@ -11,8 +11,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import (
@@ -38,8 +38,6 @@ from omnidyn.model.stick_slip.workspace import copy_row, workspace
 from omnidyn.simulation.implicit.step import GAMMA, step
 from omnidyn.simulation.speed_loop import Loop, close_loop
 
-FloatArray = NDArray[np.float64]
-
 FORGETS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its MEMORY, within these bounds
 SHORT = 1.5e-4  # [s] no step is given less than the share of tol of one so long
 ROUNDING = 1e-13  # [m/s] nor less than this
@@ -57,8 +55,8 @@ class Outcome(NamedTuple):
 
     pose: FloatArray  # (rows + 1, 3)
     state: FloatArray  # (rows + 1, size of a state), see implicit_step
-    iterations: NDArray[np.int64]  # (rows,) most solver iterations of a stage in the row
-    steps: NDArray[np.int64]  # (rows,) steps solved
+    iterations: IntArray  # (rows,) most solver iterations of a stage in the row
+    steps: IntArray  # (rows,) steps solved
 
 
 def begun(rows: int, state: FloatArray, pose: FloatArray) -> Outcome:

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import DYNAMIC
@@ -34,8 +35,6 @@ from omnidyn.simulation.sensitivity.loop import run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.march import march_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
 from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, current_bounds, implicit_run
-
-FloatArray = NDArray[np.float64]
 
 RATE = "drive.rate_Hz"
 

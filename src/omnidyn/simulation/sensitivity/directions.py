@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.keys import Key
@@ -17,8 +17,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant, plant
 from omnidyn.model.stick_slip.release import new_state
 from omnidyn.model.stick_slip.workspace import workspace
-
-FloatArray = NDArray[np.float64]
 
 EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10; all kinks are on their branch
 
@@ -32,7 +30,7 @@ class Directions(NamedTuple):
     voltage: FloatArray  # (K, rows, n) derivative of the applied voltage
     workspace: FloatArray  # (2, ...) two workspace arrays
     lift: FloatArray  # (3, 6) rows of the elimination: stuck direction, and what it is made of
-    held: NDArray[np.int64]  # (2, 3) which elements span what is stuck; pivots
+    held: IntArray  # (2, 3) which elements span what is stuck; pivots
     point: FloatArray  # (5, 3) points, accelerations
     aim: FloatArray  # (K, 3 + n) derivative of x* and i*
     middle: FloatArray  # (K, 3 + n) derivative at stage 1

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import DYNAMIC
@@ -29,8 +29,6 @@ from omnidyn.simulation.sensitivity.directions import (
 )
 from omnidyn.simulation.sensitivity.sample import MEET, Samples, empty_samples
 from omnidyn.simulation.simulate import as_tolerance, current_bounds
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.stick_slip.release import SIGNS, start_state, with_given_currents
@@ -23,8 +23,6 @@ from omnidyn.simulation.sensitivity.march import apply_row, pose_derivatives, ro
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
 from omnidyn.simulation.simulate import current_bounds
 from omnidyn.simulation.speed_loop import close_loop, loop_of, seen_speed, tick_answer, tick_branch
-
-FloatArray = NDArray[np.float64]
 
 
 class LoopDirections(NamedTuple):

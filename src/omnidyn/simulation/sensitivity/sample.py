@@ -12,15 +12,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import LENGTH
 from omnidyn.model.stick_slip.release import current_entry
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
 
-FloatArray = NDArray[np.float64]
 MEET = 1e-9  # [s] times that differ by less are one
 
 
@@ -32,7 +31,7 @@ class Samples(NamedTuple):
 
     t: FloatArray  # (rows,) [s], from the start of the run
     late: FloatArray  # (L,) [s]
-    next: NDArray[np.int64]  # (L,) the row whose sample is next
+    next: IntArray  # (L,) the row whose sample is next
     state: FloatArray  # (L, rows, S) x, and currents
     pace: FloatArray  # (L, rows, S) its time derivative
     heading: FloatArray  # (L, rows)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.model.actuation import Driver
 
 
-def driver_of(problem: Problem, values: NDArray[np.float64]) -> tuple[Driver, list[int]]:
+def driver_of(problem: Problem, values: FloatArray) -> tuple[Driver, list[int]]:
     """(the driver at these values, index of each of its numbers among the parameters or -1)."""
     where = [problem.where(name) for name in Driver._fields]
     return Driver(*(float(values[k]) if k >= 0 else plain for k, plain in zip(where, Driver(), strict=True))), where

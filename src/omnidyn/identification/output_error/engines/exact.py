@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.engines.actuation import driver_of
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march import (
@@ -40,8 +40,6 @@ from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.frames import body_to_world
 from omnidyn.model.layout import N_AXES
 from omnidyn.simulation.exact.position import PLACE_SIZE
-
-FloatArray = NDArray[np.float64]
 
 VECTOR = 4  # rows of slopes are padded to a multiple
 LATE = "latency."
@@ -164,7 +162,7 @@ class ExactEngine:
 
     def _numbers(
         self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, room: int
-    ) -> tuple[Physics, Slopes, NDArray[np.int64]]:
+    ) -> tuple[Physics, Slopes, IntArray]:
         """Physics and slopes of the outputs of one piece."""
         problem, columns = self.problem, piece.record.columns
         count, robot_count, width = len(problem.parameters), problem.robot_count, len(columns)
@@ -200,19 +198,19 @@ class ExactEngine:
         return physics, derivatives, np.array([*starts, width])
 
 
-def used_by(piece: Piece, count: int) -> NDArray[np.int64]:
+def used_by(piece: Piece, count: int) -> IntArray:
     """Which of `count` parameters and the states of a piece the kernel knows: it knows no state that is not free."""
     return np.concatenate([np.arange(count), count + np.flatnonzero(piece.free)])
 
 
-def padded(used: NDArray[np.int64]) -> int:
+def padded(used: IntArray) -> int:
     """Entries of a row of slopes."""
     return -(-len(used) // VECTOR) * VECTOR
 
 
 def march_piece(
     piece: Piece, state: FloatArray, every: Sequence[Column], count: int,
-    numbers: tuple[Physics, Slopes, NDArray[np.int64]], weighting: Weighting,
+    numbers: tuple[Physics, Slopes, IntArray], weighting: Weighting,
 ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:  # fmt: skip
     """The sums of a piece, and its (outputs, slopes) where the weighting keeps them. every: the columns of the problem.
 
@@ -270,14 +268,14 @@ def turned_by(facing: float) -> FloatArray:
     return body_to_world(facing + 0.5 * np.pi)[:2, :2]
 
 
-def _at(used: NDArray[np.int64], values: FloatArray, total: int) -> FloatArray:
+def _at(used: IntArray, values: FloatArray, total: int) -> FloatArray:
     """Values of the kernel's parameters among all, 0 for the rest. Shape (*batch, total)."""
     wide = np.zeros((*values.shape[:-1], total))
     wide[..., used] = values[..., : len(used)]
     return wide
 
 
-def _wheel_of(columns: Sequence[Column]) -> NDArray[np.int64]:
+def _wheel_of(columns: Sequence[Column]) -> IntArray:
     return np.array([i if name == "current" else -1 for name, i in columns])
 
 

@@ -10,8 +10,8 @@ import copy
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of
 from omnidyn.identification.output_error.engines.exact import LATE, Weighting
@@ -24,8 +24,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
 from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, late_samples
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Found = tuple[FloatArray, FloatArray, IntArray]
 
 

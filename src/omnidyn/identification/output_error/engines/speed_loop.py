@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.exact import LATE, Weighting
 from omnidyn.identification.output_error.engines.sums import added
@@ -25,8 +26,6 @@ from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.simulation.commands import Commands
 from omnidyn.simulation.sensitivity.derivatives import Derivatives, differentiate
 from omnidyn.simulation.sensitivity.directions import Prepared, current_derivatives, prepared
-
-FloatArray = NDArray[np.float64]
 
 MEET = 1e-7  # [s] times that differ by less are one
 SETTLED = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import PieceSums
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def added(

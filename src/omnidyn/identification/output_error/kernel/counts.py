@@ -15,11 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, part
-
-FloatArray = NDArray[np.float64]
 
 LEAST_SHARE = 0.1  # of a tick that the noise has at least: below it only rows beside an edge of a tick would count
 _CONSTANT = 0.5 * math.log(2.0 * math.pi)

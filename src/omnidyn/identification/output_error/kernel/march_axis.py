@@ -7,13 +7,11 @@ slopes in registers instead of rows.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.kernel.march import FINAL, SAME, loss_terms
 from omnidyn.simulation.exact.slopes import hold_slopes, step_slopes
-
-FloatArray = NDArray[np.float64]
 
 BY = 3  # slopes: by a, by c, by the speed at the start
 # Where the sums stand in the row that a march fills; the pairs of `info` are aa, ac, av, cc, cv, vv.

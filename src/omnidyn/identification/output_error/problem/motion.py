@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import (
     count_far,
@@ -21,8 +21,6 @@ from omnidyn.model.dynamics import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 
-FloatArray = NDArray[np.float64]
-
 CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any log
 
 
@@ -33,9 +31,9 @@ class Motion:
     seen (3,): whether anything tells of an axis; what was not measured has held nothing.
     """
 
-    moved: NDArray[np.bool_]
+    moved: BoolArray
     held: FloatArray
-    seen: NDArray[np.bool_]
+    seen: BoolArray
 
     def words(self, axis: int, where: str = "") -> str:
         """Why the friction of an axis that did not move is not fitted."""

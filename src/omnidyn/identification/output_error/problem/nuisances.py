@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece
@@ -25,8 +25,6 @@ from omnidyn.logs.steady_table import AXES
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.first_guess import GRAVITY
 from omnidyn.model.robot import Robot
-
-FloatArray = NDArray[np.float64]
 
 LATENCY, TILT = "latency", "tilt"
 NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.output_error.kernel.counts import find_tick
 from omnidyn.identification.output_error.problem.redundant import redundant
@@ -15,8 +15,6 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
-
-FloatArray = NDArray[np.float64]
 
 OUTPUTS = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")
 POSE, PARTS = "pose", ("heading", "position")

@@ -6,14 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.keys import BREAKAWAY, EMF, TORQUE, Key, expand
 from omnidyn.model.robot import Robot
-
-FloatArray = NDArray[np.float64]
 
 FRICTION_LIMIT = 1e6  # what a robot file takes
 AT = "@"  # KEY@GROUP is the number that a group has for itself
@@ -70,9 +66,7 @@ def robot_at(robot: Robot, parameters: Sequence[Parameter], values: Sequence[flo
     return robot
 
 
-def robot_parameter(
-    robot: Robot, key: str, prior: tuple[float, float] | None, others: Sequence[str] = ()
-) -> Parameter:  # fmt: skip
+def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, others: Sequence[str] = ()) -> Parameter:
     """A number of the robot file as a free parameter; `others` are free beside it.
 
     Friction may be 0: it has a linear scale and a bound at 0. What must be positive has a logarithmic one.

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.parameters import Parameter, robot_at
 from omnidyn.model.dynamics import mass_matrix, settled_currents
 from omnidyn.model.keys import BOX, Key
@@ -20,8 +20,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.exact.march import axis_levels
-
-FloatArray = NDArray[np.float64]
 
 EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10
 

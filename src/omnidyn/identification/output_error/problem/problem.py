@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.problem.parameters import Parameter, robot_at
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.robot import Robot
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 Column = tuple[str, int]
 

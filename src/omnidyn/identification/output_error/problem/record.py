@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.problem.outputs import outputs_of
 from omnidyn.logs.segments import segments
@@ -17,8 +17,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import stretches
-
-FloatArray = NDArray[np.float64]
 
 SHORTEST = 3  # rows of a piece that is used
 LOOP_REMEDY = (
@@ -140,7 +138,7 @@ def _set_point(run: Run, robot: Robot, loop: bool) -> FloatArray | None:
     return None if run.twist_command is None else wheel_speed(robot.wheels, run.twist_command)
 
 
-def _whole(known: NDArray[np.bool_], start: int, stop: int) -> list[tuple[int, int]]:
+def _whole(known: BoolArray, start: int, stop: int) -> list[tuple[int, int]]:
     """Stretches of rows with all inputs, (first, last). The last row needs none: nothing follows it."""
     if known[start : stop - 1].all():
         return [(start, stop - 1)] if stop - start >= SHORTEST else []

@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.model.frames import body_to_world
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import MAD_TO_STD
-
-FloatArray = NDArray[np.float64]
 
 NEAR = 0.2  # of what independent measurements part by
 WINDOWS = (1, 16, 256)  # rows

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, maker
 from omnidyn.identification.output_error.problem.primitives import Mapping
 from omnidyn.identification.output_error.problem.record import Record
@@ -21,8 +21,6 @@ from omnidyn.model.frames import world_to_body
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
-
-FloatArray = NDArray[np.float64]
 
 WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.problem.problem import PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Engine
-
-FloatArray = NDArray[np.float64]
 
 
 class TiedEngine:

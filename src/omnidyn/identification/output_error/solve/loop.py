@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
 from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST
@@ -25,8 +25,6 @@ from omnidyn.identification.output_error.solve.solver import Normal, Solution, S
 from omnidyn.identification.question import FREE, REST
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
 from omnidyn.model.robot import Robot
-
-FloatArray = NDArray[np.float64]
 
 FINE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
 SETTING_OFF = 60  # rows of each log on which starts are tried
@@ -48,7 +46,7 @@ def looped(records: Sequence[Record]) -> bool:
     return records[0].set_point is not None
 
 
-def loop_keys(robot: Robot, moved: NDArray[np.bool_], source: str = "") -> list[str]:
+def loop_keys(robot: Robot, moved: BoolArray, source: str = "") -> list[str]:
     """What is free by default: friction, of axes that moved only, and the gains.
 
     Raises InsufficientDataError where nothing moved.
@@ -185,9 +183,7 @@ def best_start(solver: Solver, watch: Progress) -> Point:
     return min(tried, key=lambda solution: solution.state.objective).state.point
 
 
-def _tried(
-    solver: Solver, which: Sequence[tuple[float, float, float]], what: str, watch: Progress
-) -> list[State]:  # fmt: skip
+def _tried(solver: Solver, which: Sequence[tuple[float, float, float]], what: str, watch: Progress) -> list[State]:
     """The states at each (latency [s], factor of friction, factor of gains)."""
     found = []
     for k, each in enumerate(which):

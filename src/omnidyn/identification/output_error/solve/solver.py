@@ -13,13 +13,11 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
-
-FloatArray = NDArray[np.float64]
 
 MAX_ITERATIONS = 60
 CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
@@ -70,7 +68,7 @@ class Solution:
     """
 
     state: State
-    held: NDArray[np.bool_]
+    held: BoolArray
     iterations: int
     converged: bool
     solver: Solver[Any]
@@ -108,7 +106,7 @@ class Solver(Generic[P]):
         return State(point, sums, objective + self._prior(point), now, self.problem)
 
     @property
-    def scaled(self) -> NDArray[np.bool_]:
+    def scaled(self) -> BoolArray:
         """Columns whose scale is a number of its own, not the mean square of their residuals. Shape (columns,)."""
         return np.full(len(self.tick), True) if self.nu else self.tick > 0.0
 
@@ -176,7 +174,7 @@ class Solver(Generic[P]):
     def clipped(self, inner: FloatArray) -> FloatArray:
         return np.clip(inner, self._low, self._high)
 
-    def at_bound(self, inner: FloatArray, gradient: FloatArray) -> NDArray[np.bool_]:
+    def at_bound(self, inner: FloatArray, gradient: FloatArray) -> BoolArray:
         """Which parameters stand at a bound and are pushed against it by `gradient` (downhill direction)."""
         return ((inner <= self._low) & (gradient < 0.0)) | ((inner >= self._high) & (gradient > 0.0))
 
@@ -235,7 +233,7 @@ class Normal:
                 information -= damped[:k, k:] @ lift
         return gradient, information
 
-    def distance_without(self, still: NDArray[np.bool_]) -> float:
+    def distance_without(self, still: BoolArray) -> float:
         """Squared length of the Gauss-Newton step in standard errors, over the parameters that are not `still`."""
         free = ~still
         step = _solve(self.information[np.ix_(free, free)], self.gradient[free])
@@ -257,7 +255,7 @@ class Normal:
             found.append(own)
         return np.concatenate(found)
 
-    def moved(self, damping: float, still: NDArray[np.bool_]) -> Point:
+    def moved(self, damping: float, still: BoolArray) -> Point:
         """The point of the damped step, within the bounds, without the parameters that are `still`."""
         gradient, information = self._reduced(damping)
         free = ~still

@@ -13,14 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
-
-FloatArray = NDArray[np.float64]
 
 KEY = "friction.axes.breakaway"
 LIMIT = 7.35 / 2.0

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.difference import TiedEngine
@@ -15,8 +15,6 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.statistics import central_interval, t_quantile
-
-FloatArray = NDArray[np.float64]
 
 OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
 LEAST_RUNS, LEAST_DRAWS = 5, 20

@@ -18,16 +18,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, LEAST_SHARE, information, rounding
 from omnidyn.identification.output_error.kernel.march import WAVES
 from omnidyn.identification.output_error.problem.problem import PieceSums
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State, of_states
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 STEPS = 4096  # of the integrals over a tick
 CLOSE = 1e-6  # relative, to the least variance: the noise does not show

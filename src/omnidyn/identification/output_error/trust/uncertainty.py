@@ -20,15 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import PieceSums, per_column
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.trust.rounding import rounding_scatter, silent
 from omnidyn.statistics import t_quantile
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
 MANY_RUNS = 20  # from so many on each run is a block

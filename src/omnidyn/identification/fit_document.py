@@ -1,0 +1,69 @@
+"""What a fit to whole logs says: its tables and words, and its values for machines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from omnidyn.document import Document, Points, Table, apart, interval_cell
+from omnidyn.findings.finding import FATAL, WARN, Verdict
+from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.question import OUTPUT_ERROR
+from omnidyn.identification.steady.study_parts import Difference
+from omnidyn.identification.validation import Validation
+from omnidyn.model.keys import unit
+
+SHOWN = 6  # findings of a log that are named
+
+
+def fit_document(
+    fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], differences: Sequence[Difference],
+    verdicts: Sequence[Verdict], advice: Sequence[str],
+) -> Document:  # fmt: skip
+    """The fit of each group beside its logs, the differences between groups, and what to do next."""
+    blocks, groups = [], {}
+    for group, fit in fits.items():
+        beside = [validations[group].document()] if group in validations else []
+        told = [fit.document(), *beside]
+        blocks += [[f"group {group}"] if len(fits) > 1 else [], *(each.parts for each in told)]
+        groups[group] = {**fit.to_dict(), "validation": beside[0].data if beside else None}
+    blocks.append([difference_table(differences)] if differences else [])
+    blocks.append(["next:", Points(advice, name="next")] if advice else [])
+    data = {
+        "method": OUTPUT_ERROR, **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
+        "differences": [{**vars(each), "differs": each.differs} for each in differences], "next": advice,
+        "check": [{"source": each.source, "fatal": each.fatal, "counts": each.counts} for each in verdicts],
+    }  # fmt: skip
+    return Document(apart(*blocks), data, [words for fit in fits.values() for words in fit.warnings], ascii=True)
+
+
+def number_table(fit: OutputErrorEstimate) -> Table:
+    """Every fitted number, those of the log too."""
+    rows = []
+    for name, value in fit.value.items():
+        mark = "not identifiable" if name in fit.unidentifiable else "at bound" if name in fit.at_bound else ""
+        rows.append((name, f"{value:.5g}", f"{fit.std[name]:.2g}", interval_cell(fit.ci95[name]), unit(name), mark))
+    for name, own in fit.nuisances.items():
+        mark = "not identifiable" if name in fit.unidentifiable else "of the log"
+        rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, mark))
+    return Table(("number", "value", "std error", "95 % interval", "unit", ""), rows)
+
+
+def difference_table(differences: Sequence[Difference]) -> Table:
+    """What differs between groups, and what may."""
+    rows = [
+        (d.key, f"{d.first} {d.values[0]:.4g}", f"{d.second} {d.values[1]:.4g}", f"{d.difference:+.4g}", f"{d.std:.2g}",
+         interval_cell((d.low, d.high)), unit(d.key), "differs" if d.differs else "no difference seen")
+        for d in differences
+    ]  # fmt: skip
+    return Table(("number", "first", "second", "difference", "std error", "95 % interval", "unit", ""), rows)
+
+
+def verdict_table(verdicts: Sequence[Verdict]) -> Table:
+    """What `check` says of each log."""
+    rows = []
+    for each in verdicts:
+        what = [f"{f.code} {f.where}".rstrip() for f in each.findings if f.level in (FATAL, WARN)]
+        words = ", ".join(what[:SHOWN]) + (", ..." if len(what) > SHOWN else "")
+        rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[FATAL]),
+                     str(each.counts[WARN]), words or "fit for use"))  # fmt: skip
+    return Table(("log", "rows", "length s", "rate Hz", "fatal", "to heed", "what"), rows)
