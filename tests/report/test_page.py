@@ -8,13 +8,13 @@ import pytest
 
 from omnidyn.paper.claim import Claim, ClaimVerdict
 from omnidyn.report.page import SIGNS, STYLE, render_page
-from omnidyn.report.style import Picture
+from omnidyn.report.style import Picture, new_figure
 from tests.support.outputs import Reader
 
 EVIL = "<script>alert(1)</script> & \"x\" 'y' </td></table>"
 ROBOT = {"role": "robot", "name": "axebot", "sha256": "ab" * 32}
 RECORD = {"omnidyn": "0.1.0", "command": "omnidyn demo", "inputs": [ROBOT]}
-FIGURE = Picture("fig", "Title", "Caption", b"", b"<svg xmlns='http://www.w3.org/2000/svg'/>")
+FIGURE = Picture("fig", "Title", "Caption", new_figure(1.0, 1.0))
 
 
 def claim(verdict=ClaimVerdict.REPRODUCED, key="key", text="a plain word", numbers=None):
@@ -66,7 +66,7 @@ def test_the_policy_allows_this_style_and_embedded_images_only():
 
 
 def test_all_text_is_escaped():
-    evil = Picture(EVIL, EVIL, EVIL, b"", b"<svg/>")
+    evil = Picture(EVIL, EVIL, EVIL, new_figure(1.0, 1.0))
     record = {"omnidyn": EVIL, "command": EVIL, "inputs": [{"role": EVIL, "name": EVIL, "sha256": EVIL}]}
     text = page([claim(key=EVIL, text=EVIL, numbers={EVIL: 1.0})], [evil], EVIL, record)
     read = Reader(text)

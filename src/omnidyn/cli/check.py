@@ -88,8 +88,7 @@ def _checked(
     picture: str, force: bool,
 ) -> Checked:  # fmt: skip
     """One log, block by block; an error in reading it does not stop the others."""
-    from omnidyn.findings.check import check as check_log
-    from omnidyn.findings.check import check_blocks
+    from omnidyn.findings.check import check_blocks, check_log
     from omnidyn.logs.read_log import iter_logs
 
     done, digest = Checked(path), _Digest()

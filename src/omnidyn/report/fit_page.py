@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from omnidyn.document import Points
@@ -77,7 +78,7 @@ def _runs(group: str, validation: Validation) -> str:
 
 
 def _renamed(drawn: Picture, name: str, words: str) -> Picture:
-    return Picture(_anchor(name), f"{drawn.title}, {words}", drawn.caption, drawn.png, drawn.svg)
+    return replace(drawn, name=_anchor(name), title=f"{drawn.title}, {words}")
 
 
 def _anchor(name: str) -> str:
@@ -100,7 +101,7 @@ def _correlations(fits: Fits) -> list[str]:
     for group, fit in fits.items():
         drawn = draw_correlation(fit.correlation)
         title = _named(group, drawn.title, fits)
-        found.append(figure(Picture(_anchor(f"correlation{group}"), title, drawn.caption, drawn.png, drawn.svg)))
+        found.append(figure(replace(drawn, name=_anchor(f"correlation{group}"), title=title)))
         lost = [f"{name} is not identifiable from these logs" for name in fit.unidentifiable]
         found.append(bullets([_named(group, words, fits) for words in [*lost, *fit.blind]]))
     return found
