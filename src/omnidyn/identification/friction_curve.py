@@ -22,7 +22,8 @@ class FrictionCurve:
     """What friction takes along one axis at each speed, and half its 95 % interval.
 
     axis: x, y or yaw. speed [m/s, yaw rad/s], force and half [N, yaw N m], shape (n,) each. unknown: keys of friction
-    that the data do not determine and that act along this axis: the band leaves them out.
+    that the data do not determine and that act along this axis: the band leaves them out. fitted: whether any level
+    that acts along this axis was fitted; else the force is that of the robot file.
     """
 
     axis: str
@@ -30,6 +31,7 @@ class FrictionCurve:
     force: FloatArray
     half: FloatArray
     unknown: tuple[str, ...] = ()
+    fitted: bool = True
 
 
 def friction_curve(estimate: Estimate, axis: int, speed: FloatArray) -> FrictionCurve:
@@ -52,7 +54,7 @@ def friction_curve(estimate: Estimate, axis: int, speed: FloatArray) -> Friction
         variance = np.einsum("in,ij,jn->n", jacobian, covariance, jacobian)
         freedom = min(estimate.degrees_of_freedom[name] for name in known)
         half = t_quantile(max(freedom, 1)) * np.sqrt(np.maximum(variance, 0.0))
-    return FrictionCurve(AXES[axis], speed, force, half, tuple(name for name in felt if name not in known))
+    return FrictionCurve(AXES[axis], speed, force, half, tuple(n for n in felt if n not in known), bool(felt))
 
 
 def sliding_force(robot: Robot, axis: int, speed: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,6 +60,16 @@ def path_of(run: Run, robot: Robot | None = None) -> Path | None:
 def body_twist(run: Run, robot: Robot | None = None) -> FloatArray | None:
     """Twist of a run [m/s, m/s, rad/s], shape (samples, 3): as measured, else from its wheel speeds; None without."""
     return _twist(run, robot)[0]
+
+
+def driven(twists: Sequence[FloatArray | None]) -> list[tuple[float, float] | None]:
+    """The middle 90 % of the speeds at which logs moved along x, along y and about yaw; None for an axis without."""
+    found: list[tuple[float, float] | None] = []
+    for axis in range(3):
+        speeds = np.concatenate([np.zeros(0), *(each[:, axis] for each in twists if each is not None)])
+        speeds = speeds[np.isfinite(speeds) & (speeds != 0.0)]
+        found.append((float(np.quantile(speeds, 0.05)), float(np.quantile(speeds, 0.95))) if speeds.size else None)
+    return found
 
 
 def _twist(run: Run, robot: Robot | None) -> tuple[FloatArray | None, str]:

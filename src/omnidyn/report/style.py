@@ -159,6 +159,8 @@ def around_robot(axes: PolarAxes, top: float) -> None:
     axes.set_ylim(0.0, 1.15 * top)
     ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, 1.15 * top)
     axes.set_rgrids([each for each in ticks if 0.0 < each <= 1.15 * top], angle=-112.5, fontsize=9.5, color=INK)
+    for label in axes.get_yticklabels():
+        label.set(bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}, ha="center", va="center")
     axes.spines["polar"].set_visible(True)
     axes.spines["polar"].set_color(GREY)
     axes.grid(color=GREY, alpha=0.35)

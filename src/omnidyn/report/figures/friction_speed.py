@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +14,7 @@ from omnidyn.logs.steady_table import AXES
 from omnidyn.report.style import (
     BLUE,
     GREEN,
+    GREY,
     INK,
     PALE,
     PURPLE,
@@ -26,7 +28,7 @@ from omnidyn.report.style import (
 
 COLOURS, LINES = (BLUE, VERMILLION, GREEN, PURPLE), ("-", "--", "-.", (0, (1, 1)))
 SPEED_UNIT, FORCE_UNIT = ("m/s", "m/s", "rad/s"), ("N", "N", "N m")
-ALONG = ("along x (forward)", "along y (left)", "about yaw")
+ALONG = ("along x", "along y", "about yaw")
 POINTS = 40  # of each side of a curve
 
 
@@ -67,12 +69,16 @@ def _panel(
             if half.any():
                 axes.fill_between(speed, force - half, force + half, color=colour, alpha=0.22, linewidth=0.0,
                                   label="95 % band" if k == 0 and colour == COLOURS[0] else None)  # fmt: skip
-            axes.plot(speed, force, linestyle=line, color=colour, label=name if k == 0 else None)  # type: ignore[arg-type]
+            style: dict[str, Any] = (
+                {"linestyle": line, "color": colour} if curve.fitted else {"linestyle": ":", "color": GREY}
+            )
+            axes.plot(speed, force, label=name if k == 0 else None, **style)
     axes.axhline(0.0, color=INK, linewidth=0.6)
     axes.axvline(0.0, color=INK, linewidth=0.6)
     reach = max(float(np.abs(curve.speed).max()) for curve in curves.values())
     axes.set_xlim(-reach, reach)
-    axes.set_title(f"{ALONG[axis]}: {FORCE_UNIT[axis]}")
+    guess = "" if any(curve.fitted for curve in curves.values()) else " (not fitted)"
+    axes.set_title(f"{ALONG[axis]}: {FORCE_UNIT[axis]}{guess}")
     axes.set_xlabel(f"speed, {SPEED_UNIT[axis]}")
     thin_out(axes, 5, 6)
 
@@ -84,6 +90,8 @@ def _caption(curves: Mapping[str, Sequence[FrictionCurve]], driven: bool, banded
         "speed by itself." if banded else ""
     )  # fmt: skip
     lost = f" Not determined by the data, and not in the band: {', '.join(unknown)}." if unknown else ""
+    guessed = [each.axis for parts in list(curves.values())[:1] for each in parts if not each.fitted]
+    lost += f" Dotted: {' and '.join(guessed)} was not fitted, the line is that of the robot file." if guessed else ""
     range_words = " Beyond the grey speeds the line is the law, not the data." if driven else ""
     return (
         f"What friction takes from a robot that moves along {AXES[0]}, along {AXES[1]}, or turns about {AXES[2]}; at "

@@ -40,7 +40,7 @@ def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] =
         figure = new_figure(WIDTH, height)
         grid = figure.add_gridspec(
             3 * len(shown) - 1, 1, height_ratios=([2.0, 1.0, 0.14] * len(shown))[:-1], hspace=0.12,
-            left=0.105, right=0.965, top=1.0 - 0.45 / height, bottom=0.55 / height,
+            left=0.13, right=0.965, top=1.0 - 0.45 / height, bottom=0.55 / height,
         )  # fmt: skip
         first = None
         for k, name in enumerate(shown):
@@ -54,7 +54,7 @@ def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] =
         assert first is not None
         first.set_xlim(segments[0].begin, segments[-1].end)
         handles, names = first.get_legend_handles_labels()
-        place = {"loc": "upper left", "bbox_to_anchor": (0.095, 0.995), "borderaxespad": 0.0}
+        place = {"loc": "upper left", "bbox_to_anchor": (0.12, 0.995), "borderaxespad": 0.0}
         figure.legend(handles, names, ncols=len(names), **place)
         title = f"Measured and {' and '.join(comparison.robots)}"
         return picture("overlay", title, _caption(comparison, log, len(segments)), figure)
@@ -76,8 +76,9 @@ def _values(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
     for robot, colour, line in zip(comparison.robots, COLOURS, LINES, strict=False):
         traces = [comparison.trace(robot, name, segment) for segment in segments]
         t, model = _broken([(trace.t, trace.model) for trace in traces])
-        axes.plot(t, model, line, color=colour, linewidth=3.0, alpha=0.75, label=robot)
+        axes.plot(t, model, line, color=colour, linewidth=4.0, alpha=0.55, label=robot)
     axes.set_ylabel(f"{name}, {unit(name)}")
+    axes.yaxis.set_label_coords(-0.115, 0.5)  # where the widest labels of ticks leave it whole, and all in one line
     axes.tick_params(labelbottom=False)
     axes.locator_params(axis="y", nbins=5)
 
@@ -89,6 +90,7 @@ def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
         t, error = _broken([(trace.t, trace.error) for trace in traces])
         axes.plot(t, error, line, color=colour, linewidth=1.0)
     axes.set_ylabel("error", color=INK)
+    axes.yaxis.set_label_coords(-0.115, 0.5)
     axes.locator_params(axis="y", nbins=3)
     axes.tick_params(labelbottom=last)
     if last:

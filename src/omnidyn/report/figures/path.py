@@ -36,7 +36,7 @@ def draw_path(paths: Sequence[Path], name: str = "path", of: str = "") -> Pictur
     with look():
         figure = new_figure(WIDTH, 4.3)
         left = figure.add_axes((0.095, 0.13, 0.42, 0.76))
-        right = cast(PolarAxes, figure.add_axes((0.605, 0.1, 0.36, 0.67), projection="polar"))
+        right = cast(PolarAxes, figure.add_axes((0.61, 0.1, 0.31, 0.6), projection="polar"))
         for k, path in enumerate(paths):
             _path(left, path, COLOURS[k] if k < len(COLOURS) else GREY)
         left.set_aspect("equal", adjustable="datalim")
@@ -44,7 +44,7 @@ def draw_path(paths: Sequence[Path], name: str = "path", of: str = "") -> Pictur
         left.set_xlabel("x, m")
         left.set_title("path, y in m")
         _directions(right, paths)
-        figure.text(0.575, 0.905, "metres driven per 10°, seen from above", fontsize=11.5)
+        figure.text(0.575, 0.905, "metres driven per 10° of direction", fontsize=11.5)
         return picture(name, f"Where the log{'s' * (len(paths) > 1)} went{of}", _caption(paths), figure)
 
 
@@ -65,6 +65,7 @@ def _directions(axes: PolarAxes, paths: Sequence[Path]) -> None:
     metres = np.bincount(sector, weights=length, minlength=SECTORS)
     axes.bar(width * np.arange(SECTORS), metres, width=width, color=BLUE, alpha=0.8, edgecolor=INK, linewidth=0.4)
     around_robot(axes, max(float(metres.max()), 1e-9))
+    axes.set_axisbelow(False)  # numbers stand above the bars
 
 
 def _caption(paths: Sequence[Path]) -> str:
@@ -74,6 +75,6 @@ def _caption(paths: Sequence[Path]) -> str:
     more = f" The first {len(COLOURS)} of {len(paths)} logs have a colour." if len(paths) > len(COLOURS) else ""
     return (
         f"Left: the way of the robot from {origins}, {total:.3g} m in all; a ring is a start, a dot an end.{drift}"
-        f"{more} Right: how far it drove in which direction of its own frame (forward is up, left is left). Friction along "
-        "directions that are missing there is not in the data."
+        f"{more} Right: how far it drove in which direction of its own frame (forward is up, left is left). Friction "
+        "along directions that are missing there is not in the data."
     )
