@@ -9,12 +9,12 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import Estimate
 from omnidyn.logs.steady_table import AXES
-from omnidyn.model.keys import BREAKAWAY, FRICTION, Key, find_key
+from omnidyn.model.keys import BREAKAWAY, FRICTION, Key, expand, find_key
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import sliding_wrench
 from omnidyn.statistics import t_quantile
 
-STEP = 1e-4  # of a level, or of 1 where it is smaller: forces are linear in the levels along one axis
+STEP = 1e-3  # [N, N s/m, ..] of a level: forces are linear in the levels along one axis, and any step will do
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +70,13 @@ def _is_level(name: str) -> bool:
 
 
 def _slope(robot: Robot, name: str, axis: int, speed: FloatArray) -> FloatArray:
-    """Derivative of the force by a level, from both sides."""
-    key = Key.parse(name)
-    value = key.get(robot)
-    step = STEP * max(abs(value), 1.0)
-    up, down = (key.set(robot, value + way * step, checked=False) for way in (1.0, -1.0))
-    return (sliding_force(up, axis, speed) - sliding_force(down, axis, speed)) / (2.0 * step)
+    """Derivative of the force by a level, from both sides; a list that is one number, as of a disc, moves as one."""
+    up, down = (sliding_force(_moved(robot, name, way * STEP), axis, speed) for way in (1.0, -1.0))
+    return (up - down) / (2.0 * STEP)
+
+
+def _moved(robot: Robot, name: str, by: float) -> Robot:
+    """The robot with a level, or every entry of a list of levels, changed by so much."""
+    for key in map(Key.parse, expand(name, robot)):
+        robot = key.set(robot, key.get(robot) + by, checked=False)
+    return robot

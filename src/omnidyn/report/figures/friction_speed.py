@@ -91,7 +91,9 @@ def _caption(curves: Mapping[str, Sequence[FrictionCurve]], driven: bool, banded
     )  # fmt: skip
     lost = f" Not determined by the data, and not in the band: {', '.join(unknown)}." if unknown else ""
     guessed = [each.axis for parts in list(curves.values())[:1] for each in parts if not each.fitted]
-    lost += f" Dotted: {' and '.join(guessed)} was not fitted, the line is that of the robot file." if guessed else ""
+    if guessed:
+        verb = "was" if len(guessed) == 1 else "were"
+        lost += f" Dotted: {' and '.join(guessed)} {verb} not fitted, the line is that of the robot file."
     range_words = " Beyond the grey speeds the line is the law, not the data." if driven else ""
     return (
         f"What friction takes from a robot that moves along {AXES[0]}, along {AXES[1]}, or turns about {AXES[2]}; at "

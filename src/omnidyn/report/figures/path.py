@@ -31,7 +31,7 @@ SECTORS = 36
 MAX_POINTS = 4000
 
 
-def draw_path(paths: Sequence[Path], name: str = "path", of: str = "") -> Picture:
+def draw_path(paths: Sequence[Path], name: str = "where_it_went", of: str = "") -> Picture:
     """The paths seen from above, a start as a ring and an end as a dot; and the metres driven per direction."""
     with look():
         figure = new_figure(WIDTH, 4.3)
