@@ -4,7 +4,7 @@ import omnidyn
 
 robot = omnidyn.load_robot("axebot")  # the robot of the paper; a path loads your own
 run = omnidyn.simulate(robot, [[0.0, 3.0, -3.0]] * 1500, 1e-3)  # volts for 3 wheels, 1500 steps of 1 ms
-print(run)
+print(repr(run))  # print(run) is a table
 print(f"forward at {run.twist[-1, 0]:.4f} m/s after {run.t[-1]:.1f} s, {run.pose[-1, 0]:.4f} m away")
 stuck = omnidyn.simulate(robot, [[0.0, 0.6, -0.6]] * 1500, 1e-3)
 print("under 0.6 V it stays at", stuck.pose[-1].tolist())

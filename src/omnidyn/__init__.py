@@ -12,6 +12,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from omnidyn import shown
+
 __version__ = "0.1.0"
 
 # Public name -> where it is defined. The list is tested: a name added here is a promise.
@@ -53,8 +55,12 @@ _HOME = {
 __all__ = ["__version__", *_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame  # pyright: ignore[reportMissingImports]
+
     from omnidyn.comparison.compare import compare
     from omnidyn.comparison.result import Comparison
+    from omnidyn.document import Document
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate
@@ -76,6 +82,28 @@ if TYPE_CHECKING:
     from omnidyn.model.statespace import state_space
     from omnidyn.run import Run
     from omnidyn.simulation.simulate import simulate
+
+
+def _html(document: Document) -> str:
+    from omnidyn.report.notebook import document_html
+
+    return document_html(document)
+
+
+def _figure(result: Any, **options: Any) -> Figure:
+    from omnidyn.report.plots import plot
+
+    return plot(result, **options)
+
+
+def _frame(run: Run) -> DataFrame:
+    from omnidyn.interop.dataframe import to_dataframe
+
+    return to_dataframe(run)
+
+
+# What stands above every result is handed down here: see shown.py.
+shown.made_by(html=_html, figure=_figure, frame=_frame)
 
 
 def __getattr__(name: str) -> Any:

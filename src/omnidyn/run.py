@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
+from omnidyn.shown import FIGURE, FRAME, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame  # pyright: ignore[reportMissingImports]
 
 WHEEL, AXIS, SCALAR = "wheel", "axis", "scalar"
 
@@ -27,10 +33,15 @@ CHANNELS = {
     "pose": AXIS,
     "supply": SCALAR,
 }
+UNITS = {
+    "voltage": "V", "duty": "1", "current": "A", "wheel_angle": "rad", "wheel_speed": "rad/s",
+    "wheel_speed_command": "rad/s", "twist": "m/s, m/s, rad/s", "twist_command": "m/s, m/s, rad/s",
+    "pose": "m, m, rad", "supply": "V",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Shown):
     """One run. All channels have the length of `t`; one that was not measured is None, a missing value is NaN.
 
     t: time [s], strictly increasing, need not be regular. Shape (samples,).
@@ -102,6 +113,43 @@ class Run:
         span = f"{self.t[-1] - self.t[0]:.6g} s" if len(self.t) > 1 else "one sample"
         return f"<Run {self.source or 'unnamed'}: {len(self.t)} samples, {span}, {', '.join(self.channels)}>"
 
+    def document(self) -> Document:
+        """What was measured: a row per channel and column, with its least, mean and largest value."""
+        rows = [row for name, values in self.channels.items() for row in _rows(name, values)]
+        span = float(self.t[-1] - self.t[0])
+        rate = f" at {1.0 / float(np.median(np.diff(self.t))):.4g} Hz" if len(self.t) > 1 else ""
+        head = f"{self.source or 'a run'}: {len(self.t)} samples, {span:.6g} s{rate}"
+        data = {
+            "source": self.source, "samples": len(self.t), "duration_s": span, "channels": list(self.channels),
+            "warnings": list(self.warnings),
+        }  # fmt: skip
+        table = Table(("channel", "", "unit", "least", "mean", "largest", "missing"), rows, "<<<>", name="channels")
+        warnings = Points(self.warnings, "warning:", "warnings")
+        return Document([head, "", table, warnings], data, self.warnings, ascii=True)
+
+    def plot(self, channels: Sequence[str] = ()) -> Figure:
+        """Its channels over time, as a matplotlib Figure.
+
+        channels: names of those to show, such as "twist"; all that were measured by default.
+        Raises InputError for one that this run does not have.
+        """
+        return make(FIGURE, self, channels=channels)
+
+    def plot_path(self, robot: Any = None) -> Figure:
+        """Where it went, seen from above, and how far in which direction of its body, as a matplotlib Figure.
+
+        From the measured pose, else from its speeds. robot: tells them from the speeds of its wheels.
+        Raises InputError for a run that holds none of these.
+        """
+        return make(FIGURE, self, path=True, robot=robot)
+
+    def to_dataframe(self) -> DataFrame:
+        """A pandas DataFrame with the columns of a run file (u1_V, w1_rad_s, vx_m_s), over time t_s.
+
+        Raises MissingExtraError where pandas is not installed.
+        """
+        return make(FRAME, self)
+
     def __eq__(self, other: object) -> bool:
         """Equal to the last bit in every channel and word; NaN equals NaN."""
         if not isinstance(other, Run):
@@ -118,6 +166,19 @@ class Run:
 def as_list(runs: Run | Sequence[Run]) -> list[Run]:
     """One run, or several, as a list."""
     return [runs] if isinstance(runs, Run) else list(runs)
+
+
+def _rows(channel: str, values: FloatArray) -> Iterator[tuple[str, ...]]:
+    """The columns of a channel in a table: least, mean, largest, and what share is missing."""
+    columns = values.reshape(len(values), -1)
+    units = UNITS[channel].split(", ")
+    for k, column in enumerate(columns.T):
+        known = column[np.isfinite(column)]
+        numbers = [f"{each:.4g}" for each in (known.min(), known.mean(), known.max())] if known.size else ["-"] * 3
+        missing = 1.0 - known.size / len(column)
+        of = {WHEEL: f"wheel {k + 1}", AXIS: ("x", "y", "yaw")[k % 3], SCALAR: ""}[CHANNELS[channel]]
+        name = channel.replace("_", " ") if k == 0 else ""
+        yield name, of, units[k % len(units)], *numbers, f"{missing:.0%}" if missing else ""
 
 
 def _values(run: Run) -> Iterator[Any]:

@@ -5,12 +5,11 @@ import re
 
 import pytest
 
-from omnidyn.paper.claim import Claim, ClaimVerdict, judge, listed, plain, tiny
-from omnidyn.paper.claims import all_claims
+from omnidyn.paper.claim import Claim, ClaimVerdict, judge, listed, plain, same, tiny
+from omnidyn.paper.claims import SUBJECTS, all_claims, headlines
 
 NOT = [
     "inertia",
-    "current-limit",
     "table-2-coulomb-yaw",
     "steady-speed-x",
     "steady-speed-y",
@@ -26,11 +25,10 @@ NOT = [
     "dead-zone-x",
     "dead-zone-y",
     "dead-zone-yaw",
-    "figs-1-3",
     "one-robot",
     "axes-disagree",
-    "mpc",
 ]
+ABSENT, ELSEWHERE = {"current-limit", "figs-1-3"}, {"mpc"}
 CORRECTED = [
     "wheel-1-sign",
     "noise",
@@ -75,7 +73,46 @@ def test_verdicts(claims):
         "reproduced",
         "reproduced after a correction",
         "cannot be reproduced",
+        "not in the text we have",
+        "about another paper",
     ]
+    assert {key for key, verdict in verdicts.items() if verdict is ClaimVerdict.NOT_IN_TEXT} == ABSENT
+    assert {key for key, verdict in verdicts.items() if verdict is ClaimVerdict.OTHER_PAPER} == ELSEWHERE
+
+
+def test_one_rule_for_every_number():
+    """5 %, or the same in the printed digits: 0.0107 is the printed 0.01 of one digit, 0.0934 is no 0.099."""
+    assert same(1.0499, 1.0)
+    assert not same(1.051, 1.0)
+    assert same(0.0107, 0.01, digit=0.01)
+    assert not same(0.0107, 0.01)
+    assert not same(0.0934, 0.099, digit=0.001)
+    assert same([0.37, 1.2], [0.36, 1.0]).tolist() == [True, False]
+
+
+def test_the_rule_gives_every_verdict_on_a_number_of_table_2(claims):
+    digits = {"viscous": 0.01, "coulomb": 0.1}
+    rows = {key: claim for key, claim in claims.items() if key.startswith("table-2-")}
+    assert len(rows) == 6
+    for key, claim in rows.items():
+        digit = 0.001 if key == "table-2-coulomb-yaw" else digits[key.split("-")[2]]
+        by_rule = bool(same(claim.numbers["ours"], claim.numbers["printed"], digit))
+        assert (claim.verdict is ClaimVerdict.REPRODUCED) == by_rule, key
+        assert f"{100 * claim.numbers['off'] / claim.numbers['printed']:+.1f} %" in claim.why
+
+
+def test_five_lines_say_what_came_out(claims):
+    lines = headlines(tuple(claims.values()))
+    assert len(lines) == 5
+    judged = len(claims) - len(ABSENT) - len(ELSEWHERE)
+    assert f"of {judged} claims" in lines[0]
+    assert f"{len(CORRECTED)} after a correction, {len(NOT)} cannot be" in lines[0]
+    assert "C_w: 0.09337" in lines[2]
+    assert "2 of 12" in lines[3]
+
+
+def test_every_claim_has_a_subject(claims):
+    assert {claim.subject for claim in claims.values()} == set(SUBJECTS)
 
 
 def test_claims_are_deterministic_and_keys_unique(claims):

@@ -54,7 +54,7 @@ def test_current_limit(claims):
     claim = claims["current-limit"]
     assert round(claim.numbers["stall_current"], 2) == 3.55
     assert claim.numbers["largest_starting_current"] == pytest.approx(4 / 1.69)
-    assert claim.verdict == "cannot be reproduced"
+    assert claim.verdict == "not in the text we have"
 
 
 def test_claims_follow_the_robot(axebot):

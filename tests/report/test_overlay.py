@@ -10,6 +10,7 @@ import pytest
 from matplotlib.text import Text
 
 import omnidyn
+from omnidyn.errors import InputError
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.overlay import draw_overlay
 from tests.support.compared_logs import clean_log, coulomb_times, noisy
@@ -77,5 +78,5 @@ def test_units_and_names_are_on_the_page(found):
 
 @pytest.mark.parametrize("channels", [("i1",), ("vx",) * 7])
 def test_what_cannot_be_drawn_is_refused(found, channels):
-    with pytest.raises(ValueError, match="cannot draw"):
+    with pytest.raises(InputError, match="cannot draw"):
         draw_overlay(found, channels=channels)

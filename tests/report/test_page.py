@@ -8,13 +8,13 @@ import pytest
 
 from omnidyn.paper.claim import Claim, ClaimVerdict
 from omnidyn.report.page import SIGNS, STYLE, render_page
-from omnidyn.report.style import Picture
+from omnidyn.report.style import Picture, new_figure
 from tests.support.outputs import Reader
 
 EVIL = "<script>alert(1)</script> & \"x\" 'y' </td></table>"
 ROBOT = {"role": "robot", "name": "axebot", "sha256": "ab" * 32}
 RECORD = {"omnidyn": "0.1.0", "command": "omnidyn demo", "inputs": [ROBOT]}
-FIGURE = Picture("fig", "Title", "Caption", b"", b"<svg xmlns='http://www.w3.org/2000/svg'/>")
+FIGURE = Picture("fig", "Title", "Caption", new_figure(1.0, 1.0))
 
 
 def claim(verdict=ClaimVerdict.REPRODUCED, key="key", text="a plain word", numbers=None):
@@ -35,7 +35,48 @@ def demo_page(pictures):
 def test_it_is_whole_and_every_id_is_there_once(demo_page):
     ids = Reader(demo_page).all("id")
     assert len(ids) == len(set(ids))
-    assert {"claims", "figures", "made", "fig1_robot"} <= set(ids)
+    assert {"frames-and-wheels", "validation--section-4", "made", "fig1_robot"} <= set(ids)
+    assert "figures" not in ids  # each stands beside its claims
+
+
+def test_every_picture_stands_in_front_of_its_claims(demo_page):
+    for name, first, last in (
+        ("fig1_robot", "frames", "noise"), ("fig3_friction", "table-2-viscous-x", "table-2-coulomb-yaw"),
+        ("fig2_traces", "steady-speed-x", "force-yaw"), ("fig5_dead_zone", "dead-zone-x", "dead-zone-yaw"),
+        ("fig4_steps", "fig-4", "fig-4"), ("fig6_reconcile", "one-robot", "axes-disagree"),
+    ):  # fmt: skip
+        place = demo_page.index(f'id="{name}"')
+        begin, end = demo_page.rindex("<section", 0, place), demo_page.index("</section>", place)
+        assert begin < place < demo_page.index(f'id="{first}"') < end, name
+        assert demo_page.index(f'id="{last}"') < end, name
+
+
+def test_what_came_out_and_the_rule_stand_at_the_top(demo_page):
+    from omnidyn.paper.claims import RULE, all_claims, headlines
+
+    head = Reader(demo_page[: demo_page.index("<nav>")] + "</header></main></body></html>")
+    assert head.tags.count("ol") == 1
+    for line in headlines(all_claims()):
+        assert line[:20] in head.text.replace("\N{NO-BREAK SPACE}", " ")
+    assert RULE in head.text
+
+
+def test_what_the_text_does_not_hold_stands_apart(demo_page):
+    for key in ("current-limit", "figs-1-3", "mpc"):
+        row = demo_page.index(f'<tr id="{key}">')
+        table = demo_page.rindex("<table", 0, row)
+        assert "<h3>Nothing to judge</h3>" in demo_page[table - 80 : table], key
+
+
+def test_a_picture_can_be_made_large_without_a_script():
+    read = Reader(page())
+    assert "zoom-fig" in read.all("id")
+    assert "zoom-fig" in read.all("for")
+    assert ".zoom:checked" in STYLE
+
+
+def test_pictures_beyond_the_subjects_have_a_section_of_their_own():
+    assert "figures" in Reader(page()).all("id")
 
 
 def test_it_asks_for_nothing_from_outside(demo_page):
@@ -66,7 +107,7 @@ def test_the_policy_allows_this_style_and_embedded_images_only():
 
 
 def test_all_text_is_escaped():
-    evil = Picture(EVIL, EVIL, EVIL, b"", b"<svg/>")
+    evil = Picture(EVIL, EVIL, EVIL, new_figure(1.0, 1.0))
     record = {"omnidyn": EVIL, "command": EVIL, "inputs": [{"role": EVIL, "name": EVIL, "sha256": EVIL}]}
     text = page([claim(key=EVIL, text=EVIL, numbers={EVIL: 1.0})], [evil], EVIL, record)
     read = Reader(text)

@@ -31,11 +31,11 @@ def test_a_log_without_channels_or_rows_is_drawn_too():
 
 
 def test_a_spike_survives_the_thinning():
-    from omnidyn.report.figures.raw_log import MAX_POINTS, _thin
+    from omnidyn.report.figures.channels import MAX_POINTS, thinned
 
     values = np.zeros(500_000)
     values[123_457] = 9.0
-    t, thin = _thin(np.arange(500_000.0), values, slice(None, None, 500_000 // MAX_POINTS))
+    t, thin = thinned(np.arange(500_000.0), values, slice(None, None, 500_000 // MAX_POINTS))
     assert len(thin) < 3 * MAX_POINTS
     assert thin.max() == 9.0
     assert t[thin.argmax()] == 123_457

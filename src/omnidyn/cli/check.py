@@ -101,8 +101,7 @@ def _checked(
 
     try:
         log_options.refuse_missing([path])
-        from omnidyn.findings.check import check as check_log
-        from omnidyn.findings.check import check_blocks
+        from omnidyn.findings.check import check_blocks, check_log
         from omnidyn.logs.read_log import iter_logs
 
         log, only, blocks = _first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=said)))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from omnidyn.arguments import check_order
 from omnidyn.comparison.aligned import errors_for_whiteness
 from omnidyn.comparison.difference import ModelDifference, difference
 from omnidyn.comparison.metrics import Metrics, metrics
@@ -35,6 +36,8 @@ def compare(
     sensor without sign. tol: as in `simulate`. seed: of the bootstrap. progress: is told what is being replayed.
     Raises InputError when a log does not fit a robot, InsufficientDataError when there is nothing to compare.
     """
+    other_robot = (Robot, type(None))
+    check_order("compare(robot, run) or compare(robot, run, other)", (robot, Robot), (run, Run), (other, other_robot))
     runs = tuple(as_list(run))
     robots = _named(robot, other)
     channels = what_is_compared([*robots.values()], runs, apply)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from omnidyn.comparison import text
 from omnidyn.comparison.difference import ModelDifference
@@ -12,6 +12,10 @@ from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
 from omnidyn.document import Document, Part, Points, Words
 from omnidyn.run import Run
+from omnidyn.shown import FIGURE, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -30,8 +34,8 @@ class Segment:
         return slice(self.start, self.stop)
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Shown):
     """How near one or two models come to the logs of a robot.
 
     robots: their names, the first one being what `rmse`, `fit_percent` and `vaf` are about. measured: the logs.
@@ -53,6 +57,18 @@ class Comparison:
     difference: Mapping[str, ModelDifference] = field(default_factory=dict)
     current_unsigned: bool = False
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{name} {value:.3g} {unit(name)}" for name, value in self.rmse.items())
+        return f"<Comparison of {' and '.join(self.robots)} with {len(self.measured)} logs: rmse {errors}>"
+
+    def plot(self, log: int = 0, channels: Sequence[str] = ()) -> Figure:
+        """Measured and model over time, model minus measured below it, as a matplotlib Figure.
+
+        log: which of the logs, from 0. channels: components to show, such as "vx" or "w1", at most six; the first
+        three by default. Raises InputError for one that was not compared.
+        """
+        return make(FIGURE, self, log=log, channels=channels)
 
     @property
     def rmse(self) -> dict[str, float]:

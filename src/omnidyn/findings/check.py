@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 
+from omnidyn.arguments import check_order
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
 from omnidyn.findings.finding import FATAL, NOTE, Finding, Verdict, in_order, merged
@@ -26,8 +28,9 @@ from omnidyn.findings.values.values import check_values
 from omnidyn.findings.wiring.wheels import check_wiring
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
+from omnidyn.run import Run
 
-__all__ = ["check", "check_blocks"]
+__all__ = ["check", "check_blocks", "check_log"]
 
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
@@ -40,11 +43,21 @@ WHOLE = ("never_moved", "few_rows")
 OF_EXCITATION = ("not_excited", "one_way", "one_speed")
 
 
-def check(log: Log, robot: Robot | None = None) -> Verdict:
-    """Everything that `log` shows about itself, and, with a robot, about how the two fit together.
+def check(log: Log | Run, robot: Robot | None = None) -> Verdict:
+    """Everything that a log shows about itself, and, with a robot, about how the two fit together.
 
-    Never raises for what the log holds. The verdict is fatal where the log gives wrong results as it stands.
+    log: as `load_log` reads it, or a Run in memory: then rows are its samples, counted from 0, and faults of its time
+    base are gone, for a Run has none. The verdict is fatal where the log gives wrong results as it stands; it keeps the
+    log, to be drawn by its `plot()`.
+    Never raises for what the log holds; InputError for what is neither, or where log and robot are swapped.
     """
+    check_order("check(log) or check(log, robot)", (log, (Log, Run)), (robot, (Robot, type(None))))
+    recorded = Log.of_run(log) if isinstance(log, Run) else log
+    return replace(check_log(recorded, robot), log=recorded)
+
+
+def check_log(log: Log, robot: Robot | None = None) -> Verdict:
+    """The verdict on a log, which it does not keep: many logs need no more memory than one."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing: NaN is the answer wanted
         found, work = begin(log, robot)
@@ -96,7 +109,7 @@ def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
     count = 0
     for block in blocks:
         count += 1
-        verdict = check(block, robot)
+        verdict = check_log(block, robot)
         more, last = between(last, block, verdict.rate)
         for finding in (*more, *verdict.findings):
             if finding.code not in OF_EXCITATION:

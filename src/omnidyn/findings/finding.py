@@ -5,11 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.document import Document, Words, plain
+from omnidyn.logs.log import Log
+from omnidyn.shown import FIGURE, Shown, make
 from omnidyn.statistics import stretches
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FATAL, WARN, NOTE = "fatal", "warn", "note"
 LEVELS = (FATAL, WARN, NOTE)
@@ -50,12 +55,13 @@ class Finding:
         })  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Verdict:
+@dataclass(frozen=True, repr=False)
+class Verdict(Shown):
     """All findings of one log, gravest first, and what the log excites.
 
     excitation: name of a measure -> value (see excitation.py). rows: of the log. duration [s]. rate [Hz].
-    channels: that were recorded. source: the path.
+    channels: that were recorded. source: the path. log: what was checked; None where it came in blocks, and was not
+    kept.
     """
 
     findings: tuple[Finding, ...]
@@ -65,6 +71,17 @@ class Verdict:
     rate: float = 0.0
     channels: tuple[str, ...] = ()
     source: str = ""
+    log: Log | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        return f"<Verdict {self.headline()}>"
+
+    def plot(self) -> Figure:
+        """The channels of the log as recorded, with what was found above them, as a matplotlib Figure.
+
+        Raises InputError where the log was checked in blocks, and was not kept.
+        """
+        return make(FIGURE, self)
 
     @property
     def fatal(self) -> bool:
@@ -90,8 +107,12 @@ class Verdict:
 
     def as_text(self, width: int = 110) -> str:
         """The verdict for people: headline, then a paragraph per finding. ASCII only."""
+        return self.document().to_text(max(LEAST_WIDTH, width))
+
+    def document(self) -> Document:
+        """The verdict: headline, then what is the case and what to do about it, gravest first."""
         paragraphs = [words for finding in self.findings for words in _paragraphs(finding)]
-        return Document([self.headline(), *paragraphs, _excited(self.excitation)]).to_text(max(LEAST_WIDTH, width))
+        return Document([self.headline(), *paragraphs, _excited(self.excitation)], self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, without NaN."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Points, Table, interval_cell, plain
@@ -12,6 +12,10 @@ from omnidyn.errors import shortened
 from omnidyn.model.keys import unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
+from omnidyn.shown import FIGURE, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
@@ -28,8 +32,8 @@ class Correlation:
         return float(self.matrix[self.names.index(first), self.names.index(second)])
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(Shown):
     """What data say about a robot. Parameters are named by their key in the robot file: "friction.axes.viscous[0]".
 
     robot: with the fitted numbers; its priors hold std, source and origin, so that its file tells where they come from.
@@ -53,6 +57,14 @@ class Estimate:
     method: str = ""
     data: str = ""
     scale: str = ""
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{name} = {value:.4g}" for name, value in self.value.items())
+        return f"<{type(self).__name__} {self.robot.name}: {numbers}>"
+
+    def plot(self) -> Figure:
+        """Friction against speed along x, along y and about yaw, with its 95 % band, as a matplotlib Figure."""
+        return make(FIGURE, self)
 
     def summary(self) -> str:
         """The estimate as a plain table, for reading. ASCII only."""

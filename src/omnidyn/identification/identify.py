@@ -5,24 +5,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
+from omnidyn.arguments import check_order
 from omnidyn.document import Document, apart
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.findings.check import check
+from omnidyn.findings.check import check_log
 from omnidyn.findings.finding import FATAL, Verdict
 from omnidyn.identification.advice import advice, verdict_advice
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
+from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit, fit_output_error
 from omnidyn.identification.output_error.inputs import why_no_inputs
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import State
-from omnidyn.identification.question import AUTO, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STEADY, STEADY_STATE, Question
 from omnidyn.identification.recordings import fingerprint
 from omnidyn.identification.steady.axis_lines import identify_lines
 from omnidyn.identification.steady.settling import why_no_transient
@@ -34,6 +36,10 @@ from omnidyn.logs.log import Log
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
 from omnidyn.run import Run, as_list
+from omnidyn.shown import FIGURE, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Tell = Callable[[str], object]
 
@@ -43,7 +49,10 @@ CUT_SHORT = "the numbers are the best so far, not the best there are"
 NOT_COMPARED = "the numbers are those of the whole fit, but nothing was compared with them"
 
 
-def identify(runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None, **options: Any) -> Estimate:
+@shows_options(FIT, STEADY)
+def identify(
+    runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None, **options: Unpack[Options]
+) -> Estimate:
     """Fit the robot to logs. Returns an Estimate: robot, value, std, ci95, correlation, warnings.
 
     question, options: see `Question`, such as method=, free=, nuisances=, loss= or shape=. With the method "auto" the
@@ -52,6 +61,7 @@ def identify(runs: Run | Sequence[Run], robot: Robot, *, question: Question | No
     Raises InputError for options of another method and for what cannot be used, InsufficientDataError where the logs
     cannot answer.
     """
+    check_order("identify(runs, robot)", (runs, Run), (robot, Robot))
     every = as_list(runs)
     robot = as_driven(robot, every)
     asked = Question.for_method("", question, options)
@@ -110,8 +120,8 @@ def settle_method(runs: Sequence[Run], robot: Robot, question: Question, tell: T
     return replace(question, method=method)
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Shown):
     """All that logs say about a robot: estimates of each group, differences between groups, and what to do next.
 
     method: that was taken. estimates: group -> Estimate; one, "all", where there are no groups. validations: group ->
@@ -131,9 +141,11 @@ class Identification:
     interrupted: str = ""
 
     @classmethod
+    @shows_options(FIT, STEADY)
     def of(
         cls, runs: Run | Sequence[Run], robot: Robot, question: Question | None = None, *, logs: Sequence[Log] = (),
-        progress: Tell | None = None, tell: Tell | None = None, keep_best: bool = False, **options: Any,
+        progress: Tell | None = None, tell: Tell | None = None, keep_best: bool = False,
+        **options: Unpack[Options],
     ) -> Identification:  # fmt: skip
         """Choose the method; check, fit, validate and advise.
 
@@ -142,6 +154,7 @@ class Identification:
         user must know at once. keep_best: an interrupt leaves the best so far, instead of being raised.
         Errors: as `identify` raises.
         """
+        check_order("Identification.of(runs, robot)", (runs, Run), (robot, Robot))
         every = as_list(runs)
         robot = as_driven(robot, every)
         asked = (question or Question()).but(options)
@@ -155,6 +168,13 @@ class Identification:
         if why:
             heard.tell(f"{why}; `method` {STEADY_STATE} (`group` instead of `per`) answers in seconds")
         return _fitted(every, robot, asked, logs, heard)
+
+    def __repr__(self) -> str:
+        return f"<Identification by {self.method}: {', '.join(f'{g} {e!r}' for g, e in self.estimates.items())}>"
+
+    def plot(self) -> Figure:
+        """Friction against speed with its 95 % band, of each group, as a matplotlib Figure."""
+        return make(FIGURE, self)
 
     @property
     def estimate(self) -> Estimate:
@@ -251,7 +271,7 @@ def _verdicts(logs: Sequence[Log], robot: Robot, heard: _Heard) -> list[Verdict]
     found = []
     for k, log in enumerate(logs):
         heard.now(f"checking {k + 1} of {len(logs)}")
-        found.append(check(log, robot))
+        found.append(check_log(log, robot))
         for finding in found[-1].findings:
             if finding.level == FATAL:
                 heard.tell(f"warning: {log.source}: {finding.message}: {finding.remedy}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.comparison.aligned import PATH, errors_for_whiteness
 from omnidyn.comparison.compare import compare
+from omnidyn.comparison.replay import choose_input
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import counts_from_start, unit
 from omnidyn.document import Document, Table, cell, chance_cell
@@ -147,7 +148,15 @@ def validate(
 
 
 def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[[str], object] | None) -> Comparison:
-    return compare(fit.robot, [as_fitted(run.as_measured(), fit) for run in runs], progress=progress)
+    measured = [run.as_measured() for run in runs]
+    read = [as_fitted(run, fit) for run in measured]
+    found = compare(fit.robot, read, progress=progress)
+    if all(one is other for one, other in zip(measured, read, strict=True)):
+        return found
+    inputs = dict.fromkeys(choose_input(fit.robot, run).replace("_", " ") for run in measured)
+    more = dict.fromkeys(name.partition(".")[0].replace("_", " ") for name in fit.nuisances)
+    words = f"the logged {' or '.join(inputs)} as the motors had it, with the fitted {', '.join(more)}"
+    return replace(found, applied=dict.fromkeys(found.robots, words))
 
 
 def _scores(fit: OutputErrorEstimate, found: Comparison) -> dict[str, Score]:

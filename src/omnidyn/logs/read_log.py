@@ -60,7 +60,9 @@ def read_log(
     skip_bad_rows: bool = False,
     current_unsigned: bool = False,
 ) -> Run:
-    """Read a log as a Run: columns are guessed from names and units, and what was guessed stands in its warnings.
+    """Read a log as a Run, to fit, simulate and compare with; `load_log` reads it as recorded, faults and all.
+
+    Columns are guessed from names and units, and what was guessed stands in the warnings of the Run.
 
     robot: settles what names leave open, and is needed for speeds of the motor shaft. columns: a ColumnMap, the path of
     one (TOML), or overrides such as {"u1": "motor_1_volts:V"}. sort: rows whose time goes back are sorted instead of
@@ -80,7 +82,10 @@ def read_log(
 
 
 def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None) -> Log:
-    """Read a log as it was recorded: in SI, by channel, time not yet trusted. Raises InputError."""
+    """Read a log as recorded, faults and all, which is what `check` needs; `read_log` makes a Run of it, to work with.
+
+    In SI and by channel; its time may repeat, go back or be missing. Raises InputError.
+    """
     options = options or LogOptions()
     table = with_joined_stamp(read_table(path, header=options.header, skip_bad_rows=options.skip_bad_rows))
     return log_from_table(table, map_columns(table, robot, options), robot, options)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import starmap
 from pathlib import Path
 from typing import Any
@@ -72,7 +72,7 @@ def _is_parquet(path: str | os.PathLike) -> bool:
 
 def run_to_parquet(run: Run) -> bytes:
     """The run as a Parquet file. Raises InputError where a value is infinite, MissingExtraError without pyarrow."""
-    columns = dict(_columns(run))
+    columns = run_columns(run)
     for name, values in columns.items():
         _refuse_infinite(name, values)
     return parquet_bytes(columns, {name: _unit(name) for name in columns})
@@ -80,17 +80,18 @@ def run_to_parquet(run: Run) -> bytes:
 
 def run_to_csv(run: Run) -> str:
     """The run as the text of a run file. Raises InputError where a value is infinite."""
-    columns = dict(_columns(run))
+    columns = run_columns(run)
     rows = zip(*starmap(_cells, columns.items()), strict=True)
     return ",".join(columns) + "\n" + "\n".join(map(",".join, rows)) + "\n"
 
 
-def _columns(run: Run) -> Iterator[tuple[str, FloatArray]]:
-    """Every column by name, in the order of the file."""
-    yield "t_s", run.t
+def run_columns(run: Run) -> dict[str, FloatArray]:
+    """Every column of the file of a run by name, in its order; t_s is the first. Shape (samples,) each."""
+    columns = {"t_s": run.t}
     for channel, values in run.channels.items():
         values = values.reshape(len(run), -1)
-        yield from zip(columns_of(channel, values.shape[1]), values.T, strict=True)
+        columns |= zip(columns_of(channel, values.shape[1]), values.T, strict=True)
+    return columns
 
 
 def _cells(name: str, values: FloatArray) -> list[str]:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from omnidyn.document import Document
 from omnidyn.errors import printable
 from omnidyn.model.drive import Drive
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor, mass_at_rim
+from omnidyn.model.robot_table import robot_table
 from omnidyn.model.value import Flag, Text, Value, number
 from omnidyn.model.wheels import Wheels, check_count
+from omnidyn.shown import FIGURE, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SCHEMA = 1
 MOST_SPINNING = 1000.0  # times the body, at the rim: more is a unit that was mistaken
@@ -52,7 +58,7 @@ class Prior(Value):
     origin: Annotated[Origin, Field(description="where it comes from")] = GIVEN
 
 
-class Robot(Value):
+class Robot(Shown, Value):
     """A robot: all that eqs (1)-(14) need. Frozen; `replace` makes a changed copy.
 
     priors: key of the robot file, such as "motor.resistance_ohm" or "friction.axes.coulomb[0]", -> Prior.
@@ -85,3 +91,24 @@ class Robot(Value):
                 "g cm2: 1 g cm2 = 1e-7 kg m2"
             )
         return self
+
+    def __repr__(self) -> str:
+        return f"<Robot {self.name}: {self.wheels.count} wheels, {self.body.mass:.6g} kg>"
+
+    __str__ = Shown.__str__  # pydantic's own would come first in a subclass
+
+    def document(self) -> Document:
+        """Its numbers, and where each comes from."""
+        table = robot_table(self, self.priors)
+        keys = ("key", "value", "std", "origin")
+        numbers = [dict(zip(keys, row, strict=False)) for row in table.rows]
+        head = [f"{self.name}: {self.wheels.count} wheels", *([self.source] if self.source else []), ""]
+        return Document([*head, table], {"name": self.name, "source": self.source, "numbers": numbers})
+
+    def plot(self, what: Literal["layout", "dead zone", "friction"] = "layout") -> Figure:
+        """A picture of it, as a matplotlib Figure.
+
+        layout: from above, to scale. dead zone: what sets it in motion, over the direction of travel. friction: the
+        force of friction over speed, along x, along y and about yaw.
+        """
+        return make(FIGURE, self, what=what)

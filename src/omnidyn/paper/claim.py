@@ -1,11 +1,6 @@
 """Claim: one thing the paper says, our number beside it, and a verdict.
 
-What counts as reproduced:
-
-    an equation             agrees with the model within ROUNDING
-    a number of Table 2     within one unit of its last printed digit
-    a speed                 within SPEED_TOLERANCE of the printed one; a robot printed at rest is at rest
-    "about" so many volts   within ABOUT of the printed number
+What counts as reproduced is one rule, RULE, for every row; `same` is the part of it on numbers.
 """
 
 from __future__ import annotations
@@ -15,10 +10,18 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from omnidyn.arrays import BoolArray
 
 ROUNDING = 1e-12
-SPEED_TOLERANCE = 0.05
-ABOUT = 0.15
+TOLERANCE = 0.05
+RULE = (
+    f"The rule, the same on every row: an equation is reproduced where the model agrees with it to rounding; a number "
+    f"where ours is within {100.0 * TOLERANCE:g} % of it, or the same in the digits that are printed; a robot printed "
+    'at rest where it is at rest. A row of several numbers is reproduced where all of them are. "About" gives no '
+    f"digits: there the {100.0 * TOLERANCE:g} % alone count."
+)
 
 Numbers = dict[str, float | list]
 
@@ -29,12 +32,18 @@ class ClaimVerdict(StrEnum):
     REPRODUCED = "reproduced"
     CORRECTED = "reproduced after a correction"
     NOT_REPRODUCED = "cannot be reproduced"
+    NOT_IN_TEXT = "not in the text we have"
+    OTHER_PAPER = "about another paper"
 
     @property
     def short(self) -> str:
-        """The verdict in a word: yes, mended or no."""
-        short = {ClaimVerdict.REPRODUCED: "yes", ClaimVerdict.CORRECTED: "mended", ClaimVerdict.NOT_REPRODUCED: "no"}
-        return short[self]
+        """The verdict in a word: yes, mended or no; absent or other where there was nothing to judge."""
+        return dict(zip(ClaimVerdict, ("yes", "mended", "no", "absent", "other"), strict=True))[self]
+
+    @property
+    def judged(self) -> bool:
+        """Whether there was anything to judge."""
+        return self in (ClaimVerdict.REPRODUCED, ClaimVerdict.CORRECTED, ClaimVerdict.NOT_REPRODUCED)
 
 
 @dataclass(frozen=True)
@@ -43,7 +52,8 @@ class Claim:
 
     key: short name. place: where it stands in the paper. statement: what it says, in plain words.
     printed and ours: its number and our computed one, as text. verdict: what became of it. why: the reason, in numbers.
-    numbers: all that stands behind, computed: name -> number or list of numbers, fit for JSON.
+    numbers: all that stands behind, computed: name -> number or list of numbers, fit for JSON. subject: of the paper,
+    under which the claim stands among others.
     """
 
     key: str
@@ -54,6 +64,17 @@ class Claim:
     verdict: ClaimVerdict
     why: str
     numbers: Numbers = field(default_factory=dict)
+    subject: str = ""
+
+
+def same(ours: ArrayLike, printed: ArrayLike, digit: float = 0.0) -> BoolArray:
+    """Whether numbers are the printed ones, by RULE. digit: one unit of the last digit that is printed.
+
+    Shapes: any, as NumPy joins them.
+    """
+    ours, printed = np.asarray(ours, dtype=float), np.asarray(printed, dtype=float)
+    off = np.abs(ours - printed)
+    return (off <= TOLERANCE * np.abs(printed)) | (off < 0.5 * digit)
 
 
 def judge(as_printed: bool, as_corrected: bool = False) -> ClaimVerdict:

@@ -9,7 +9,7 @@ from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.robot import Robot
-from omnidyn.paper.claim import ROUNDING, Claim, judge, plain, tiny
+from omnidyn.paper.claim import ROUNDING, Claim, judge, plain, same, tiny
 from omnidyn.paper.steady import settled_twist
 from omnidyn.paper.tables import (
     AXES,
@@ -82,14 +82,17 @@ def _table_2(kind: str, axis: int, line: Estimate, bound: Estimate) -> Claim:
     half, off = (high - low) / 2.0, ours - printed
     moving, (moving_low, moving_high) = bound.value[name], bound.ci95[name]
     inside = "inside" if low <= printed <= high else "outside"
+    digits = ", the same in the digit that is printed," if same(ours, printed, LAST_DIGIT[kind][axis]) else ","
+    digits = digits if not same(ours, printed) else ","
     return Claim(
         key=f"table-2-{kind}-{AXES[axis]}",
         place="Table 2",
         statement=f"{letter} from Table 1 by least squares.",
         printed=f"{printed:g} {unit}",
         ours=f"{ours:.4g} +- {half:.2g} {unit}",
-        verdict=judge(abs(off) < LAST_DIGIT[kind][axis]),
-        why=f"All four rows give {ours:.4g}, {off:+.2g} from the printed number, which is {inside} the 95 % interval, "
+        verdict=judge(bool(same(ours, printed, LAST_DIGIT[kind][axis]))),
+        why=f"All four rows give {ours:.4g}, {100.0 * off / printed:+.1f} % from the printed number{digits} "
+        f"which is {inside} the 95 % interval, "
         f"{low:.3g} to {high:.3g}: {line.degrees_of_freedom[name]} degrees of freedom leave "
         f"+-{100 * half / abs(ours):.0f} %. The moving rows alone give {moving:.4g}, {moving_low:.3g} to "
         f"{moving_high:.3g}.",
@@ -137,8 +140,8 @@ def _unit_of_b_w(robot: Robot, line: Estimate) -> Claim:
     torque, lever = line.value[_name("viscous", 2)], float(np.mean(robot.wheels.robot_radius))
     printed = TABLE_2_VISCOUS[2]
     as_torque, as_force = (
-        abs(torque - printed) < LAST_DIGIT["viscous"][2],
-        abs(torque / lever - printed) < LAST_DIGIT["viscous"][2],
+        bool(same(torque, printed, LAST_DIGIT["viscous"][2])),
+        bool(same(torque / lever, printed, LAST_DIGIT["viscous"][2])),
     )
     return Claim(
         key="unit-of-b-w",

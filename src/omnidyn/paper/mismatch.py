@@ -9,7 +9,7 @@ import numpy as np
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
-from omnidyn.paper.claim import SPEED_TOLERANCE, Claim, ClaimVerdict, judge, listed, plain
+from omnidyn.paper.claim import TOLERANCE, Claim, ClaimVerdict, judge, listed, plain, same
 from omnidyn.paper.reconcile import FRICTION, Reconciliation, reconciliations
 from omnidyn.paper.steady import printed_force
 from omnidyn.paper.tables import AXES, MPC_SENTENCE, PAPER_AXES, SPEED_UNIT
@@ -40,7 +40,7 @@ def _one_robot(trials: Sequence[Reconciliation]) -> Claim:
         why=f"Of one number {single.words()} leaves least: {_left(single)}, {single.explained} rows; of two "
         f"{pair.words()}: {_left(pair)}, {pair.explained} rows. Friction alone wants {friction.words()}, against "
         f"forces of at most {listed(forces)} in Table 1, and leaves {_left(friction)}. No fit explains more than "
-        f"{most} of {nothing.rows} rows, within {100 * SPEED_TOLERANCE:g} % or at rest: no single change does, and no "
+        f"{most} of {nothing.rows} rows, within {100 * TOLERANCE:g} % or at rest: no single change does, and no "
         "pair.",
         numbers=plain(
             agreeing=nothing.explained,
@@ -65,7 +65,7 @@ def _wanted(trials: Sequence[Reconciliation]) -> Claim:
         statement="One set of motor parameters holds for all three axes.",
         printed="Table 3",
         ours=f"R = {listed(values)} ohm for v, v_n, w",
-        verdict=judge(max(values) / min(values) - 1.0 < SPEED_TOLERANCE),
+        verdict=judge(bool(same(max(values), min(values)))),
         why=f"Fitted to each axis alone, the speeds want {_each(resistance)}; or a lost voltage: {_each(drop)}. What "
         f"mends w is the ratio of the radii: {radius.words()} brings its rmse from {trials[0].rmse['yaw']:.2f} to "
         f"{radius.rmse['yaw']:.2f} rad/s and leaves v and v_n as they are; {wheel.words()} does the same for w and "
@@ -108,7 +108,7 @@ def _mpc(robot: Robot) -> Claim:
         statement=f"The predictive controller of Araujo et al. 2011 {MPC_SENTENCE}.",
         printed=MPC_SENTENCE,
         ours="saturation only",
-        verdict=ClaimVerdict.NOT_REPRODUCED,
+        verdict=ClaimVerdict.OTHER_PAPER,
         why="That paper, as read by the project, predicts without the non-linear part: friction is in its simulated "
         f"plant only. Its B divides the torque row by M instead of I_n, {theirs:.4f} instead of {ours:.4f} rad/s^2/V, "
         f"{ours / theirs:.0f} times less, and it puts continuous matrices into a discrete equation, where A would "

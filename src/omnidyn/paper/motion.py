@@ -10,7 +10,7 @@ from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
-from omnidyn.paper.claim import ROUNDING, Claim, judge, listed, plain, tiny
+from omnidyn.paper.claim import ROUNDING, Claim, judge, listed, plain, same, tiny
 from omnidyn.paper.steady import settled_twist
 from omnidyn.paper.tables import EQ_13_POWER_OF_GEAR, EQ_13_SYMBOLS_OF_A33, INERTIA_SENTENCE
 
@@ -187,7 +187,7 @@ def _inertia(robot: Robot) -> Claim:
         statement=f"I_n is that of {INERTIA_SENTENCE}.",
         printed=f"{inertia:g} kg m^2",
         ours=f"{cylinder:.4f} kg m^2",
-        verdict=judge(abs(cylinder / inertia - 1.0) < 0.05),
+        verdict=judge(bool(same(cylinder, inertia))),
         why=f"A cylinder of {mass:g} kg and radius b = {radius:g} m has {cylinder:.4f} kg m^2, "
         f"{inertia / cylinder:.1f} times less; {inertia:g} needs a radius of {needed:.2f} m. Steady speeds do not "
         f"tell which is right: I_n only sets how fast w settles, {settling[0]:.3f} s with the printed one and "

@@ -123,7 +123,7 @@ def _current_limit(robot: Robot) -> Claim:
         statement="The current is limited to i_max.",
         printed="i_max, no value",
         ours=f"stall current {stall:.2f} A",
-        verdict=ClaimVerdict.NOT_REPRODUCED,
+        verdict=ClaimVerdict.NOT_IN_TEXT,
         why=f"i_max has no printed value. At {np.max(limit):g} V a blocked motor draws {stall:.2f} A, and the steps "
         f"of Table 4 start with up to {starting:.2f} A: a limit below that would be felt, one above {stall:.2f} A "
         "only when the voltage is reversed at speed. The preset has none.",

@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
-from omnidyn.paper.claim import SPEED_TOLERANCE, listed
+from omnidyn.paper.claim import listed, same
 from omnidyn.paper.steady import printed_speed, printed_voltage, rms, settled_twist
 from omnidyn.paper.tables import AXES
 
@@ -94,7 +94,7 @@ class Reconciliation:
     values: fitted, in the order of `freed` (friction: B of the three axes, then C). at_bound: names that ended at a
     bound of CHANGES. speeds: of the model, by axis [m/s, yaw rad/s]. rmse: by axis, over its four rows.
     cost: root of the mean square of the normalised residuals, all axes. explained: how many rows agree, a moving one
-    within SPEED_TOLERANCE, one at rest by being at rest. rows: how many there are.
+    as `same` says, one at rest by being at rest. rows: how many there are.
     """
 
     freed: tuple[str, ...]
@@ -204,6 +204,6 @@ def _result(
         speeds={axis: speeds[k == COLUMN].tolist() for k, axis in enumerate(AXES)},
         rmse={axis: rms(off[k == COLUMN]) for k, axis in enumerate(AXES)},
         cost=rms(off / SCALE),
-        explained=int((np.abs(off) <= SPEED_TOLERANCE * SPEED).sum()),
+        explained=int(same(SPEED + off, SPEED).sum()),
         rows=len(SPEED),
     )

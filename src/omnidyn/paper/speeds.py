@@ -11,7 +11,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
-from omnidyn.paper.claim import SPEED_TOLERANCE, Claim, judge, listed, plain
+from omnidyn.paper.claim import TOLERANCE, Claim, judge, listed, plain, same
 from omnidyn.paper.steady import (
     model_speed,
     pattern_of,
@@ -62,7 +62,7 @@ def _steady_speed(robot: Robot, axis: str) -> Claim:
         statement=f"The model of Table 3 reaches the steady speeds {PAPER_AXES[axis]} of Table 1.",
         printed=f"{listed(printed)} {SPEED_UNIT[axis]} at {listed(levels)} V",
         ours=f"{listed(ours)} {SPEED_UNIT[axis]}",
-        verdict=judge(bool(np.abs(off).max() < SPEED_TOLERANCE)),
+        verdict=judge(bool(same(ours, printed).all())),
         why=f"The model is off by {listed(100 * off, '+.1f')} %; rmse {rms(ours - printed):.3f} {SPEED_UNIT[axis]} "
         "over the moving rows.",
         numbers=plain(voltage=levels, measured=printed, model=ours, relative_error=off, rmse=rms(ours - printed)),
@@ -92,7 +92,7 @@ def _force(robot: Robot, axis: str) -> Claim:
     ours = drive_wrench(robot, printed_twist(axis), printed_voltage(axis))[:, column]
     resistance = float(np.mean(robot.motor.resistance)) * ours[0] / printed[0]  # at rest i = u/R
     drop = float(np.abs(printed_voltage(axis)[0]).max()) * (1.0 - printed[0] / ours[0])
-    close = int((np.abs(ours / printed - 1.0) < SPEED_TOLERANCE).sum())
+    close = int(same(ours, printed).sum())
     return Claim(
         key=f"force-{axis}",
         place="Table 1, eq (11)",
@@ -100,7 +100,7 @@ def _force(robot: Robot, axis: str) -> Claim:
         printed=f"{listed(printed)} {FORCE_UNIT[axis]}",
         ours=f"{listed(ours)} {FORCE_UNIT[axis]} from voltage and speed",
         verdict=judge(close == len(ours)),
-        why=f"{close} of {len(ours)} rows agree within {100 * SPEED_TOLERANCE:g} %. At rest the current is u/R: the "
+        why=f"{close} of {len(ours)} rows agree within {100 * TOLERANCE:g} %. At rest the current is u/R: the "
         f"printed force implies R = {resistance:.2f} ohm where Table 3 prints {np.mean(robot.motor.resistance):g}, or "
         f"{drop:.2f} V lost of the largest voltage.",
         numbers=plain(

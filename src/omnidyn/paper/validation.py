@@ -6,7 +6,7 @@ import numpy as np
 
 from omnidyn.model.deadzone import breakaway_voltage, moves
 from omnidyn.model.robot import Robot
-from omnidyn.paper.claim import ABOUT, SPEED_TOLERANCE, Claim, ClaimVerdict, judge, listed, plain
+from omnidyn.paper.claim import TOLERANCE, Claim, ClaimVerdict, judge, listed, plain, same
 from omnidyn.paper.steady import measured_speed, pattern_of, printed_voltage, settled_speed
 from omnidyn.paper.tables import AXES, DEAD_ZONE_TEXT, FIG_2_SPEED, FIG_2_VOLTAGE, PAPER_AXES, TABLE_4
 
@@ -46,7 +46,7 @@ def _fig_2(robot: Robot) -> Claim:
         statement=f"{FIG_2_VOLTAGE:g} V give about {FIG_2_SPEED:g} m/s.",
         printed=f"{FIG_2_SPEED:g} m/s",
         ours=f"{ours:.3f} m/s",
-        verdict=judge(abs(off) < SPEED_TOLERANCE),
+        verdict=judge(bool(same(ours, FIG_2_SPEED))),
         why=f"The model is {100 * off:+.1f} % off. The traces of Fig. 2 are not in the text we have.",
         numbers=plain(printed=FIG_2_SPEED, ours=ours, relative_error=off),
     )
@@ -62,13 +62,13 @@ def _fig_4(robot: Robot) -> Claim:
     ours, measured = np.array(both).T
     steps = sum(len(TABLE_4[axis]) for axis in AXES)
     off = ours / measured - 1.0
-    close = int((np.abs(off) < SPEED_TOLERANCE).sum())
+    close = int(same(ours, measured).sum())
     return Claim(
         key="fig-4",
         place="Fig. 4",
         statement="The model follows the robot through the nine steps of Table 4.",
         printed="curves, not in the text we have",
-        ours=f"{close} of {len(off)} speeds within {100 * SPEED_TOLERANCE:g} %",
+        ours=f"{close} of {len(off)} speeds within {100 * TOLERANCE:g} %",
         verdict=judge(close == steps),
         why=f"Table 1 has the same voltages for {len(off)} of the {steps} steps. There the model settles "
         f"{listed(100 * off, '+.0f')} % off. How the robot got there was not printed as numbers.",
@@ -85,7 +85,7 @@ def _dead_zone(robot: Robot, axis: str) -> Claim:
         statement=f"The dead zone of {PAPER_AXES[axis]} is about {text:g} V.",
         printed=f"about {text:g} V",
         ours=f"{ours:.3f} V",
-        verdict=judge(abs(ours / text - 1.0) < ABOUT),
+        verdict=judge(bool(same(ours, text))),
         why=f"C of Table 2 and the motor of Table 3 give {100 * ours / text:.0f} % of it. Table 1 shows the robot at "
         f"rest at {largest_at_rest:g} V, {'more' if largest_at_rest > text else 'less'} than the text says.",
         numbers=plain(printed=text, ours=ours, at_rest_in_table_1=largest_at_rest),
@@ -99,6 +99,6 @@ def _other_figures() -> Claim:
         statement="Figures without a number in the text we have.",
         printed="not in the text we have",
         ours="none",
-        verdict=ClaimVerdict.NOT_REPRODUCED,
+        verdict=ClaimVerdict.NOT_IN_TEXT,
         why="We work from the text of the paper: of these figures it holds neither data nor numbers.",
     )

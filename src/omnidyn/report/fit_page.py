@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from omnidyn.document import Points
@@ -10,11 +11,15 @@ from omnidyn.identification.fit_document import difference_table, number_table, 
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import Validation, output_name
+from omnidyn.logs.path import Path, body_twist, driven, path_of
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.overlay import draw_overlay
+from omnidyn.report.figures.path import draw_path
 from omnidyn.report.figures.residuals import draw_residuals
 from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, section
+from omnidyn.report.plots import draw_estimates
 from omnidyn.report.style import Picture
+from omnidyn.run import Run
 
 Fits = Mapping[str, OutputErrorEstimate]
 
@@ -29,6 +34,8 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
         f"measured: {first.method}. Data: {'; '.join(f.data for f in fits.values())}."
     )
     between = [section("differences", "Between the groups", difference_table(found.differences))]
+    friction = draw_estimates(fits, driven=_driven(fits, validations))
+    travelled = _paths(fits, validations)
     unchecked = paragraph("The logs are too long to be checked on the way: see omnidyn check.")
     checked = content(verdict_table(found.verdicts)) if found.verdicts else unchecked
     doubts, advice = list(dict.fromkeys(_doubts(fits, validations))), list(dict.fromkeys(found.advice))
@@ -36,14 +43,17 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     numbers = _each(fits, lambda group, fit: content(number_table(fit)))
     sections = [
         section("findings", "What the data say", Points(_findings(fits, validations))),
-        Section("numbers", "Numbers, with 95 % intervals", numbers),
-        *(between if found.differences else []),
-        Section("data", "The logs, and what check says of them", checked),
-        Section("runs", "Measured and model", _each(validations, _runs)),
-        Section("residuals", "What the model leaves", residuals),
-        Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
         section("doubts", "Doubts", Points(doubts), none="None."),
         section("next", "What to measure next", Points(advice), none="Nothing: every number is well determined."),
+        Section("runs", "Measured and model", _each(validations, _runs)),
+        section("friction", "Friction against speed", friction),
+        *([section("path", "Where the logs went", draw_path(travelled))] if travelled else []),
+        Section("residuals", "What the model leaves", residuals),
+        Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
+        Section("numbers", "Numbers, with 95 % intervals", numbers),
+        *(between if found.differences else []),
+        Section("scores", "How near the model comes", _each(validations, lambda group, each: content(each.table()))),
+        Section("data", "The logs, and what check says of them", checked),
     ]
     return page(f"{robot}: identified from whole logs", introduction, sections, provenance)
 
@@ -53,13 +63,13 @@ def _named(group: str, words: str, fits: Mapping[str, Any]) -> str:
 
 
 def _findings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
-    found = []
+    found = [_named(group, words, fits) for group, each in validations.items() for words in each.statements()]
     for group, fit in fits.items():
         for name, value, _, interval, unit, mark in number_table(fit).rows:
+            if name in fit.nuisances:
+                continue  # of the log, not of the robot: they stand in the table
             text = f"{name} = {value} {unit}, 95 % {interval}".replace("  ", " ")
             found.append(_named(group, f"{text}{f' ({mark})' if mark else ''}", fits))
-    for group, each in validations.items():
-        found += [_named(group, words, fits) for words in each.statements()]
     return found
 
 
@@ -73,11 +83,31 @@ def _runs(group: str, validation: Validation) -> str:
     pictures = [_renamed(draw_overlay(validation.fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
     if validation.held_out is not None:
         pictures.append(_renamed(draw_overlay(validation.held_out), f"overlay-held-out{group}", "on a log held out"))
-    return content(validation.table(), *pictures)
+    return content(*pictures)
+
+
+def _measured(validations: Mapping[str, Validation]) -> list[tuple[str, Run]]:
+    """(group, run) of every run that was compared, fitted or held out."""
+    return [
+        (group, run)
+        for group, each in validations.items()
+        for comparison in (each.fitted, each.held_out) if comparison is not None
+        for run in comparison.measured
+    ]  # fmt: skip
+
+
+def _driven(fits: Fits, validations: Mapping[str, Validation]) -> list[tuple[float, float] | None]:
+    """The middle 90 % of the speeds of all logs, of each axis."""
+    return driven([body_twist(run, fits[group].robot) for group, run in _measured(validations)])
+
+
+def _paths(fits: Fits, validations: Mapping[str, Validation]) -> list[Path]:
+    every = (path_of(run, fits[group].robot) for group, run in _measured(validations))
+    return [path for path in every if path is not None]
 
 
 def _renamed(drawn: Picture, name: str, words: str) -> Picture:
-    return Picture(_anchor(name), f"{drawn.title}, {words}", drawn.caption, drawn.png, drawn.svg)
+    return replace(drawn, name=_anchor(name), title=f"{drawn.title}, {words}")
 
 
 def _anchor(name: str) -> str:
@@ -100,7 +130,7 @@ def _correlations(fits: Fits) -> list[str]:
     for group, fit in fits.items():
         drawn = draw_correlation(fit.correlation)
         title = _named(group, drawn.title, fits)
-        found.append(figure(Picture(_anchor(f"correlation{group}"), title, drawn.caption, drawn.png, drawn.svg)))
+        found.append(figure(replace(drawn, name=_anchor(f"correlation{group}"), title=title)))
         lost = [f"{name} is not identifiable from these logs" for name in fit.unidentifiable]
         found.append(bullets([_named(group, words, fits) for words in [*lost, *fit.blind]]))
     return found

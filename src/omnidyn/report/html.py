@@ -13,6 +13,7 @@ from typing import Any
 from omnidyn.document import Points, Table
 from omnidyn.report.style import Picture
 
+WORDS = 24  # characters of a cell that is wrapped
 STYLE = (Path(__file__).parent / "page.css").read_text("utf-8")
 
 
@@ -72,8 +73,14 @@ def _document(title: str, body: str) -> str:
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], name: str = "plain") -> str:
     """A table of plain text; `name` is its class in page.css."""
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
-    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     return f'<div class="wide"><table class="{name}"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _cell(text: str) -> str:
+    """A cell; one of many words is wrapped."""
+    kind = ' class="words"' if len(text) > WORDS else ""
+    return f"<td{kind}>{escape(text)}</td>"
 
 
 def bullets(words: Sequence[str]) -> str:
@@ -87,11 +94,14 @@ def paragraph(words: str) -> str:
 
 
 def figure(picture: Picture) -> str:
-    """A picture with its title and caption, inside the page."""
+    """A picture with its title and caption, inside the page; a box to tick makes it large, and scrolls it."""
     data = base64.b64encode(picture.svg).decode()
+    name = escape(picture.name, quote=True)
     image = f'<img alt="{escape(picture.caption, quote=True)}" src="data:image/svg+xml;base64,{data}">'
+    zoom = f'<input type="checkbox" class="zoom" id="zoom-{name}"><label for="zoom-{name}">large</label>'
     words = f"<b>{escape(picture.title)}.</b> {escape(picture.caption)}"
-    return f'<figure id="{escape(picture.name, quote=True)}">{image}<figcaption>{words}</figcaption></figure>'
+    frame = f'<div class="frame" tabindex="0">{image}</div>'
+    return f'<figure id="{name}">{zoom}{frame}<figcaption>{words}</figcaption></figure>'
 
 
 SHOWN_INPUTS = 20

@@ -26,8 +26,8 @@ def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     pictures = [] if study.windows is None else [draw_motor_lines(study.motors, study.windows)]
     sections = [
         section("findings", "What the data say", told["statements"]),
-        section("numbers", "Numbers, with 95 % intervals", told["motors"]),
-        *([section("figures", "Figures", *pictures)] if pictures else []),
         section("doubts", "Doubts", told["doubts"], none="None."),
+        *([section("figures", "Figures", *pictures)] if pictures else []),
+        section("numbers", "Numbers, with 95 % intervals", told["motors"]),
     ]
     return page("Motors from logs", WINDOWS if study.windows is not None else FREE_RUNS, sections, provenance)

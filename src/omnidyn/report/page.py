@@ -7,30 +7,69 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from omnidyn.paper.claims import Claim, ClaimVerdict, verdict_counts
+from omnidyn.paper.claims import RULE, Claim, ClaimVerdict, headlines, verdict_counts
+from omnidyn.report.formulas import formula
 from omnidyn.report.html import STYLE, Section, figure, page
 from omnidyn.report.style import Picture
 
 __all__ = ["SIGNS", "STYLE", "render_page"]
 
 # Beside the colour, which is that of the short word: a reader who cannot see one has the other, and the words.
-SIGNS = {"yes": "\N{CHECK MARK}", "mended": "\N{ALMOST EQUAL TO}", "no": "\N{MULTIPLICATION X}"}
+SIGNS = {
+    "yes": "\N{CHECK MARK}", "mended": "\N{ALMOST EQUAL TO}", "no": "\N{MULTIPLICATION X}",
+    "absent": "\N{EN DASH}", "other": "\N{RIGHTWARDS ARROW}",
+}  # fmt: skip
+
+# Which pictures stand beside the claims of which subject.
+BESIDE = {
+    "Frames and wheels": ("fig1_robot",),
+    "Friction, Table 2": ("fig3_friction",),
+    "Steady speeds, Table 1": ("fig2_traces",),
+    "Validation, section 4": ("fig4_steps", "fig5_dead_zone"),
+    "How the tables fit together": ("fig6_reconcile",),
+}
 
 
 def render_page(
     title: str, introduction: str, claims: Sequence[Claim], pictures: Sequence[Picture], provenance: Mapping[str, Any]
 ) -> str:
-    """The report as HTML. provenance: version ("omnidyn"), "command" and "inputs" (role, name, sha256)."""
-    sections = [
-        Section("claims", "Claims", _table(claims)), Section("figures", "Figures", "".join(map(figure, pictures)))
-    ]  # fmt: skip
-    return page(title, introduction, sections, provenance, lead=_counts(claims))
+    """The report as HTML: what came out, the rule, then every subject with its pictures and its claims.
+
+    provenance: version ("omnidyn"), "command" and "inputs" (role, name, sha256).
+    """
+    subjects = dict.fromkeys(claim.subject for claim in claims)
+    sections = [_subject(subject, claims, pictures) for subject in subjects]
+    beside = {name for subject in subjects for name in BESIDE.get(subject, ())}
+    others = [each for each in pictures if each.name not in beside]
+    more = [Section("figures", "Figures", "".join(map(figure, others)))] if others else []
+    return page(title, introduction, [*sections, *more], provenance, lead=_lead(claims))
+
+
+def _lead(claims: Sequence[Claim]) -> str:
+    """Five lines, where the claims are those of the paper; how many have which verdict; the rule."""
+    try:
+        lines = headlines(claims)
+    except KeyError:  # some claims only
+        lines = []
+    told = f'<ol class="lines">{"".join(f"<li>{formula(line)}</li>" for line in lines)}</ol>' if lines else ""
+    return f'{told}{_counts(claims)}<p class="rule">{escape(RULE)}</p>'
 
 
 def _counts(claims: Sequence[Claim]) -> str:
     counts = verdict_counts(claims)
     parts = "".join(f"<li>{_badge(verdict)} <b>{number}</b></li>" for verdict, number in counts.items())
     return f'<ul class="counts">{parts}</ul>'
+
+
+def _subject(subject: str, claims: Sequence[Claim], pictures: Sequence[Picture]) -> Section:
+    """Pictures, then the claims that were judged, then those that were not."""
+    own = [claim for claim in claims if claim.subject == subject]
+    shown = [figure(each) for name in BESIDE.get(subject, ()) for each in pictures if each.name == name]
+    judged = [claim for claim in own if claim.verdict.judged]
+    apart = [claim for claim in own if not claim.verdict.judged]
+    rest = f"<h3>Nothing to judge</h3>{_table(apart)}" if apart else ""
+    key = "".join(c if c.isalnum() else "-" for c in subject.lower()) or "claims"
+    return Section(key, subject or "Claims", "".join(shown) + (_table(judged) if judged else "") + rest)
 
 
 def _badge(verdict: ClaimVerdict) -> str:
@@ -47,10 +86,10 @@ def _table(claims: Sequence[Claim]) -> str:
 def _row(claim: Claim) -> str:
     cells = (
         _badge(claim.verdict),
-        escape(claim.place),
-        f"<b>{escape(claim.statement)}</b><p>{escape(claim.why)}</p>{_numbers(claim.numbers)}",
-        escape(claim.printed),
-        escape(claim.ours),
+        formula(claim.place),
+        f"<b>{formula(claim.statement)}</b><p>{formula(claim.why)}</p>{_numbers(claim.numbers)}",
+        formula(claim.printed),
+        formula(claim.ours),
     )
     return f'<tr id="{escape(claim.key, quote=True)}">{"".join(f"<td>{cell}</td>" for cell in cells)}</tr>'
 

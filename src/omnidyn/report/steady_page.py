@@ -9,8 +9,10 @@ from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.steady.study_words import FORCES
+from omnidyn.logs.path import driven
 from omnidyn.report.figures.shapes import shape_pictures
 from omnidyn.report.html import page, section
+from omnidyn.report.plots import draw_estimates
 
 
 def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
@@ -23,11 +25,12 @@ def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
     errors, *pictures = shape_pictures(study)
     sections = [
         section("findings", "What the data say", told["statements"]),
+        section("doubts", "Doubts", told.joined("warnings", "doubts"), none="None."),
+        section("next", "What to measure next", told["next"], none="Nothing: every number is well determined."),
+        section("forces", "Forces", *pictures),
+        section("friction", "Friction against speed", draw_estimates(study.estimates, driven=driven([points.twist]))),
+        section("shapes", "Which shape", errors, told["shapes"]),
         section("levels", "Friction, with 95 % intervals", told["levels"]),
         section("data", "What was used", told["travel"]),
-        section("shapes", "Which shape", errors, told["shapes"]),
-        section("forces", "Forces", *pictures),
-        section("doubts", "Doubts", told.joined("warnings", "doubts"), none="None."),
-        section("next", "What to measure next", told["next"]),
     ]
     return page(f"{study.robot.name}: friction from logs", introduction, sections, provenance)

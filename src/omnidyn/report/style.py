@@ -10,13 +10,16 @@ import contextlib
 import io
 import threading
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import matplotlib
 import matplotlib.style
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
+from matplotlib.ticker import MaxNLocator
 
 from omnidyn.paper.tables import AXES, PAPER_AXES
 
@@ -65,13 +68,22 @@ _DRAWING = threading.RLock()
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as files: name without ending, title, caption in plain words, and the bytes of both formats."""
+    """A figure with its words: name without ending, title, caption in plain words. Files are made when asked for."""
 
     name: str
     title: str
     caption: str
-    png: bytes
-    svg: bytes
+    figure: Figure = field(compare=False, repr=False)
+
+    @cached_property
+    def png(self) -> bytes:
+        """The bytes of a PNG file; the same figure gives the same bytes."""
+        return _saved(self.figure, "png")
+
+    @cached_property
+    def svg(self) -> bytes:
+        """The bytes of an SVG file; the same figure gives the same bytes."""
+        return _saved(self.figure, "svg")
 
 
 @contextlib.contextmanager
@@ -84,22 +96,30 @@ def look() -> Iterator[None]:
         yield
 
 
+class Shown(Figure):
+    """A Figure that a notebook shows without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        return _saved(self, "png")
+
+
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure [inch], drawn by Agg."""
-    figure = Figure(figsize=(width, height), facecolor="white")
+    figure = Shown(figsize=(width, height), facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
 
 def picture(name: str, title: str, caption: str, figure: Figure) -> Picture:
-    """The figure in both formats; the same figure gives the same bytes."""
-    return Picture(name, title, caption, _saved(figure, "png"), _saved(figure, "svg"))
+    """The figure with its words."""
+    return Picture(name, title, caption, figure)
 
 
 def _saved(figure: Figure, form: str) -> bytes:
     metadata = {"Software": None} if form == "png" else {"Date": None, "Creator": None}
     stream = io.BytesIO()
-    figure.savefig(stream, format=form, dpi=DPI, metadata=metadata)
+    with look():
+        figure.savefig(stream, format=form, dpi=DPI, metadata=metadata)
     return stream.getvalue()
 
 
@@ -131,6 +151,20 @@ def axis_title(axis: str) -> str:
     """Name of a body axis with the paper's letter and the unit of its speed."""
     letter = PAPER_AXES[axis].replace("v_n", "vₙ").replace("w", "ω")
     return f"{axis} ({letter})"
+
+
+def around_robot(axes: PolarAxes, top: float) -> None:
+    """Directions of travel as in the picture of the robot: forward is up, left is left. top: of what was drawn."""
+    axes.set_theta_zero_location("N")
+    axes.set_thetagrids([0.0, 90.0, 180.0, 270.0], ["x\nforward", "y\nleft", "180°", "-90°"], fontsize=10.0)
+    axes.set_ylim(0.0, 1.15 * top)
+    ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, 1.15 * top)
+    axes.set_rgrids([each for each in ticks if 0.0 < each <= 1.15 * top], angle=-112.5, fontsize=9.5, color=INK)
+    for label in axes.get_yticklabels():
+        label.set(bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}, ha="center", va="center")
+    axes.spines["polar"].set_visible(True)
+    axes.spines["polar"].set_color(GREY)
+    axes.grid(color=GREY, alpha=0.35)
 
 
 def note(axes: Axes, x: float, y: float, words: str, **how) -> None:

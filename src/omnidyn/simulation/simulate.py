@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
@@ -54,6 +55,7 @@ def simulate(
     Raises InputError for wrong shapes, NaN, infinite values, a start beyond 1e3 m/s, dt outside 1e-9..3600 s, a missing
     supply, or a tol outside 1e-10..1 m/s.
     """
+    _check_order(robot, voltage, dt)
     given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
     start = as_start("twist", twist, 3), as_start("pose", pose, 3)
     amperes = as_start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
@@ -66,6 +68,15 @@ def simulate(
             (twists, poses), currents = simulate_exact(robot, given.voltage, given.dt, *start), None
         return as_run(robot, given, given.voltage, twists, poses, None, "exact engine", (), currents)
     return _implicit(robot, given, *start, amperes, tolerance)
+
+
+def _check_order(robot: Robot, voltage: object, dt: object) -> None:
+    """Refuses a robot, a voltage and a time in each other's place."""
+    call = "simulate(robot, voltage, dt)"
+    if not isinstance(robot, Robot):
+        check_order(call, (robot, Robot), (voltage, type(robot)), (dt, object))
+    if np.ndim(voltage) == 0 and np.ndim(dt) == 2:  # type: ignore[arg-type]
+        raise InputError("two arguments stand in each other's place", got="the time before the voltage", expected=call)
 
 
 def as_tolerance(tol: float | None) -> float:

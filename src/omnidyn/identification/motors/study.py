@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from omnidyn.identification.motors.free_run import fit_rmse
 from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import MotorLog, motor_logs
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
-from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.identification.options import Options, shows_options
+from omnidyn.identification.question import MOTOR_FIT, MOTOR_LINES, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 
@@ -92,9 +93,10 @@ class MotorStudy:
         }  # fmt: skip
 
 
+@shows_options(MOTOR_FIT, MOTOR_LINES)
 def identify_motors(
     runs: Run | Sequence[Run], robot: Robot | None = None, *, question: Question | None = None,
-    now: Callable[[str], object] = lambda words: None, **options: Any,
+    now: Callable[[str], object] = lambda words: None, **options: Unpack[Options],
 ) -> MotorStudy:  # fmt: skip
     """Slope, dead band, lag and inertia of every motor of some logs.
 

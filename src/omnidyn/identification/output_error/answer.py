@@ -21,7 +21,7 @@ class Nuisance:
     unit: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OutputErrorEstimate(Estimate):
     """An Estimate from whole logs. `correlation` covers the nuisances too.
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Unpack
 
 from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.inputs import why_no_inputs
@@ -45,7 +46,7 @@ from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
-from omnidyn.identification.question import GAUSS, OUTPUT_ERROR, STUDENT, Question
+from omnidyn.identification.question import FIT, GAUSS, OUTPUT_ERROR, STUDENT, Question
 from omnidyn.identification.recordings import count_once
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
@@ -267,9 +268,10 @@ class Fit:
         return find_breakaway(solution, axes, trust(solution.solver, solution, self.question.covariance))
 
 
+@shows_options(FIT)
 def fit_output_error(
     runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None,
-    watch: Callable[[State], object] | None = None, **options: Any,
+    watch: Callable[[State], object] | None = None, **options: Unpack[Options],
 ) -> OutputErrorEstimate:  # fmt: skip
     """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
 
@@ -284,9 +286,10 @@ def fit_output_error(
     return fit.answer(fit.solve(progress), progress).estimate
 
 
+@shows_options(FIT)
 def identify_groups(
     runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, question: Question | None = None,
-    watch: Callable[[State], object] | None = None, **options: Any,
+    watch: Callable[[State], object] | None = None, **options: Unpack[Options],
 ) -> Answer:  # fmt: skip
     """Fit logs of several groups at once by output error.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from scipy.linalg import null_space
@@ -19,7 +19,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
-from omnidyn.identification.question import STEADY_STATE, Question
+from omnidyn.identification.options import Options, shows_options
+from omnidyn.identification.question import STEADY, STEADY_STATE, Question
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
@@ -69,9 +70,10 @@ class SteadyStudy:
         return next(iter(self.estimates.values()))
 
 
+@shows_options(STEADY)
 def identify_steady(
     runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question | None = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> SteadyStudy:  # fmt: skip
     """Identify friction from the steady windows of runs.
 

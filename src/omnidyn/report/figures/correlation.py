@@ -10,18 +10,23 @@ from omnidyn.model.keys import find_key
 from omnidyn.report.style import INK, WIDTH, Picture, look, new_figure, picture
 
 MOST = 16
+INCHES = 0.092  # of a letter, about
 CLEAR = 0.6  # beyond it the ground is dark, and the number on it white
 
 
 def draw_correlation(correlation: Correlation) -> Picture:
-    """The lower triangle of the correlations, the number in each field; brown goes together, purple against."""
+    """The lower triangle of the correlations, the number in each field; orange goes together, purple against."""
     names, matrix = correlation.names[:MOST], correlation.matrix[:MOST, :MOST]
     count = len(names)
-    side = min(0.52 * count, 5.6)
-    width, height = WIDTH, side + 0.5 + 1.0
+    short = [_short(name) for name in names]
+    longest = INCHES * max(map(len, short))
+    side = min(0.52 * count, WIDTH - longest - 1.3)
+    foot = 0.25 + 0.6 * longest  # of labels that lean
+    width, height = WIDTH, side + 0.15 + foot
     with look():
         figure = new_figure(width, height)
-        axes = figure.add_axes((0.32, 1.0 / height, side / width, side / height))
+        left = (longest + 0.25) / width
+        axes = figure.add_axes((left, foot / height, side / width, side / height))
         shown = np.where(np.tril(np.ones((count, count), dtype=bool)), matrix, np.nan)
         image = axes.imshow(shown, cmap="PuOr_r", vmin=-1.0, vmax=1.0, aspect="auto")
         for i in range(count):
@@ -29,14 +34,14 @@ def draw_correlation(correlation: Correlation) -> Picture:
                 colour = "white" if abs(matrix[i, j]) > CLEAR else INK
                 axes.text(j, i, f"{matrix[i, j]:.2f}".replace("0.", "."), ha="center", va="center", color=colour,
                           fontsize=10.0 if count <= 10 else 8.0)  # fmt: skip
-        short = [_short(name) for name in names]
         axes.set_yticks(range(count), short)
         axes.set_xticks(range(count), short, rotation=40, ha="right", rotation_mode="anchor")
         axes.grid(visible=False)
         axes.tick_params(length=0)
         for spine in axes.spines.values():
             spine.set_visible(False)
-        bar = figure.colorbar(image, ax=axes, fraction=0.05, pad=0.03, ticks=[-1.0, 0.0, 1.0])
+        beside = figure.add_axes((left + (side + 0.2) / width, foot / height, 0.16 / width, side / height))
+        bar = figure.colorbar(image, cax=beside, ticks=[-1.0, 0.0, 1.0])
         bar.outline.set_visible(False)  # type: ignore[operator]
         more = "" if len(correlation.names) <= MOST else f" The first {MOST} of {len(correlation.names)}."
         return picture(
@@ -50,7 +55,7 @@ def _short(name: str) -> str:
     """A key without what all keys share: "friction.axes.viscous[0]" is "viscous x"."""
     key = find_key(name)
     if key is None:
-        return name.replace("_", " ")
+        return name.replace("_", " ").replace(".", " ")
     if key.axis is not None and key.index is not None:
         return f"{key.field} {AXES[key.axis]}"
     return str(key).removeprefix(f"{key.table}.").replace("_", " ")

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from omnidyn.arrays import FloatArray
 from omnidyn.comparison.result import Comparison, Segment
 from omnidyn.comparison.traces import unit
+from omnidyn.errors import InputError
 from omnidyn.report.style import BLUE, GREY, INK, MEASURED, PALE, VERMILLION, WIDTH, Picture, look, new_figure, picture
 
 MOST_PANELS = 6
@@ -24,19 +25,22 @@ def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] =
     """One log of a comparison: measured (black) and each model in time, model minus measured below it.
 
     log: which of the logs, from 0. channels: components to show, at most six; by default the first three compared.
-    Lines break where nothing was integrated; such gaps are grey. Raises ValueError for unknown or too many components.
+    Lines break where nothing was integrated; such gaps are grey. Raises InputError for unknown or too many components.
     """
     shown = tuple(channels) or _usual(comparison, log)
     unknown = [name for name in shown if name not in comparison.channels]
     if unknown or not 1 <= len(shown) <= MOST_PANELS:
-        raise ValueError(f"cannot draw {unknown or shown}; expected up to {MOST_PANELS} of {comparison.channels}")
+        raise InputError(
+            "cannot draw these components", got=", ".join(unknown or shown) or "none",
+            expected=f"up to {MOST_PANELS} of {', '.join(comparison.channels)}", where="channels",
+        )  # fmt: skip
     segments = [segment for segment in comparison.segments if segment.log == log]
     height = HEIGHT * len(shown) + EXTRA
     with look():
         figure = new_figure(WIDTH, height)
         grid = figure.add_gridspec(
             3 * len(shown) - 1, 1, height_ratios=([2.0, 1.0, 0.14] * len(shown))[:-1], hspace=0.12,
-            left=0.105, right=0.965, top=1.0 - 0.45 / height, bottom=0.55 / height,
+            left=0.13, right=0.965, top=1.0 - 0.45 / height, bottom=0.55 / height,
         )  # fmt: skip
         first = None
         for k, name in enumerate(shown):
@@ -50,7 +54,7 @@ def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] =
         assert first is not None
         first.set_xlim(segments[0].begin, segments[-1].end)
         handles, names = first.get_legend_handles_labels()
-        place = {"loc": "upper left", "bbox_to_anchor": (0.095, 0.995), "borderaxespad": 0.0}
+        place = {"loc": "upper left", "bbox_to_anchor": (0.12, 0.995), "borderaxespad": 0.0}
         figure.legend(handles, names, ncols=len(names), **place)
         title = f"Measured and {' and '.join(comparison.robots)}"
         return picture("overlay", title, _caption(comparison, log, len(segments)), figure)
@@ -68,12 +72,13 @@ def _values(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
     traces = [comparison.trace(comparison.robots[0], name, segment) for segment in segments]
     t, measured = _broken([(trace.t, trace.measured) for trace in traces])
     dots = {"marker": ".", "markersize": 4.0} if len(t) <= DOTS else {}
-    axes.plot(t, measured, color=MEASURED, linewidth=1.0, label="measured", **dots)
+    axes.plot(t, measured, color=MEASURED, linewidth=0.9, label="measured", zorder=4, **dots)
     for robot, colour, line in zip(comparison.robots, COLOURS, LINES, strict=False):
         traces = [comparison.trace(robot, name, segment) for segment in segments]
         t, model = _broken([(trace.t, trace.model) for trace in traces])
-        axes.plot(t, model, line, color=colour, label=robot)
+        axes.plot(t, model, line, color=colour, linewidth=4.0, alpha=0.55, label=robot)
     axes.set_ylabel(f"{name}, {unit(name)}")
+    axes.yaxis.set_label_coords(-0.115, 0.5)  # where the widest labels of ticks leave it whole, and all in one line
     axes.tick_params(labelbottom=False)
     axes.locator_params(axis="y", nbins=5)
 
@@ -85,6 +90,7 @@ def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
         t, error = _broken([(trace.t, trace.error) for trace in traces])
         axes.plot(t, error, line, color=colour, linewidth=1.0)
     axes.set_ylabel("error", color=INK)
+    axes.yaxis.set_label_coords(-0.115, 0.5)
     axes.locator_params(axis="y", nbins=3)
     axes.tick_params(labelbottom=last)
     if last:

@@ -1,0 +1,62 @@
+"""Arguments in each other's place, or of another kind: said in one sentence, before anything fails further inside."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+from omnidyn.errors import InputError
+
+# What to call instead, by the name of the type that is wanted.
+MADE_BY = {
+    "Robot": 'omnidyn.load_robot("axebot"), or of a file, makes one',
+    "Run": "omnidyn.read_log(path) makes one",
+    "Log": "omnidyn.load_log(path) makes one",
+    "OutputErrorEstimate": "omnidyn.fit_output_error(runs, robot) makes one",
+}
+
+Kinds = type | tuple[type, ...]
+
+
+def check_order(call: str, *places: tuple[object, Kinds]) -> None:
+    """Refuse arguments that stand in each other's place, and those of a wrong kind.
+
+    call: as it is written, "compare(robot, run)". places: (what was given, what belongs there) of each argument, in
+    that order; a list stands for what it holds, an empty one for anything.
+    Raises InputError, which names both where two were swapped.
+    """
+    wrong = [k for k, (given, wanted) in enumerate(places) if not _is(given, wanted)]
+    if not wrong:
+        return
+    for one in wrong:
+        for other, (_, wanted) in enumerate(places):
+            if other != one and _is(places[one][0], wanted) and _is(places[other][0], places[one][1]):
+                first, second = sorted((one, other))
+                raise InputError(
+                    "two arguments stand in each other's place",
+                    got=f"{_kind(places[first][0])} before {_kind(places[second][0])}", expected=call,
+                )  # fmt: skip
+    given, wanted = places[wrong[0]]
+    names = [each.__name__ for each in (wanted if isinstance(wanted, tuple) else (wanted,))]
+    raise InputError(
+        f"an argument is no {' or '.join(names)}", got=_kind(given), expected=call,
+        remedy=next((MADE_BY[name] for name in names if name in MADE_BY), ""),
+    )  # fmt: skip
+
+
+def _is(value: object, wanted: Kinds) -> bool:
+    """Whether a value, or every item of a list, is of a kind."""
+    if isinstance(value, list | tuple):
+        return all(isinstance(each, wanted) for each in value)
+    return isinstance(value, Iterator) or isinstance(value, wanted)  # noqa: SIM101  what an iterator holds is not known
+
+
+def _kind(value: object) -> str:
+    """What a value is, for a message: "a Run", "a list of Robot"."""
+    if isinstance(value, str | os.PathLike):
+        return f"the text {os.fspath(value)!r}"
+    if isinstance(value, list | tuple) and value:
+        kinds = dict.fromkeys(type(each).__name__ for each in value)
+        return f"a {type(value).__name__} of {' and '.join(kinds)}"
+    name = type(value).__name__
+    return "nothing" if value is None else f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"

@@ -1,0 +1,99 @@
+"""plot(): the picture of each result, as a matplotlib Figure. The public package hands it down to them: shown.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from omnidyn.comparison.result import Comparison
+from omnidyn.errors import InputError
+from omnidyn.findings.finding import Verdict
+from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.friction_curve import FrictionCurve, friction_curve, sliding_force
+from omnidyn.identification.identify import Identification
+from omnidyn.logs.path import path_of
+from omnidyn.logs.steady_table import AXES
+from omnidyn.model.robot import Robot
+from omnidyn.model.sliding import top_speeds
+from omnidyn.report.figures.channels import draw_run
+from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
+from omnidyn.report.figures.friction_speed import draw_friction_speed, speeds_up_to
+from omnidyn.report.figures.overlay import draw_overlay
+from omnidyn.report.figures.path import draw_path
+from omnidyn.report.figures.raw_log import draw_raw_log
+from omnidyn.report.figures.robot import draw_robot
+from omnidyn.report.style import Picture
+from omnidyn.run import Run
+
+WHOLE = "all"  # the name of the one group where there are no groups
+
+
+def plot(result: Any, **options: Any) -> Figure:
+    """The figure of a result; its title and caption are those of the page. Raises InputError for wrong options."""
+    drawn = next(draw(result, **options) for kind, draw in PICTURES.items() if isinstance(result, kind))
+    drawn.figure.set_label(drawn.title)
+    return drawn.figure
+
+
+def _robot(robot: Robot, what: str) -> Picture:
+    pictures: dict[str, Callable[[], Picture]] = {
+        "layout": lambda: draw_robot(robot),
+        "dead zone": lambda: draw_dead_zone_map({robot.name: robot}),
+        "friction": lambda: draw_friction_speed({robot.name: _of_file(robot)}, banded=False),
+    }
+    if what not in pictures:
+        raise InputError("no such picture", got=what, expected=", ".join(pictures), where="what")
+    return pictures[what]()
+
+
+def _run(run: Run, channels: Sequence[str] = (), path: bool = False, robot: Robot | None = None) -> Picture:
+    if not path:
+        return draw_run(run, channels)
+    went = path_of(run, robot)
+    if went is None:
+        raise InputError(
+            "where it went is not in the run", got=", ".join(run.channels), expected="twist or pose",
+            remedy="or wheel speeds and the robot: plot_path(robot)",
+        )  # fmt: skip
+    return draw_path([went])
+
+
+def _verdict(verdict: Verdict) -> Picture:
+    if verdict.log is None:
+        raise InputError(
+            "the log was checked in blocks, and is not kept", expected="the verdict of check(log) on the whole log"
+        )
+    return draw_raw_log(verdict.log, verdict)
+
+
+def _of_file(robot: Robot) -> list[FrictionCurve]:
+    """The curves of a robot as its file has it."""
+    curves = []
+    for axis, top in enumerate(top_speeds(robot)):
+        speed = speeds_up_to(float(top))
+        curves.append(FrictionCurve(AXES[axis], speed, sliding_force(robot, axis, speed), 0.0 * speed))
+    return curves
+
+
+def estimate_curves(estimate: Estimate) -> list[FrictionCurve]:
+    """The curves of an estimate along x, along y and about yaw, up to the speeds that its robot can reach."""
+    tops = top_speeds(estimate.robot)
+    return [friction_curve(estimate, axis, speeds_up_to(float(top))) for axis, top in enumerate(tops)]
+
+
+def draw_estimates(estimates: Mapping[str, Estimate], **how: Any) -> Picture:
+    """Friction against speed of one estimate, or of the groups of one identification."""
+    names = {name: estimate.robot.name if name == WHOLE else name for name, estimate in estimates.items()}
+    return draw_friction_speed({names[name]: estimate_curves(each) for name, each in estimates.items()}, **how)
+
+
+PICTURES: dict[type, Callable[..., Picture]] = {
+    Run: _run,
+    Robot: _robot,
+    Verdict: _verdict,
+    Comparison: draw_overlay,
+    Estimate: lambda estimate: draw_estimates({WHOLE: estimate}),
+    Identification: lambda found: draw_estimates(found.estimates),
+}

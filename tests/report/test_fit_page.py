@@ -1,0 +1,78 @@
+"""The page of a fit: verdict, pictures, tables; duty is called duty; measured lines lie above the model's."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.logs.log import Log
+from omnidyn.report.figures.correlation import draw_correlation
+from omnidyn.report.fit_page import render_fit
+from tests.support.compared_logs import clean_log, noisy
+from tests.support.figures import shown_texts
+from tests.support.outputs import Reader
+
+ROBOT = omnidyn.load_robot("axebot")
+RECORD = {"omnidyn": "0.1.0", "command": "omnidyn identify", "inputs": []}
+
+
+def duty_log(seed):
+    run = noisy(clean_log(ROBOT, seed), seed).replace(source=f"drive{seed}.csv")
+    return run.replace(duty=run.voltage / 6.0, voltage=None, supply=np.full(len(run), 6.0))
+
+
+@pytest.fixture(scope="module")
+def found():
+    runs = [duty_log(seed) for seed in (1, 2)]
+    logs = [Log.of_run(run) for run in runs]
+    return omnidyn.Identification.of(runs, ROBOT, logs=logs, hold_out="drive2.csv", nuisances=("latency", "dead_band"))
+
+
+@pytest.fixture(scope="module")
+def page(found):
+    return render_fit(found, RECORD)
+
+
+def test_verdict_then_pictures_then_tables(page):
+    keys = ["findings", "doubts", "next", "runs", "friction", "path", "residuals", "correlation", "numbers", "scores"]
+    places = [page.index(f'<section id="{key}">') for key in keys]
+    assert places == sorted(places)
+    first_table = page.index("<table")
+    assert page.index("</figure>") < page.rindex("</figure>", 0, first_table) < first_table
+
+
+def test_every_id_is_there_once(page):
+    ids = Reader(page).all("id")
+    assert len(ids) == len(set(ids))
+    assert {"friction_speed", "where_it_went"} <= set(ids)
+
+
+def test_a_logged_duty_is_called_duty(page, found):
+    text = Reader(page).text
+    assert "the logged duty as the motors had it, with the fitted latency, dead band" in text
+    assert "the logged voltage" not in text
+    validation = next(iter(found.validations.values()))
+    assert list(validation.fitted.applied) == ["axebot"]
+
+
+def test_the_first_words_are_the_verdict_and_the_log_s_own_numbers_are_in_the_table_only(page, found):
+    findings = page[page.index('<section id="findings">') : page.index('<section id="doubts">')]
+    said = next(iter(found.validations.values())).statements()
+    assert next(iter(said)) in Reader(findings).text
+    assert "latency" not in findings
+    assert "latency.twist" in page[page.index('<section id="numbers">') :]
+
+
+def test_labels_of_correlations_are_whole_however_long(found):
+    figure = draw_correlation(found.estimate.correlation).figure
+    for words, box in shown_texts(figure):
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, words
+        assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1, words
+
+
+def test_the_measured_line_lies_above_and_is_thinner(found):
+    axes = next(iter(found.validations.values())).fitted.plot().axes[0]
+    measured, model = axes.lines[:2]
+    assert (measured.get_label(), model.get_label()) == ("measured", "axebot")
+    assert measured.get_zorder() > model.get_zorder()
+    assert measured.get_linewidth() < 0.5 * model.get_linewidth()
+    assert model.get_alpha() < 1.0

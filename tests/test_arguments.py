@@ -1,0 +1,57 @@
+"""Arguments in each other's place: both are named, in one sentence."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.arguments import check_order
+from omnidyn.errors import InputError
+from omnidyn.run import Run
+
+ROBOT = omnidyn.load_robot("axebot")
+RUN = Run(t=np.arange(3.0), twist=np.zeros((3, 3)))
+VOLTS = np.zeros((4, 3))
+
+
+@pytest.mark.parametrize(
+    "call, got, expected",
+    [
+        (lambda: omnidyn.compare(RUN, ROBOT), "a Run before a Robot", r"compare\(robot, run\)"),
+        (lambda: omnidyn.compare([RUN, RUN], ROBOT), "a list of Run before a Robot", r"compare\(robot, run\)"),
+        (lambda: omnidyn.compare(RUN, ROBOT, ROBOT), "a Run before a Robot", "compare"),
+        (lambda: omnidyn.identify(ROBOT, [RUN]), "a Robot before a list of Run", r"identify\(runs, robot\)"),
+        (lambda: omnidyn.Identification.of(ROBOT, RUN), "a Robot before a Run", "of"),
+        (lambda: omnidyn.simulate(VOLTS, ROBOT, 0.1), "a ndarray before a Robot", r"simulate\(robot, voltage, dt\)"),
+        (
+            lambda: omnidyn.simulate(VOLTS.tolist(), ROBOT, 0.1),
+            "a list of list before a Robot",
+            r"simulate\(robot, voltage, dt\)",
+        ),
+        (lambda: omnidyn.simulate(ROBOT, 0.1, VOLTS), "the time before the voltage", "simulate"),
+        (lambda: omnidyn.check(ROBOT, RUN), "a Robot before a Run", r"check\(log\)"),
+    ],
+)
+def test_a_swapped_pair_is_recognised(call, got, expected):
+    with pytest.raises(InputError, match=f"each other's place; got {got}; expected .*{expected}"):
+        call()
+
+
+@pytest.mark.parametrize(
+    "call, words",
+    [
+        (lambda: omnidyn.compare("axebot", RUN), "no Robot; got the text 'axebot'; expected compare.*load_robot"),
+        (lambda: omnidyn.identify("log.csv", ROBOT), "no Run; got the text 'log.csv'.*read_log"),
+        (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "no Run; got a list of Run and Robot"),
+        (lambda: omnidyn.check(None), "no Log or Run; got nothing.*load_log"),
+        (lambda: omnidyn.simulate("axebot", VOLTS, 0.1), "no Robot; got the text 'axebot'"),
+    ],
+)
+def test_another_kind_is_refused_with_what_makes_the_right_one(call, words):
+    with pytest.raises(InputError, match=words):
+        call()
+
+
+def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
+    check_order("f(runs, robot)", ((RUN, RUN), Run), (ROBOT, omnidyn.Robot))
+    check_order("f(runs, robot)", ([], Run), (ROBOT, omnidyn.Robot))
+    check_order("f(runs, robot)", (iter([RUN]), Run), (ROBOT, omnidyn.Robot))

@@ -1,0 +1,139 @@
+"""What print, a notebook and plot() give of each result; a repr stays one short line."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import omnidyn
+from omnidyn.errors import InputError
+from omnidyn.findings.check import check_log
+from omnidyn.logs.log import Log
+from tests.support.compared_logs import clean_log, coulomb_times, noisy
+from tests.support.figures import shown_texts
+from tests.support.outputs import Reader
+
+ROBOT = omnidyn.load_robot("axebot")
+
+
+@pytest.fixture(scope="module")
+def run():
+    return noisy(clean_log(ROBOT, 1), 1)
+
+
+@pytest.fixture(scope="module")
+def results(run):
+    fit = omnidyn.identify([run], ROBOT, nuisances="none")
+    return {
+        "run": run,
+        "robot": ROBOT,
+        "verdict": omnidyn.check(run, ROBOT),
+        "comparison": omnidyn.compare(ROBOT, run, coulomb_times(ROBOT, 1.3)),
+        "estimate": fit,
+        "identification": omnidyn.Identification.of([run], ROBOT, nuisances="none"),
+    }
+
+
+NAMES = ["run", "robot", "verdict", "comparison", "estimate", "identification"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_print_is_the_document_and_a_notebook_has_the_same_words(results, name):
+    result = results[name]
+    text = str(result)
+    assert text == result.document().to_text()
+    assert len(text.splitlines()) > 3
+    html = result._repr_html_()
+    page = Reader(html)
+    assert page.tags.count("table") == sum(type(part).__name__ == "Table" for part in result.document().parts)
+    assert "<script" not in html
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_repr_is_one_line(results, name):
+    assert repr(results[name]).startswith("<")
+    assert "\n" not in repr(results[name])
+    assert "array(" not in repr(results[name])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_plot_is_a_figure_with_nothing_cut_off(results, name):
+    figure = results[name].plot()
+    assert isinstance(figure, Figure)
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    page = figure.bbox
+    for words, box in shown_texts(figure):
+        assert page.x0 - 1 <= box.x0 <= box.x1 <= page.x1 + 1, words
+        assert page.y0 - 1 <= box.y0 <= box.y1 <= page.y1 + 1, words
+
+
+def test_a_run_says_its_numbers(run):
+    table = run.document()["channels"]
+    row = next(row for row in table.rows if row[0] == "twist")
+    vx = run.twist[:, 0]
+    assert row == ("twist", "x", "m/s", f"{vx.min():.4g}", f"{vx.mean():.4g}", f"{vx.max():.4g}", "")
+    holes = run.replace(twist=np.where(np.arange(len(run))[:, None] < len(run) // 2, np.nan, run.twist))
+    assert "50%" in str(holes)
+
+
+def test_a_robot_says_where_its_numbers_come_from():
+    robot = omnidyn.load_robot("robotino")
+    rows = {row[0]: row for row in robot.document()["numbers"].rows}
+    assert rows["body.mass_kg"][1:4] == ("8", "1", "given")
+    assert rows["friction.direction.coulomb"][1:4] == ("42.5, 36.1", "0.2, 0.2", "measured")
+    assert not [key for key in rows if key.startswith("friction.axes")]  # it has none
+
+
+def test_texts_in_a_notebook_are_text(run):
+    evil = run.replace(source="<script>alert(1)</script>", warnings=("<b>",))
+    page = Reader(evil._repr_html_())
+    assert not {"script", "b"} & set(page.tags)
+    assert "<script>" in page.text
+
+
+def test_pictures_of_a_robot_have_names():
+    for what in ("layout", "dead zone", "friction"):
+        assert ROBOT.plot(what).get_label()
+    with pytest.raises(InputError, match="no such picture; got speed; expected layout, dead zone, friction"):
+        ROBOT.plot("speed")
+
+
+def test_a_run_draws_the_channels_asked_for(run):
+    assert len(run.plot(["twist"]).axes) == len(run.plot("twist").axes) == 1
+    with pytest.raises(InputError, match="does not hold this; got current"):
+        run.plot(["twist", "current"])
+
+
+def test_where_a_run_went_needs_something_that_says_so(run):
+    assert len(run.plot_path().axes) == 2
+    wheels = omnidyn.Run(t=run.t, wheel_speed=run.wheel_speed)
+    with pytest.raises(InputError, match="where it went is not in the run"):
+        wheels.plot_path()
+    assert len(wheels.plot_path(ROBOT).axes) == 2
+
+
+def test_a_verdict_on_blocks_has_no_log_to_draw(run):
+    with pytest.raises(InputError, match="checked in blocks"):
+        check_log(Log.of_run(run)).plot()
+
+
+def test_a_plot_starts_no_pyplot_and_leaves_the_backend_alone(tmp_path):
+    script = (
+        "import sys, omnidyn\nomnidyn.load_robot('axebot').plot()\n"
+        "print('matplotlib.pyplot' in sys.modules, 'matplotlib' in sys.modules)"
+    )
+    sources = str(Path(__file__).resolve().parents[1] / "src")
+    result = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=True,
+        env={"PYTHONPATH": sources, "HOME": str(tmp_path)},
+    )  # fmt: skip
+    assert result.stdout == "False True\n"
+
+
+def test_printing_imports_no_matplotlib(tmp_path):
+    script = "import sys, omnidyn\nprint(omnidyn.load_robot('axebot'))\nassert 'matplotlib' not in sys.modules"
+    sources = str(Path(__file__).resolve().parents[1] / "src")
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, timeout=120, check=True, env={"PYTHONPATH": sources})
