@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from omnidyn.findings.finding import FATAL, WARN, Verdict
-from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.estimate import NOT_DETERMINED, Estimate
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.shape_residual import between_axes
 from omnidyn.identification.steady.study_parts import Difference
@@ -31,11 +31,20 @@ def number_rows(fit: OutputErrorEstimate) -> list[tuple[str, ...]]:
     """Every fitted number, those of the log too, as cells under NUMBER_HEAD."""
     rows = []
     for name, value in fit.value.items():
-        mark = "not identifiable" if name in fit.unidentifiable else "at bound" if name in fit.at_bound else ""
+        if name in fit.unidentifiable:
+            rows.append((name, f"{value:.5g}", "", "", unit(name), NOT_DETERMINED))
+            continue
+        mark = "at bound" if name in fit.at_bound else ""
         rows.append((name, f"{value:.5g}", f"{fit.std[name]:.2g}", interval(fit.ci95[name]), unit(name), mark))
     for name, own in fit.nuisances.items():
-        mark = "not identifiable" if name in fit.unidentifiable else "of the log"
-        rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval(own.ci95), own.unit, mark))
+        if name in fit.unidentifiable:
+            rows.append((name, f"{own.value:.4g}", "", "", own.unit, NOT_DETERMINED))
+        else:
+            rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval(own.ci95), own.unit, "of the log"))
+    rows += [
+        (one.name, f"{one.value:.5g}", f"{one.std:.2g}", interval(one.ci95), one.unit, one.words)
+        for one in fit.combinations
+    ]
     return rows
 
 
@@ -89,9 +98,19 @@ def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
         axis = _axis(name) or name
         yield f"drive {axis} harder than {bound:.3g} {unit(name)}: it never moved, so its friction is only bounded"
     for name in fit.unidentifiable:
-        yield f"{name} cannot be told from these logs: {_remedy(name)}"
+        if math.isinf(fit.std.get(name, 0.0)):
+            yield f"{name} cannot be told from these logs: {_remedy(name)}"
+    known = [name for name in fit.unidentifiable if math.isfinite(fit.std.get(name, math.inf))]
+    if known:
+        yield (
+            f"the logs do not tell {', '.join(known)}: what you measure or read off a label (with its std), or a log "
+            "with currents, says more than a longer log"
+        )
     for words in fit.blind:
-        yield f"{words}: fix one of them to what was measured otherwise (`fixed`), or give it a std (`use_priors`)"
+        yield (
+            f"{words}: fix one of them to what was measured otherwise (`fixed`), or write what is known of it into the "
+            "robot file, with a std"
+        )
 
 
 def _remedy(name: str) -> str:
@@ -139,7 +158,7 @@ def _together(fit: OutputErrorEstimate) -> Iterator[str]:
 def _wide(fit: Estimate) -> Iterator[str]:
     shares = {
         name: fit.std[name] / abs(value) for name, value in fit.value.items()
-        if value and math.isfinite(fit.std[name]) and name not in fit.at_bound
+        if value and name not in fit.unidentifiable and name not in fit.at_bound
     }  # fmt: skip
     wide = {name: share for name, share in shares.items() if share > WIDE}
     if wide:

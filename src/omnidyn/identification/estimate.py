@@ -15,6 +15,8 @@ from omnidyn.model.keys import unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
 
+NOT_DETERMINED = "not determined"  # in the place of an interval: the data do not give one
+UNKNOWN = {"std": None, "ci95": [None, None]}  # the same for machines
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
 
@@ -38,7 +40,8 @@ class Estimate:
     value, std, ci95: name -> estimate, standard error, 95 % interval (low, high), in the unit of the key.
     correlation: between the estimates. degrees_of_freedom: name -> rows minus parameters behind that number.
     at_bound: names of what a bound holds (a friction that came out negative). std is then that of the free fit.
-    lower_bound: name -> what the number is at least, where the data say no more (breakaway from rows at rest).
+    unidentifiable: names of what the data do not determine. lower_bound: name -> what the number is at least, where the
+    data say no more (breakaway from rows at rest).
     warnings: what a reader must know, in words. method, data: how it was made, and from what (name, SHA-256).
     """
 
@@ -49,6 +52,7 @@ class Estimate:
     correlation: Correlation
     degrees_of_freedom: Mapping[str, int]
     at_bound: tuple[str, ...] = ()
+    unidentifiable: tuple[str, ...] = ()
     lower_bound: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     method: str = ""
@@ -71,6 +75,9 @@ class Estimate:
     def _table(self) -> Table:
         rows = []
         for name, value in self.value.items():
+            if name in self.unidentifiable:
+                rows.append((name, f"{value:.4g}", "", NOT_DETERMINED, unit(name)))
+                continue
             mark = "  at bound" if name in self.at_bound else ""
             interval = interval_cell(self.ci95[name])
             rows.append((name, f"{value:.4g}", f"{self.std[name]:.3g}", interval, unit(name) + mark))
@@ -88,6 +95,7 @@ class Estimate:
                 "at_bound": name in self.at_bound,
                 "unit": unit(name),
             }
+            | (UNKNOWN if name in self.unidentifiable else {})
             for name, value in self.value.items()
         }
         return {

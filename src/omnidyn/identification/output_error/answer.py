@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from omnidyn.document import Part, Points, interval_cell
-from omnidyn.identification.estimate import Estimate, finite_or_none
+from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate, finite_or_none
 from omnidyn.identification.steady.study_parts import Difference
 
 
@@ -21,20 +21,34 @@ class Nuisance:
     unit: str = ""
 
 
+@dataclass(frozen=True)
+class Combination:
+    """A number that the logs determine where they do not determine those behind it: name, value, std, 95 % interval."""
+
+    name: str
+    value: float
+    std: float
+    ci95: tuple[float, float]
+    unit: str
+    words: str
+
+
 @dataclass(frozen=True, eq=False)
 class OutputErrorEstimate(Estimate):
     """An Estimate from whole logs. `correlation` covers the nuisances too.
 
     nuisances: name -> Nuisance. noise: output -> std of what the model leaves, in the unit of the output; after
     Student's t without its wild samples, of counts before the encoder rounds.
-    unidentifiable: names of what the data do not determine; they keep what the robot had, std and interval are
-    infinite. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
+    unidentifiable: names of what the data do not determine. Where the std of the robot file is a prior, the value is
+    the one that goes best with all others, std and interval are those of the posterior, hardly more than what the file
+    said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
+    together. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
     iterations, converged: of the minimisation.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
-    unidentifiable: tuple[str, ...] = ()
+    combinations: tuple[Combination, ...] = ()
     blind: tuple[str, ...] = ()
     covariance: str = ""
     iterations: int = 0
@@ -42,12 +56,17 @@ class OutputErrorEstimate(Estimate):
 
     def _parts(self) -> list[Part]:
         """The numbers of the log, the noise and what the data do not show, after the rest."""
+        sums = [f"{one.words}: {one.value:.4g} {interval_cell(one.ci95)} {one.unit}" for one in self.combinations]
         logs = [
-            f"{name}: {own.value:.4g} {interval_cell(own.ci95)} {own.unit}".rstrip()
+            f"{name}: {NOT_DETERMINED if name in self.unidentifiable else self._of_log(own)}"
             for name, own in self.nuisances.items()
         ]
         noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
-        return [*super()._parts(), *logs, *noise, Points(self.blind, "not shown by the data:")]
+        return [*super()._parts(), *sums, *logs, *noise, Points(self.blind, "not shown by the data:")]
+
+    @staticmethod
+    def _of_log(own: Nuisance) -> str:
+        return f"{own.value:.4g} {interval_cell(own.ci95)} {own.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it."""
@@ -55,7 +74,7 @@ class OutputErrorEstimate(Estimate):
             name: {
                 "value": finite_or_none(n.value), "std": finite_or_none(n.std),
                 "ci95": [finite_or_none(b) for b in n.ci95], "unit": n.unit,
-            }
+            } | (UNKNOWN if name in self.unidentifiable else {})
             for name, n in self.nuisances.items()
         }  # fmt: skip
         return {
@@ -63,6 +82,7 @@ class OutputErrorEstimate(Estimate):
             "nuisances": nuisances,
             "noise": {name: finite_or_none(std) for name, std in self.noise.items()},
             "unidentifiable": list(self.unidentifiable),
+            "combinations": [asdict(one) for one in self.combinations],
             "blind": list(self.blind),
             "covariance": self.covariance,
             "converged": self.converged,

@@ -25,8 +25,8 @@ from omnidyn.identification.output_error.prepare import (
     Group,
     expand_keys,
     free_by_default,
+    guesses,
     is_exact,
-    known_priors,
     make_engine,
     make_group,
     read_records,
@@ -94,7 +94,7 @@ class Fit:
         refuse_unknown(question.fixed, robot)
         asked_axes(question.free or (), question.fixed)
         (progress or Progress()).doing("looking for what moved")
-        keys = question.free if question.free is not None else known_priors(robot) if question.use_priors else ()
+        keys = question.free if question.free is not None else guesses(robot)
         exact = exact and stays_exact(robot, [key for key in keys if key not in question.fixed])
         made = [
             make_group(name, records, robot, question, exact, usual, alone=groups is None)
@@ -137,7 +137,7 @@ class Fit:
             group = self.groups[0]
             words = [*warnings, *group.warnings, *hints]
             estimate = conclude(
-                solver, solution, known, group.records, loss, words, group.bounds, levels, again.intervals
+                solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels, again.intervals
             )
             return Answer({group.name: estimate}, (), solver.problem.names, ())
         engine, estimates = solver.engine, {}
@@ -146,7 +146,9 @@ class Fit:
             words = [*warnings, *member.group.warnings]
             better = engine.named_alone(member, again.intervals)
             seen, alone = engine.seen_alone(member, solution, known)
-            estimate = conclude(seen.solver, seen, alone, member.group.records, loss, words, {}, (), better)
+            estimate = conclude(
+                seen.solver, seen, alone, member.group.records, loss, words, {}, member.group.moved, (), better
+            )
             others = ", ".join(each.name for each in engine.members if each is not member)
             estimates[member.name] = replace(estimate, method=f"{estimate.method}; fitted together with {others}")
         own = own_names(self.question.per_free, [member.problem for member in engine.members])

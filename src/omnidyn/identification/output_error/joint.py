@@ -87,7 +87,7 @@ class JointEngine:
         own = replace(
             known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
             unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],
-            plain=known.plain[np.ix_(at, at)],
+            plain=known.plain[np.ix_(at, at)], guessed=known.guessed[at],
             directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
         )  # fmt: skip
         return Solution(state, solution.held[at], solution.iterations, solution.converged, solver), own
