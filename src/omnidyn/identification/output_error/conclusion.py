@@ -14,12 +14,13 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.combinations import combinations
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import difference_noise
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
+from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
 from omnidyn.model.keys import Key, with_priors
 from omnidyn.model.robot import Prior, Robot
@@ -262,6 +263,7 @@ def _warnings(
     if not solution.converged:
         words.append(f"the fit was cut short after {solution.iterations} iterations: the numbers are of its last step")
     words += [f"{name} is not identifiable from these logs" for name in blind]
+    words += [implausible(name, value) for name, value in too_early(solver, solution).items()]
     for j, p in enumerate(solver.problem.parameters[: solver.problem.robot_count]):
         if known.held[j]:
             words.append(f"{p.name} is at its bound {solution.state.point.values[j]:.4g}: the best fit lies beyond it")

@@ -32,7 +32,7 @@ from omnidyn.identification.output_error.prepare import (
     read_records,
     stays_exact,
 )
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES, automatic
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated, refuse_unknown
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
@@ -43,7 +43,7 @@ from omnidyn.identification.output_error.solve.solver import Normal, Solution, S
 from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
-from omnidyn.identification.output_error.trust.support import supported, wanted
+from omnidyn.identification.output_error.trust.support import supported, too_early, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.identification.question import GAUSS, OUTPUT_ERROR, STUDENT, Question
 from omnidyn.model.robot import Robot
@@ -124,7 +124,7 @@ class Fit:
         """
         progress, done = progress or Progress(), isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
-        hints = self._hints(solution, done)
+        hints = [*solution.notes, *self._hints(solution, done)]
         solution, levels = self._levels(solution) if done else (solution, [])
         solver = solution.solver
         progress.doing("finding how sure the numbers are")
@@ -158,16 +158,21 @@ class Fit:
     def _settled(self, group: Group, progress: Progress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
         found = self._solve(group, group.problem(), progress)
-        if self.question.nuisances is not None or group.engine == IMPLICIT:
+        if self.question.nuisances is not None:
             return found
-        progress.doing("which nuisances the logs support")
-        kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
+        early = too_early(found.solver, found)
+        if group.engine == IMPLICIT:
+            kept = tuple(name for name in _nuisances(found.solver.problem) if name not in early)
+        else:
+            progress.doing("which nuisances the logs support")
+            kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
         lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
         if not lost:
             return found
+        notes = tuple(f"{implausible(name, value)}: it is not fitted" for name, value in early.items())
         if group.engine == LOOP:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
-        return self._solve(group, group.problem(kept), progress)
+        return replace(self._solve(group, group.problem(kept), progress), notes=notes)
 
     def _solve(self, group: Group, problem: Problem, progress: Progress) -> Solution:
         """The best point of one group alone."""

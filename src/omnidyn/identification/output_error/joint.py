@@ -169,7 +169,7 @@ def joint_start(engine: JointEngine, nu: float, progress: Progress, alone: Mappi
         elif member.group.engine == LOOP:
             point = loop_start(member.problem, nu, progress.aside(words))
         else:
-            point = moving_start(member.problem, nu)
+            point = moving_start(member.problem, nu, progress)
         for k, value in zip(member.at, point.values, strict=True):
             values[k].append(float(value))
         states += point.states

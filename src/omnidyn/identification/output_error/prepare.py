@@ -13,7 +13,13 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.motion import Motion, motion
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, nuisance_parameters, pieces
+from omnidyn.identification.output_error.problem.nuisances import (
+    LATENCY,
+    automatic,
+    earliest,
+    nuisance_parameters,
+    pieces,
+)
 from omnidyn.identification.output_error.problem.parameters import Parameter, names_of, robot_parameters
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
@@ -169,7 +175,10 @@ def make_problem(
     if engine != EXACT:
         own = [_within_reach(p, _drive(records, robot)) for p in own]
     auto = automatic(records) if engine == EXACT else (LATENCY,)
-    more = nuisance_parameters(auto if question.nuisances is None else question.nuisances, records, robot)
+    more = (
+        nuisance_parameters(auto, records, robot, earliest(records)) if question.nuisances is None
+        else nuisance_parameters(question.nuisances, records, robot)
+    )  # fmt: skip
     late = any(p.name.startswith(LATENCY) for p in more)
     start = question.start
     parts = loop_pieces(records, robot, start) if engine == LOOP else pieces(records, robot, start, late)

@@ -66,7 +66,7 @@ class State:
 class Solution:
     """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short.
 
-    solver: which found it.
+    solver: which found it. notes: what is to be said of the way there.
     """
 
     state: State
@@ -74,6 +74,7 @@ class Solution:
     iterations: int
     converged: bool
     solver: Solver[Any]
+    notes: tuple[str, ...] = ()
 
 
 class Solver(Generic[P]):

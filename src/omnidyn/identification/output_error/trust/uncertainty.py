@@ -55,7 +55,7 @@ class Trust:
     prior holds more than the data do, see TOLD; its covariance is the posterior's. free_step (P,): from a bound to
     where the fit would go without it. kind: white or sandwich. widening: largest ratio of the sandwich's std to the
     plain one. quantile: standard errors in half a 95 % interval. degrees: of freedom behind it. neighbours (columns,):
-    correlation of successive residuals. directions: blind or weak ones that no prior holds: (eigenvalue, relative change
+    correlation of successive residuals. directions: blind or weak ones no prior holds: (eigenvalue, relative change
     of each parameter). runs: that were the blocks, 0 where these were shorter than a run. plain (P, P): inverse of the
     information, which is what the likelihood itself curves by; the covariance where the noise is white.
     """
