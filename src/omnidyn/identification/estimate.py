@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.document import Document, Part, Points, Table, interval_cell
+from omnidyn.model.first_guess import rests_on, rests_on_guesses
 from omnidyn.model.keys import unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
@@ -70,7 +71,8 @@ class Estimate:
         """Its words and its table, in the order of reading."""
         bounds = [f"{name} is at least {bound:.4g} {unit(name)}" for name, bound in self.lower_bound.items()]
         head = [f"{self.robot.name}: {self.method}", f"data: {self.data}", ""]
-        return [*head, self._table(), *bounds, Points(self.warnings, "warning:")]
+        held = [words] if (words := rests_on_guesses(self.robot)) else []
+        return [*head, self._table(), *bounds, *held, Points(self.warnings, "warning:")]
 
     def _table(self) -> Table:
         rows = []
@@ -105,6 +107,7 @@ class Estimate:
                 "names": list(self.correlation.names),
                 "matrix": [[finite_or_none(entry) for entry in row] for row in self.correlation.matrix.tolist()],
             },
+            "rests_on_guesses": rests_on(self.robot),
             "warnings": list(self.warnings),
             "method": self.method,
             "data": self.data,
@@ -114,9 +117,13 @@ class Estimate:
 
 def identified(std: float | None, source: str) -> Prior:
     """The prior of an identified number: its standard error, where it is one, and from what it was identified."""
-    text = "".join(c if c.isprintable() else " " for c in source)[:SOURCE_LENGTH]
     known = std is not None and 0.0 < std <= 1e9
-    return Prior(std=float(std) if known else None, source=text, origin=IDENTIFIED)  # type: ignore[arg-type]
+    return Prior(std=float(std) if known else None, source=printable(source), origin=IDENTIFIED)  # type: ignore[arg-type]
+
+
+def printable(source: str) -> str:
+    """The words of a source as a robot file takes them."""
+    return "".join(c if c.isprintable() else " " for c in source)[:SOURCE_LENGTH]
 
 
 def finite_or_none(value: float) -> float | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.estimate import Correlation, identified
+from omnidyn.identification.estimate import Correlation, identified, printable
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.combinations import combinations
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS, implausible
@@ -22,7 +22,8 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
-from omnidyn.model.keys import Key, with_priors
+from omnidyn.model.first_guess import WITH_THE_FIT
+from omnidyn.model.keys import VISCOUS, Key, with_priors
 from omnidyn.model.robot import Prior, Robot
 
 FloatArray = NDArray[np.float64]
@@ -57,12 +58,12 @@ def conclude(
     for name, (spread, interval) in (better or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
     data = _data(records)
-    own_levels = _levels(levels, ci95)
+    own_levels, joint = _levels(levels, ci95), combinations(problem, values, known, moved)
     names = [p.name for p in problem.parameters]
     fitted = problem.parameters[:own]
     warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-        robot=_with_levels(_robot(problem, values, std, open_, data), own_levels),
+        robot=_with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
@@ -80,7 +81,7 @@ def conclude(
         },
         noise=noise_of(solver, solution),
         unidentifiable=open_,
-        combinations=combinations(problem, values, known, moved),
+        combinations=joint,
         blind=tuple(_direction(problem, value, way, known.blind) for value, way in known.directions),
         covariance=known.kind,
         iterations=solution.iterations,
@@ -184,12 +185,15 @@ def intervals(
     return std, ci95
 
 
-def _robot(problem: Problem, values: FloatArray, std: Mapping[str, float], open_: Sequence[str], data: str) -> Robot:
+def _robot(
+    problem: Problem, values: FloatArray, std: Mapping[str, float], open_: Sequence[str], data: str, together: bool
+) -> Robot:
     """The robot with the fitted numbers, and where they come from.
 
     What the data do not determine has the value that goes with the others: the robot must move as the log does, for
     which a product is enough. Its origin and std stay: a narrower std, written and read again, would count the log
-    twice. Of a number with a logarithmic scale the std is a share, and stays that share.
+    twice. Of a number with a logarithmic scale the std is a share, and stays that share. together: whether the data
+    determine what motors and viscous friction do together.
     """
     robot, found = problem.robot, {}
     for p, value in zip(problem.parameters[: problem.robot_count], values, strict=False):
@@ -197,9 +201,11 @@ def _robot(problem: Problem, values: FloatArray, std: Mapping[str, float], open_
         for key, factor in ((p.name, 1.0), *p.also):
             if p.name not in open_:
                 found[key] = identified(std[p.name] * factor, f"output error, {data}")
-            elif p.log and (before := prior_of(problem.robot, key)) and before.std is not None:
-                share = value / float(Key.parse(p.name).get(problem.robot))
-                found[key] = before.replace(std=float(before.std * share))
+            elif (before := prior_of(problem.robot, key)) and before.std is not None:
+                share = value / float(Key.parse(p.name).get(problem.robot)) if p.log else 1.0
+                joint = together and (p.part == "motor" or Key.parse(key).level == VISCOUS)
+                source = printable(f"{WITH_THE_FIT}, {data}") if joint else before.source
+                found[key] = before.replace(std=float(before.std * share), source=source)
     axes = robot.friction.axes
     if axes.breakaway is not None:
         robot = _breaking_at(robot, [max(s, c) for s, c in zip(axes.breakaway, axes.coulomb, strict=True)])

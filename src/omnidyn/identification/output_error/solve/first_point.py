@@ -85,9 +85,9 @@ def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
 
 
 def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
-    """The point with the latencies that go with motors near their own; only currents cannot do without.
+    """The point with the latencies that go with motors near their own; only currents need them.
 
-    The latency of a current meets a jump at every row: a motor that is a wrong guess brings it to the wrong side of one,
+    The latency of a current meets a jump at every row: a motor that is a wrong guess brings it to the wrong side of it,
     and no descent brings it back. So motors come first, with every latency at its start.
     """
     if problem.where(CURRENTS) < 0:
