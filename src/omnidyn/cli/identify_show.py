@@ -62,7 +62,8 @@ def _tell_fit(found: Identification, record: dict[str, Any], to: Out) -> None:
             for g, fit in fits.items()
         }
         show_json({
-            "method": OUTPUT_ERROR, **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
+            "method": OUTPUT_ERROR, "verdict": {"ok": not found.failures, "words": found.verdict},
+            **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
             "differences": [{**vars(d), "differs": d.differs} for d in found.differences], "next": found.advice,
             "check": [{"source": v.source, "fatal": v.fatal, "counts": v.counts} for v in found.verdicts],
             "output": files or None, "report": report or None, "provenance": record,
@@ -76,7 +77,7 @@ def _fit_text(found: Identification) -> str:
     from omnidyn.identification.advice import DIFFERENCE_HEAD, difference_rows
     from omnidyn.identification.steady.study_table import table_text
 
-    lines = []
+    lines = [*textwrap.wrap(found.verdict, 100), ""] if found.verdict else []
     for group, fit in found.estimates.items():
         lines += [f"group {group}", ""] if len(found.estimates) > 1 else []
         lines += [fit.summary().rstrip("\n"), ""]
