@@ -51,8 +51,10 @@ def init(
     ),
     like: str = typer.Option("", metavar="ROBOT", help="Take what is not given from this preset or robot file."),
     azimuth: str = typer.Option("", metavar="DEGREES", help="Where they stand, such as 60,180,300; 0 is forward."),
-    wheel_radius: float | None = typer.Option(None, help="Radius of a wheel [m]."),
-    robot_radius: float | None = typer.Option(None, help="Centre to wheel [m]; mecanum: half track + half wheelbase."),
+    wheel_radius: str = typer.Option("", metavar="M", help="Radius of a wheel [m], or one per wheel: 0.03,0.03,0.034."),
+    robot_radius: str = typer.Option(
+        "", metavar="M", help="Centre to wheel [m], or one per wheel; mecanum: half track + half wheelbase."
+    ),
     mass: float | None = typer.Option(None, help="Mass of the robot [kg]."),
     voltage_limit: float | None = typer.Option(None, help="Most the driver gives to a motor [V]; default: a guess."),
     log: list[str] = typer.Option(
@@ -74,7 +76,8 @@ def init(
     The rest is guessed, with a wide spread, and marked as a guess.
     """
     given = {
-        "wheels": wheels, "azimuth": _azimuths(azimuth), "wheel_radius": wheel_radius, "robot_radius": robot_radius,
+        "wheels": wheels, "azimuth": _azimuths(azimuth),
+        "wheel_radius": _radii("--wheel-radius", wheel_radius), "robot_radius": _radii("--robot-radius", robot_radius),
         "mass": mass, "voltage_limit": voltage_limit,
     }  # fmt: skip
     _refuse_words(given, mecanum, friction, like, out, json)
@@ -129,6 +132,14 @@ def _azimuths(text: str) -> list[float] | None:
     from omnidyn.cli.terminal.numbers import number_list
 
     return number_list("--azimuth", text) if text else None
+
+
+def _radii(option: str, text: str) -> float | tuple[float, ...] | None:
+    """One number for all wheels, or one per wheel; None where none is given."""
+    from omnidyn.cli.terminal.numbers import number_list
+
+    values = tuple(number_list(option, text)) if text else ()
+    return values if len(values) > 1 else values[0] if values else None
 
 
 def _checked_path(name: str, out: str, force: bool) -> str:
