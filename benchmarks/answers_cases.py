@@ -177,7 +177,7 @@ identify floor/smooth1.csv --robot guess.toml --nuisance none --free friction --
 identify floor/smooth1.csv --robot box.toml --free body.mass_kg --free motor.resistance_ohm --fix body.mass_kg
 identify floor/smooth1.csv --robot box.toml --nuisance latency --nuisance gain --nuisance dead_band --json
 identify floor/smooth1.csv --robot box.toml --nuisance fade --nuisance tilt --json
-identify floor/smooth1.csv --robot prior.toml --use-priors --nuisance none --json
+identify floor/smooth1.csv --robot prior.toml --nuisance none --json
 identify floor/smooth1.csv --robot box.toml --nuisance none --profile friction.axes.coulomb[0] --json
 identify floor/smooth1.csv --robot box.toml --start free --nuisance none
 identify floor/smooth1.csv --robot box.toml --start rest --nuisance none --latency twist=0.02

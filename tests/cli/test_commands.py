@@ -91,6 +91,22 @@ def test_deadzone_for_machines(call):
     assert len(result["provenance"]["inputs"][0]["sha256"]) == 64
 
 
+def test_what_rests_on_a_guess_says_so(call, here):
+    """A file of `init` is nothing but guesses beside what a ruler tells; the paper's robot has none."""
+    from omnidyn.model.first_guess import first_guess
+    from omnidyn.model.robot_file import save_robot
+
+    line = "rests on guesses of the robot file: "
+    save_robot(first_guess("new", load_robot("axebot").wheels, 1.5, 6.0), "new.toml")
+    assert f"{line}resistance, torque constant, gear ratio, friction\n" in call("deadzone", "new.toml")[1]
+    assert f"{line}inertia, resistance" in call("simulate", "new.toml", "u.csv")[1]
+    assert strict(call("simulate", "new.toml", "u.csv", "--json")[1])["rests_on_guesses"][0] == "inertia"
+    call("simulate", "axebot", "u.csv", "-o", "run.csv")
+    compared = call("compare", "run.csv", "--robot", "new.toml")[1]
+    assert f"{line}inertia, resistance" in compared
+    assert line not in call("deadzone", "axebot")[1] + call("simulate", "axebot", "u.csv")[1]
+
+
 def test_deadzone_of_a_pattern_names_the_axis_that_gives_way(call):
     row = strict(call("deadzone", "axebot", "--pattern", "-1,2,-3", "--json")[1])["dead_zone"][0]
     assert row["axis"] == "yaw"

@@ -43,6 +43,37 @@ def call(logs, tmp_path, monkeypatch, capsys):
     return run
 
 
+@pytest.fixture
+def mirrored(logs):
+    """A log whose y points the other way, as of a camera above the field."""
+    run = noisy_draw(simulate(load_robot("axebot"), excitation(20.0, seed=7), 0.01), 7)
+    if not (logs / "mirrored.csv").exists():
+        write_run(run.replace(twist=run.twist * [1.0, -1.0, 1.0]), logs / "mirrored.csv")
+    return "mirrored.csv"
+
+
+def test_a_model_that_does_not_follow_its_log_is_written_and_ends_with_4(call, mirrored, tmp_path):
+    """The verdict is the first line; it was exit 0, with a warning after the table."""
+    out = tmp_path / "fit.toml"
+    code, told, err = call(mirrored, "--robot", "axebot", "-o", str(out), "--nuisance", "none")
+    assert code == 4
+    assert told.startswith("failed: the model does not follow vy (fit ")
+    assert "omnidyn: failed: the model does not follow vy" in err
+    assert load_robot(out).priors[COULOMB].origin == "identified"
+    code, told, _ = call(mirrored, "--robot", "axebot", "--json", "--nuisance", "none")
+    assert code == 4
+    assert not strict(told)["verdict"]["ok"]
+    code, told, _ = call("smooth0.csv", mirrored, "--robot", "axebot", "--hold-out", mirrored, "--nuisance", "none")
+    assert code == 4
+    assert "does not follow vy" in told.splitlines()[0]
+
+
+def test_a_model_that_follows_says_so_first(call):
+    code, told, _ = call("smooth0.csv", "--robot", "axebot", "--nuisance", "none")
+    assert code == 0
+    assert told.startswith("the model follows the logs that it was fitted to\n")
+
+
 def test_output_error_is_the_default_and_predicts_a_log_it_never_saw(call, tmp_path):
     arguments = ("smooth0.csv", "smooth1.csv", "--robot", "axebot", "--hold-out", "smooth1.csv")
     code, out, err = call(*arguments, "-o", str(tmp_path / "fit.toml"), "--report", str(tmp_path / "r.html"))

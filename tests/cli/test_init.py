@@ -494,3 +494,16 @@ def test_a_current_limit_that_holds_the_robot_is_not_blamed_on_the_pattern(call,
     code, out, _ = call("deadzone", "weak.toml")
     assert code == 0
     assert "never   no voltage times (0, 1, -1) moves it" in out
+
+
+def test_radii_may_differ_from_wheel_to_wheel(call, here):
+    code, *_ = call("init", "odd", "--azimuth", "60,180,300", "--wheel-radius", "0.03,0.03,0.034", "--robot-radius",
+                    "0.11,0.11,0.14", "--mass", "2.8")  # fmt: skip
+    assert code == 0
+    robot = load_robot("odd.toml")
+    assert robot.wheels.wheel_radius == (0.03, 0.03, 0.034)
+    assert robot.wheels.robot_radius == (0.11, 0.11, 0.14)
+    code, _, err = call("init", "bad", "--azimuth", "60,180,300", "--wheel-radius", "3cm", "--robot-radius", "0.1",
+                        "--mass", "2.8")  # fmt: skip
+    assert code == 3
+    assert "--wheel-radius: not a list of numbers; got 3cm" in err

@@ -11,6 +11,7 @@ from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.first_guess import (
     AXES,
     WHY,
+    WITH_THE_FIT,
     default_prior,
     even_azimuths,
     first_guess,
@@ -18,6 +19,8 @@ from omnidyn.model.first_guess import (
     like,
     mecanum_wheels,
     reasons,
+    rests_on,
+    rests_on_guesses,
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key, all_keys
@@ -210,3 +213,15 @@ def test_the_guess_is_near_a_robot_it_has_never_seen():
     motor = first_guess("udea", wheels, 3.178, 22.2).motor
     speed_per_percent = 0.01 * 22.2 / (motor.emf_constant * motor.gear_ratio)
     assert speed_per_percent == pytest.approx(0.43, rel=0.25)
+
+
+def test_what_an_answer_rests_on_is_named_once(axebot):
+    """At rest no mass, inertia or back-EMF has a say; what a fit changed together with others is not a guess alone."""
+    robot = first_guess("new", axebot.wheels, 1.5)
+    every = "inertia, resistance, torque constant, emf constant, gear ratio, voltage limit, friction"
+    assert rests_on_guesses(robot) == f"rests on guesses of the robot file: {every}"
+    still = "resistance, torque constant, gear ratio, voltage limit, friction"
+    assert rests_on_guesses(robot, at_rest=True) == f"rests on guesses of the robot file: {still}"
+    fitted = {key: prior.replace(source=f"{WITH_THE_FIT}, yard.csv") for key, prior in robot.priors.items()}
+    assert rests_on(robot.replace(priors=fitted)) == []
+    assert rests_on_guesses(axebot) == ""

@@ -30,13 +30,17 @@ def deadzone(
     from omnidyn.cli.terminal.numbers import number_list
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.model.deadzone import axis_patterns
+    from omnidyn.model.first_guess import rests_on, rests_on_guesses
     from omnidyn.model.robot_file import load_robot
 
     loaded, source = load_robot(robot), robot_input(robot)
     patterns = [number_list("--pattern", pattern)] if pattern else axis_patterns(loaded).tolist()
     rows = [_row(loaded, each) for each in patterns]
     head = f"{loaded.name} at rest: it starts to move when the voltages of the wheels exceed"
-    told = Document([head, "", *(_line(loaded, row) for row in rows)], {"robot": loaded.name, "dead_zone": rows})
+    told = Document(
+        [head, "", *(_line(loaded, row) for row in rows), *filter(None, [rests_on_guesses(loaded, at_rest=True)])],
+        {"robot": loaded.name, "dead_zone": rows, "rests_on_guesses": rests_on(loaded, at_rest=True)},
+    )
     tell(told, json, provenance([source]))
     if picture:
         _draw(loaded, picture, force)

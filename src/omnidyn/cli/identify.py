@@ -16,7 +16,7 @@ from omnidyn.cli.terminal.streams import say
 from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.identification.question import options as fields_of_question
 
-INTERRUPTED = 130
+INTERRUPTED, FAILED = 130, 4
 
 
 def _asks(command: Callable[..., None]) -> Callable[..., None]:
@@ -131,3 +131,6 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
     if found.interrupted:
         told(f"interrupted: {found.interrupted}")
         raise typer.Exit(INTERRUPTED)
+    if found.failures:
+        told(found.verdict)
+        raise typer.Exit(FAILED)

@@ -45,13 +45,13 @@ def simulate(
         raise typer.BadParameter("-o - and --json both want stdout.")
     _refuse_early(robot, voltages, "" if out == "-" else out, force)
     with progress("simulating (the first run of an engine compiles it)") as now:
-        run, record = _simulated(robot, voltages, duration, max_steps, start_twist, start_pose, tol)
+        run, record, guesses = _simulated(robot, voltages, duration, max_steps, start_twist, start_pose, tol)
         now("writing the run")
         _write(run, out, force)
     for warning in run.warnings:
         say(f"omnidyn: warning: {warning}")
     if out != "-":
-        tell(_document(run), json, record, output=out or None)
+        tell(_document(run, guesses), json, record, output=out or None)
     if out != "-" and not json:
         say(f"omnidyn: wrote {out}" if out else "omnidyn: nothing written; -o FILE writes the run")
 
@@ -77,10 +77,11 @@ def _simulated(
     twist: list[float],
     pose: list[float],
     tol: float,
-) -> tuple[Run, dict[str, Any]]:
-    """The run and the record of what it was made from."""
+) -> tuple[Run, dict[str, Any], list[str]]:
+    """The run, the record of what it was made from, and what of that is a guess."""
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.logs.command_file import read_commands
+    from omnidyn.model.first_guess import rests_on
     from omnidyn.model.robot_file import load_robot
     from omnidyn.simulation.simulate import simulate as simulate_robot
 
@@ -89,7 +90,7 @@ def _simulated(
     record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": held.sha256}])
     command = {held.kind: held.rows, "supply": held.supply}
     run = simulate_robot(loaded, dt=held.dt, twist=twist, pose=pose, tol=tol or None, **command)
-    return run.replace(t=run.t + held.t0, warnings=(*held.notes, *run.warnings)), record
+    return run.replace(t=run.t + held.t0, warnings=(*held.notes, *run.warnings)), record, rests_on(loaded)
 
 
 def _write(run: Run, out: str, force: bool) -> None:
@@ -101,8 +102,10 @@ def _write(run: Run, out: str, force: bool) -> None:
         write_run(run, out, force)
 
 
-def _document(run: Run) -> Document:
+def _document(run: Run, guesses: list[str]) -> Document:
     """What one wants to know first about a run."""
+    from omnidyn.model.first_guess import guess_line
+
     assert run.twist is not None
     assert run.pose is not None
     moved, duration = bool(run.twist.any()), run.t[-1] - run.t[0]
@@ -115,6 +118,7 @@ def _document(run: Run) -> Document:
         "moved": moved,
         "final_twist": {"vx_m_s": vx, "vy_m_s": vy, "omega_rad_s": omega},
         "final_pose": {"x_m": x, "y_m": y, "heading_rad": heading},
+        "rests_on_guesses": guesses,
         "warnings": run.warnings,
     }
     still = "it never moved: the voltages stay within the dead zone (see: omnidyn deadzone)"
@@ -124,4 +128,4 @@ def _document(run: Run) -> Document:
         f"at the end   vx {vx:.4f} m/s   vy {vy:.4f} m/s   omega {omega:.4f} rad/s",
         f"             x {x:.4f} m   y {y:.4f} m   heading {heading:.4f} rad",
     ]
-    return Document(lines, data)
+    return Document([*lines, *filter(None, [guess_line(guesses)])], data)

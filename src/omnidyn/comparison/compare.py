@@ -15,6 +15,7 @@ from omnidyn.comparison.result import Comparison, Segment
 from omnidyn.comparison.traces import Trace, compared_components, counts_from_start, trace_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
+from omnidyn.model.first_guess import rests_on
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 from omnidyn.simulation.simulate import TOLERANCE
@@ -64,6 +65,7 @@ def compare(
         by_segment={name: _by_segment(by, kept) for name, by in traces.items()},
         difference=_differences([*traces.values()], kept, seed) if len(robots) == 2 else {},
         current_unsigned=current_unsigned,
+        rests_on={name: tuple(rests_on(model)) for name, model in robots.items()},
         warnings=(*_warnings(runs, replays), *_sign_doubts(runs, traces, current_unsigned)),
     )
 

@@ -11,6 +11,7 @@ from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
 from omnidyn.document import Document, Part, Points, Words
+from omnidyn.model.first_guess import guess_line
 from omnidyn.run import Run
 from omnidyn.shown import FIGURE, Shown, make
 
@@ -43,7 +44,8 @@ class Comparison(Shown):
     channels: the components compared ("vx", "w1", "heading", ...). segments: the free runs.
     overall: robot -> component -> Metrics over all samples. by_segment: robot -> component -> Metrics of each segment,
     None where it has no sample. difference: component -> which of two robots is better; empty for one robot.
-    current_unsigned: whether currents were compared by size. warnings: what a reader must know, in words.
+    current_unsigned: whether currents were compared by size. rests_on: robot -> what of it is a guess.
+    warnings: what a reader must know, in words.
     """
 
     robots: tuple[str, ...]
@@ -56,6 +58,7 @@ class Comparison(Shown):
     by_segment: Mapping[str, Mapping[str, tuple[Metrics | None, ...]]]
     difference: Mapping[str, ModelDifference] = field(default_factory=dict)
     current_unsigned: bool = False
+    rests_on: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -118,14 +121,15 @@ class Comparison(Shown):
         parts.append(Points(self.warnings, "warning:"))
         return Document(parts, self.to_dict(), self.warnings, ascii=True)
 
-    def _title(self, robot: str) -> tuple[Words, Words]:
-        """Which robot met which logs, and what drove it."""
+    def _title(self, robot: str) -> tuple[Words, ...]:
+        """Which robot met which logs, what drove it, and what of it is a guess."""
         seconds = sum(segment.end - segment.begin for segment in self.segments)
         logs, count = len(self.measured), len(self.segments)
         where = self.measured[0].source or "one run"
         where = where if logs == 1 else f"{logs} logs, first {where}"
         title = f"{robot} against {where}: {count} free run{'s' * (count > 1)}, {seconds:.4g} s"
-        return Words(title), Words(f"applied: {self.applied[robot]}")
+        held = [Words(line)] if (line := guess_line(self.rests_on.get(robot, ()))) else []
+        return Words(title), Words(f"applied: {self.applied[robot]}"), *held
 
     def _name(self, k: int) -> str:
         at = self.segments[k]
@@ -137,6 +141,7 @@ class Comparison(Shown):
         robots = {
             name: {
                 "applied": self.applied[name],
+                "rests_on_guesses": list(self.rests_on.get(name, ())),
                 "overall": {key: asdict(each) for key, each in self.overall[name].items()},
                 "by_segment": {
                     key: [None if each is None else asdict(each) for each in row]

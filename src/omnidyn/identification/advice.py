@@ -48,9 +48,19 @@ def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
         axis = _axis(name) or name
         yield f"drive {axis} harder than {bound:.3g} {unit(name)}: it never moved, so its friction is only bounded"
     for name in fit.unidentifiable:
-        yield f"{name} cannot be told from these logs: {_remedy(name)}"
+        if math.isinf(fit.std.get(name, 0.0)):
+            yield f"{name} cannot be told from these logs: {_remedy(name)}"
+    known = [name for name in fit.unidentifiable if math.isfinite(fit.std.get(name, math.inf))]
+    if known:
+        yield (
+            f"the logs do not tell {', '.join(known)}: what you measure or read off a label (with its std), or a log "
+            "with currents, says more than a longer log"
+        )
     for words in fit.blind:
-        yield f"{words}: fix one of them to what was measured otherwise (`fixed`), or give it a std (`use_priors`)"
+        yield (
+            f"{words}: fix one of them to what was measured otherwise (`fixed`), or write what is known of it into the "
+            "robot file, with a std"
+        )
 
 
 def _remedy(name: str) -> str:
@@ -99,7 +109,7 @@ def _wide(fit: Estimate, validation: Validation | None) -> Iterator[str]:
     """What is known too roughly. A longer log helps against noise only: not where the model itself misses something."""
     shares = {
         name: fit.std[name] / abs(value) for name, value in fit.value.items()
-        if value and math.isfinite(fit.std[name]) and name not in fit.at_bound
+        if value and name not in fit.unidentifiable and name not in fit.at_bound
     }  # fmt: skip
     wide = {name: share for name, share in shares.items() if share > WIDE}
     if wide:

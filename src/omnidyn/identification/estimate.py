@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Points, Table, interval_cell, plain
 from omnidyn.errors import shortened
+from omnidyn.model.first_guess import rests_on, rests_on_guesses
 from omnidyn.model.keys import unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
@@ -17,6 +18,8 @@ from omnidyn.shown import FIGURE, Shown, make
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+NOT_DETERMINED = "not determined"  # in the place of an interval: the data do not give one
+UNKNOWN = {"std": None, "ci95": [None, None]}  # the same for machines
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
 
@@ -40,7 +43,8 @@ class Estimate(Shown):
     value, std, ci95: name -> estimate, standard error, 95 % interval (low, high), in the unit of the key.
     correlation: between the estimates. degrees_of_freedom: name -> rows minus parameters behind that number.
     at_bound: names of what a bound holds (a friction that came out negative). std is then that of the free fit.
-    lower_bound: name -> what the number is at least, where the data say no more (breakaway from rows at rest).
+    unidentifiable: names of what the data do not determine. lower_bound: name -> what the number is at least, where the
+    data say no more (breakaway from rows at rest).
     warnings: what a reader must know, in words. method, data: how it was made, and from what (name, SHA-256).
     scale: what all forces scale with, in words: numbers that were taken as they stand.
     """
@@ -52,6 +56,7 @@ class Estimate(Shown):
     correlation: Correlation
     degrees_of_freedom: Mapping[str, int]
     at_bound: tuple[str, ...] = ()
+    unidentifiable: tuple[str, ...] = ()
     lower_bound: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     method: str = ""
@@ -79,11 +84,15 @@ class Estimate(Shown):
         bounds = [f"{name} is at least {bound:.4g} {unit(name)}" for name, bound in self.lower_bound.items()]
         head = [f"{self.robot.name}: {self.method}", f"data: {self.data}", ""]
         scale = [self.scale] if self.scale else []
-        return [*head, self._table(), *bounds, *scale, Points(self.warnings, "warning:")]
+        held = [words] if (words := rests_on_guesses(self.robot)) else []
+        return [*head, self._table(), *bounds, *scale, *held, Points(self.warnings, "warning:")]
 
     def _table(self) -> Table:
         rows = []
         for name, value in self.value.items():
+            if name in self.unidentifiable:
+                rows.append((name, f"{value:.4g}", "", NOT_DETERMINED, unit(name)))
+                continue
             mark = "  at bound" if name in self.at_bound else ""
             interval = interval_cell(self.ci95[name])
             rows.append((name, f"{value:.4g}", f"{self.std[name]:.3g}", interval, unit(name) + mark))
@@ -98,12 +107,14 @@ class Estimate(Shown):
                 "degrees_of_freedom": int(self.degrees_of_freedom[name]), "at_bound": name in self.at_bound,
                 "unit": unit(name),
             }
+            | (UNKNOWN if name in self.unidentifiable else {})
             for name, value in self.value.items()
         }  # fmt: skip
         return plain({
             "parameters": parameters,
             "lower_bound": self.lower_bound,
             "correlation": {"names": self.correlation.names, "matrix": self.correlation.matrix},
+            "rests_on_guesses": rests_on(self.robot),
             "warnings": self.warnings,
             "method": self.method,
             "data": self.data,
@@ -114,6 +125,10 @@ class Estimate(Shown):
 
 def identified(std: float | None, source: str) -> Prior:
     """The prior of an identified number: its standard error, where it is one, and from what it was identified."""
-    text = shortened("".join(c if c.isprintable() else " " for c in source), SOURCE_LENGTH)
     known = std is not None and 0.0 < std <= 1e9
-    return Prior(std=float(std) if known else None, source=text, origin=IDENTIFIED)  # type: ignore[arg-type]
+    return Prior(std=float(std) if known else None, source=printable(source), origin=IDENTIFIED)  # type: ignore[arg-type]
+
+
+def printable(source: str) -> str:
+    """The words of a source as a robot file takes them."""
+    return shortened("".join(c if c.isprintable() else " " for c in source), SOURCE_LENGTH)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from omnidyn.document import Document, Points, Table, apart, interval_cell
+from omnidyn.document import Document, Part, Points, Table, Words, apart, interval_cell
 from omnidyn.findings.finding import FATAL, WARN, Verdict
+from omnidyn.identification.estimate import NOT_DETERMINED
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_parts import Difference
@@ -17,10 +18,11 @@ SHOWN = 6  # findings of a log that are named
 
 def fit_document(
     fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], differences: Sequence[Difference],
-    verdicts: Sequence[Verdict], advice: Sequence[str],
+    verdicts: Sequence[Verdict], advice: Sequence[str], verdict: str = "", ok: bool = True,
 ) -> Document:  # fmt: skip
-    """The fit of each group beside its logs, the differences between groups, and what to do next."""
-    blocks, groups = [], {}
+    """The verdict, the fit of each group beside its logs, the differences between groups, and what to do next."""
+    blocks: list[Sequence[Part]] = [[Words(verdict)] if verdict else []]
+    groups = {}
     for group, fit in fits.items():
         beside = [validations[group].document()] if group in validations else []
         told = [fit.document(), *beside]
@@ -29,7 +31,8 @@ def fit_document(
     blocks.append([difference_table(differences)] if differences else [])
     blocks.append(["next:", Points(advice, name="next")] if advice else [])
     data = {
-        "method": OUTPUT_ERROR, **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
+        "method": OUTPUT_ERROR, "verdict": {"ok": ok, "words": verdict},
+        **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
         "differences": [{**vars(each), "differs": each.differs} for each in differences], "next": advice,
         "check": [{"source": each.source, "fatal": each.fatal, "counts": each.counts} for each in verdicts],
     }  # fmt: skip
@@ -40,11 +43,20 @@ def number_table(fit: OutputErrorEstimate) -> Table:
     """Every fitted number, those of the log too."""
     rows = []
     for name, value in fit.value.items():
-        mark = "not identifiable" if name in fit.unidentifiable else "at bound" if name in fit.at_bound else ""
+        if name in fit.unidentifiable:
+            rows.append((name, f"{value:.5g}", "", "", unit(name), NOT_DETERMINED))
+            continue
+        mark = "at bound" if name in fit.at_bound else ""
         rows.append((name, f"{value:.5g}", f"{fit.std[name]:.2g}", interval_cell(fit.ci95[name]), unit(name), mark))
     for name, own in fit.nuisances.items():
-        mark = "not identifiable" if name in fit.unidentifiable else "of the log"
-        rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, mark))
+        if name in fit.unidentifiable:
+            rows.append((name, f"{own.value:.4g}", "", "", own.unit, NOT_DETERMINED))
+        else:
+            rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, "of the log"))
+    rows += [
+        (one.name, f"{one.value:.5g}", f"{one.std:.2g}", interval_cell(one.ci95), one.unit, one.words)
+        for one in fit.combinations
+    ]
     return Table(("number", "value", "std error", "95 % interval", "unit", ""), rows)
 
 

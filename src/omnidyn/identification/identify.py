@@ -177,6 +177,33 @@ class Identification(Shown):
         return make(FIGURE, self)
 
     @property
+    def failures(self) -> tuple[str, ...]:
+        """Why the numbers mean nothing, in words: what of a log is not followed, by the rule of validation.py, and
+        fatal findings of `check`; empty for a fit that stands."""
+        words = []
+        for group, validation in (self.validations or {}).items():
+            missed = validation.not_followed(self.fits[group].noise)
+            if missed:
+                names = ", ".join(f"{name} (fit {percent:.0f} %)" for name, percent in missed.items())
+                where = f"{group}: " if len(self.estimates) > 1 else ""
+                words.append(f"{where}the model does not follow {names}")
+        for verdict in self.verdicts:
+            found = [finding.message for finding in verdict.findings if finding.level == FATAL]
+            if found:
+                words.append(f"{verdict.source or 'the log'} is not fit for use as it stands: {'; '.join(found)}")
+        return tuple(words)
+
+    @property
+    def verdict(self) -> str:
+        """The answer in one sentence, failures first; "" of a method without free runs."""
+        if self.failures:
+            return f"failed: {'; '.join(self.failures)}: the numbers mean nothing until that is mended"
+        held = [v.held_out is not None for v in (self.validations or {}).values()]
+        if not held:
+            return ""
+        return f"the model follows the logs{', held-out ones too' if all(held) else ' that it was fitted to'}"
+
+    @property
     def estimate(self) -> Estimate:
         """The estimate of the first group; the only one where there are no groups."""
         return next(iter(self.estimates.values()))
@@ -186,7 +213,10 @@ class Identification(Shown):
         if self.study is not None:
             return study_document(self.study)
         if self.method == OUTPUT_ERROR:
-            return fit_document(self.fits, self.validations or {}, self.differences, self.verdicts, self.advice)
+            return fit_document(
+                self.fits, self.validations or {}, self.differences, self.verdicts, self.advice, self.verdict,
+                not self.failures,
+            )  # fmt: skip
         lines = {group: estimate.document() for group, estimate in self.estimates.items()}
         data = {"shape": self.question.shape, "groups": {group: each.data for group, each in lines.items()}}
         return Document(apart(*(each.parts for each in lines.values())), data, ascii=True)

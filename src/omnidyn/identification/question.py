@@ -56,9 +56,10 @@ class Question:
         of=EVERYONE, choices=(*METHODS, AUTO),
     )  # fmt: skip
     free: tuple[str, ...] | None = _option(
-        None, "Fit this; friction is all of it.",
+        None, "Fit this instead of the friction and all guesses; friction is all of it.",
         'Keys of the robot file, such as "body.mass_kg"; that of a list stands for its items. None: the friction that '
-        "the robot has. The EMF constant follows the torque constant, wheel by wheel, unless both are free. Breakaway "
+        "the robot has, and every number that has a std which no earlier fit wrote. Such a std is a prior, listed or "
+        "not. The EMF constant follows the torque constant, wheel by wheel, unless both are listed. Breakaway "
         'follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" asks for its interval, without '
         '"[0]" for all.',
         of=(FIT,), metavar="KEY",
@@ -76,12 +77,6 @@ class Question:
     loss: str = _option(
         GAUSS, "gaussian, or student-t for logs with outliers.", of=(FIT, MOTOR_FIT), choices=(GAUSS, STUDENT)
     )
-    use_priors: bool = _option(
-        False, "A std in the robot file counts as a prior.",
-        "What has one is free, too. Off by default: a std that an earlier fit wrote from the same log would count the "
-        "log twice; such ones are never used.",
-        of=(FIT,),
-    )  # fmt: skip
     hold_out: tuple[str, ...] = _option(
         (), "Do not fit these logs: predict them.", "Globs, or folders, of the sources of runs.",
         of=(FIT, MOTOR_FIT), metavar="GLOB",

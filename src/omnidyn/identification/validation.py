@@ -1,8 +1,14 @@
-"""Validation: the fitted robot as a free run beside the logs it was fitted to, and beside logs it never saw."""
+"""Validation: the fitted robot as a free run beside the logs it was fitted to, and beside logs it never saw.
+
+The rule of a model that does not follow its log: of a signal that was fitted, the free run leaves more than half of the
+spread (a fit below FOLLOWS percent), on held-out logs where there are any, and errors more than ROUGH times what the
+signal scatters by from row to row, so that a signal of mere noise is not blamed. Headings and positions count on the
+logs they were fitted to: a free run drifts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -27,6 +33,7 @@ POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
 LASTING = 2.0  # errors over their scatter from row to row, beyond which most of them is no noise
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
+FOLLOWS, ROUGH = 50.0, 3.0  # [%]; see above
 
 
 @dataclass(frozen=True)
@@ -104,6 +111,20 @@ class Validation:
         else:
             yield "held-out logs are predicted as well as the noise allows"
 
+    def not_followed(self, fitted: Collection[str]) -> dict[str, float]:
+        """Component -> fit [%] of what the model does not follow, by the rule above. fitted: names of outputs."""
+        which = FITTED if self.held_out is None else HELD_OUT
+        found = {}
+        for name in self.scores[FITTED]:
+            score = self.scores[FITTED if name in POSE else which].get(name)
+            percent = None if score is None else score.fit_percent
+            if percent is None or percent >= FOLLOWS or output_name(name) not in fitted:
+                continue
+            comparison = self.fitted if name in POSE or self.held_out is None else self.held_out
+            if _signal_over_scatter(comparison, name) > ROUGH:
+                found[name] = percent
+        return found
+
     def _lasting(self, name: str) -> float:
         """Errors on held-out logs over what white noise, which differs from row to row, makes of them."""
         found = self.held_out
@@ -131,6 +152,16 @@ class Validation:
             }
             for which, comparison in ((FITTED, self.fitted), (HELD_OUT, self.held_out)) if comparison is not None
         }  # fmt: skip
+
+
+def _signal_over_scatter(found: Comparison, name: str) -> float:
+    """Errors over what the measured signal scatters by from row to row, robustly: most rows are none of a jump."""
+    traces = [found.trace(found.robots[0], name, segment) for segment in found.segments]
+    steps = np.concatenate([np.diff(trace.measured) for trace in traces])
+    errors = np.concatenate([trace.error for trace in traces])
+    scatter = robust_std(steps[np.isfinite(steps)], 0.0) / np.sqrt(2.0)
+    size = float(np.sqrt(np.nanmean(errors**2)))
+    return size / scatter if scatter > 0.0 else np.inf
 
 
 def validate(

@@ -21,7 +21,7 @@ import numpy as np
 
 from omnidyn.model.drive import SPEED, Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, Key, all_keys
+from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, VISCOUS, Key, all_keys
 from omnidyn.model.motor import Motor
 from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Origin, Prior, Robot
 from omnidyn.model.wheels import PerWheel, Wheels
@@ -52,6 +52,7 @@ SPREAD = {
 }
 FRICTION_SPREAD = 1.0
 LIKE_SPREAD = 0.3  # of what is taken over from another robot
+WITH_THE_FIT = "goes with a fit"  # source of a guess that a fit has changed together with others
 EXACT = ("wheels.azimuth_deg", "wheels.roller_angle_deg")  # a drawing, not a measurement
 
 _COULOMB, _VISCOUS = f"{FRICTION_SHARE:g} of the weight", f"{VISCOUS_SHARE:g} C at 1 m/s"
@@ -293,6 +294,35 @@ def guessed(robot: Robot) -> list[str]:
     """What of a robot is a guess, as short names: ["inertia", "resistance", ...]; all friction is one word."""
     keys = [Key.parse(key) for key, prior in robot.priors.items() if prior.origin == GUESS]
     return list(dict.fromkeys(FRICTION if key.level else key.words for key in keys))
+
+
+def rests_on(robot: Robot, at_rest: bool = False) -> list[str]:
+    """What of a robot an answer rests on that is a guess, as `guessed` names it.
+
+    Numbers that only show together, and were fitted together, are right as the sum or product that any answer takes
+    from them: they are not named. at_rest: of what a robot at rest does, which no mass, speed or back-EMF changes.
+    """
+    kept = {
+        key: prior for key, prior in robot.priors.items()
+        if not prior.source.startswith(WITH_THE_FIT) and not (at_rest and _shows_in_motion(Key.parse(key)))
+    }  # fmt: skip
+    return guessed(robot.model_copy(update={"priors": kept}))
+
+
+def rests_on_guesses(robot: Robot, at_rest: bool = False) -> str:
+    """The same as a line of text; "" where nothing is a guess."""
+    return guess_line(rests_on(robot, at_rest))
+
+
+def guess_line(names: Sequence[str]) -> str:
+    """What an answer rests on, as a line of text; "" where nothing is a guess."""
+    return f"rests on guesses of the robot file: {', '.join(names)}" if names else ""
+
+
+def _shows_in_motion(key: Key) -> bool:
+    return (
+        key.level == VISCOUS or key.name == EMF or key.part in ("body", "drive") or key.field.endswith("_inertia_kg_m2")
+    )
 
 
 def reasons(robot: Robot) -> list[tuple[str, str]]:

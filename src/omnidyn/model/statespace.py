@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
+from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
@@ -73,6 +74,20 @@ def state_space(robot: Robot, motors: MotorWrench | None = None) -> StateSpace:
         K=per_mass(robot, np.diag(-coulomb)).T,
         C=np.eye(3),
     )
+
+
+def damping(robot: Robot) -> FloatArray:
+    """What brakes each axis per speed: viscous friction of every shape and back-EMF, [N s/m, N s/m, N m s], (3,)."""
+    braking = drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count))
+    axes, direction, wheels = robot.friction.axes, robot.friction.direction, robot.friction.wheels
+    along = np.array([direction.viscous, direction.viscous, direction.yaw_viscous])
+    rims = robot.wheels.wrench_matrix**2 @ np.broadcast_to(wheels.viscous, robot.wheels.count)
+    return np.array(axes.viscous) + along + rims - np.diag(braking)
+
+
+def push_per_volt(robot: Robot) -> FloatArray:
+    """Wrench at rest per volt of the pattern of each axis, `axis_patterns`, [N/V, N/V, N m/V], (3,)."""
+    return np.diag(drive_wrench(linear_part(robot), np.zeros(3), axis_patterns(robot))).copy()
 
 
 def is_decoupled(system: StateSpace, tolerance: float = 1e-12) -> bool:

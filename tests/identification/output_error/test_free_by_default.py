@@ -5,11 +5,14 @@ import pytest
 
 from omnidyn.identification.advice import advice
 from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.prepare import expand_keys, free_by_default
+from omnidyn.identification.output_error.prepare import expand_keys, free_by_default, guesses
+from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.validation import validate
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import BOX, Key
+from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
+from omnidyn.model.statespace import damping, push_per_volt
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation
 
@@ -17,6 +20,9 @@ DIRECTION = (
     "friction.direction.coulomb[0]", "friction.direction.coulomb[1]", "friction.direction.viscous",
     "friction.direction.yaw_coulomb", "friction.direction.yaw_viscous",
 )  # fmt: skip
+RESISTANCE = "motor.resistance_ohm"
+GUESSES = ("body.inertia_kg_m2", RESISTANCE, "motor.torque_constant_Nm_A", "motor.gear_ratio")
+VISCOUS = (DIRECTION[2], DIRECTION[4])
 
 
 @pytest.fixture(scope="module")
@@ -34,23 +40,95 @@ def test_it_is_the_friction_that_the_robot_has(robot):
     assert "friction.direction.yaw_coulomb" not in free_by_default(off)
 
 
-def test_the_robot_of_init_is_fitted_as_it_is_and_its_guesses_are_named(robot):
-    """Friction is found where the motor is right; where it is a wrong guess, the advice is to measure or fit it."""
-    true = Key.parse("friction.direction.coulomb[0]").set(robot, 2.0)
+def log_of(robot, resistance):
+    """A log of a robot whose friction along x is 2 N, and whose motors have so many times the resistance."""
+    true = Key.parse(DIRECTION[0]).set(robot, 2.0)
+    true = Key.parse(RESISTANCE).set(true, resistance * true.motor.resistance)
     rng, volts = np.random.default_rng(0), 1.5 * np.vstack([np.zeros((10, 3)), excitation(6.0, 25.0)])
-    found = []
-    for resistance in (1.0, 0.6):
-        own = Key.parse("motor.resistance_ohm").set(true, resistance * true.motor.resistance)
-        run = simulate(own, np.clip(volts, -6.0, 6.0), 0.04)
-        noisy = run.twist + 0.005 * rng.standard_normal(run.twist.shape)
-        log = run.replace(twist=noisy, wheel_speed=None, current=None, pose=None)
-        fit = fit_output_error(log, robot, start="rest", nuisances=())
-        found.append((fit, advice(fit, validate(fit, [log]))))
-    (right, quiet), (wrong, told) = found
-    key = DIRECTION[0]
-    assert abs(right.value[key] - 2.0) < 4.0 * right.std[key]
-    assert not any("are guesses of the robot file" in words for words in quiet)
-    assert abs(wrong.value[key] - 2.0) > 4.0 * right.std[key]
-    assert any("motor.resistance_ohm" in words and "are guesses of the robot file" in words for words in told)
-    told = " ".join(told)
+    run = simulate(true, np.clip(volts, -6.0, 6.0), 0.04)
+    noisy = run.twist + 0.005 * rng.standard_normal(run.twist.shape)
+    return run.replace(twist=noisy, wheel_speed=None, current=None, pose=None), true
+
+
+@pytest.fixture(scope="module")
+def wrong(robot):
+    """A log of motors of 0.6 times the resistance that `init` guessed, and the fit that follows from `init`."""
+    log, true = log_of(robot, 0.6)
+    return log, true, fit_output_error(log, robot, start="rest", nuisances=())
+
+
+def test_guesses_are_free_so_that_friction_comes_out_right_beside_a_wrong_motor(wrong):
+    _, true, fit = wrong
+    assert set(fit.value) == {*DIRECTION, *GUESSES}
+    told = set(fit.value) - set(fit.unidentifiable)
+    assert {DIRECTION[0], DIRECTION[1], DIRECTION[3], RESISTANCE, "body.inertia_kg_m2"} <= told
+    for name in told:
+        assert abs(fit.value[name] - Key.parse(name).get(true)) < 4.0 * fit.std[name], name
+
+
+def test_what_only_the_guess_holds_is_not_determined_and_named(wrong):
+    """Of torque constant and gear only the product shows; of viscous friction only the sum with the back-EMF."""
+    fit = wrong[2]
+    assert {"motor.torque_constant_Nm_A", "motor.gear_ratio", *VISCOUS} <= set(fit.unidentifiable)
+    text = fit.summary()
+    assert "not determined" in text
+    assert " inf" not in text
+    own = fit.to_dict()["parameters"]["motor.gear_ratio"]
+    assert (own["std"], own["ci95"]) == (None, [None, None])
+    assert own["value"] > 0.0
+    assert not any("motor.gear_ratio is known within" in words for words in advice(fit, None))
+
+
+def test_what_is_known_together_is_named_with_an_interval(wrong):
+    """The sums that the logs determine hold the truth, where their parts are not determined."""
+    _, true, fit = wrong
+    found = {one.name: one for one in fit.combinations}
+    assert set(found) == {f"{kind}.{axis}" for kind in ("damping", "push") for axis in ("x", "y", "yaw")}
+    assert [found[f"damping.{axis}"].unit for axis in ("x", "y", "yaw")] == ["N s/m", "N s/m", "N m s"]
+    for kind, of in (("damping", damping), ("push", push_per_volt)):
+        for axis, value in zip(("x", "y", "yaw"), of(true), strict=True):
+            one = found[f"{kind}.{axis}"]
+            assert abs(one.value - value) < 4.0 * one.std < 0.2 * value
+            assert one.ci95[0] < one.value < one.ci95[1]
+    assert "damping.x" in [one["name"] for one in fit.to_dict()["combinations"]]
+
+
+def test_the_robot_that_is_written_moves_as_the_log_does_and_keeps_its_guesses(wrong, robot):
+    """Its values go together; the origin and the width of a guess stay, for its std would count the log twice."""
+    _, true, fit = wrong
+    assert np.allclose(damping(fit.robot), damping(true), rtol=0.05)
+    assert np.allclose(push_per_volt(fit.robot), push_per_volt(true), rtol=0.05)
+    gear, before = fit.robot.priors["motor.gear_ratio"], robot.priors["motor.gear_ratio"]
+    assert gear.origin == "guess"
+    assert gear.std / fit.robot.motor.gear_ratio == pytest.approx(before.std / robot.motor.gear_ratio)
+    assert fit.robot.priors[RESISTANCE].origin == "identified"
+    assert fit.robot.motor.emf_constant == fit.robot.motor.torque_constant
+
+
+def test_a_guess_that_is_held_is_named_where_the_model_misses_something(wrong, robot):
+    log, _, _ = wrong
+    fit = fit_output_error(log, robot, start="rest", nuisances=(), free="friction")
+    told = " ".join(advice(fit, validate(fit, [log])))
+    assert "motor.resistance_ohm" in told
+    assert "are guesses of the robot file" in told
     assert "(`free` friction `free` motor.torque_constant_Nm_A `free` motor.resistance_ohm `free` body.inertia" in told
+    fixed = fit_output_error(log, robot, start="rest", nuisances=(), fixed=[RESISTANCE])
+    assert "motor.gear_ratio" in fixed.value
+    assert RESISTANCE not in fixed.value
+
+
+def test_half_and_twice_of_a_guess_are_equally_far_from_it():
+    """The prior of a number that must be positive is one of its logarithm."""
+    p = Parameter(RESISTANCE, 3.0, 1e-3, 1e3, True, (3.0, 3.0))
+    mean, std = p.known
+    assert std == 1.0
+    assert p.inner(6.0) - mean == pytest.approx(mean - p.inner(1.5))
+    assert Parameter(DIRECTION[0], 3.0, 0.0, 1e3, prior=(3.0, 2.0)).known == (3.0, 2.0)
+
+
+def test_a_setting_or_a_drawing_is_not_free_by_default(robot):
+    known = {"wheels.azimuth_deg": Prior(std=1.0), "motor.voltage_limit_V": Prior(std=1.0)}
+    assert guesses(robot.replace(priors=known)) == ()
+    assert guesses(robot.replace(priors=known), looped=True) == ("motor.voltage_limit_V",)
+    magnet = {f"motor.{name}": Prior(std=1e-3) for name in ("torque_constant_Nm_A", "emf_constant_Vs_rad")}
+    assert guesses(robot.replace(priors=magnet)) == ("motor.torque_constant_Nm_A",)  # the other one follows

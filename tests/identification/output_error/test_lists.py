@@ -3,7 +3,8 @@ its entries."""
 
 import numpy as np
 
-from omnidyn.identification.output_error.fit import fit_output_error, known_priors
+from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.output_error.prepare import known_priors
 from omnidyn.identification.output_error.problem.parameters import robot_parameters
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, expand
 from omnidyn.model.robot import Prior
@@ -79,9 +80,7 @@ def test_a_prior_of_four_resistances(four_wheel):
     """It holds each of them, and what is known of those that were not free stays in the file."""
     robot = with_motor(four_wheel, resistance=(1.6, 1.7, 1.8, 1.9)).replace(priors={RESISTANCE: SHEET})
     first = f"{RESISTANCE}[0]"
-    fit = fit_output_error(
-        driven(robot), robot, free=["friction", first], use_priors=True, nuisances=(), start="rest"
-    )  # fmt: skip
+    fit = fit_output_error(driven(robot), robot, free=["friction", first], nuisances=(), start="rest")
     assert fit.std[first] <= 0.05
     assert abs(fit.value[first] - 1.6) < 4.0 * fit.std[first]
     assert RESISTANCE not in fit.robot.priors

@@ -167,19 +167,21 @@ def test_an_axis_that_never_moved_is_bounded_from_below(axebot, clean):
     assert any("axis yaw never visibly moved" in words for words in fit.warnings)
 
 
-def test_a_prior_counts_only_when_asked_and_never_one_of_an_earlier_fit(axebot, clean):
+def test_what_has_a_std_is_free_with_it_as_a_prior_but_never_one_of_an_earlier_fit(axebot, clean):
     log, key = noisy(clean, 18), "motor.resistance_ohm"
     robot = axebot.replace(priors={key: Prior(std=0.05, source="datasheet"), BOX[0]: Prior(std=1e-6)})
-    plain = fit_output_error(log, robot, start="rest")
+    plain = fit_output_error(log, robot, start="rest", fixed=[key])
     assert key not in plain.value
-    known = fit_output_error(log, robot, start="rest", use_priors=True)
+    known = fit_output_error(log, robot, start="rest")
     assert abs(known.value[key] - 1.69) < 0.15
     assert known.std[key] < 0.05
     assert known.value[BOX[0]] == pytest.approx(0.94, abs=1e-5)  # its prior is narrow
-    loose = fit_output_error(log, axebot.replace(priors={key: Prior(std=0.05)}), start="rest", use_priors=True)
-    assert loose.std[BOX[3]] > plain.std[BOX[3]]  # an uncertain resistance makes friction uncertain
-    again = fit_output_error(log, plain.robot, start="rest", use_priors=True)
-    assert again.std[BOX[0]] == pytest.approx(plain.std[BOX[0]], rel=1e-3)
+    assert BOX[0] in known.unidentifiable  # and the logs tell less of it
+    loose = fit_output_error(log, axebot.replace(priors={key: Prior(std=0.05)}), start="rest")
+    alone = fit_output_error(log, axebot, start="rest")
+    assert loose.std[BOX[3]] > alone.std[BOX[3]]  # an uncertain resistance makes friction uncertain
+    again = fit_output_error(log, alone.robot, start="rest")
+    assert again.std[BOX[0]] == pytest.approx(alone.std[BOX[0]], rel=1e-3)
 
 
 def test_what_is_written_can_be_read_and_says_where_it_comes_from(axebot, clean, tmp_path):

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from omnidyn.document import Part, Points, interval_cell, plain
-from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.steady.study_parts import Difference
 
 
@@ -21,20 +21,34 @@ class Nuisance:
     unit: str = ""
 
 
+@dataclass(frozen=True)
+class Combination:
+    """A number that the logs determine where they do not determine those behind it: name, value, std, 95 % interval."""
+
+    name: str
+    value: float
+    std: float
+    ci95: tuple[float, float]
+    unit: str
+    words: str
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class OutputErrorEstimate(Estimate):
     """An Estimate from whole logs. `correlation` covers the nuisances too.
 
     nuisances: name -> Nuisance. noise: output -> std of what the model leaves, in the unit of the output; after
     Student's t without its wild samples, of counts before the encoder rounds.
-    unidentifiable: names of what the data do not determine; they keep what the robot had, std and interval are
-    infinite. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
+    unidentifiable: names of what the data do not determine. Where the std of the robot file is a prior, the value is
+    the one that goes best with all others, std and interval are those of the posterior, hardly more than what the file
+    said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
+    together. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
     unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the minimisation.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
-    unidentifiable: tuple[str, ...] = ()
+    combinations: tuple[Combination, ...] = ()
     blind: tuple[str, ...] = ()
     covariance: str = ""
     unused: tuple[str, ...] = ()
@@ -43,19 +57,27 @@ class OutputErrorEstimate(Estimate):
 
     def _parts(self) -> list[Part]:
         """The numbers of the log, the noise and what the data do not show, after the rest."""
+        sums = [f"{one.words}: {one.value:.4g} {interval_cell(one.ci95)} {one.unit}" for one in self.combinations]
         logs = [
-            f"{name}: {own.value:.4g} {interval_cell(own.ci95)} {own.unit}".rstrip()
+            f"{name}: {NOT_DETERMINED if name in self.unidentifiable else self._of_log(own)}"
             for name, own in self.nuisances.items()
         ]
         noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
         left = [Points(self.blind, "not shown by the data:"), Points(self.unused, "not used:")]
-        return [*super()._parts(), *logs, *noise, *left]
+        return [*super()._parts(), *sums, *logs, *noise, *left]
+
+    @staticmethod
+    def _of_log(own: Nuisance) -> str:
+        return f"{own.value:.4g} {interval_cell(own.ci95)} {own.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it."""
-        nuisances = {name: asdict(own) for name, own in self.nuisances.items()}
+        nuisances = {
+            name: asdict(own) | (UNKNOWN if name in self.unidentifiable else {}) for name, own in self.nuisances.items()
+        }
         return super().to_dict() | plain({
-            "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable, "blind": self.blind,
+            "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable,
+            "combinations": [asdict(one) for one in self.combinations], "blind": self.blind,
             "covariance": self.covariance, "unused": self.unused, "converged": self.converged,
         })  # fmt: skip
 

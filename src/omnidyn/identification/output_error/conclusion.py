@@ -11,18 +11,21 @@ from scipy.special import ndtri
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.estimate import Correlation, identified
+from omnidyn.identification.estimate import Correlation, identified, printable
 from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS
+from omnidyn.identification.output_error.combinations import combinations
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import difference_noise
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
+from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
-from omnidyn.model.keys import with_priors
-from omnidyn.model.robot import Robot
+from omnidyn.model.first_guess import WITH_THE_FIT
+from omnidyn.model.keys import VISCOUS, Key, with_priors
+from omnidyn.model.robot import Prior, Robot
 
 IN_METRES = (("twist", 0), ("twist", 1), ("position", 0), ("position", 1))  # outputs that know of no wheel radius
 LEAST_SHARE = 1e-4  # of a lost direction that a number lost with it must have to be named
@@ -32,32 +35,34 @@ SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted
 
 def conclude(
     solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], loss: str, more: Sequence[str],
-    lower_bound: Mapping[str, float], levels: Sequence[Breakaway] = (),
+    lower_bound: Mapping[str, float], moved: BoolArray, levels: Sequence[Breakaway] = (),
     better: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None,
 ) -> OutputErrorEstimate:  # fmt: skip
     """The Estimate of a solution. loss: of the fit, in words; more: warnings to join; lower_bound: for the Estimate;
-    levels: of breakaway that were asked for; better: name -> (std, interval) that replace those of the covariance.
+    moved (3,): which axes did; levels: of breakaway that were asked for; better: name -> (std, interval) that replace
+    those of the covariance.
 
     Raises InsufficientDataError where the logs say nothing about any of the robot's numbers.
     """
     problem, values = solver.problem, solution.state.point.values.copy()
     blind = tuple(p.name for p, b in zip(problem.parameters, known.blind, strict=True) if b)
-    unseen = tuple(p.name for p, none in zip(problem.parameters, known.unseen, strict=True) if none)
+    open_ = tuple(p.name for p, b in zip(problem.parameters, known.open, strict=True) if b)
     own = problem.robot_count
     missed = unexplained(solver, solution)
-    if known.blind[:own].all():
+    if known.open[:own].all():
         _refuse_blind([p.name for p in problem.parameters[:own]], missed, records[0].source, known.unseen[:own])
-    values = np.where(known.unseen, [p.value for p in problem.parameters], values)  # they say nothing: as they were
+    as_they_were = [p.value if p.prior is None else p.prior[0] for p in problem.parameters]
+    values = np.where(known.unseen, as_they_were, values)
     std, ci95 = intervals(problem, values, known)
     for name, (spread, interval) in (better or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
     data = _data(records)
-    own_levels = _levels(levels, ci95)
+    own_levels, joint = _levels(levels, ci95), combinations(problem, values, known, moved)
     names = [p.name for p in problem.parameters]
     fitted = problem.parameters[:own]
     warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-        robot=_with_levels(_robot(problem, values, std, unseen, data), own_levels),
+        robot=_with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
@@ -80,7 +85,8 @@ def conclude(
             for j, name in enumerate(names[own:])
         },
         noise=noise_of(solver, solution),
-        unidentifiable=blind,
+        unidentifiable=open_,
+        combinations=joint,
         blind=tuple(_direction(problem, value, way, known.blind) for value, way in known.directions),
         covariance=known.kind,
         unused=_unused(records),
@@ -187,19 +193,36 @@ def intervals(
     return std, ci95
 
 
-def _robot(problem: Problem, values: FloatArray, std: Mapping[str, float], unseen: Sequence[str], data: str) -> Robot:
-    """The robot with the fitted numbers, and where they come from."""
+def _robot(
+    problem: Problem, values: FloatArray, std: Mapping[str, float], open_: Sequence[str], data: str, together: bool
+) -> Robot:
+    """The robot with the fitted numbers, and where they come from.
+
+    What the data do not determine has the value that goes with the others: the robot must move as the log does, for
+    which a product is enough. Its origin and std stay: a narrower std, written and read again, would count the log
+    twice. Of a number with a logarithmic scale the std is a share, and stays that share. together: whether the data
+    determine what motors and viscous friction do together.
+    """
     robot, found = problem.robot, {}
     for p, value in zip(problem.parameters[: problem.robot_count], values, strict=False):
-        if p.name in unseen:
-            continue
         robot = p.on(robot, float(value))
         for key, factor in ((p.name, 1.0), *p.also):
-            found[key] = identified(std[p.name] * factor, f"output error, {data}")
+            if p.name not in open_:
+                found[key] = identified(std[p.name] * factor, f"output error, {data}")
+            elif (before := prior_of(problem.robot, key)) and before.std is not None:
+                share = value / float(Key.parse(p.name).get(problem.robot)) if p.log else 1.0
+                joint = together and (p.part == "motor" or Key.parse(key).level == VISCOUS)
+                source = printable(f"{WITH_THE_FIT}, {data}") if joint else before.source
+                found[key] = before.replace(std=float(before.std * share), source=source)
     axes = robot.friction.axes
     if axes.breakaway is not None:
         robot = _breaking_at(robot, [max(s, c) for s, c in zip(axes.breakaway, axes.coulomb, strict=True)])
     return with_priors(robot, found)
+
+
+def prior_of(robot: Robot, key: str) -> Prior | None:
+    """What the file knows of a number, by itself or as an entry of a list."""
+    return robot.priors.get(key) or robot.priors.get(Key.parse(key).name)
 
 
 def _breaking_at(robot: Robot, levels: Sequence[float]) -> Robot:
@@ -254,6 +277,7 @@ def _warnings(
     if not solution.converged:
         words.append(f"the fit was cut short after {solution.iterations} iterations: the numbers are of its last step")
     words += [f"{name} is not identifiable from these logs" for name in blind]
+    words += [implausible(name, value) for name, value in too_early(solver, solution).items()]
     for j, p in enumerate(solver.problem.parameters[: solver.problem.robot_count]):
         if known.held[j]:
             words.append(f"{p.name} is at its bound {solution.state.point.values[j]:.4g}: the best fit lies beyond it")

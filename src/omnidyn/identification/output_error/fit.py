@@ -26,14 +26,14 @@ from omnidyn.identification.output_error.prepare import (
     Group,
     expand_keys,
     free_by_default,
+    guesses,
     is_exact,
-    known_priors,
     make_engine,
     make_group,
     read_records,
     stays_exact,
 )
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES, automatic
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated, refuse_unknown
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
@@ -44,7 +44,7 @@ from omnidyn.identification.output_error.solve.solver import Normal, Solution, S
 from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
-from omnidyn.identification.output_error.trust.support import supported, wanted
+from omnidyn.identification.output_error.trust.support import supported, too_early, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.identification.question import FIT, GAUSS, OUTPUT_ERROR, STUDENT, Question
 from omnidyn.identification.recordings import count_once
@@ -99,7 +99,7 @@ class Fit:
         refuse_unknown(question.fixed, robot)
         asked_axes(question.free or (), question.fixed)
         (progress or Progress()).doing("looking for what moved")
-        keys = question.free if question.free is not None else known_priors(robot) if question.use_priors else ()
+        keys = question.free if question.free is not None else guesses(robot)
         exact = exact and stays_exact(robot, [key for key in keys if key not in question.fixed])
         made = [
             make_group(name, records, robot, question, exact, usual, alone=groups is None)
@@ -129,7 +129,7 @@ class Fit:
         """
         progress, done = progress or Progress(), isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
-        warnings, hints = [*self.twice, *warnings], self._hints(solution, done)
+        warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution, done)]
         solution, levels = self._levels(solution) if done else (solution, [])
         solver = solution.solver
         progress.doing("finding how sure the numbers are")
@@ -142,7 +142,7 @@ class Fit:
             group = self.groups[0]
             words = [*warnings, *group.warnings, *hints]
             estimate = conclude(
-                solver, solution, known, group.records, loss, words, group.bounds, levels, again.intervals
+                solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels, again.intervals
             )
             return Answer({group.name: estimate}, (), solver.problem.names, ())
         engine, estimates = solver.engine, {}
@@ -151,7 +151,9 @@ class Fit:
             words = [*warnings, *member.group.warnings]
             better = engine.named_alone(member, again.intervals)
             seen, alone = engine.seen_alone(member, solution, known)
-            estimate = conclude(seen.solver, seen, alone, member.group.records, loss, words, {}, (), better)
+            estimate = conclude(
+                seen.solver, seen, alone, member.group.records, loss, words, {}, member.group.moved, (), better
+            )
             others = ", ".join(each.name for each in engine.members if each is not member)
             estimates[member.name] = replace(estimate, method=f"{estimate.method}; fitted together with {others}")
         own = own_names(self.question.per_free, [member.problem for member in engine.members])
@@ -161,16 +163,21 @@ class Fit:
     def _settled(self, group: Group, progress: Progress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
         found = self._solve(group, group.problem(), progress)
-        if self.question.nuisances is not None or group.engine == IMPLICIT:
+        if self.question.nuisances is not None:
             return found
-        progress.doing("which nuisances the logs support")
-        kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
+        early = too_early(found.solver, found)
+        if group.engine == IMPLICIT:
+            kept = tuple(name for name in _nuisances(found.solver.problem) if name not in early)
+        else:
+            progress.doing("which nuisances the logs support")
+            kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
         lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
         if not lost:
             return found
+        notes = tuple(f"{implausible(name, value)}: it is not fitted" for name, value in early.items())
         if group.engine == LOOP:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
-        return self._solve(group, group.problem(kept), progress)
+        return replace(self._solve(group, group.problem(kept), progress), notes=notes)
 
     def _solve(self, group: Group, problem: Problem, progress: Progress) -> Solution:
         """The best point of one group alone."""

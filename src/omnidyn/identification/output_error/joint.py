@@ -85,7 +85,7 @@ class JointEngine:
         own = replace(
             known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
             unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],
-            plain=known.plain[np.ix_(at, at)],
+            plain=known.plain[np.ix_(at, at)], guessed=known.guessed[at],
             directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
         )  # fmt: skip
         return Solution(state, solution.held[at], solution.iterations, solution.converged, solver), own
@@ -167,7 +167,7 @@ def joint_start(engine: JointEngine, nu: float, progress: Progress, alone: Mappi
         elif member.group.engine == LOOP:
             point = loop_start(member.problem, nu, progress.aside(words))
         else:
-            point = moving_start(member.problem, nu)
+            point = moving_start(member.problem, nu, progress)
         for k, value in zip(member.at, point.values, strict=True):
             values[k].append(float(value))
         states += point.states

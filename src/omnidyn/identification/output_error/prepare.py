@@ -17,6 +17,7 @@ from omnidyn.identification.output_error.problem.nuisances import (
     LATENCY,
     TRAVELS,
     automatic,
+    earliest,
     nuisance_parameters,
     pieces,
 )
@@ -28,7 +29,20 @@ from omnidyn.identification.output_error.trust.breakaway import KEY
 from omnidyn.identification.question import Question
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.dynamics import drive_wrench
-from omnidyn.model.keys import BOX, COULOMB, FRICTION, GAINS, VISCOUS, Key, expand, friction_keys, unit
+from omnidyn.model.keys import (
+    BOX,
+    BREAKAWAY,
+    COULOMB,
+    EMF,
+    FRICTION,
+    GAINS,
+    TORQUE,
+    VISCOUS,
+    Key,
+    expand,
+    friction_keys,
+    unit,
+)
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.run import Run
@@ -41,6 +55,9 @@ FINER = 1e-6  # the same where a path is fitted: what a speed is off by adds up,
 ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
+LIMIT = "motor.voltage_limit_V"
+# A drawing, a setting of the firmware and a battery: their std is for the reader. A nominal supply has a nuisance.
+NEVER_FREE = ("wheels.azimuth_deg", "wheels.roller_angle_deg", "drive.rate_Hz", "drive.supply_V")
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 
 
@@ -81,7 +98,8 @@ def make_group(
         question = _loop_question(question, found, records, robot)
         return Group(name, records, robot, question, LOOP, usual, found.moved, {}, ())
     engine, bounds, warnings = EXACT if exact else IMPLICIT, {}, []
-    asked, fixed = question.free if question.free is not None else usual, set(question.fixed)
+    asked = question.free if question.free is not None else (*dict.fromkeys((*usual, *guesses(robot))),)
+    fixed = set(question.fixed)
     for axis in np.flatnonzero(~found.moved).tolist():
         own = {key for key in (*asked, *usual) if Key.parse(key).axis == axis}
         fixed |= own
@@ -98,9 +116,7 @@ def make_group(
             robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)
     if alone and not found.moved.any():
         raise _never_moved(found, records[0].source)
-    if warnings and question.free is None and question.use_priors:
-        question = replace(question, fixed=tuple(fixed))
-    elif warnings:
+    if warnings:
         question = replace(question, free=tuple(key for key in asked if key not in fixed), fixed=())
     return Group(name, records, robot, question, engine, usual, found.moved, bounds, tuple(warnings))
 
@@ -118,8 +134,7 @@ def _never_moved(found: Motion, source: str) -> InsufficientDataError:
 
 def _loop_question(question: Question, found: Motion, records: Sequence[Record], robot: Robot) -> Question:
     """By default friction of what moved, and the gains. Raises InsufficientDataError where nothing moved."""
-    more = known_priors(robot) if question.use_priors else ()
-    keys = dict.fromkeys((*loop_keys(robot, found.moved, records[0].source), *more))
+    keys = dict.fromkeys((*loop_keys(robot, found.moved, records[0].source), *guesses(robot, looped=True)))
     free = tuple(key for key in keys if key not in question.fixed)
     return question if question.free is not None else replace(question, free=free, fixed=())
 
@@ -145,9 +160,9 @@ def make_problem(
 
     Raises InputError for unknown keys, or where nothing is left free.
     """
-    priors = known_priors(robot) if question.use_priors else {}
+    priors = known_priors(robot)
     keys = [*question.free] if question.free is not None else [
-        *dict.fromkeys((*(usual or free_by_default(robot)), *priors))
+        *dict.fromkeys((*(usual or free_by_default(robot)), *guesses(robot)))
     ]  # fmt: skip
     unknown = [key for key in question.fixed if key not in keys]
     if unknown and question.free is not None:
@@ -161,7 +176,10 @@ def make_problem(
     if engine != EXACT:
         own = [_within_reach(p, _drive(records, robot)) for p in own]
     auto = automatic(records) if engine == EXACT else (LATENCY,)
-    more = nuisance_parameters(auto if question.nuisances is None else question.nuisances, records, robot)
+    more = (
+        nuisance_parameters(auto, records, robot, earliest(records)) if question.nuisances is None
+        else nuisance_parameters(question.nuisances, records, robot)
+    )  # fmt: skip
     late = any(p.name.startswith(LATENCY) for p in more)
     start = question.start
     parts = (
@@ -234,6 +252,23 @@ def free_by_default(robot: Robot, exact: bool | None = None) -> tuple[str, ...]:
         return BOX
     has = {key: Key.parse(key) for key in friction_keys(robot)}
     return tuple(name for name, key in has.items() if key.level == VISCOUS or key.get(robot) > 0.0)
+
+
+def guesses(robot: Robot, looped: bool = False) -> tuple[str, ...]:
+    """What is free by default beside friction: every number whose std no fit has written, and that a fit can move.
+
+    The EMF constant follows the torque constant, and breakaway coulomb. looped: whether a speed loop makes the voltage;
+    where it is logged, a limit on it says nothing.
+    """
+    found = {name: Key.parse(name) for name in known_priors(robot)}
+    magnet = any(key.name == TORQUE for key in found.values())
+    kept = []
+    for name, key in found.items():
+        tied = (magnet and key.name == EMF) or key.level == BREAKAWAY
+        held = key.name in NEVER_FREE or (key.name == LIMIT and not looped)
+        if not tied and not held and (key.level or key.get(robot) > 0.0):
+            kept.append(name)
+    return tuple(kept)
 
 
 def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:

@@ -31,6 +31,9 @@ LATENCY, TILT = "latency", "tilt"
 NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT)
 TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an unknown start
 EARLIEST, LATEST = -0.1, 0.3  # [s]
+FILTER = (
+    0.03  # [s] of a speed that was smoothed forwards and backwards: so early it shows what the voltage is yet to do
+)
 SUPPLY_STD = 0.1  # of a nominal supply: a battery is full or it is not
 MOST_FADE = 0.9
 SILENT = 5  # rows without voltage that show a robot at rest
@@ -38,8 +41,27 @@ CLEAR = 4.0  # standard errors from 0 that count as motion
 LEAD = 5  # rows whose mean is where a free start begins
 
 
-def nuisance_parameters(wanted: Sequence[str], records: Sequence[Record], robot: Robot) -> list[Parameter]:
-    """The nuisances asked for as free parameters. Raises InputError for a name that is none."""
+def earliest(records: Sequence[Record]) -> float:
+    """The latency [s] before which no log is plausible: a row, and what a filter looks ahead."""
+    rows = [float(np.median(np.diff(record.t))) for record in records if len(record.t) > 1]
+    return -(max(rows, default=0.0) + FILTER)
+
+
+def implausible(name: str, latency: float) -> str:
+    """What to say of a latency before `earliest`."""
+    return (
+        f"{name} of {1e3 * latency:.0f} ms is implausible: the channel would show what the voltage does only so much "
+        "later. The clocks differ, a filter looks ahead (centred speeds), or it stands in for another fault"
+    )
+
+
+def nuisance_parameters(
+    wanted: Sequence[str], records: Sequence[Record], robot: Robot, from_: float = EARLIEST
+) -> list[Parameter]:
+    """The nuisances asked for as free parameters; latencies begin at `from_` [s].
+
+    Raises InputError for a name that is none.
+    """
     unknown = [name for name in wanted if name.partition(".")[0] not in NUISANCES]
     if unknown:
         raise InputError("no such nuisance", got=unknown[0], expected=", ".join(NUISANCES), where="nuisances")
@@ -47,7 +69,7 @@ def nuisance_parameters(wanted: Sequence[str], records: Sequence[Record], robot:
     found: list[Parameter] = []
     for name in wanted:
         if name == LATENCY:
-            found += [Parameter(f"{LATENCY}.{channel}", 0.0, EARLIEST, LATEST) for channel in channels]
+            found += [Parameter(f"{LATENCY}.{channel}", 0.0, from_, LATEST) for channel in channels]
         elif name.startswith(f"{LATENCY}."):
             if name.partition(".")[2] not in channels:
                 raise InputError("no such channel", got=name, expected=", ".join(channels), where="nuisances")

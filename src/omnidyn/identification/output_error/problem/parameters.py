@@ -23,7 +23,8 @@ class Parameter:
     """One free number. The solver sees log(value) where `log`, so that it stays positive, else the value.
 
     name: key of the robot file, or of a nuisance. value: where it starts. low, high: bounds. prior: (mean, std) of what
-    is known beforehand, in the unit of the value. also: other keys of the robot file, tied to it by a factor.
+    is known beforehand, in the unit of the value; of a `log` number std over mean is that of its logarithm, so that
+    half and twice of a rough guess are equally far from it. also: other keys of the robot file, tied by a factor.
     """
 
     name: str
@@ -50,6 +51,14 @@ class Parameter:
     def slope(self, value: float) -> float:
         """d value / d inner."""
         return value if self.log else 1.0
+
+    @property
+    def known(self) -> tuple[float, float] | None:
+        """The prior in the numbers that the solver sees: (mean, std)."""
+        if self.prior is None:
+            return None
+        mean, std = self.prior
+        return self.inner(mean), std / mean if self.log else std
 
     def on(self, robot: Robot, value: float) -> Robot:
         """The robot with this number and those tied to it; not checked, for speed."""

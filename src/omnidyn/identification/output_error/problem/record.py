@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -84,7 +85,12 @@ def record(
     finite = np.isfinite(inputs)
     _refuse_wheels_without_input(run, robot, finite)
     known = np.full(len(run), True) if finite.all() else np.asarray(finite.all(axis=1))
-    pieces = [piece for s in segments(run.t) for piece in _whole(known, s.start, s.stop)]
+    parts = segments(run.t)
+    pieces = [piece for s in parts for piece in _whole(known, s.start, s.stop)]
+    if len(parts) > 1:
+        lost = [float(run.t[b.start] - run.t[a.stop - 1]) for a, b in pairwise(parts)]
+        many = "a gap" if len(lost) == 1 else f"{len(lost)} gaps, the longest"
+        notes.append(f"{many} of {max(lost):.3g} s: what lies between gaps is fitted from a start of its own")
     if not pieces:
         raise InsufficientDataError(
             "no stretch of the log has inputs throughout", got=f"{int(known.sum())} rows of {len(run)} with all inputs",

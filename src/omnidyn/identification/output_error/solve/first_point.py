@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solver, State
 from omnidyn.model.keys import FRICTION
 
+CURRENTS = f"{LATENCY}.current"
 MANY = 100_000  # rows to which a long log is first fitted
 FEW = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
@@ -77,7 +79,7 @@ def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
     solver, short, own = (
         Solver(problem, ImplicitEngine(problem), nu, max(NEAR, BIAS * rows)),
         problem.shortened(FEW),
-        moving_start(problem, nu),
+        moving_start(problem, nu, watch),
     )
     if short is problem:
         return solver.minimise(own, watch=watch).state.point
@@ -90,10 +92,27 @@ def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
     return solver.minimise(min(states, key=lambda state: state.objective).point, watch=watch).state.point
 
 
-def moving_start(problem: Problem, nu: float) -> Point:
-    """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes."""
+def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
+    """The point with the latencies that go with motors near their own; only currents need them.
+
+    The latency of a current meets a jump at every row: a motor that is a wrong guess brings it to the wrong side of it,
+    and no descent brings it back. So motors come first, with every latency at its start.
+    """
+    if problem.where(CURRENTS) < 0:
+        return point
+    still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
+    held = replace(problem, parameters=tuple(still))
+    first = Solver(held, ImplicitEngine(held), nu, NEAR).minimise(point, watch=watch.aside("motors first"))
+    return _with_latencies(Solver(problem, ImplicitEngine(problem), nu), first.state).point
+
+
+def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
+    """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes.
+
+    With the latencies that go with it, where currents need them.
+    """
     own, short = problem.start(), problem.shortened(FEW)
     solver = Solver(short, ImplicitEngine(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
-    return min(points, key=lambda point: solver.state(point).objective)
+    return _timed(short, min(points, key=lambda point: solver.state(point).objective), nu, watch)

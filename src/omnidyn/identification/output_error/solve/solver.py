@@ -3,7 +3,7 @@
 Gauss: the noise of each column is concentrated out, F = 1/2 sum n_c log(sum of r^2 / n_c), so that one minimisation
 finds parameters and noise together. Student's t: F = sum of rho + n_c log s_c, steps in the parameters and in the
 scales s_c in turn. Counts (kernel/counts.py) are held like that too, beside the others. A prior adds
-((p - mean)/std)^2 / 2.
+((z - mean)/std)^2 / 2, z the number or its logarithm.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class State:
 class Solution:
     """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short.
 
-    solver: which found it.
+    solver: which found it. notes: what is to be said of the way there.
     """
 
     state: State
@@ -72,6 +72,7 @@ class Solution:
     iterations: int
     converged: bool
     solver: Solver[Any]
+    notes: tuple[str, ...] = ()
 
 
 class Solver(Generic[P]):
@@ -196,8 +197,9 @@ class Solver(Generic[P]):
     def _prior(self, point: Point) -> float:
         total = 0.0
         for p, value in zip(self.problem.parameters, point.values, strict=True):
-            if p.prior is not None:
-                total += 0.5 * ((float(value) - p.prior[0]) / p.prior[1]) ** 2
+            if p.known is not None:
+                mean, std = p.known
+                total += 0.5 * ((p.inner(float(value)) - mean) / std) ** 2
         for piece, state in zip(self.problem.pieces, point.states, strict=True):
             pull, known = piece.start_prior(state)
             total += 0.5 * float(pull[known > 0.0] ** 2 @ (1.0 / known[known > 0.0]))
@@ -227,10 +229,10 @@ class Normal:
     def _add_priors(self) -> None:
         self.prior_gradient, self.prior_information = np.zeros(self._count), np.zeros(self._count)
         for j, p in enumerate(self.solver.problem.parameters):
-            if p.prior is not None:
-                mean, std = p.prior
-                self.prior_information[j] = (self.scale[j] / std) ** 2
-                self.prior_gradient[j] = (mean - self.state.point.values[j]) / std**2 * self.scale[j]
+            if p.known is not None:
+                mean, std = p.known
+                self.prior_information[j] = std**-2
+                self.prior_gradient[j] = (mean - self.inner[j]) / std**2
 
     def _reduced(self, damping: float) -> tuple[FloatArray, FloatArray]:
         """Gradient and information of the parameters, the states of each piece eliminated."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.identification.output_error.problem.nuisances import LATENCY
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, earliest, implausible
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import final_weighting
@@ -16,7 +16,7 @@ CLEAR = 5.0  # standard errors at which a log asks for a nuisance
 
 
 def supported(solver: Solver, solution: Solution, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of `names` that the logs determine: latencies to LATENCY_STD, a dead band to DEAD_SHARE.
+    """Those of `names` that the logs determine: plausible latencies to LATENCY_STD, a dead band to DEAD_SHARE.
 
     A gain stays: it is there because the supply is only nominal, and its prior keeps it.
     """
@@ -25,12 +25,19 @@ def supported(solver: Solver, solution: Solution, names: tuple[str, ...]) -> tup
     blind = np.diag(normal.information) <= 0.0
     largest = max(float(np.nanmax(np.abs(piece.record.voltage))) for piece in solver.problem.pieces)
     limits = {LATENCY: LATENCY_STD, DEAD_BAND: DEAD_SHARE * largest, GAIN: np.inf}
-    kept = []
+    early, kept = too_early(solver, solution), []
     for j, parameter in enumerate(solver.problem.parameters):
         kind = parameter.part
-        if kind in names and not blind[j] and std[j] <= limits[kind]:
+        if kind in names and not blind[j] and std[j] <= limits[kind] and parameter.name not in early:
             kept.append(parameter.name)
     return tuple(kept)
+
+
+def too_early(solver: Solver, solution: Solution) -> dict[str, float]:
+    """Latencies at or before the earliest that is plausible, by their names [s]."""
+    limit = earliest([piece.record for piece in solver.problem.pieces])
+    pairs = zip(solver.problem.parameters, solution.state.point.values.tolist(), strict=True)
+    return {p.name: value for p, value in pairs if p.part == LATENCY and value <= limit}
 
 
 def wanted(solver: Solver, solution: Solution, wider: Solver) -> list[str]:
@@ -62,6 +69,9 @@ def wanted(solver: Solver, solution: Solution, wider: Solver) -> list[str]:
         if spread > 0.0 and abs(step) > CLEAR * spread:
             parameter = wider.problem.parameters[j]
             value = parameter.outer(normal.inner[j] + step)
+            if parameter.part == LATENCY and value < earliest([piece.record for piece in wider.problem.pieces]):
+                words.append(f"{implausible(parameter.name, value)}: it is not fitted")
+                continue
             words.append(
                 f"the logs would fit better with {parameter.name} = {value:.3g} ({abs(step) / spread:.0f} standard "
                 f'errors): if that can be, ask for it among the nuisances, "{parameter.name}"'
