@@ -29,6 +29,11 @@ VOLTS = np.zeros((4, 3))
         ),
         (lambda: omnidyn.simulate(ROBOT, 0.1, VOLTS), "the time before the voltage", "simulate"),
         (lambda: omnidyn.check(ROBOT, RUN), "a Robot before a Run", r"check\(log\)"),
+        (lambda: omnidyn.fit_output_error(ROBOT, RUN), "a Robot before a Run", "fit_output_error"),
+        (lambda: omnidyn.identify_steady(ROBOT, [RUN]), "a Robot before a list of Run", "identify_steady"),
+        (lambda: omnidyn.identify_groups(ROBOT, [RUN], ["a"]), "a Robot before a list of Run", "identify_groups"),
+        (lambda: omnidyn.write_run("run.csv", RUN), "the text 'run.csv' before a Run", r"write_run\(run, path\)"),
+        (lambda: omnidyn.save_robot("robot.toml", ROBOT), "the text 'robot.toml' before a Robot", "save_robot"),
     ],
 )
 def test_a_swapped_pair_is_recognised(call, got, expected):

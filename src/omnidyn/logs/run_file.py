@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
@@ -49,6 +50,7 @@ def write_run(run: Run, path: str | os.PathLike, force: bool = False) -> Path:
     Raises InputError when the file exists (unless `force`) or cannot be written, or when a value is infinite, and
     MissingExtraError for Parquet without pyarrow.
     """
+    check_order("write_run(run, path)", (run, Run), (path, (str, os.PathLike)))
     check_format(path)
     check_output(path, force)
     return write_atomic(path, run_to_parquet(run) if _is_parquet(path) else run_to_csv(run), force)

@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from omnidyn.arguments import check_order
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
 from omnidyn.model.keys import TABLES, is_told
@@ -115,6 +116,7 @@ def _dotted(path: tuple[str | int, ...]) -> str:
 
 def save_robot(robot: Robot, path: str | os.PathLike, force: bool = False) -> Path:
     """Write a robot file. Raises InputError when it exists (unless `force`) or cannot be written."""
+    check_order("save_robot(robot, path)", (robot, Robot), (path, (str, os.PathLike)))
     return write_atomic(path, robot_to_toml(robot), force)
 
 

@@ -75,7 +75,7 @@ def _check_order(robot: Robot, voltage: object, dt: object) -> None:
     call = "simulate(robot, voltage, dt)"
     if not isinstance(robot, Robot):
         check_order(call, (robot, Robot), (voltage, type(robot)), (dt, object))
-    if np.ndim(voltage) == 0 and np.ndim(dt) == 2:  # type: ignore[arg-type]
+    if isinstance(voltage, int | float) and isinstance(dt, list | tuple | np.ndarray):
         raise InputError("two arguments stand in each other's place", got="the time before the voltage", expected=call)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Unpack
 
+from omnidyn.arguments import check_order
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
@@ -288,6 +289,7 @@ def fit_output_error(
 
     Returns an Estimate with nuisances, noise and what is not identifiable. Errors: see `Fit.of` and `Fit.answer`.
     """
+    check_order("fit_output_error(runs, robot)", (runs, Run), (robot, Robot))
     progress = Progress.of(watch)
     fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=progress)
     return fit.answer(fit.solve(progress), progress).estimate
@@ -305,6 +307,7 @@ def identify_groups(
     Raises InputError for what cannot be used, InsufficientDataError where a group says nothing about its numbers, or
     has too few runs for a bootstrap, UnsupportedError for robots and logs that output error does not take.
     """
+    check_order("identify_groups(runs, robot, groups)", (runs, Run), (robot, Robot))
     progress = Progress.of(watch)
     fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
     return fit.answer(fit.solve(progress), progress)

@@ -15,6 +15,7 @@ from typing import Unpack
 import numpy as np
 from scipy.linalg import null_space
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
@@ -83,6 +84,7 @@ def identify_steady(
     Raises InsufficientDataError when nothing is steady, nothing moves, or no shape is determined; InputError for a run
     without the channels needed, or for a wrong option.
     """
+    check_order("identify_steady(runs, robot)", (runs, Run), (robot, Robot))
     asked = Question.for_method(STEADY_STATE, question, options)
     robust = asked.robust
     points = force_points(
