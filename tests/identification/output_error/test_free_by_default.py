@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.identification.advice import advice
 from omnidyn.identification.output_error.fit import fit_output_error
-from omnidyn.identification.output_error.prepare import expand_keys, free_by_default, guesses
+from omnidyn.identification.output_error.prepare import expand_keys, free_by_default, guesses, known_priors
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.validation import validate
 from omnidyn.model.first_guess import first_guess
@@ -132,3 +132,8 @@ def test_a_setting_or_a_drawing_is_not_free_by_default(robot):
     assert guesses(robot.replace(priors=known), looped=True) == ("motor.voltage_limit_V",)
     magnet = {f"motor.{name}": Prior(std=1e-3) for name in ("torque_constant_Nm_A", "emf_constant_Vs_rad")}
     assert guesses(robot.replace(priors=magnet)) == ("motor.torque_constant_Nm_A",)  # the other one follows
+
+
+def test_what_a_robot_no_longer_has_is_no_guess(robot):
+    """A file with a speed loop whose drive was exchanged in Python: the std of its rate is left over."""
+    assert known_priors(robot.replace(priors={"drive.rate_Hz": Prior(std=1.0)})) == {}

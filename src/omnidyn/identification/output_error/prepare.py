@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -272,11 +273,15 @@ def guesses(robot: Robot, looped: bool = False) -> tuple[str, ...]:
 
 
 def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry."""
+    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry.
+
+    One of a number that this robot no longer has, because a part of it was exchanged, is left out.
+    """
     found = {}
     for name, prior in robot.priors.items():
         if prior.std is not None and prior.origin != IDENTIFIED:
-            found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
+            with contextlib.suppress(InputError):
+                found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
     return found
 
 
