@@ -29,6 +29,7 @@ def compare(
     ),
     picture: str = typer.Option("", "--picture", metavar="FILE", help="Measured and models, as .png or .svg."),
     show_channels: str = typer.Option("", "--show", metavar="W1,I1", help="Channels of the picture; default: three."),
+    band: bool = typer.Option(False, "--band", help="How far the model may be off by the std of its robot file."),
     segments: bool = typer.Option(False, "--segments", help="Show every segment too."),
     apply: str = typer.Option("", help="Input to replay: voltage, duty, wheel_speed_command or twist_command."),
     hold: float = typer.Option(0.2, min=0.0, help="How long a missing input keeps its last value [s]."),
@@ -49,6 +50,7 @@ def compare(
     The model runs free under the logged voltages (or duties, or set speeds through the speed loop of the robot file),
     from gap to gap. Below: how far it ends up from what was measured.
     """
+    from omnidyn.comparison.bands import with_bands
     from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
 
     if len(robot) > MOST_ROBOTS:
@@ -63,6 +65,9 @@ def compare(
         runs, hashes = _runs(files, robots[0], options, sort, maps, now)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
         found = _compared(robots, runs, apply, hold, current_unsigned, now)
+        if band:
+            now("drawing robots for the band")
+            found = with_bands(found, robots, apply=apply or None, hold=hold)
         if picture:
             now("drawing")
             _draw(found, picture, channels, force)

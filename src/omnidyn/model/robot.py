@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from omnidyn.model.correlation import KeyCorrelation
 from omnidyn.model.drive import Drive
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor
@@ -52,6 +53,7 @@ class Robot(Value):
     """A robot: all that eqs (1)-(14) need. Frozen; `replace` makes a changed copy.
 
     priors: key of the robot file, such as "motor.resistance_ohm" or "friction.axes.coulomb[0]", -> Prior.
+    correlation: which of these numbers are off together; numbers that a change took away have no part in it.
     """
 
     name: Annotated[Text, Field(min_length=1)]
@@ -61,6 +63,7 @@ class Robot(Value):
     motor: Motor
     drive: Drive = Drive()
     friction: Friction = Friction()
+    correlation: Annotated[KeyCorrelation | None, Field(description="which numbers are off together")] = None
     priors: Annotated[dict[str, Prior], Field(exclude=True, default_factory=dict)]
 
     @model_validator(mode="after")

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
+from omnidyn.comparison.bands import FEW, with_bands
+from omnidyn.comparison.result import Comparison
 from omnidyn.document import Points
 from omnidyn.identification.fit_document import difference_table, number_table, verdict_table
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import Validation, output_name
+from omnidyn.model.dead_zone_answer import dead_zone
+from omnidyn.model.robot import Robot
+from omnidyn.model.uncertainty import DRAWS
 from omnidyn.report.figures.correlation import draw_correlation
+from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.residuals import draw_residuals
 from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, section
 from omnidyn.report.style import Picture
+from omnidyn.simulation.exact.march import why_not_exact
 
 Fits = Mapping[str, OutputErrorEstimate]
 
@@ -38,8 +46,9 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
         section("findings", "What the data say", Points(_findings(fits, validations))),
         Section("numbers", "Numbers, with 95 % intervals", numbers),
         *(between if found.differences else []),
+        Section("dead-zone", "Dead zone", _each(fits, _dead_zone)),
         Section("data", "The logs, and what check says of them", checked),
-        Section("runs", "Measured and model", _each(validations, _runs)),
+        Section("runs", "Measured and model", _each(validations, partial(_runs, fits))),
         Section("residuals", "What the model leaves", residuals),
         Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
         section("doubts", "Doubts", Points(doubts), none="None."),
@@ -69,11 +78,27 @@ def _each(parts: Mapping[str, Any], content: Callable[[str, Any], str]) -> str:
     return "".join(paragraph(f"{group}:") + content(group, each) for group, each in parts.items())
 
 
-def _runs(group: str, validation: Validation) -> str:
-    pictures = [_renamed(draw_overlay(validation.fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
+def _dead_zone(group: str, fit: OutputErrorEstimate) -> str:
+    """Volts and duty at which the robot starts to move, and how sure they are."""
+    found, name = dead_zone(fit.robot), fit.robot.name
+    drawn = draw_dead_zone_map({name: fit.robot}, {name: found})
+    drawn = Picture(_anchor(f"{drawn.name}{group}"), drawn.title, drawn.caption, drawn.png, drawn.svg)
+    return content(found.table(), Points(found.statements()), drawn)
+
+
+def _runs(fits: Fits, group: str, validation: Validation) -> str:
+    robot = (fits.get(group) or next(iter(fits.values()))).robot
+    pictures = [_renamed(_overlay(robot, validation.fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
     if validation.held_out is not None:
-        pictures.append(_renamed(draw_overlay(validation.held_out), f"overlay-held-out{group}", "on a log held out"))
+        drawn = _overlay(robot, validation.held_out)
+        pictures.append(_renamed(drawn, f"overlay-held-out{group}", "on a log held out"))
     return content(validation.table(), *pictures)
+
+
+def _overlay(robot: Robot, found: Comparison) -> Picture:
+    """The first log, with the band of the model; fewer draws where the engine is slow."""
+    draws = FEW if why_not_exact(robot) else DRAWS
+    return draw_overlay(with_bands(found, [robot], logs=(0,), draws=draws))
 
 
 def _renamed(drawn: Picture, name: str, words: str) -> Picture:

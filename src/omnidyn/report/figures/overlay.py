@@ -73,9 +73,21 @@ def _values(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
         traces = [comparison.trace(robot, name, segment) for segment in segments]
         t, model = _broken([(trace.t, trace.model) for trace in traces])
         axes.plot(t, model, line, color=colour, label=robot)
+        _band(axes, comparison, segments, robot, name, colour)
     axes.set_ylabel(f"{name}, {unit(name)}")
     axes.tick_params(labelbottom=False)
     axes.locator_params(axis="y", nbins=5)
+
+
+def _band(axes: Axes, comparison: Comparison, segments: Sequence[Segment], robot: str, name: str, colour: str) -> None:
+    """Behind the lines, how far the model may be off by the std of its robot file."""
+    label = "95 %"
+    for segment in segments:
+        ends = comparison.band(robot, name, segment)
+        if ends is not None:
+            t = comparison.trace(robot, name, segment).t
+            axes.fill_between(t, *ends, color=colour, alpha=0.25, linewidth=0.0, zorder=1, label=label)
+            label = ""
 
 
 def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], name: str, last: bool) -> None:
@@ -116,7 +128,8 @@ def _caption(comparison: Comparison, log: int, count: int) -> str:
         f"{robot}: rmse " + ", ".join(f"{name} {each.rmse:.3g} {unit(name)}" for name, each in found.items())
         for robot, found in comparison.overall.items()
     )
+    band = " Bands: 95 %, from the std of the robot file; sensors add to that." if comparison.bands else ""
     return (
         f"{source}: measured, and what each model does under {comparison.applied[comparison.robots[0]]}, as a free run "
-        f"that never sees the measurement. Below each: model minus measured.{gaps} Over all logs, {errors}."
+        f"that never sees the measurement. Below each: model minus measured.{gaps}{band} Over all logs, {errors}."
     )
