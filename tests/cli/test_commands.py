@@ -79,8 +79,25 @@ def test_robots_lists_every_preset(call):
 def test_deadzone_has_the_paper_s_numbers(call):
     code, out, _ = call("deadzone", "axebot")
     assert code == 0
-    lines = [line.split() for line in out.splitlines()[2:]]
+    lines = [line.split() for line in out.splitlines()[2:5]]
     assert [(line[0], line[1]) for line in lines] == [("x", "0.670"), ("y", "0.528"), ("yaw", "0.174")]
+    assert [line[-1] for line in lines] == ["0.112", "0.088", "0.029"]  # duty of 6 V
+    assert "no interval: no number of the robot file has a std; identify writes them" in out
+
+
+def test_deadzone_has_intervals_and_names_the_guesses_behind_them(call):
+    _, out, _ = call("deadzone", "robotino")
+    assert "it rests on guesses: friction.direction.yaw_coulomb (60 % by its std)" in out
+    assert "the duty rests on guesses: motor.voltage_limit_V (8" in out
+    told = strict(call("deadzone", "robotino", "--json")[1])
+    x, _, yaw = told["dead_zone"]
+    # The ellipse is known to 0.2 of 42.5 N, the turn to 1.5 of 2.5 N m: a guess.
+    assert (x["interval_V"][1] - x["interval_V"][0]) / x["breakaway_scale_V"] < 0.03
+    assert (yaw["interval_V"][1] - yaw["interval_V"][0]) / yaw["breakaway_scale_V"] > 1.5
+    assert told["guesses"] == ["friction.direction.yaw_coulomb", "motor.voltage_limit_V"]
+    around = told["directions"]
+    assert len(around["direction_deg"]) == len(around["low_V"]) == len(around["high_V"]) == 72
+    assert "it rests on guesses" in call("deadzone", "robotino", "--json")[2]
 
 
 def test_deadzone_for_machines(call):
@@ -110,7 +127,7 @@ def test_a_dead_zone_beyond_the_motors_is_said(call, here):
     from omnidyn import save_robot
 
     save_robot(weak, here / "weak.toml")
-    lines = call("deadzone", "weak.toml")[1].splitlines()[2:]
+    lines = call("deadzone", "weak.toml")[1].splitlines()[2:5]
     assert [line.endswith("(beyond the limit of the motors)") for line in lines] == [True, True, False]
 
 

@@ -74,11 +74,12 @@ def interval_of(robot: Robot, function: Callable[[Robot], ArrayLike], count: int
 class Ends:
     """The 95 % interval of so many results, added one by one: what lies far inside of it is not kept.
 
-    Between two results as quantiles usually are; infinity is a result like others, an element that is once NaN is NaN.
+    Result k of n, in order, stands for the share (k - 1/2)/n (Hazen), as each draw of a Latin hypercube does. Infinity
+    is a result like others; an element that is once NaN is NaN.
     """
 
     def __init__(self, count: int) -> None:
-        self._below, self._share = divmod(LOW * (count - 1), 1.0)
+        self._below, self._share = divmod(max(LOW * count - 0.5, 0.0), 1.0)
         self._kept = min(int(self._below) + 2, count)
         self._lowest: list[FloatArray] = []
 
@@ -104,7 +105,7 @@ class Ends:
             between = first + self._share * (then - first)
         ends = np.where(np.isinf(first) | np.isinf(then), then if self._share > 0.5 else first, between)
         low, high = np.where(self._none, np.nan, ends)
-        return Interval(low, -high)
+        return Interval(low + 0.0, 0.0 - high)
 
 
 def _errors(known: Told, count: int, seed: int) -> FloatArray:
@@ -114,7 +115,7 @@ def _errors(known: Told, count: int, seed: int) -> FloatArray:
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     random = np.random.default_rng(seed)
     place = np.stack([random.permutation(count) for _ in known.keys], axis=1)
-    normal = ndtri((place + random.random(place.shape)) / count)
+    normal = ndtri((place + 0.5) / count)
     return normal @ root.T * scale
 
 

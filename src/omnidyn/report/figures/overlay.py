@@ -96,6 +96,11 @@ def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
         traces = [comparison.trace(robot, name, segment) for segment in segments]
         t, error = _broken([(trace.t, trace.error) for trace in traces])
         axes.plot(t, error, line, color=colour, linewidth=1.0)
+        for segment, trace in zip(segments, traces, strict=True):
+            ends = comparison.band(robot, name, segment)
+            if ends is not None:  # where the error of a right model may lie, its numbers being off
+                low, high = trace.model - ends[1], trace.model - ends[0]
+                axes.fill_between(trace.t, low, high, color=colour, alpha=0.25, linewidth=0.0, zorder=1)
     axes.set_ylabel("error", color=INK)
     axes.locator_params(axis="y", nbins=3)
     axes.tick_params(labelbottom=last)
@@ -128,7 +133,11 @@ def _caption(comparison: Comparison, log: int, count: int) -> str:
         f"{robot}: rmse " + ", ".join(f"{name} {each.rmse:.3g} {unit(name)}" for name, each in found.items())
         for robot, found in comparison.overall.items()
     )
-    band = " Bands: 95 %, from the std of the robot file; sensors add to that." if comparison.bands else ""
+    band = (
+        " Bands: how far numbers that are off as the robot file says may bring it, 95 %; sensors add to that."
+        if comparison.bands
+        else ""
+    )
     return (
         f"{source}: measured, and what each model does under {comparison.applied[comparison.robots[0]]}, as a free run "
         f"that never sees the measurement. Below each: model minus measured.{gaps}{band} Over all logs, {errors}."
