@@ -171,6 +171,46 @@ def test_simulate_writes_the_run_that_python_gives(call, here):
     assert read_run(here / "run.csv").pose.tobytes() == wanted.pose.tobytes()
 
 
+def test_simulate_with_a_band_writes_its_ends_beside_the_run(call, here):
+    from omnidyn import band, read_voltages, save_robot
+    from omnidyn.model.robot import Prior
+
+    known = load_robot("axebot").replace(priors={"friction.axes.coulomb[0]": Prior(std=0.1, origin="guess")})
+    save_robot(known, here / "known.toml")
+    code, out, err = call("simulate", "known.toml", "u.csv", "-o", "run.csv", "--band")
+    assert code == 0
+    assert "[..]: 95 %, 100 robots drawn from the std and correlations of 1 numbers of the file" in out
+    assert "the band rests on guesses: friction.axes.coulomb[0]" in out
+    assert "wrote run.csv, run-low.csv, run-high.csv" in err
+    held = read_voltages(here / "u.csv", 3)
+    wanted = band(known, held.voltage, held.dt)
+    for name, end in (("low", wanted.low), ("high", wanted.high)):
+        assert read_run(here / f"run-{name}.csv").twist.tobytes() == end.twist.tobytes()
+    code, _, err = call("simulate", "known.toml", "u.csv", "-o", "other.csv", "--band", "--json", "--force")
+    assert (here / "other-low.csv").exists()
+    (here / "run.csv").unlink()
+    code, _, err = call("simulate", "known.toml", "u.csv", "-o", "run.csv", "--band")
+    assert code == 3
+    assert "run-low.csv" in err
+    assert not (here / "run.csv").exists()
+
+
+def test_the_band_for_machines_and_its_refusals(call, here):
+    from omnidyn import save_robot
+    from omnidyn.model.robot import Prior
+
+    known = load_robot("axebot").replace(priors={"motor.resistance_ohm": Prior(std=0.1)})
+    save_robot(known, here / "known.toml")
+    told = strict(call("simulate", "known.toml", "u.csv", "--band", "--json")[1])
+    low, high = told["band"]["low"]["final_pose"]["x_m"], told["band"]["high"]["final_pose"]["x_m"]
+    assert low < told["final_pose"]["x_m"] < high
+    assert (told["band"]["draws"], told["band"]["output"], told["band"]["guesses"]) == (100, None, [])
+    assert call("simulate", "axebot", "u.csv", "-o", "-", "--band")[0] == 2
+    code, _, err = call("simulate", "axebot", "u.csv", "--band")
+    assert code == 4
+    assert "nothing says how far the numbers of this robot may be off; got axebot without any std" in err
+
+
 def test_without_an_output_nothing_is_written(call, here):
     before = sorted(here.iterdir())
     code, out, err = call("simulate", "axebot", "u.csv")

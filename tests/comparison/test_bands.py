@@ -65,19 +65,19 @@ def test_the_picture_has_it_behind_the_lines(found):
 
 
 def test_one_robot_of_two_without_std_is_named(found):
-    both = with_bands(compare(OFF, found.measured[0], AXEBOT), [OFF, AXEBOT], draws=4)
+    both = with_bands(compare(OFF, found.measured[0], AXEBOT), [OFF, AXEBOT], draws=20)
     assert list(both.bands) == [OFF.name]
     assert "axebot has no band: no number of its file has a std" in both.warnings
 
 
 def test_currents_without_sign_have_a_band_without_sign(found):
-    unsigned = with_bands(compare(OFF, found.measured[0], current_unsigned=True), [OFF], draws=9)
+    unsigned = with_bands(compare(OFF, found.measured[0], current_unsigned=True), [OFF], draws=20)
     low, high = unsigned.band(OFF.name, "i2", unsigned.segments[0])
     assert (low >= 0.0).all()
     assert (high >= low).all()
 
 
 def test_only_the_logs_asked_for(found):
-    two = with_bands(compare(OFF, [found.measured[0]] * 2), [OFF], logs=(1,), draws=3)
+    two = with_bands(compare(OFF, [found.measured[0]] * 2), [OFF], logs=(1,), draws=20)
     assert two.band(OFF.name, "vx", two.segments[0]) is None
     assert two.band(OFF.name, "vx", two.segments[1]) is not None

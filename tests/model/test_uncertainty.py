@@ -116,13 +116,18 @@ def test_a_robot_without_std_has_nothing_to_draw():
         plausible(told(**{R: 0.1}), 0)
 
 
-@pytest.mark.parametrize("count", [2, 3, 39, 40, 41, 100, 257, 1000])
+@pytest.mark.parametrize("count", [20, 39, 40, 41, 100, 257, 1000])
 def test_the_ends_are_the_quantiles_of_all_results(count):
     results = np.random.default_rng(count).normal(size=(count, 3, 2))
     ends = Ends(count)
     for each in results:
         ends.add(each)
     np.testing.assert_allclose(ends.interval, np.quantile(results, [0.025, 0.975], axis=0, method="hazen"))
+
+
+def test_fewer_than_twenty_draws_have_no_interval():
+    with pytest.raises(InputError, match="draws: too few draws for a 95 % interval; got 19; expected 20 or more"):
+        interval_of(told(**{R: 0.1}), lambda each: each.motor.resistance, 19)
 
 
 def test_infinity_is_a_result_and_nan_none():

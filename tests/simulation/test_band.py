@@ -56,17 +56,17 @@ def test_a_robot_that_may_or_may_not_move():
 
 def test_the_same_seed_is_the_same_band_whatever_the_threads(monkeypatch):
     robot = AXEBOT.replace(priors={"motor.resistance_ohm": Prior(std=0.1), C_X["axes"]: Prior(std=0.1)})
-    one = band(robot, FORWARD, 2e-3, draws=9)
-    assert one == band(robot, FORWARD, 2e-3, draws=9)
+    one = band(robot, FORWARD, 2e-3, draws=20)
+    assert one == band(robot, FORWARD, 2e-3, draws=20)
     monkeypatch.setattr("os.cpu_count", lambda: 1)
-    assert one == band(robot, FORWARD, 2e-3, draws=9)
-    assert one.high != band(robot, FORWARD, 2e-3, draws=9, seed=1).high
+    assert one == band(robot, FORWARD, 2e-3, draws=20)
+    assert one.high != band(robot, FORWARD, 2e-3, draws=20, seed=1).high
 
 
 def test_it_takes_what_simulate_takes():
     robot = known(load_robot("robotino"), "drive.kp_V_s_rad", 1.0)
     commands = np.tile([0.5, 0.0, -0.5], (20, 1))
-    low, high, _ = omnidyn.band(robot, wheel_speed_command=commands, dt=0.01, draws=5, twist=(0.1, 0.0, 0.0))
+    low, high, _ = omnidyn.band(robot, wheel_speed_command=commands, dt=0.01, draws=20, twist=(0.1, 0.0, 0.0))
     assert (high.voltage[1] > low.voltage[1]).any()
     np.testing.assert_array_equal(low.twist[0], high.twist[0])
 

@@ -50,7 +50,6 @@ def compare(
     The model runs free under the logged voltages (or duties, or set speeds through the speed loop of the robot file),
     from gap to gap. Below: how far it ends up from what was measured.
     """
-    from omnidyn.comparison.bands import with_bands
     from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
 
     if len(robot) > MOST_ROBOTS:
@@ -64,10 +63,7 @@ def compare(
         files, robots = log_options.log_files(log), _robots(robot)
         runs, hashes = _runs(files, robots[0], options, sort, maps, now)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
-        found = _compared(robots, runs, apply, hold, current_unsigned, now)
-        if band:
-            now("drawing robots for the band")
-            found = with_bands(found, robots, apply=apply or None, hold=hold)
+        found = _compared(robots, runs, apply, hold, current_unsigned, band, now)
         if picture:
             now("drawing")
             _draw(found, picture, channels, force)
@@ -109,12 +105,19 @@ def _channels(
 
 
 def _compared(
-    robots: Sequence[Robot], runs: Sequence[Run], apply: str, hold: float, current_unsigned: bool, now: Any
+    robots: Sequence[Robot], runs: Sequence[Run], apply: str, hold: float, current_unsigned: bool, band: bool, now: Any
 ) -> Comparison:
     from omnidyn.comparison.compare import compare as compare_robots
 
     return compare_robots(
-        robots[0], runs, *robots[1:], apply=apply or None, hold=hold, current_unsigned=current_unsigned, progress=now
+        robots[0],
+        runs,
+        *robots[1:],
+        apply=apply or None,
+        hold=hold,
+        current_unsigned=current_unsigned,
+        progress=now,
+        band=band,
     )
 
 

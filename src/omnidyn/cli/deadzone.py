@@ -17,7 +17,7 @@ def deadzone(
     robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
     pattern: str = typer.Option("", help="One number per wheel, such as 0,1,-1; default: one pattern per axis."),
     picture: str = typer.Option("", "--map", metavar="FILE", help="Map over all directions, as .png or .svg."),
-    draws: int = typer.Option(100, min=2, max=10_000, help="Robots drawn for the intervals."),
+    draws: int = typer.Option(100, min=20, max=10_000, help="Robots drawn for the intervals."),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:

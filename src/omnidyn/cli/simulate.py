@@ -54,7 +54,7 @@ def simulate(
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
     files = _ends_of(out) if band and out else []
-    for path in (out, *files) if out != "-" else ():
+    for path in (out, *files) if out not in ("", "-") else ():
         _refuse_early(path, force)
     with progress("simulating (the first run of an engine compiles it)") as now:
         job = _Job.read(robot, voltages, duration, max_steps)

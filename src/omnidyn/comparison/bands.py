@@ -13,7 +13,7 @@ from omnidyn.model.uncertainty import DRAWS, plausible
 from omnidyn.simulation.band import Band, band_of
 
 COARSE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest
-FEW = 30  # robots drawn where each run is dear
+FEW = 20  # robots drawn where each run is dear: the least that have a 95 % interval
 
 
 def with_bands(

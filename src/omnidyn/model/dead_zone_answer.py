@@ -206,11 +206,12 @@ def _full(robot: Robot) -> tuple[float, str]:
 def _row(
     robot: Robot, pattern: FloatArray, scale: float, full: float, found: Interval | None, k: int, every: int
 ) -> Breakaway:
-    volts, duty = np.multiply(scale, pattern), float(_duty(np.array([scale]), pattern[None], full)[0])
+    duty = float(_duty(np.array([scale]), pattern[None], full)[0])
     ends = None if found is None else (float(found.low[k]), float(found.high[k]))
     duty_ends = None if found is None else (float(found.low[every + k]), float(found.high[every + k]))
     if not np.isfinite(scale):
         return Breakaway("", pattern, scale, duty, ends, duty_ends, False)
+    volts = np.multiply(scale, pattern)
     moving = [axis for axis, moved in zip(AXES, moves(robot, BEYOND * volts), strict=True) if moved]
     reachable = bool((clip_voltage(robot.motor, volts) == volts).all())
     return Breakaway("+".join(moving), pattern, scale, duty, ends, duty_ends, reachable)

@@ -36,7 +36,7 @@ FURTHEST = math.log(1e4)  # of a logarithm: the span of a fit
 LOW = 0.025  # share of the results below a 95 % interval, and above it
 LEAST = 1e-6  # of value or std, that a friction stays above: 0 would switch a part of it off
 PULLS = 60  # halvings that bring a draw out of range back to the value itself
-MOST_DRAWS = 1_000_000
+FEWEST, MOST_DRAWS = 20, 1_000_000  # of fewer draws even the outermost two are less than 95 % apart
 
 
 class Interval(NamedTuple):
@@ -72,13 +72,17 @@ def interval_of(robot: Robot, function: Callable[[Robot], ArrayLike], count: int
 
 
 class Ends:
-    """The 95 % interval of so many results, added one by one: what lies far inside of it is not kept.
+    """The 95 % interval of so many results (20 or more), added one by one: what lies far inside of it is not kept.
 
     Result k of n, in order, stands for the share (k - 1/2)/n (Hazen), as each draw of a Latin hypercube does. Infinity
     is a result like others; an element that is once NaN is NaN.
     """
 
     def __init__(self, count: int) -> None:
+        if count < FEWEST:
+            raise InputError(
+                "too few draws for a 95 % interval", got=count, expected=f"{FEWEST} or more", where="draws"
+            )
         self._below, self._share = divmod(max(LOW * count - 0.5, 0.0), 1.0)
         self._kept = min(int(self._below) + 2, count)
         self._lowest: list[FloatArray] = []
