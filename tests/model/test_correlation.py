@@ -9,6 +9,7 @@ from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import PRESETS, load_robot, parse_robot, robot_to_toml
 from omnidyn.model.told import correlation_of, told, with_correlation
+from omnidyn.model.uncertainty import plausible
 
 AXEBOT = load_robot("axebot")
 TEXT = (PRESETS / "axebot.toml").read_text("utf-8")
@@ -149,3 +150,16 @@ def test_the_std_of_the_fit_is_kept_where_it_is_not_that_of_the_number():
     assert both.correlation.std == (0.1, 0.4)
     np.testing.assert_array_equal(told(both).std, [0.1, 0.4])
     np.testing.assert_array_equal(told(robot).std, [0.1, 0.5])
+
+
+def test_a_list_that_is_one_number_is_drawn_as_one():
+    """A disc: its coulomb is a number for both directions."""
+    disc = AXEBOT.replace(friction=Friction(direction=DirectionFriction(coulomb=(1.8, 1.8), viscous=0.5)))
+    disc = disc.replace(priors={f"friction.direction.{k}": Prior(std=0.1) for k in ("coulomb", "viscous")})
+    both = with_correlation(disc, ["friction.direction.coulomb", "friction.direction.viscous"], [[1, -0.7], [-0.7, 1]])
+    x, y = (f"friction.direction.coulomb[{k}]" for k in range(2))
+    assert both.correlation.of((x, y))[0, 1] == 1.0
+    assert both.correlation.of((y, "friction.direction.viscous"))[0, 1] == -0.7
+    for draw in plausible(both, 20):
+        assert draw.friction.direction.coulomb[0] == pytest.approx(draw.friction.direction.coulomb[1], rel=1e-9)
+    assert parse_robot(robot_to_toml(both)) == both

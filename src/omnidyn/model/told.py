@@ -113,16 +113,21 @@ def refuse_strange_keys(robot: Robot) -> None:
 def with_correlation(robot: Robot, keys: Sequence[str], matrix: ArrayLike, std: Sequence[float] = ()) -> Robot:
     """The robot with what is now known of how some of its numbers are off together; what was known of others stays.
 
-    matrix: shape (keys, keys). std: of each key, kept where it is not what stands beside the number. Raises InputError
-    for keys that are none of the robot, and for what is no matrix of correlations.
+    A key of a list stands for all its entries, which are one number then. matrix: shape (keys, keys). std: of each key,
+    kept where it is not what stands beside the number. Raises InputError for keys that are none of the robot, and for
+    what is no matrix of correlations.
     """
+    tied = [(k, each) for k, key in enumerate(keys) for each in expand(key, robot)]
+    at = [k for k, _ in tied]
+    matrix = np.asarray(matrix, dtype=float).reshape(len(keys), len(keys))[np.ix_(at, at)]
+    keys, std = [each for _, each in tied], [std[k] for k in at] if len(std) else ()
     before = correlation_of(robot)
     old = tuple(key for key in (before.keys if before is not None else ()) if key not in keys)
     every = (*old, *keys)
     whole = np.eye(len(every))
     if before is not None:
         whole[: len(old), : len(old)] = before.of(old)
-    whole[len(old) :, len(old) :] = np.asarray(matrix, dtype=float).reshape(len(keys), len(keys))
+    whole[len(old) :, len(old) :] = matrix
     own = numbers_told(robot)
     beside = [float(own[key].std or 0.0) if key in own else 0.0 for key in every]
     earlier = dict(zip(before.keys, before.std, strict=True)) if before is not None and before.std is not None else {}
