@@ -32,6 +32,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.told import ANGLES, Told, is_log, numbers_told, told
 
 DRAWS = 100
+NOISE = 1e-13  # of an eigenvalue of a correlation: less is rounding, and numbers that are one stay one
 FURTHEST = math.log(1e4)  # of a logarithm: the span of a fit
 LOW = 0.025  # share of the results below a 95 % interval, and above it
 LEAST = 1e-6  # of value or std, that a friction stays above: 0 would switch a part of it off
@@ -116,7 +117,7 @@ def _errors(known: Told, count: int, seed: int) -> FloatArray:
     """Errors of the numbers on their scales. Shape (count, keys)."""
     scale = known.std / np.where(known.log, known.value, 1.0)
     values, vectors = np.linalg.eigh(known.correlation)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    root = vectors * np.sqrt(np.where(values > NOISE, values, 0.0))
     random = np.random.default_rng(seed)
     place = np.stack([random.permutation(count) for _ in known.keys], axis=1)
     normal = ndtri((place + 0.5) / count)
