@@ -13,11 +13,10 @@ from omnidyn.identification.fit_document import difference_table, number_table, 
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import Validation, output_name
-from omnidyn.model.dead_zone_answer import dead_zone
 from omnidyn.model.robot import Robot
 from omnidyn.model.uncertainty import DRAWS
+from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.correlation import draw_correlation
-from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.residuals import draw_residuals
 from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, section
@@ -46,7 +45,7 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
         section("findings", "What the data say", Points(_findings(fits, validations))),
         Section("numbers", "Numbers, with 95 % intervals", numbers),
         *(between if found.differences else []),
-        Section("dead-zone", "Dead zone", _each(fits, _dead_zone)),
+        dead_zone_section({group: fit.robot for group, fit in fits.items()}),
         Section("data", "The logs, and what check says of them", checked),
         Section("runs", "Measured and model", _each(validations, partial(_runs, fits))),
         Section("residuals", "What the model leaves", residuals),
@@ -76,14 +75,6 @@ def _each(parts: Mapping[str, Any], content: Callable[[str, Any], str]) -> str:
     if len(parts) == 1:
         return "".join(content("", each) for each in parts.values())
     return "".join(paragraph(f"{group}:") + content(group, each) for group, each in parts.items())
-
-
-def _dead_zone(group: str, fit: OutputErrorEstimate) -> str:
-    """Volts and duty at which the robot starts to move, and how sure they are."""
-    found, name = dead_zone(fit.robot), fit.robot.name
-    drawn = draw_dead_zone_map({name: fit.robot}, {name: found})
-    drawn = Picture(_anchor(f"{drawn.name}{group}"), drawn.title, drawn.caption, drawn.png, drawn.svg)
-    return content(found.table(), Points(found.statements()), drawn)
 
 
 def _runs(fits: Fits, group: str, validation: Validation) -> str:

@@ -9,6 +9,7 @@ from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.steady.study_words import FORCES
+from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.shapes import shape_pictures
 from omnidyn.report.html import page, section
 
@@ -24,6 +25,7 @@ def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
     sections = [
         section("findings", "What the data say", told["statements"]),
         section("levels", "Friction, with 95 % intervals", told["levels"]),
+        dead_zone_section({group: each.robot for group, each in study.estimates.items()}),
         section("data", "What was used", told["travel"]),
         section("shapes", "Which shape", errors, told["shapes"]),
         section("forces", "Forces", *pictures),
