@@ -79,6 +79,7 @@ BAD = {
         "matrx = 1\nmatrix =",
         r"\[correlation\] matrx: unknown key; got matrx; did you mean matrix",
     ),
+    "known of one": ("[[1, 0.25]", "[[{ value = 1.0, std = 0.1 }, 0.25]", r"matrix\[0\]\[0\]: cannot use this value"),
     "std of one": ("keys =", "std = [0.1]\nkeys =", "too few or too many std; got 1; expected 2"),
     "negative std": (
         "keys =",
@@ -163,3 +164,9 @@ def test_a_list_that_is_one_number_is_drawn_as_one():
     for draw in plausible(both, 20):
         assert draw.friction.direction.coulomb[0] == pytest.approx(draw.friction.direction.coulomb[1], rel=1e-9)
     assert parse_robot(robot_to_toml(both)) == both
+
+
+def test_what_is_measured_anew_by_itself_leaves_it():
+    robot = with_correlation(AXEBOT, KEYS, MATRIX)
+    assert with_correlation(robot, [KEYS[2]], [[1.0]]).correlation.keys == KEYS[:2]
+    assert with_correlation(robot, KEYS, np.eye(3)).correlation is None

@@ -50,7 +50,7 @@ class KeyCorrelation(Value):
         found, place = np.eye(len(keys)), {key: k for k, key in enumerate(self.keys)}
         known = [k for k, key in enumerate(keys) if key in place]
         at = [place[keys[k]] for k in known]
-        matrix = np.array(self.matrix).reshape(len(self.keys), -1)
+        matrix = np.array(self.matrix).reshape(len(self.keys), len(self.keys))
         found[np.ix_(known, known)] = 0.5 * (matrix + matrix.T)[np.ix_(at, at)]
         np.fill_diagonal(found, 1.0)
         return found

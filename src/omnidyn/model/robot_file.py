@@ -20,6 +20,8 @@ from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 PRESETS = Path(__file__).parent / "presets"
 MAX_ROBOT_FILE_BYTES = 2**20
 
+TOGETHER = "correlation"
+
 # Keys of the schema for which no law exists yet. They are refused by name: never ignored, never "unknown".
 PENDING = frozenset(
     {"wheels.traction_mu"}
@@ -104,7 +106,8 @@ def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Pr
             remedy="remove it, or use a later version",
             where=key_path(path),
         )
-    if isinstance(node, dict) and "value" in node and table_at(Robot, path) is None:
+    known_of = isinstance(node, dict) and "value" in node and table_at(Robot, path) is None
+    if known_of and path[0] != TOGETHER:  # nothing is known of a correlation
         known = {key: value for key, value in node.items() if key != "value"}
         try:
             priors[_dotted(path)] = Prior(**{"origin": _origin_in(known.get("source")), **known})

@@ -134,6 +134,12 @@ def with_correlation(robot: Robot, keys: Sequence[str], matrix: ArrayLike, std: 
     joint = [*(earlier.get(key, beside[k]) for k, key in enumerate(old)), *(std or beside[len(old) :])]
     apart = not np.allclose(joint, beside, rtol=1e-9, atol=0.0)
     found = key_correlation(every, whole, tuple(map(float, joint)) if apart else None)
-    changed = robot.model_copy(update={"correlation": found if len(every) > 1 else None})
-    refuse_strange_keys(changed)
-    return changed
+    refuse_strange_keys(robot.model_copy(update={"correlation": found}))
+    return robot.model_copy(update={"correlation": found if apart else _without_the_free(found)})
+
+
+def _without_the_free(known: KeyCorrelation) -> KeyCorrelation | None:
+    """The correlations without numbers that are off for themselves; None where all are."""
+    matrix = known.of(known.keys)
+    keys = tuple(key for key, row in zip(known.keys, matrix, strict=True) if np.count_nonzero(row) > 1)
+    return key_correlation(keys, known.of(keys)) if keys else None
