@@ -27,9 +27,11 @@ _HOME = {
     "Run": "omnidyn.run",
     "acceleration": "omnidyn.model.dynamics",
     "axis_patterns": "omnidyn.model.deadzone",
+    "band": "omnidyn.simulation.band",
     "breakaway_voltage": "omnidyn.model.deadzone",
     "check": "omnidyn.findings.check",
     "compare": "omnidyn.comparison.compare",
+    "dead_zone": "omnidyn.model.dead_zone_answer",
     "dead_zone_map": "omnidyn.model.deadzone",
     "fit_output_error": "omnidyn.identification.output_error.fit",
     "fit_steady_state": "omnidyn.identification.steady.steady_state",
@@ -40,6 +42,7 @@ _HOME = {
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
+    "plausible": "omnidyn.model.uncertainty",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
     "read_log": "omnidyn.logs.read_log",
@@ -75,12 +78,15 @@ if TYPE_CHECKING:
     from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
+    from omnidyn.model.dead_zone_answer import dead_zone
     from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
     from omnidyn.model.dynamics import acceleration
     from omnidyn.model.robot import Robot
     from omnidyn.model.robot_file import load_robot, preset_names, save_robot
     from omnidyn.model.statespace import state_space
+    from omnidyn.model.uncertainty import plausible
     from omnidyn.run import Run
+    from omnidyn.simulation.band import band
     from omnidyn.simulation.simulate import simulate
 
 

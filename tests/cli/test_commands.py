@@ -79,8 +79,25 @@ def test_robots_lists_every_preset(call):
 def test_deadzone_has_the_paper_s_numbers(call):
     code, out, _ = call("deadzone", "axebot")
     assert code == 0
-    lines = [line.split() for line in out.splitlines()[2:]]
+    lines = [line.split() for line in out.splitlines()[2:5]]
     assert [(line[0], line[1]) for line in lines] == [("x", "0.670"), ("y", "0.528"), ("yaw", "0.174")]
+    assert [line[-1] for line in lines] == ["0.112", "0.088", "0.029"]  # duty of 6 V
+    assert "no interval: no number of the robot file has a std; identify writes them" in out
+
+
+def test_deadzone_has_intervals_and_names_the_guesses_behind_them(call):
+    _, out, _ = call("deadzone", "robotino")
+    assert "it rests on guesses: friction.direction.yaw_coulomb (60 % by its std)" in out
+    assert "the duty rests on guesses: motor.voltage_limit_V (8" in out
+    told = strict(call("deadzone", "robotino", "--json")[1])
+    x, _, yaw = told["dead_zone"]
+    # The ellipse is known to 0.2 of 42.5 N, the turn to 1.5 of 2.5 N m: a guess.
+    assert (x["interval_V"][1] - x["interval_V"][0]) / x["breakaway_scale_V"] < 0.03
+    assert (yaw["interval_V"][1] - yaw["interval_V"][0]) / yaw["breakaway_scale_V"] > 1.5
+    assert told["guesses"] == ["friction.direction.yaw_coulomb", "motor.voltage_limit_V"]
+    around = told["directions"]
+    assert len(around["direction_deg"]) == len(around["low_V"]) == len(around["high_V"]) == 72
+    assert "it rests on guesses" in call("deadzone", "robotino", "--json")[2]
 
 
 def test_deadzone_for_machines(call):
@@ -126,7 +143,7 @@ def test_a_dead_zone_beyond_the_motors_is_said(call, here):
     from omnidyn import save_robot
 
     save_robot(weak, here / "weak.toml")
-    lines = call("deadzone", "weak.toml")[1].splitlines()[2:]
+    lines = call("deadzone", "weak.toml")[1].splitlines()[2:5]
     assert [line.endswith("(beyond the limit of the motors)") for line in lines] == [True, True, False]
 
 
@@ -168,6 +185,46 @@ def test_simulate_writes_the_run_that_python_gives(call, here):
     held = read_voltages(here / "u.csv", 3)
     wanted = simulate(load_robot("axebot"), held.voltage, held.dt)
     assert read_run(here / "run.csv").pose.tobytes() == wanted.pose.tobytes()
+
+
+def test_simulate_with_a_band_writes_its_ends_beside_the_run(call, here):
+    from omnidyn import band, read_voltages, save_robot
+    from omnidyn.model.robot import Prior
+
+    known = load_robot("axebot").replace(priors={"friction.axes.coulomb[0]": Prior(std=0.1, origin="guess")})
+    save_robot(known, here / "known.toml")
+    code, out, err = call("simulate", "known.toml", "u.csv", "-o", "run.csv", "--band")
+    assert code == 0
+    assert "[..]: 95 %, 100 robots drawn from the std and correlations of 1 numbers of the file" in out
+    assert "the band rests on guesses: friction.axes.coulomb[0]" in out
+    assert "wrote run.csv, run-low.csv, run-high.csv" in err
+    held = read_voltages(here / "u.csv", 3)
+    wanted = band(known, held.voltage, held.dt)
+    for name, end in (("low", wanted.low), ("high", wanted.high)):
+        assert read_run(here / f"run-{name}.csv").twist.tobytes() == end.twist.tobytes()
+    code, _, err = call("simulate", "known.toml", "u.csv", "-o", "other.csv", "--band", "--json", "--force")
+    assert (here / "other-low.csv").exists()
+    (here / "run.csv").unlink()
+    code, _, err = call("simulate", "known.toml", "u.csv", "-o", "run.csv", "--band")
+    assert code == 3
+    assert "run-low.csv" in err
+    assert not (here / "run.csv").exists()
+
+
+def test_the_band_for_machines_and_its_refusals(call, here):
+    from omnidyn import save_robot
+    from omnidyn.model.robot import Prior
+
+    known = load_robot("axebot").replace(priors={"motor.resistance_ohm": Prior(std=0.1)})
+    save_robot(known, here / "known.toml")
+    told = strict(call("simulate", "known.toml", "u.csv", "--band", "--json")[1])
+    low, high = told["band"]["low"]["final_pose"]["x_m"], told["band"]["high"]["final_pose"]["x_m"]
+    assert low < told["final_pose"]["x_m"] < high
+    assert (told["band"]["draws"], told["band"]["output"], told["band"]["guesses"]) == (100, None, [])
+    assert call("simulate", "axebot", "u.csv", "-o", "-", "--band")[0] == 2
+    code, _, err = call("simulate", "axebot", "u.csv", "--band")
+    assert code == 4
+    assert "nothing says how far the numbers of this robot may be off; got axebot without any std" in err
 
 
 def test_without_an_output_nothing_is_written(call, here):

@@ -8,6 +8,7 @@ import pytest
 
 import omnidyn
 from omnidyn.cli import main
+from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from tests.support.compared_logs import clean_log, coulomb_times, noisy
 
@@ -41,6 +42,23 @@ def test_one_robot_one_log(call):
     assert float(rows["w3"][3]) == pytest.approx(0.3, rel=0.15)
     assert float(rows["vx"][6]) > 94.0
     assert "columns of run.csv" in err
+
+
+def test_a_band_in_words_and_values(call):
+    known = AXEBOT.replace(name="known", priors={"friction.axes.coulomb[0]": Prior(std=0.1, origin="guess")})
+    omnidyn.save_robot(known, "known.toml")
+    code, out, _ = call("run.csv", "--robot", "known.toml", "--band", "--picture", "band.svg")
+    assert code == 0
+    assert "95 % band of known, from the std of its file" in out
+    assert "warning: the band of known rests on guesses: friction.axes.coulomb[0]" in out
+    with open("band.svg", encoding="utf-8") as file:
+        assert "fill-opacity: 0.25" in file.read()
+    told = json.loads(call("run.csv", "--robot", "known.toml", "--band", "--json")[1])["bands"]["known"]
+    assert told["half_width"]["vx"] > 10.0 * told["half_width"]["vy"] >= 0.0
+    assert told["guesses"] == ["friction.axes.coulomb[0]"]
+    code, out, _ = call("run.csv", "--robot", "axebot", "--band")
+    assert code == 0
+    assert "warning: axebot has no band: no number of its file has a std" in out
 
 
 def test_for_machines(call):

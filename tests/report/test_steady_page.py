@@ -5,6 +5,7 @@ import pytest
 
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.study import identify_steady
+from omnidyn.model.dead_zone_answer import dead_zone
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.figures.shapes import shape_pictures
@@ -43,7 +44,18 @@ def page(study):
 def test_it_is_whole_and_every_id_is_there_once(page):
     ids = Reader(page).all("id")
     assert len(ids) == len(set(ids))
-    assert {"findings", "levels", "data", "shapes", "forces", "doubts", "next", "made", "force_polar"} <= set(ids)
+    assert {
+        "findings",
+        "levels",
+        "dead-zone",
+        "data",
+        "shapes",
+        "forces",
+        "doubts",
+        "next",
+        "made",
+        "force_polar",
+    } <= set(ids)
 
 
 def test_it_asks_for_nothing_from_outside_and_runs_nothing(page, motors):
@@ -54,6 +66,14 @@ def test_it_asks_for_nothing_from_outside_and_runs_nothing(page, motors):
         assert all(link.startswith(("data:", "#")) for link in links)
         assert not {"script", "iframe", "object", "embed", "form"} & set(read.tags)
         assert not [name for _, name, _ in read.values if name.startswith("on") or name == "style"]
+
+
+def test_each_group_has_its_dead_zone(page, study):
+    text = Reader(page).text
+    for estimate in study.estimates.values():
+        x = dead_zone(estimate.robot).rows[0]
+        assert x.scale_interval[0] < x.scale < x.scale_interval[1]
+        assert f"{x.scale_interval[0]:.3f} to {x.scale_interval[1]:.3f}" in text
 
 
 def test_names_of_groups_are_text(page):

@@ -29,6 +29,7 @@ def compare(
     ),
     picture: str = typer.Option("", "--picture", metavar="FILE", help="Measured and models, as .png or .svg."),
     show_channels: str = typer.Option("", "--show", metavar="W1,I1", help="Channels of the picture; default: three."),
+    band: bool = typer.Option(False, "--band", help="How far the model may be off by the std of its robot file."),
     segments: bool = typer.Option(False, "--segments", help="Show every segment too."),
     apply: str = typer.Option("", help="Input to replay: voltage, duty, wheel_speed_command or twist_command."),
     hold: float = typer.Option(0.2, min=0.0, help="How long a missing input keeps its last value [s]."),
@@ -63,7 +64,7 @@ def compare(
         files, robots = log_options.log_files(log), _robots(robot)
         runs, hashes = _runs(files, robots[0], options, sort, maps, now)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
-        found = _compared(robots, runs, apply, hold, current_unsigned, now)
+        found = _compared(robots, runs, apply, hold, current_unsigned, band, now)
     tell(found.document(segments), json, _record(robot, files, hashes))
     if picture:
         with progress("drawing"):
@@ -105,12 +106,19 @@ def _channels(
 
 
 def _compared(
-    robots: Sequence[Robot], runs: Sequence[Run], apply: str, hold: float, current_unsigned: bool, now: Any
+    robots: Sequence[Robot], runs: Sequence[Run], apply: str, hold: float, current_unsigned: bool, band: bool, now: Any
 ) -> Comparison:
     from omnidyn.comparison.compare import compare as compare_robots
 
     return compare_robots(
-        robots[0], runs, *robots[1:], apply=apply or None, hold=hold, current_unsigned=current_unsigned, progress=now
+        robots[0],
+        runs,
+        *robots[1:],
+        apply=apply or None,
+        hold=hold,
+        current_unsigned=current_unsigned,
+        progress=now,
+        band=band,
     )
 
 

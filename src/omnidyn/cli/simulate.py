@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -12,7 +14,10 @@ from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document
 
 if TYPE_CHECKING:
+    from omnidyn.logs.command_file import HeldCommands
+    from omnidyn.model.robot import Robot
     from omnidyn.run import Run
+    from omnidyn.simulation.band import Band
 
 DEFAULT_MAX_STEPS = 1_000_000
 
@@ -29,6 +34,9 @@ def simulate(
     twist: str = typer.Option("0,0,0", metavar="VX,VY,W", help="Where it starts [m/s, m/s, rad/s]."),
     pose: str = typer.Option("0,0,0", metavar="X,Y,HEADING", help="Where it starts [m, m, rad]."),
     tol: float = typer.Option(1e-6, help="Error of the implicit engine [m/s]; 0 takes one fixed step a row."),
+    band: bool = typer.Option(
+        False, "--band", help="How far it may be off by the std of the robot file; two files more."
+    ),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="The summary for machines."),
 ) -> None:
@@ -40,57 +48,95 @@ def simulate(
     from omnidyn.cli.terminal.numbers import three
 
     start_twist, start_pose = three("--twist", twist), three("--pose", pose)
+    if out == "-" and band:
+        raise typer.BadParameter("--band writes two more files beside OUT; -o - has no place for them.")
     # -o - and --json both want stdout
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
-    _refuse_early(robot, voltages, "" if out == "-" else out, force)
+    files = _ends_of(out) if band and out else []
+    _refuse_early(robot, voltages, ["" if path == "-" else path for path in (out, *files)], force)
     with progress("simulating (the first run of an engine compiles it)") as now:
-        run, record, guesses = _simulated(robot, voltages, duration, max_steps, start_twist, start_pose, tol)
+        job = _Job.read(robot, voltages, duration, max_steps)
+        run = job.run(twist=start_twist, pose=start_pose, tol=tol or None)
+        ends = None
+        if band:
+            now("simulating plausible robots")
+            ends = job.band(run, twist=start_twist, pose=start_pose, tol=tol or None)
         now("writing the run")
         _write(run, out, force)
+        for end, path in zip((ends.low, ends.high) if ends else (), files, strict=False):
+            _write(end, path, force)
     for warning in run.warnings:
         say(f"omnidyn: warning: {warning}")
     if out != "-":
-        tell(_document(run, guesses), json, record, output=out or None)
+        tell(_document(run, job, ends, files), json, job.record, output=out or None)
     if out != "-" and not json:
-        say(f"omnidyn: wrote {out}" if out else "omnidyn: nothing written; -o FILE writes the run")
+        say(f"omnidyn: wrote {', '.join((out, *files))}" if out else "omnidyn: nothing written; -o FILE writes the run")
 
 
-def _refuse_early(robot: str, voltages: str, out: str, force: bool) -> None:
+def _ends_of(out: str) -> list[str]:
+    """Where the ends of a band are written: beside the run."""
+    path = Path(out)
+    return [str(path.with_name(f"{path.stem}-{end}{path.suffix}")) for end in ("low", "high")]
+
+
+def _refuse_early(robot: str, voltages: str, outputs: list[str], force: bool) -> None:
     """Before any work: an input that is not there, a place where the run could not be written in the end."""
     from omnidyn.cli.log_options import keep_inputs
     from omnidyn.files import check_output
 
-    keep_inputs([], [robot], [voltages], out)
-    if out:
+    keep_inputs([], [robot], [voltages], *outputs)
+    for path in filter(None, outputs):
         from omnidyn.logs.run_file import check_format
 
-        check_format(out)
-        check_output(out, force)
+        check_format(path)
+        check_output(path, force)
 
 
-def _simulated(
-    robot: str,
-    voltages: str,
-    duration: float | None,
-    max_steps: int,
-    twist: list[float],
-    pose: list[float],
-    tol: float,
-) -> tuple[Run, dict[str, Any], list[str]]:
-    """The run, the record of what it was made from, and what of that is a guess."""
-    from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.logs.command_file import read_commands
-    from omnidyn.model.first_guess import rests_on
-    from omnidyn.model.robot_file import load_robot
-    from omnidyn.simulation.simulate import simulate as simulate_robot
+@dataclass(frozen=True)
+class _Job:
+    """What is simulated: the robot, its commands, and the record of what both were made from."""
 
-    loaded = load_robot(robot)
-    held = read_commands(voltages, loaded.wheels.count, duration, max_steps)
-    record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": held.sha256}])
-    command = {held.kind: held.rows, "supply": held.supply}
-    run = simulate_robot(loaded, dt=held.dt, twist=twist, pose=pose, tol=tol or None, **command)
-    return run.replace(t=run.t + held.t0, warnings=(*held.notes, *run.warnings)), record, rests_on(loaded)
+    robot: Robot
+    held: HeldCommands
+    record: dict[str, Any]
+
+    @classmethod
+    def read(cls, robot: str, voltages: str, duration: float | None, max_steps: int) -> _Job:
+        """From the files that the command names."""
+        from omnidyn.cli.terminal.session import provenance, robot_input
+        from omnidyn.logs.command_file import read_commands
+        from omnidyn.model.robot_file import load_robot
+
+        loaded = load_robot(robot)
+        held = read_commands(voltages, loaded.wheels.count, duration, max_steps)
+        record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": held.sha256}])
+        return cls(loaded, held, record)
+
+    @property
+    def guesses(self) -> list[str]:
+        """What of the robot is a guess."""
+        from omnidyn.model.first_guess import rests_on
+
+        return rests_on(self.robot)
+
+    @property
+    def _commands(self) -> dict[str, Any]:
+        return {self.held.kind: self.held.rows, "supply": self.held.supply, "dt": self.held.dt}
+
+    def run(self, **options: Any) -> Run:
+        """What the robot does."""
+        from omnidyn.simulation.simulate import simulate as simulate_robot
+
+        run = simulate_robot(self.robot, **self._commands, **options)
+        return run.replace(t=run.t + self.held.t0, warnings=(*self.held.notes, *run.warnings))
+
+    def band(self, run: Run, **options: Any) -> Band:
+        """Between which lines it may lie, at the times of the run."""
+        from omnidyn.simulation.band import band as band_of_run
+
+        found = band_of_run(self.robot, **self._commands, **options)
+        return found._replace(low=found.low.replace(t=run.t), high=found.high.replace(t=run.t))
 
 
 def _write(run: Run, out: str, force: bool) -> None:
@@ -102,30 +148,61 @@ def _write(run: Run, out: str, force: bool) -> None:
         write_run(run, out, force)
 
 
-def _document(run: Run, guesses: list[str]) -> Document:
+def _document(run: Run, job: _Job, ends: Band | None, files: list[str]) -> Document:
     """What one wants to know first about a run."""
     from omnidyn.model.first_guess import guess_line
 
     assert run.twist is not None
-    assert run.pose is not None
     moved, duration = bool(run.twist.any()), run.t[-1] - run.t[0]
-    vx, vy, omega = run.twist[-1].tolist()
-    x, y, heading = run.pose[-1].tolist()
     data = {
         "source": run.source,
         "samples": len(run),
         "duration_s": duration,
         "moved": moved,
-        "final_twist": {"vx_m_s": vx, "vy_m_s": vy, "omega_rad_s": omega},
-        "final_pose": {"x_m": x, "y_m": y, "heading_rad": heading},
-        "rests_on_guesses": guesses,
+        **_last(run),
+        "rests_on_guesses": job.guesses,
         "warnings": run.warnings,
     }
     still = "it never moved: the voltages stay within the dead zone (see: omnidyn deadzone)"
     lines = [
         f"{run.source}: {len(run)} samples, {duration:.6g} s",
         *([] if moved else [still]),
-        f"at the end   vx {vx:.4f} m/s   vy {vy:.4f} m/s   omega {omega:.4f} rad/s",
-        f"             x {x:.4f} m   y {y:.4f} m   heading {heading:.4f} rad",
+        *_last_lines(run, ends),
     ]
-    return Document([*lines, *filter(None, [guess_line(guesses)])], data)
+    return _with_band([*lines, *filter(None, [guess_line(job.guesses)])], data, job.robot, ends, files)
+
+
+def _last(run: Run) -> dict[str, dict[str, float]]:
+    """Where a run ends."""
+    assert run.twist is not None
+    assert run.pose is not None
+    twist = zip(("vx_m_s", "vy_m_s", "omega_rad_s"), run.twist[-1].tolist(), strict=True)
+    pose = zip(("x_m", "y_m", "heading_rad"), run.pose[-1].tolist(), strict=True)
+    return {"final_twist": dict(twist), "final_pose": dict(pose)}
+
+
+def _last_lines(run: Run, ends: Band | None) -> list[str]:
+    """Where it ends, in words; with a band, its ends in brackets."""
+    units = {"vx": "m/s", "vy": "m/s", "omega": "rad/s", "x": "m", "y": "m", "heading": "rad"}
+    runs = [run, *((ends.low, ends.high) if ends else ())]
+    values = [[value for part in _last(each).values() for value in part.values()] for each in runs]
+    words = [
+        f"{name} {own:.4f}{f' [{sides[0]:.4f}, {sides[1]:.4f}]' if sides else ''} {unit}"
+        for (name, unit), (own, *sides) in zip(units.items(), zip(*values, strict=True), strict=True)
+    ]
+    return [f"at the end   {'   '.join(words[:3])}", f"             {'   '.join(words[3:])}"]
+
+
+def _with_band(lines: list[str], data: dict[str, Any], robot: Robot, ends: Band | None, files: list[str]) -> Document:
+    """The summary, with what its band rests on."""
+    if ends is None:
+        return Document(lines, data)
+    from omnidyn.model.told import told
+
+    known = told(robot)
+    words = (
+        f"[..]: 95 %, {ends.draws} robots drawn from the std and correlations of {len(known.keys)} numbers of the file"
+    )
+    sides = {"low": _last(ends.low), "high": _last(ends.high)}
+    band = {"draws": ends.draws, **sides, "guesses": list(known.guessed), "output": files or None}
+    return Document([*lines, words], {**data, "band": band})

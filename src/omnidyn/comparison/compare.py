@@ -8,6 +8,7 @@ import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.comparison.aligned import errors_for_whiteness
+from omnidyn.comparison.bands import with_bands
 from omnidyn.comparison.difference import ModelDifference, difference
 from omnidyn.comparison.metrics import Metrics, metrics
 from omnidyn.comparison.replay import HOLD, Replay, choose_input, refuse_other_robot, replay
@@ -26,7 +27,7 @@ ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))
 def compare(
     robot: Robot, run: Run | Sequence[Run], other: Robot | None = None, *, apply: str | None = None,
     hold: float = HOLD, current_unsigned: bool = False, tol: float | None = TOLERANCE, seed: int = 0,
-    progress: Callable[[str], object] | None = None,
+    progress: Callable[[str], object] | None = None, band: bool = False,
 ) -> Comparison:  # fmt: skip
     """Replay logs against one robot, or two, and measure how near each comes.
 
@@ -35,6 +36,7 @@ def compare(
     run: one Run or several. other: a second robot under the same inputs. apply: another input than the first that was
     logged. hold: how long a missing input keeps its value [s]. current_unsigned: compare currents by size, for a
     sensor without sign. tol: as in `simulate`. seed: of the bootstrap. progress: is told what is being replayed.
+    band: how far each model may be off by the std of its robot file, from a hundred plausible robots (`with_bands`).
     Raises InputError when a log does not fit a robot, InsufficientDataError when there is nothing to compare.
     """
     other_robot = (Robot, type(None))
@@ -54,7 +56,7 @@ def compare(
     kept = tuple(key for key in channels if all(key in found for found in overall.values()))
     if not kept:
         raise InsufficientDataError("no measured value falls into a replayed segment", expected="speeds or a pose")
-    return Comparison(
+    found = Comparison(
         robots=tuple(robots),
         measured=runs,
         simulated={name: tuple(part.run for part in parts) for name, parts in replays.items()},
@@ -68,6 +70,11 @@ def compare(
         rests_on={name: tuple(rests_on(model)) for name, model in robots.items()},
         warnings=(*_warnings(runs, replays), *_sign_doubts(runs, traces, current_unsigned)),
     )
+    if not band:
+        return found
+    if progress is not None:
+        progress("replaying plausible robots for the band")
+    return with_bands(found, [*robots.values()], apply=apply, hold=hold, seed=seed)
 
 
 def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | None = None) -> tuple[str, ...]:

@@ -6,14 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from omnidyn.arrays import FloatArray
 from omnidyn.comparison import text
 from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
 from omnidyn.document import Document, Part, Points, Words
+from omnidyn.logs.channels import place
 from omnidyn.model.first_guess import guess_line
 from omnidyn.run import Run
 from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.simulation.band import Band
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +50,8 @@ class Comparison(Shown):
     overall: robot -> component -> Metrics over all samples. by_segment: robot -> component -> Metrics of each segment,
     None where it has no sample. difference: component -> which of two robots is better; empty for one robot.
     current_unsigned: whether currents were compared by size. rests_on: robot -> what of it is a guess.
-    warnings: what a reader must know, in words.
+    warnings: what a reader must know, in words. bands: robot -> log -> Band of its run, where that was asked for and
+    its file has a std.
     """
 
     robots: tuple[str, ...]
@@ -60,6 +66,8 @@ class Comparison(Shown):
     current_unsigned: bool = False
     rests_on: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    bands: Mapping[str, Mapping[int, Band]] = field(default_factory=dict)
+    guesses: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{name} {value:.3g} {unit(name)}" for name, value in self.rmse.items())
@@ -98,6 +106,28 @@ class Comparison(Shown):
         real, ours = self.measured[segment.log], self.simulated[robot][segment.log]
         return trace_of(component, real, ours, segment.rows, self.current_unsigned)
 
+    def band(self, robot: str, component: str, segment: Segment) -> tuple[FloatArray, FloatArray] | None:
+        """(low, high) end of the band of one component over one segment, None where there is none."""
+        own = self.bands.get(robot, {}).get(segment.log)
+        if own is None:
+            return None
+        real = self.measured[segment.log]
+        low, high = (trace_of(component, real, end, segment.rows).model for end in (own.low, own.high))
+        if self.current_unsigned and (place(component) or ("",))[0] == "current":
+            inside = (low < 0.0) & (high > 0.0)
+            low, high = np.where(inside, 0.0, np.minimum(abs(low), abs(high))), np.maximum(abs(low), abs(high))
+        return low, high
+
+    def half_widths(self, robot: str) -> dict[str, float]:
+        """Component -> mean half width of its band, in SI units; nothing where there is no band."""
+        found = {}
+        for name in self.channels:
+            ends = [ends for segment in self.segments if (ends := self.band(robot, name, segment)) is not None]
+            width = np.concatenate([0.5 * (high - low) for low, high in ends]) if ends else np.zeros(0)
+            if np.isfinite(width).any():
+                found[name] = float(np.nanmean(width))
+        return found
+
     def summary(self, segments: bool = False) -> str:
         """The comparison as plain tables, for reading; with `segments`, each segment too. ASCII only."""
         return self.document(segments).to_text() + "\n"
@@ -110,6 +140,9 @@ class Comparison(Shown):
             for k in range(len(self.segments) if segments else 0):
                 of_segment = {name: found[k] for name, found in self.by_segment[robot].items()}
                 parts += [self._name(k), text.metrics_table(self.channels, of_segment, head=()), ""]
+        for robot in self.bands:
+            told = f"95 % band of {robot}, from the std of its file: mean half width beside the error"
+            parts += [told, "", text.band_table(self.half_widths(robot), self.overall[robot]), ""]
         if self.difference:
             first, second = self.robots
             parts += [
@@ -156,6 +189,10 @@ class Comparison(Shown):
             "units": {name: unit(name) for name in self.channels},
             "robots": robots,
             "difference": {key: {**asdict(each), "better": self.better(key)} for key, each in self.difference.items()},
+            "bands": {
+                name: {"half_width": self.half_widths(name), "guesses": list(self.guesses.get(name, ()))}
+                for name in self.bands
+            },
             "current_unsigned": self.current_unsigned,
             "warnings": list(self.warnings),
         }

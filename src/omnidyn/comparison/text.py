@@ -27,6 +27,12 @@ def _row(name: str, each: Metrics | None) -> tuple[str, ...]:
     )  # fmt: skip
 
 
+def band_table(half_widths: Mapping[str, float], found: Mapping[str, Metrics]) -> Table:
+    """How wide the band of a model is, a row per component, beside how far the model is off."""
+    rows = [(name, unit(name), f"{half:.4g}", f"{found[name].rmse:.4g}") for name, half in half_widths.items()]
+    return Table(("", "unit", "half width", "rmse"), rows, "<<>", (8, 6, 10, 9))
+
+
 def difference_table(robots: Sequence[str], found: Mapping[str, ModelDifference]) -> Table:
     """Which of two robots is better, a row per component."""
     rows = []

@@ -7,7 +7,14 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import acceleration, axes_hold_alone, axes_move_alone, drive_wrench, linear_part
+from omnidyn.model.dynamics import (
+    acceleration,
+    axes_hold_alone,
+    axes_move_alone,
+    drive_wrench,
+    holds_under,
+    linear_part,
+)
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
 
@@ -40,10 +47,11 @@ def axis_patterns(robot: Robot) -> FloatArray:
     return _scaled(_voltage_per_wrench(robot).T)
 
 
-def breakaway_voltage(robot: Robot, pattern: ArrayLike) -> FloatArray:
+def breakaway_voltage(robot: Robot, pattern: ArrayLike, halvings: int = BISECTIONS) -> FloatArray:
     """The scale s >= 0 [V] up to which the robot stays at rest under the voltage s * pattern.
 
     `pattern` has shape (*batch, wheels), no unit; returns (*batch,); infinite where the pattern never moves it.
+    halvings: of where there is no closed form; the share of the scale that each leaves open is half of the last one's.
     Raises InputError when its last axis is not one entry per wheel.
     """
     pattern = _patterns(robot, pattern)
@@ -53,7 +61,7 @@ def breakaway_voltage(robot: Robot, pattern: ArrayLike) -> FloatArray:
         with np.errstate(divide="ignore", invalid="ignore"):
             scale = np.where(wrench_per_volt > 1e-12 * breakaway, breakaway / wrench_per_volt, np.inf)
         return scale.min(axis=-1)
-    return _bisect(robot, pattern.reshape(-1, pattern.shape[-1])).reshape(pattern.shape[:-1])
+    return _bisect(robot, pattern.reshape(-1, pattern.shape[-1]), halvings).reshape(pattern.shape[:-1])
 
 
 def dead_zone_map(robot: Robot, directions: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -106,23 +114,16 @@ def _patterns(robot: Robot, pattern: ArrayLike) -> FloatArray:
     return pattern
 
 
-def _held(robot: Robot, voltage: FloatArray) -> BoolArray:
-    """Whether nothing at all moves, to the last bit. voltage: (k, n). Shape (k,)."""
-    at_rest = np.zeros((len(voltage), 3))
-    if axes_hold_alone(robot):
-        return np.all(robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage)), axis=-1)
-    return np.all(acceleration(robot, at_rest, voltage) == 0.0, axis=-1)
-
-
-def _bisect(robot: Robot, patterns: FloatArray) -> FloatArray:
+def _bisect(robot: Robot, patterns: FloatArray, halvings: int) -> FloatArray:
     """The largest scale that holds, by doubling and bisection on an exact test. Shape (k,)."""
+    holds_at = holds_under(robot)
     low, high = np.zeros(len(patterns)), np.full(len(patterns), 1e-3)
-    still = _held(robot, high[:, None] * patterns)
+    still = holds_at(high[:, None] * patterns)
     while still.any() and high.max() < HIGHEST:
         low, high = np.where(still, high, low), np.where(still, 2.0 * high, high)
-        still &= _held(robot, high[:, None] * patterns)
-    for _ in range(BISECTIONS):
+        still &= holds_at(high[:, None] * patterns)
+    for _ in range(halvings):
         middle = 0.5 * (low + high)
-        holds = _held(robot, middle[:, None] * patterns)
+        holds = holds_at(middle[:, None] * patterns)
         low, high = np.where(holds, middle, low), np.where(holds, high, middle)
     return np.where(still, np.inf, low)

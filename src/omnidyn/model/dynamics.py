@@ -11,10 +11,12 @@ The terms in brackets belong to a turning body frame; eqs (4) (5) leave them out
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.mass import masses_couple, per_mass
@@ -81,6 +83,25 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
     return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(
         *batch, 3
     )
+
+
+def holds_under(robot: Robot) -> Callable[[FloatArray], BoolArray]:
+    """A test of whether nothing at all moves from rest under voltages [V], to the last bit: (k, wheels) -> (k,).
+
+    For many tests of one robot: what they share is made once.
+    """
+    if axes_hold_alone(robot):
+        return lambda voltage: np.all(
+            robot.friction.axes.holds(drive_wrench(robot, np.zeros((len(voltage), 3)), voltage)), axis=-1
+        )
+    numbers = plant(robot.model_copy(update={"motor": robot.motor.model_copy(update={"electrical": QUASI_STATIC})}))
+    at_rest = moving_states(numbers, np.zeros((1, N_AXES)))
+
+    def holds(voltage: FloatArray) -> BoolArray:
+        volts = np.ascontiguousarray(voltage, dtype=float)
+        return np.all(accelerations(numbers, np.tile(at_rest, (len(volts), 1)), volts) == 0.0, axis=-1)
+
+    return holds
 
 
 def _vectors(name: str, value: ArrayLike, size: int) -> FloatArray:

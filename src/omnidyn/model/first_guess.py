@@ -52,7 +52,6 @@ SPREAD = {
 }
 FRICTION_SPREAD = 1.0
 LIKE_SPREAD = 0.3  # of what is taken over from another robot
-WITH_THE_FIT = "goes with a fit"  # source of a guess that a fit has changed together with others
 EXACT = ("wheels.azimuth_deg", "wheels.roller_angle_deg")  # a drawing, not a measurement
 
 _COULOMB, _VISCOUS = f"{FRICTION_SHARE:g} of the weight", f"{VISCOUS_SHARE:g} C at 1 m/s"
@@ -304,7 +303,7 @@ def rests_on(robot: Robot, at_rest: bool = False) -> list[str]:
     """
     kept = {
         key: prior for key, prior in robot.priors.items()
-        if not prior.source.startswith(WITH_THE_FIT) and not (at_rest and _shows_in_motion(Key.parse(key)))
+        if (prior.guessed or prior.origin != GUESS) and not (at_rest and _shows_in_motion(Key.parse(key)))
     }  # fmt: skip
     return guessed(robot.model_copy(update={"priors": kept}))
 

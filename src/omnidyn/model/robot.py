@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from omnidyn.document import Document
 from omnidyn.errors import printable
+from omnidyn.model.correlation import KeyCorrelation
 from omnidyn.model.drive import Drive
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor, mass_at_rim
@@ -48,6 +49,9 @@ IDENTIFIED: Origin = "identified"
 IMPORTED: Origin = "imported"
 
 
+WITH_THE_FIT = "goes with a fit"  # source of a guess that a fit has changed together with others
+
+
 class Prior(Value):
     """What is known about one number: its standard deviation, and where it comes from, in words and as a value."""
 
@@ -57,11 +61,20 @@ class Prior(Value):
     source: Text = ""
     origin: Annotated[Origin, Field(description="where it comes from")] = GIVEN
 
+    @property
+    def guessed(self) -> bool:
+        """Whether an answer that takes this number rests on a guess.
+
+        Numbers that only show together, and were fitted together, are right as the sum or product that answers take.
+        """
+        return self.origin == GUESS and not self.source.startswith(WITH_THE_FIT)
+
 
 class Robot(Shown, Value):
     """A robot: all that eqs (1)-(14) need. Frozen; `replace` makes a changed copy.
 
     priors: key of the robot file, such as "motor.resistance_ohm" or "friction.axes.coulomb[0]", -> Prior.
+    correlation: which of these numbers are off together; numbers that a change took away have no part in it.
     """
 
     name: Annotated[Text, Field(min_length=1), AfterValidator(printable)]
@@ -71,6 +84,7 @@ class Robot(Shown, Value):
     motor: Motor
     drive: Drive = Drive()
     friction: Friction = Friction()
+    correlation: Annotated[KeyCorrelation | None, Field(description="which numbers are off together")] = None
     priors: Annotated[dict[str, Prior], Field(exclude=True, default_factory=dict)]
 
     @model_validator(mode="after")

@@ -17,8 +17,10 @@ from omnidyn.model.presets import PRESETS as PRESETS
 from omnidyn.model.presets import preset_names as preset_names
 from omnidyn.model.presets import robot_path
 from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, SCHEMA, Origin, Prior, Robot
+from omnidyn.model.told import correlation_of, refuse_strange_keys
 from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 
+TOGETHER = "correlation"
 # Keys of the schema for which no law exists yet. They are refused by name: never ignored, never "unknown".
 PENDING = frozenset(
     {"wheels.traction_mu"}
@@ -69,9 +71,11 @@ def robot_from_dict(document: dict[str, Any]) -> Robot:
     if "priors" in plain:  # a field of Robot, not a key of the file
         raise InputError("unknown key", got="priors", expected="{ value, std, source, origin } at the number itself")
     try:
-        return Robot.model_validate({**plain, "priors": priors}, by_alias=True, by_name=False)
+        robot = Robot.model_validate({**plain, "priors": priors}, by_alias=True, by_name=False)
     except ValidationError as error:
         raise from_validation(error, Robot) from None
+    refuse_strange_keys(robot)
+    return robot
 
 
 def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Prior]) -> Any:
@@ -84,7 +88,8 @@ def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Pr
             remedy="remove it, or use a later version",
             where=key_path(path),
         )
-    if isinstance(node, dict) and "value" in node and table_at(Robot, path) is None:
+    known_of = isinstance(node, dict) and "value" in node and table_at(Robot, path) is None
+    if known_of and path[0] != TOGETHER:  # nothing is known of a correlation
         known = {key: value for key, value in node.items() if key != "value"}
         try:
             priors[_dotted(path)] = Prior(**{"origin": _origin_in(known.get("source")), **known})
@@ -126,7 +131,7 @@ def robot_to_toml(robot: Robot) -> str:
     if robot.source:
         head.append(f"source = {toml_literal(robot.source)}")
     tables = [_table(name, getattr(robot, name), robot.priors) for name in TABLES]
-    return "\n".join(head) + "\n" + "".join(tables)
+    return "\n".join(head) + "\n" + "".join(tables) + _together(robot)
 
 
 def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
@@ -143,6 +148,17 @@ def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
             note = type(value).model_fields[field].description
             lines.append(f"{key} = {_with_prior(content, path, priors)}" + (f"  # {note}" if note else ""))
     return ("\n[" + name + "]\n" + "\n".join(lines) + "\n" if lines else "") + inner
+
+
+def _together(robot: Robot) -> str:
+    """The table of correlations, of the numbers that the robot has; a key and a row each on a line of its own."""
+    known = correlation_of(robot)
+    if known is None:
+        return ""
+    keys = "".join(f"  {toml_literal(key)},\n" for key in known.keys)
+    rows = "".join(f"  {toml_literal(row)},\n" for row in known.matrix)
+    std = "" if known.std is None else f"std = {toml_literal(known.std)}  # of the fit\n"
+    return f"\n[correlation]  # which numbers are off together\nkeys = [\n{keys}]\nmatrix = [\n{rows}]\n{std}"
 
 
 def _with_prior(content: Any, path: str, priors: dict[str, Prior]) -> str:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+from omnidyn.comparison.bands import FEW, with_bands
+from omnidyn.comparison.result import Comparison
 from omnidyn.document import Points
 from omnidyn.identification.fit_document import difference_table, number_table, verdict_table
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import Validation, output_name
 from omnidyn.logs.path import Path, body_twist, driven, path_of
+from omnidyn.model.robot import Robot
+from omnidyn.model.uncertainty import DRAWS
+from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
@@ -20,6 +26,7 @@ from omnidyn.report.html import Section, bullets, content, figure, page, paragra
 from omnidyn.report.plots import draw_estimates
 from omnidyn.report.style import Picture
 from omnidyn.run import Run
+from omnidyn.simulation.exact.march import why_not_exact
 
 Fits = Mapping[str, OutputErrorEstimate]
 
@@ -45,8 +52,9 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
         section("findings", "What the data say", Points(_findings(fits, validations))),
         section("doubts", "Doubts", Points(doubts), none="None."),
         section("next", "What to measure next", Points(advice), none="Nothing: every number is well determined."),
-        Section("runs", "Measured and model", _each(validations, _runs)),
+        Section("runs", "Measured and model", _each(validations, partial(_runs, fits))),
         section("friction", "Friction against speed", friction),
+        dead_zone_section({group: fit.robot for group, fit in fits.items()}),
         *([section("path", "Where the logs went", draw_path(travelled))] if travelled else []),
         Section("residuals", "What the model leaves", residuals),
         Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
@@ -79,10 +87,11 @@ def _each(parts: Mapping[str, Any], content: Callable[[str, Any], str]) -> str:
     return "".join(paragraph(f"{group}:") + content(group, each) for group, each in parts.items())
 
 
-def _runs(group: str, validation: Validation) -> str:
-    pictures = [_renamed(draw_overlay(validation.fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
+def _runs(fits: Fits, group: str, validation: Validation) -> str:
+    robot = (fits.get(group) or next(iter(fits.values()))).robot
+    pictures = [_renamed(_overlay(robot, validation.fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
     if validation.held_out is not None:
-        pictures.append(_renamed(draw_overlay(validation.held_out), f"overlay-held-out{group}", "on a log held out"))
+        pictures.append(_renamed(_overlay(robot, validation.held_out), f"overlay-held-out{group}", "on a log held out"))
     return content(*pictures)
 
 
@@ -104,6 +113,12 @@ def _driven(fits: Fits, validations: Mapping[str, Validation]) -> list[tuple[flo
 def _paths(fits: Fits, validations: Mapping[str, Validation]) -> list[Path]:
     every = (path_of(run, fits[group].robot) for group, run in _measured(validations))
     return [path for path in every if path is not None]
+
+
+def _overlay(robot: Robot, found: Comparison) -> Picture:
+    """The first log, with the band of the model; fewer draws where the engine is slow."""
+    draws = FEW if why_not_exact(robot) else DRAWS
+    return draw_overlay(with_bands(found, [robot], logs=(0,), draws=draws))
 
 
 def _renamed(drawn: Picture, name: str, words: str) -> Picture:

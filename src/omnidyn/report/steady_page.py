@@ -10,6 +10,7 @@ from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.steady.study_words import FORCES
 from omnidyn.logs.path import driven
+from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.shapes import shape_pictures
 from omnidyn.report.html import page, section
 from omnidyn.report.plots import draw_estimates
@@ -31,6 +32,7 @@ def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
         section("friction", "Friction against speed", draw_estimates(study.estimates, driven=driven([points.twist]))),
         section("shapes", "Which shape", errors, told["shapes"]),
         section("levels", "Friction, with 95 % intervals", told["levels"]),
+        dead_zone_section({group: each.robot for group, each in study.estimates.items()}),
         section("data", "What was used", told["travel"]),
     ]
     return page(f"{study.robot.name}: friction from logs", introduction, sections, provenance)

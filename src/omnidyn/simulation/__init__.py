@@ -2,5 +2,5 @@
 
 simulate is the door; commands makes volts of what was commanded, speed_loop is the firmware's, programs are commands
 to learn from, pose integrates the twist. Two engines: exact/ for the paper's law, implicit/ for all others.
-sensitivity/ gives the derivatives of a run.
+sensitivity/ gives the derivatives of a run, band how far it may be off.
 """

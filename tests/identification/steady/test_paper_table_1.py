@@ -130,7 +130,9 @@ def test_the_robot_carries_the_numbers_their_errors_and_their_origin(robot, tmp_
     assert back.priors["friction.axes.breakaway[0]"].std is None
     assert "lower bound from rest" in back.priors["friction.axes.breakaway[0]"].source
     assert back.motor == robot.motor
-    assert back.replace(friction=robot.friction, priors=robot.priors) == robot
+    assert back.replace(friction=robot.friction, priors=robot.priors, correlation=None) == robot
+    names = fit.correlation.names
+    np.testing.assert_allclose(back.correlation.of(names), fit.correlation.matrix, atol=1e-9)
 
 
 def test_the_rows_of_w_are_faster_than_the_motor_can_turn(robot):

@@ -33,6 +33,7 @@ from omnidyn.identification.motors.log import HEADING
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
 from omnidyn.model.robot import Prior, Robot
+from omnidyn.model.told import with_correlation
 from omnidyn.model.wheels import per_wheel
 
 COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"
@@ -91,7 +92,9 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
         words.append(
             "the friction of the floor is as it was: if it was fitted with that of the wheels in it, fit it anew"
         )
-    return MotorNumbers(with_priors(robot, priors), value, std, tuple(words))
+    # Motors that were measured anew, each by itself, are no longer off together with what an earlier fit found.
+    told = with_correlation(with_priors(robot, priors), [*priors], np.eye(len(priors)))
+    return MotorNumbers(told, value, std, tuple(words))
 
 
 def _supply(study: MotorStudy, robot: Robot) -> tuple[float, list[str]]:

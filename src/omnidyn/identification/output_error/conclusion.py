@@ -16,6 +16,7 @@ from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.combinations import combinations
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS, implausible
+from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import difference_noise
@@ -23,12 +24,13 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
-from omnidyn.model.first_guess import WITH_THE_FIT
 from omnidyn.model.keys import VISCOUS, Key, with_priors
-from omnidyn.model.robot import Prior, Robot
+from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
+from omnidyn.model.told import with_correlation
 
 IN_METRES = (("twist", 0), ("twist", 1), ("position", 0), ("position", 1))  # outputs that know of no wheel radius
 LEAST_SHARE = 1e-4  # of a lost direction that a number lost with it must have to be named
+LARGEST_STD = 1e9  # what a robot file takes
 HALF, ROUGH = 0.5, 3.0  # of an output's spread, and times its noise from row to row: errors beyond are no noise
 SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted to Gaussian noise of std 1
 
@@ -62,7 +64,9 @@ def conclude(
     fitted = problem.parameters[:own]
     warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-        robot=_with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels),
+        robot=_together(
+            _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels), fitted, std, known
+        ),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
@@ -268,6 +272,21 @@ def _correlation(names: Sequence[str], known: Trust) -> Correlation:
     matrix = np.where(np.outer(finite, finite), known.covariance, 0.0) / np.outer(size, size)
     np.fill_diagonal(matrix, 1.0)
     return Correlation(tuple(names), matrix)
+
+
+def _together(robot: Robot, fitted: Sequence[Parameter], std: Mapping[str, float], known: Trust) -> Robot:
+    """The robot with what the fit knows of how its numbers are off together; what is tied to a number goes with it.
+
+    Numbers without a std of this fit have no part in it.
+    """
+    tied = [
+        (j, key, std[p.name] * factor) for j, p in enumerate(fitted)
+        if 0.0 < std[p.name] < LARGEST_STD and 0.0 < known.std[j] < math.inf
+        for key, factor in ((p.name, 1.0), *p.also)
+    ]  # fmt: skip
+    at = [j for j, _, _ in tied]
+    matrix = _correlation([p.name for p in fitted], known).matrix[np.ix_(at, at)]
+    return with_correlation(robot, [key for _, key, _ in tied], matrix, [spread for *_, spread in tied])
 
 
 def _warnings(

@@ -24,6 +24,7 @@ from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.friction import AxesFriction
 from omnidyn.model.keys import unit, with_priors
 from omnidyn.model.robot import Robot
+from omnidyn.model.told import with_correlation
 
 REST = ("bound", "line", "ignore")
 MAX_FRICTION = 1e6  # what a robot file takes
@@ -240,7 +241,9 @@ def _robot(robot: Robot, friction: AxesFriction, std: dict[str, float], found: _
     for axis, bound in found.bounds.items():
         if friction.breakaway is not None and friction.breakaway[axis] == bound:
             known[_breakaway(axis)] = identified(None, f"lower bound from rest, {data}")
-    return with_priors(robot.replace(friction=robot.friction.replace(axes=friction)), known)
+    fitted = with_priors(robot.replace(friction=robot.friction.replace(axes=friction)), known)
+    together = _correlation(found.lines)
+    return with_correlation(fitted, together.names, together.matrix)
 
 
 def _correlation(lines: dict[int, Line]) -> Correlation:

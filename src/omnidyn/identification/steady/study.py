@@ -35,6 +35,7 @@ from omnidyn.model.keys import AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import GUESS, Prior, Robot
+from omnidyn.model.told import with_correlation
 from omnidyn.run import Run
 from omnidyn.statistics import t_quantile
 
@@ -206,12 +207,14 @@ def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str
     turning = is_turning(robot, points)
     data = words.data(points, group)
     friction, kept = _friction(robot, fit, value, turning)
+    together = Correlation(fit.keys, _correlation(fit.covariance))
+    fitted = robot.replace(friction=friction, priors=_priors(robot, std, kept, data))
     return Estimate(
-        robot=robot.replace(friction=friction, priors=_priors(robot, std, kept, data)),
+        robot=with_correlation(fitted, together.names, together.matrix),
         value=value,
         std=std,
         ci95=_intervals(fit),
-        correlation=Correlation(fit.keys, _correlation(fit.covariance)),
+        correlation=together,
         degrees_of_freedom=dict.fromkeys(fit.keys, fit.degrees_of_freedom),
         at_bound=tuple(key for key, free in zip(fit.keys, fit.free, strict=True) if free < 0.0),
         warnings=(*words.about_fit(fit, robust, kept), *words.about_back_emf(fit.keys, emf.guesses)),

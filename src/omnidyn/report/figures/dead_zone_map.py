@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import cast
 
 import numpy as np
@@ -10,6 +11,7 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 
 from omnidyn.arrays import FloatArray
+from omnidyn.model.dead_zone_answer import DeadZone
 from omnidyn.model.deadzone import dead_zone_force, dead_zone_map
 from omnidyn.model.robot import Robot
 from omnidyn.report.style import (
@@ -27,15 +29,17 @@ from omnidyn.report.style import (
 )
 
 STEP_DEG = 1.0
+NOTHING: Mapping[str, DeadZone] = MappingProxyType({})
 COLOURS, LINES = (BLUE, VERMILLION, GREEN, PURPLE), ("-", "--", "-.", (0, (1, 1)))
 AROUND = {0.0: "x\nforward", 45.0: "45°", 90.0: "y\nleft", 135.0: "135°", 180.0: "180°", 225.0: "-135°",
           270.0: "-90°", 315.0: "-45°"}  # fmt: skip
 
 
-def draw_dead_zone_map(robots: Mapping[str, Robot]) -> Picture:
+def draw_dead_zone_map(robots: Mapping[str, Robot], found: Mapping[str, DeadZone] = NOTHING) -> Picture:
     """One closed line per robot (name -> robot, at most four): voltage on the left, force on the right.
 
-    One robot alone is filled: inside it stays exactly at rest.
+    One robot alone is filled: inside it stays exactly at rest. found: name -> DeadZone, whose 95 % interval of the
+    voltage is drawn as a band.
     """
     if not 1 <= len(robots) <= len(COLOURS):
         raise ValueError(f"{len(robots)} robots; expected 1 to {len(COLOURS)}")
@@ -48,12 +52,14 @@ def draw_dead_zone_map(robots: Mapping[str, Robot]) -> Picture:
             volts, force = dead_zone_map(robot, directions)[0], dead_zone_force(robot, directions)
             for axes, level in ((left, volts), (right, force)):
                 _closed_line(axes, directions, level, colour, line, name, fill=len(robots) == 1)
+            if name in found:
+                _band(left, found[name], colour)
         for axes, words in ((left, "voltage of the most loaded motor, V"), (right, "push of the motors, N")):
             _dress(axes)
             figure.text(axes.get_position().x0 - 0.05, 0.94, words, fontsize=11.5)
         handles, names = left.get_legend_handles_labels()
         figure.legend(handles, names, loc="lower center", ncols=len(names), bbox_to_anchor=(0.5, 0.0))
-        return picture("dead_zone_map", "The dead zone over the direction of travel", _caption(robots), figure)
+        return picture("dead_zone_map", "The dead zone over the direction of travel", _caption(robots, found), figure)
 
 
 def _closed_line(
@@ -64,6 +70,17 @@ def _closed_line(
     if fill:
         axes.fill(directions, np.nan_to_num(level), color=colour, alpha=0.12, linewidth=0)
     axes.plot(directions, level, color=colour, linestyle=line, label=name)  # type: ignore[arg-type]
+
+
+def _band(axes: PolarAxes, found: DeadZone, colour: str) -> None:
+    """The 95 % interval of the voltage, all around; a gap where the robot may never move."""
+    if found.band is None:
+        return
+    around = np.append(found.directions, found.directions[0] + 2.0 * np.pi)
+    low, high = (np.append(end, end[0]) for end in found.band)
+    axes.fill_between(
+        around, low, high, where=np.isfinite(high).tolist(), color=colour, alpha=0.28, linewidth=0, label="95 %"
+    )
 
 
 def _dress(axes: PolarAxes) -> None:
@@ -82,10 +99,12 @@ def _dress(axes: PolarAxes) -> None:
     axes.grid(color=GREY, alpha=0.35)
 
 
-def _caption(robots: Mapping[str, Robot]) -> str:
+def _caption(robots: Mapping[str, Robot], found: Mapping[str, DeadZone]) -> str:
+    sure = any(each.band is not None for each in found.values())
+    band = " Band: 95 % interval, from the std of the robot file." if sure else ""
     subject = next(iter(robots.values())).name if len(robots) == 1 else "each robot"
     return (
         f"How hard it is to set {subject} in motion from rest, over the direction of travel: the voltage of the most "
         "loaded motor (left) and the push of the motors (right) at which it starts to move. Below that it stays "
-        "exactly at rest. The voltages push along the direction, without a torque."
+        f"exactly at rest. The voltages push along the direction, without a torque.{band}"
     )

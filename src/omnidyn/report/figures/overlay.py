@@ -77,10 +77,22 @@ def _values(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
         traces = [comparison.trace(robot, name, segment) for segment in segments]
         t, model = _broken([(trace.t, trace.model) for trace in traces])
         axes.plot(t, model, line, color=colour, linewidth=4.0, alpha=0.55, label=robot)
+        _band(axes, comparison, segments, robot, name, colour)
     axes.set_ylabel(f"{name}, {unit(name)}")
     axes.yaxis.set_label_coords(-0.115, 0.5)  # where the widest labels of ticks leave it whole, and all in one line
     axes.tick_params(labelbottom=False)
     axes.locator_params(axis="y", nbins=5)
+
+
+def _band(axes: Axes, comparison: Comparison, segments: Sequence[Segment], robot: str, name: str, colour: str) -> None:
+    """Behind the lines, how far the model may be off by the std of its robot file."""
+    label = "95 %"
+    for segment in segments:
+        ends = comparison.band(robot, name, segment)
+        if ends is not None:
+            t = comparison.trace(robot, name, segment).t
+            axes.fill_between(t, *ends, color=colour, alpha=0.25, linewidth=0.0, zorder=1, label=label)
+            label = ""
 
 
 def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], name: str, last: bool) -> None:
@@ -89,6 +101,11 @@ def _errors(axes: Axes, comparison: Comparison, segments: Sequence[Segment], nam
         traces = [comparison.trace(robot, name, segment) for segment in segments]
         t, error = _broken([(trace.t, trace.error) for trace in traces])
         axes.plot(t, error, line, color=colour, linewidth=1.0)
+        for segment, trace in zip(segments, traces, strict=True):
+            ends = comparison.band(robot, name, segment)
+            if ends is not None:  # where the error of a right model may lie, its numbers being off
+                low, high = trace.model - ends[1], trace.model - ends[0]
+                axes.fill_between(trace.t, low, high, color=colour, alpha=0.25, linewidth=0.0, zorder=1)
     axes.set_ylabel("error", color=INK)
     axes.yaxis.set_label_coords(-0.115, 0.5)
     axes.locator_params(axis="y", nbins=3)
@@ -122,7 +139,12 @@ def _caption(comparison: Comparison, log: int, count: int) -> str:
         f"{robot}: rmse " + ", ".join(f"{name} {each.rmse:.3g} {unit(name)}" for name, each in found.items())
         for robot, found in comparison.overall.items()
     )
+    band = (
+        " Bands: how far numbers that are off as the robot file says may bring it, 95 %; sensors add to that."
+        if comparison.bands
+        else ""
+    )
     return (
         f"{source}: measured, and what each model does under {comparison.applied[comparison.robots[0]]}, as a free run "
-        f"that never sees the measurement. Below each: model minus measured.{gaps} Over all logs, {errors}."
+        f"that never sees the measurement. Below each: model minus measured.{gaps}{band} Over all logs, {errors}."
     )

@@ -1,0 +1,44 @@
+"""Bands of a comparison: what of the distance between model and robot the std of the robot file may explain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from omnidyn.comparison.replay import HOLD, replay
+from omnidyn.comparison.result import Comparison
+from omnidyn.model.robot import Robot
+from omnidyn.model.told import told
+from omnidyn.model.uncertainty import DRAWS, plausible
+from omnidyn.simulation.band import Band, band_of
+
+COARSE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest
+FEW = 20  # robots drawn where each run is dear: the least that have a 95 % interval
+
+
+def with_bands(
+    found: Comparison, robots: Sequence[Robot], *, logs: Sequence[int] | None = None, apply: str | None = None,
+    hold: float = HOLD, tol: float | None = COARSE, draws: int = DRAWS, seed: int = 0,
+) -> Comparison:  # fmt: skip
+    """The comparison with the band of each model: the same free runs by plausible robots.
+
+    robots: those compared, in order. logs: which logs, all by default. apply, hold, tol: as they were compared. A robot
+    whose file has no std has no band, and a warning says so.
+    """
+    which = range(len(found.measured)) if logs is None else logs
+    bands: dict[str, Mapping[int, Band]] = {}
+    words, guessed = [], {}
+    for name, robot in zip(found.robots, robots, strict=True):
+        known = told(robot)
+        if not known.keys:
+            words.append(f"{name} has no band: no number of its file has a std")
+            continue
+        drawn = plausible(robot, draws, seed)
+        bands[name] = {
+            k: band_of(drawn, lambda each, k=k: replay(each, found.measured[k], apply=apply, hold=hold, tol=tol).run)
+            for k in which
+        }
+        guessed[name] = known.guessed
+        if known.guessed:
+            words.append(f"the band of {name} rests on guesses: {', '.join(known.guessed)}")
+    return replace(found, bands=bands, guesses=guessed, warnings=(*found.warnings, *words))

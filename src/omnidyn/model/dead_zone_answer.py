@@ -1,0 +1,247 @@
+"""How much it takes to set a robot in motion, and how sure that is: volts, duty, their intervals, what they rest on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from omnidyn.arrays import FloatArray
+from omnidyn.document import Document, Part, Table, Words, plain
+from omnidyn.model.actuation import clip_voltage
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
+from omnidyn.model.robot import GUESS, Robot
+from omnidyn.model.told import numbers_told, told
+from omnidyn.model.uncertainty import DRAWS, Interval, effects, interval_of
+
+AXES = ("x", "y", "yaw")
+AROUND = np.radians(np.arange(0.0, 360.0, 5.0))  # directions of travel that are answered for
+HALVINGS = 20  # of a drawn robot: a millionth of its voltage
+BEYOND = 1.0 + 1e-9
+FELT = 1e-5  # share that a number must change the answer by to be named
+
+
+@dataclass(frozen=True, eq=False)
+class Breakaway:
+    """One pattern of voltages. pattern: shape (wheels,), no unit. scale: volts times the pattern at which it gives way.
+
+    axis: what gives way first, "x", "y", "yaw" or several; "" where it never moves. duty: of the most loaded motor.
+    scale_interval, duty_interval: 95 %, None where the file has no std. reachable: within the limit of the motors.
+    """
+
+    axis: str
+    pattern: FloatArray
+    scale: float
+    duty: float
+    scale_interval: tuple[float, float] | None
+    duty_interval: tuple[float, float] | None
+    reachable: bool
+
+    @property
+    def voltage(self) -> FloatArray:
+        """The voltage of each motor [V]. Shape (wheels,)."""
+        return self.scale * self.pattern + 0.0
+
+
+@dataclass(frozen=True)
+class RestsOn:
+    """A number behind the answer: its key, its origin, whether it is a guess, its std, and by which share the answer changes with it.
+
+    By its std alone, or by 1 % where it has none. Correlations make the whole less, or more, than the sum of these.
+    duty: whether it changes the duty alone, as a supply does, not the volts.
+    """
+
+    key: str
+    origin: str
+    guessed: bool
+    std: float | None
+    effect: float
+    duty: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class DeadZone:
+    """The dead zone of a robot. rows: one per pattern, by default along x, along y and about yaw.
+
+    directions: of travel [rad], shape (k,). voltage: of the most loaded motor at which it starts to move that way [V],
+    shape (k,). band: its 95 % interval; None where the file has no std. full: the volts that a duty of 1 is.
+    full_words: what these are. rests_on: numbers with a std, and guesses, that the rows change with; the strongest
+    first. draws: robots behind the intervals.
+    """
+
+    robot: Robot
+    rows: tuple[Breakaway, ...]
+    directions: FloatArray
+    voltage: FloatArray
+    band: Interval | None
+    full: float
+    full_words: str
+    rests_on: tuple[RestsOn, ...]
+    draws: int
+
+    @property
+    def guesses(self) -> tuple[str, ...]:
+        """The guesses that it rests on."""
+        return tuple(each.key for each in self.rests_on if each.guessed)
+
+    def summary(self) -> str:
+        """The dead zone in words, for reading."""
+        return self.document().to_text()
+
+    def document(self) -> Document:
+        """What it says."""
+        doubts = self._doubts()
+        head = f"{self.robot.name} at rest: it starts to move when the voltages of the wheels exceed"
+        parts: list[Part] = [head, "", *map(_line, self.rows), "", *map(Words, [*self._around(), *doubts])]
+        intervals = self.table() if self.band is not None else None
+        if intervals is not None:
+            parts += ["", "95 % intervals, from the std and the correlations of the file", "", intervals]
+        return Document(parts, self.to_dict(), [words for words in doubts if self.guesses or self.band is None])
+
+    def table(self) -> Table:
+        """A row per pattern: volts and duty with their intervals."""
+        rows = [
+            (row.axis or "never", f"{row.scale:.3f}", _ends(row.scale_interval), f"{row.duty:.3f}",
+             _ends(row.duty_interval), "" if row.reachable else "beyond the limit of the motors")
+            for row in self.rows
+        ]  # fmt: skip
+        return Table(("axis", "voltage V", "95 %", "duty", "95 %", ""), rows, "<>>>><")
+
+    def statements(self) -> list[str]:
+        """What must be said beside the numbers, in words."""
+        return [*self._around(), *self._doubts()]
+
+    def _around(self) -> list[str]:
+        """The easiest and the hardest direction of travel, and what a duty is of."""
+        words = [f"duty: of {self.full_words}, {self.full:g} V"]
+        if not np.isfinite(self.voltage).any():
+            return words
+        least, most = (1.0 + FELT) * self.voltage.min(), (1.0 - FELT) * self.voltage.max()  # the first of equals
+        ends = [int(np.argmax(self.voltage <= least)), int(np.argmax(self.voltage >= most))]
+        told_ = [f"{self.voltage[k]:.3f} V{self._band_at(k)} at {np.degrees(self.directions[k]):.0f} deg" for k in ends]
+        return [f"over all directions of travel, without turning: from {told_[0]} to {told_[1]}", *words]
+
+    def _band_at(self, k: int) -> str:
+        return "" if self.band is None else f" [{self.band.low[k]:.3f}, {self.band.high[k]:.3f}]"
+
+    def _doubts(self) -> list[str]:
+        """Guesses that it rests on, by name, and where there is no interval."""
+        words = []
+        for what, duty in (("it rests", False), ("the duty rests", True)):
+            named = [each for each in self.rests_on if each.guessed and each.duty == duty]
+            known = [f"{each.key} ({100.0 * each.effect:.2g} % by its std)" for each in named if each.std is not None]
+            bare = [f"{each.key} (no std: in no interval)" for each in named if each.std is None]
+            if named:
+                words.append(f"{what} on guesses: {', '.join([*known, *bare])}")
+        if self.band is None:
+            words.append("no interval: no number of the robot file has a std; identify writes them")
+        elif not any(each.std is not None and not each.duty for each in self.rests_on):
+            words.append("the intervals are empty: no number that the dead zone follows from has a std in the file")
+        return words
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        rows = [
+            {"axis": row.axis or None, "pattern": row.pattern,
+             "breakaway_scale_V": row.scale, "interval_V": row.scale_interval,
+             "voltage_V": row.voltage if np.isfinite(row.scale) else None,
+             "duty": row.duty, "duty_interval": row.duty_interval, "reachable": row.reachable}
+            for row in self.rows
+        ]  # fmt: skip
+        around = {
+            "direction_deg": np.degrees(self.directions).round(9), "voltage_V": self.voltage,
+            "low_V": None if self.band is None else self.band.low,
+            "high_V": None if self.band is None else self.band.high,
+        }  # fmt: skip
+        return plain({
+            "robot": self.robot.name, "dead_zone": rows, "directions": around,
+            "duty_of": {"volts": self.full, "words": self.full_words},
+            "rests_on": [vars(each) for each in self.rests_on], "guesses": self.guesses,
+            "draws": self.draws if self.band is not None else 0,
+        })  # fmt: skip
+
+
+def dead_zone(robot: Robot, patterns: ArrayLike | None = None, *, draws: int = DRAWS, seed: int = 0) -> DeadZone:
+    """The dead zone of a robot at rest: along each axis and over the direction of travel, each with its 95 % interval.
+
+    patterns: of voltages, shape (k, wheels), no unit; by default those of `axis_patterns`. The intervals follow from
+    the std and the correlations of the robot file, guesses included, by so many draws (`plausible`); a file without
+    any std has none. A pattern stays the same volts for every draw.
+    Raises InputError where a pattern has not one entry per wheel, or for a strange number of draws.
+    """
+    own = axis_patterns(robot) if patterns is None else np.atleast_2d(np.asarray(patterns, dtype=float))
+    scale = breakaway_voltage(robot, own)
+    voltage, around = dead_zone_map(robot, AROUND)
+    every = np.concatenate([own, around])
+    found = None
+    if told(robot).keys:
+        found = interval_of(robot, partial(_volts_and_duty, patterns=every), draws, seed)
+    count, full, words = len(own), *_full(robot)
+    rows = [_row(robot, own[k], float(scale[k]), full, found, k, len(every)) for k in range(count)]
+    band = None if found is None else Interval(*(end[count : len(every)] for end in found))
+    return DeadZone(robot, tuple(rows), AROUND, voltage, band, full, words, _rests_on(robot, own), draws)
+
+
+def _volts_and_duty(robot: Robot, patterns: FloatArray) -> FloatArray:
+    """Scale [V] of each pattern, then the duty of its most loaded motor. Shape (2 k,)."""
+    scale = breakaway_voltage(robot, patterns, HALVINGS)
+    return np.concatenate([scale, _duty(scale, patterns, _full(robot)[0])])
+
+
+def _duty(scale: FloatArray, patterns: FloatArray, full: float) -> FloatArray:
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isfinite(scale), scale * np.abs(patterns).max(axis=-1) / full, np.inf)
+
+
+def _full(robot: Robot) -> tuple[float, str]:
+    """The volts that a duty of 1 is, and what they are."""
+    if robot.drive.supply is not None:
+        return robot.drive.supply, "the supply"
+    return float(np.min(robot.motor.voltage_limit)), "the voltage limit (the file has no supply)"
+
+
+def _row(
+    robot: Robot, pattern: FloatArray, scale: float, full: float, found: Interval | None, k: int, every: int
+) -> Breakaway:
+    duty = float(_duty(np.array([scale]), pattern[None], full)[0])
+    ends = None if found is None else (float(found.low[k]), float(found.high[k]))
+    duty_ends = None if found is None else (float(found.low[every + k]), float(found.high[every + k]))
+    if not np.isfinite(scale):
+        return Breakaway("", pattern, scale, duty, ends, duty_ends, False)
+    volts = np.multiply(scale, pattern)
+    moving = [axis for axis, moved in zip(AXES, moves(robot, BEYOND * volts), strict=True) if moved]
+    reachable = bool((clip_voltage(robot.motor, volts) == volts).all())
+    return Breakaway("+".join(moving), pattern, scale, duty, ends, duty_ends, reachable)
+
+
+def _rests_on(robot: Robot, patterns: FloatArray) -> tuple[RestsOn, ...]:
+    """The numbers with a std, and the guesses, that the volts of the patterns change with."""
+    own = {key: p for key, p in numbers_told(robot).items() if p.std is not None or p.origin == GUESS}
+    moving = patterns[np.isfinite(breakaway_voltage(robot, patterns, HALVINGS))]
+    if not own or not len(moving):
+        return ()
+    both = partial(_volts_and_duty, patterns=moving)
+    volts = effects(robot, partial(breakaway_voltage, pattern=moving, halvings=HALVINGS), [*own])
+    found = [
+        RestsOn(key, own[key].origin, own[key].guessed, own[key].std, size, volts[key] <= FELT)
+        for key, size in effects(robot, both, [*own]).items() if size > FELT
+    ]  # fmt: skip
+    return tuple(sorted(found, key=lambda each: (each.duty, -each.effect)))
+
+
+def _line(row: Breakaway) -> str:
+    """A pattern in words. The limit stands there where the motors cannot reach what it takes."""
+    pattern = ", ".join(f"{value:g}" for value in row.pattern)
+    if not np.isfinite(row.scale):
+        return f"  never   no voltage times ({pattern}) moves it"
+    voltage = ", ".join(f"{value:.3f}" for value in row.voltage)
+    limit = "" if row.reachable else "  (beyond the limit of the motors)"
+    return f"  {row.axis:6}  {row.scale:.3f} V x ({pattern})  =  ({voltage}) V, duty {row.duty:.3f}{limit}"
+
+
+def _ends(ends: Sequence[float] | None) -> str:
+    return "" if ends is None else f"{ends[0]:.3f} to {'never' if np.isinf(ends[1]) else f'{ends[1]:.3f}'}"

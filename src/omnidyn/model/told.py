@@ -1,0 +1,145 @@
+"""What a robot file tells of how far its numbers may be off: their std, their correlations, which are guesses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.errors import InputError
+from omnidyn.model.correlation import KeyCorrelation, key_correlation
+from omnidyn.model.keys import Key, expand, find_key
+from omnidyn.model.robot import Prior, Robot
+
+NEAR = 0.5  # std over value, from which on a friction may be 0
+ANGLES = ("wheels.azimuth_deg", "wheels.roller_angle_deg")
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """The numbers of a robot that have a std. keys: names. value, std: shape (keys,), in the unit of each.
+
+    correlation: shape (keys, keys). log: which have a logarithmic scale. guessed: those that are guesses.
+    """
+
+    keys: tuple[str, ...]
+    value: FloatArray
+    std: FloatArray
+    correlation: FloatArray
+    log: BoolArray
+    guessed: tuple[str, ...]
+
+
+def told(robot: Robot) -> Told:
+    """What the file of a robot says of how far its numbers may be off."""
+    own = {key: prior for key, prior in numbers_told(robot).items() if prior.std is not None}
+    together = robot.correlation
+    std = {key: float(prior.std or 0.0) for key, prior in own.items()}
+    if together is not None and together.std is not None:
+        std |= {key: s for key, s in zip(together.keys, together.std, strict=True) if key in std and s > 0.0}
+    keys, value = tuple(own), np.array([Key.parse(key).get(robot) for key in own])
+    spread = np.array([std[key] for key in keys])
+    correlation = np.eye(len(keys)) if together is None else together.of(keys)
+    log = np.array([is_log(key, v, s) for key, v, s in zip(keys, value, spread, strict=True)], dtype=bool)
+    return Told(keys, value, spread, correlation, log, tuple(k for k, prior in own.items() if prior.guessed))
+
+
+def numbers_told(robot: Robot) -> dict[str, Prior]:
+    """Key -> Prior of every number that the robot has and that something is told of; of a list, for each entry.
+
+    Friction of a shape that is off has no number, whatever is still told of it.
+    """
+    found = {}
+    for name, prior in robot.priors.items():
+        if find_key(name) is not None:
+            found |= {key: prior for key in expand(name, robot) if _has(robot, key)}
+    return found
+
+
+def guesses(robot: Robot) -> tuple[str, ...]:
+    """The keys of all numbers that are guesses, with a std or without."""
+    return tuple(key for key, prior in numbers_told(robot).items() if prior.guessed)
+
+
+def _has(robot: Robot, name: str) -> bool:
+    """Whether a robot has a number of this name, and in friction that is not off."""
+    key = find_key(name)
+    if key is None:
+        return False
+    try:
+        key.get(robot)
+    except InputError:
+        return False
+    if not key.level:
+        return True
+    law = getattr(robot.friction, key.table.rpartition(".")[2])
+    return any(level is not None and np.any(level) for level in dict(law).values())
+
+
+def is_log(name: str, value: float, std: float) -> bool:
+    """Whether a number has a logarithmic scale: what must be positive, and a friction that is far from 0."""
+    key = Key.parse(name)
+    return key.name not in ANGLES and value > 0.0 and (not key.level or std < NEAR * value)
+
+
+def correlation_of(robot: Robot) -> KeyCorrelation | None:
+    """The correlations of the numbers that the robot has; None where fewer than two are left."""
+    own = robot.correlation
+    if own is None:
+        return None
+    kept = [k for k, key in enumerate(own.keys) if _has(robot, key)]
+    if len(kept) == len(own.keys):
+        return own if kept else None
+    keys = tuple(own.keys[k] for k in kept)
+    std = None if own.std is None else tuple(own.std[k] for k in kept)
+    return key_correlation(keys, own.of(keys), std) if len(keys) > 1 else None
+
+
+def refuse_strange_keys(robot: Robot) -> None:
+    """Raises InputError for a correlation of what is no number of the robot."""
+    for k, key in enumerate(robot.correlation.keys if robot.correlation is not None else ()):
+        try:
+            Key.parse(key).get(robot)
+        except InputError as error:
+            raise InputError(
+                error.what, got=error.got or key, expected=error.expected, remedy=error.remedy,
+                where=f"[correlation] keys[{k}]",
+            ) from None  # fmt: skip
+
+
+def with_correlation(robot: Robot, keys: Sequence[str], matrix: ArrayLike, std: Sequence[float] = ()) -> Robot:
+    """The robot with what is now known of how some of its numbers are off together; what was known of others stays.
+
+    A key of a list stands for all its entries, which are one number then. matrix: shape (keys, keys). std: of each key,
+    kept where it is not what stands beside the number. Raises InputError for keys that are none of the robot, and for
+    what is no matrix of correlations.
+    """
+    tied = [(k, each) for k, key in enumerate(keys) for each in expand(key, robot)]
+    at = [k for k, _ in tied]
+    matrix = np.asarray(matrix, dtype=float).reshape(len(keys), len(keys))[np.ix_(at, at)]
+    keys, std = [each for _, each in tied], [std[k] for k in at] if len(std) else ()
+    before = correlation_of(robot)
+    old = tuple(key for key in (before.keys if before is not None else ()) if key not in keys)
+    every = (*old, *keys)
+    whole = np.eye(len(every))
+    if before is not None:
+        whole[: len(old), : len(old)] = before.of(old)
+    whole[len(old) :, len(old) :] = matrix
+    own = numbers_told(robot)
+    beside = [float(own[key].std or 0.0) if key in own else 0.0 for key in every]
+    earlier = dict(zip(before.keys, before.std, strict=True)) if before is not None and before.std is not None else {}
+    joint = [*(earlier.get(key, beside[k]) for k, key in enumerate(old)), *(std or beside[len(old) :])]
+    apart = not np.allclose(joint, beside, rtol=1e-9, atol=0.0)
+    found = key_correlation(every, whole, tuple(map(float, joint)) if apart else None)
+    refuse_strange_keys(robot.model_copy(update={"correlation": found}))
+    return robot.model_copy(update={"correlation": found if apart else _without_the_free(found)})
+
+
+def _without_the_free(known: KeyCorrelation) -> KeyCorrelation | None:
+    """The correlations without numbers that are off for themselves; None where all are."""
+    matrix = known.of(known.keys)
+    keys = tuple(key for key, row in zip(known.keys, matrix, strict=True) if np.count_nonzero(row) > 1)
+    return key_correlation(keys, known.of(keys)) if keys else None

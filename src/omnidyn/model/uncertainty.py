@@ -1,0 +1,202 @@
+"""Uncertainty: how far the numbers of a robot may be off, together, and what follows from that for anything else.
+
+    z = ln p or p,   z_drawn = z + D S w,   S S' = R,   w independent, each standard normal
+
+p are the numbers of a robot file that have a std, D their std, R their correlation ([correlation] of the file, 0 where
+it says nothing). What follows from them is computed once per drawn robot, and its interval is that of the results:
+propagation of distributions, JCGM 101:2008, sections 5 and 7. To first order it is the propagation of variances g' C g
+of JCGM 100:2008, 5.2; but a robot that sticks, or is about to, has no first order.
+
+The draws of w are a Latin hypercube (McKay, Beckman, Conover, Technometrics 21 (1979)): each share of each normal is
+hit once, which makes a hundred draws do for a 95 % interval. One seed gives the same robots, always.
+
+Scales: what must be positive has a logarithmic one, where 2 and 1/2 are equally far, as in a fit. So has a friction
+that is far from 0 (told.NEAR): what a fit can tell is often a product of friction and motor constants, and products
+stay what they are on that scale alone. A friction that may be 0 is normal, next to 0 below that. An angle is normal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtri
+
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.model.keys import BREAKAWAY, Key
+from omnidyn.model.robot import Robot
+from omnidyn.model.told import ANGLES, Told, is_log, numbers_told, told
+
+DRAWS = 100
+NOISE = 1e-13  # of an eigenvalue of a correlation: less is rounding, and numbers that are one stay one
+FURTHEST = math.log(1e4)  # of a logarithm: the span of a fit
+LOW = 0.025  # share of the results below a 95 % interval, and above it
+LEAST = 1e-6  # of value or std, that a friction stays above: 0 would switch a part of it off
+PULLS = 60  # halvings that bring a draw out of range back to the value itself
+FEWEST, MOST_DRAWS = 20, 1_000_000  # of fewer draws even the outermost two are less than 95 % apart
+
+
+class Interval(NamedTuple):
+    """Ends of a 95 % interval, each of the shape of what it is about."""
+
+    low: FloatArray
+    high: FloatArray
+
+
+def plausible(robot: Robot, count: int = DRAWS, seed: int = 0) -> list[Robot]:
+    """Robots that may be meant: draws of all numbers that have a std, guesses included, with their correlations.
+
+    Raises InsufficientDataError where no number of the robot has a std, InputError for a strange count.
+    """
+    known = told(robot)
+    if not known.keys:
+        raise InsufficientDataError(
+            "nothing says how far the numbers of this robot may be off", got=f"{robot.name} without any std",
+            expected="{ value = .., std = .. } at the numbers of its file", remedy="let identify write it, or add std",
+        )  # fmt: skip
+    if not 1 <= count <= MOST_DRAWS:
+        raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="draws")
+    keys = [Key.parse(key) for key in known.keys]
+    return [_drawn(robot, keys, known, off) for off in _errors(known, count, seed)]
+
+
+def interval_of(robot: Robot, function: Callable[[Robot], ArrayLike], count: int = DRAWS, seed: int = 0) -> Interval:
+    """The 95 % interval of a function of the robot, each element for itself; raises what `plausible` raises."""
+    ends = Ends(count)
+    for each in plausible(robot, count, seed):
+        ends.add(np.asarray(function(each), dtype=float))
+    return ends.interval
+
+
+class Ends:
+    """The 95 % interval of so many results (20 or more), added one by one: what lies far inside of it is not kept.
+
+    Result k of n, in order, stands for the share (k - 1/2)/n (Hazen), as each draw of a Latin hypercube does. Infinity
+    is a result like others; an element that is once NaN is NaN.
+    """
+
+    def __init__(self, count: int) -> None:
+        if count < FEWEST:
+            raise InputError(
+                "too few draws for a 95 % interval", got=count, expected=f"{FEWEST} or more", where="draws"
+            )
+        self._below, self._share = divmod(max(LOW * count - 0.5, 0.0), 1.0)
+        self._kept = min(int(self._below) + 2, count)
+        self._lowest: list[FloatArray] = []
+
+    def add(self, result: FloatArray) -> None:
+        """One more result; all have one shape."""
+        new = np.stack([result, -result])
+        if not self._lowest:
+            self._none = np.isnan(new)
+        self._none |= np.isnan(new)
+        self._lowest.append(new)
+        if len(self._lowest) >= 2 * self._kept:
+            self._sort()
+
+    def _sort(self) -> None:
+        self._lowest = list(np.sort(np.stack(self._lowest), axis=0)[: self._kept])
+
+    @property
+    def interval(self) -> Interval:
+        """The ends, of all that was added."""
+        self._sort()
+        first, then = (self._lowest[min(int(self._below) + k, len(self._lowest) - 1)] for k in (0, 1))
+        with np.errstate(invalid="ignore"):
+            between = first + self._share * (then - first)
+        ends = np.where(np.isinf(first) | np.isinf(then), then if self._share > 0.5 else first, between)
+        low, high = np.where(self._none, np.nan, ends)
+        return Interval(low + 0.0, 0.0 - high)
+
+
+def _errors(known: Told, count: int, seed: int) -> FloatArray:
+    """Errors of the numbers on their scales. Shape (count, keys)."""
+    scale = known.std / np.where(known.log, known.value, 1.0)
+    values, vectors = np.linalg.eigh(known.correlation)
+    root = vectors * np.sqrt(np.where(values > NOISE, values, 0.0))
+    random = np.random.default_rng(seed)
+    place = np.stack([random.permutation(count) for _ in known.keys], axis=1)
+    normal = ndtri((place + 0.5) / count)
+    return normal @ root.T * scale
+
+
+def _drawn(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> Robot:
+    """One robot. What no robot file may hold comes half-way back to the value, as often as that takes."""
+    for _ in range(PULLS):
+        draw = robot
+        for k, key in enumerate(keys):
+            value = float(known.value[k])
+            draw = key.set(draw, _off(key, value, float(off[k]), bool(known.log[k])), checked=False)
+        draw = _holding(draw)
+        bad = _out_of_range(draw)
+        if not bad:
+            return draw
+        off = np.where([key.part in bad for key in keys], 0.5 * off, off)
+    return robot
+
+
+def _off(key: Key, value: float, error: float, log: bool) -> float:
+    if log:
+        return value * math.exp(min(max(error, -FURTHEST), FURTHEST))
+    return value + error if key.name in ANGLES else max(LEAST * max(value, abs(error)), value + error)
+
+
+def _out_of_range(robot: Robot) -> set[str]:
+    """The parts of a robot that hold what no file may hold."""
+    bad = set()
+    for part in ("body", "wheels", "motor", "drive"):
+        try:
+            getattr(robot, part).replace()
+        except InputError:
+            bad.add(part)
+    for law in robot.friction.laws:
+        try:
+            law.replace()  # pyright: ignore[reportAttributeAccessIssue]
+        except InputError:
+            bad.add("friction")
+    return bad
+
+
+def _holding(robot: Robot) -> Robot:
+    """The robot with breakaway nowhere below Coulomb friction, of which it was drawn apart."""
+    friction, changed = robot.friction, {}
+    for name in type(friction).model_fields:
+        law = getattr(friction, name)
+        levels = {
+            field: _at_least(level, getattr(law, COULOMB_OF[field]) or 0.0)
+            for field, level in dict(law).items() if BREAKAWAY in field and level is not None
+        }  # fmt: skip
+        if levels:
+            changed[name] = law.model_copy(update=levels)
+    return robot.model_copy(update={"friction": friction.model_copy(update=changed)}) if changed else robot
+
+
+# What each level of breakaway is at least; `backward` of the wheels is coulomb where they have no other.
+COULOMB_OF = {"breakaway": "coulomb", "yaw_breakaway": "yaw_coulomb", "breakaway_backward": "backward"}
+
+
+def _at_least(level: float | tuple[float, ...], least: float | tuple[float, ...]) -> float | tuple[float, ...]:
+    higher = np.maximum(level, least)
+    return tuple(higher.tolist()) if higher.ndim else float(higher)
+
+
+def effects(robot: Robot, function: Callable[[Robot], ArrayLike], keys: Sequence[str]) -> dict[str, float]:
+    """Key -> by how much the function changes, at the most, relative to itself, where that number alone is off.
+
+    By its std, or by 1 % where it has none.
+    """
+    at, own, found = np.asarray(function(robot), dtype=float), numbers_told(robot), {}
+    for name in keys:
+        key = Key.parse(name)
+        value = float(key.get(robot))
+        std = (own[name].std if name in own else None) or 0.01 * abs(value)
+        log = is_log(name, value, std)
+        moved = _holding(key.set(robot, _off(key, value, std / value if log else std, log), checked=False))
+        other = at if _out_of_range(moved) else np.asarray(function(moved), dtype=float)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found[name] = float(np.nanmax(np.abs(other - at) / np.abs(at), initial=0.0))
+    return found

@@ -1,0 +1,69 @@
+"""Band: between which lines a predicted run lies, as far as the robot file knows its numbers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from omnidyn.arrays import FloatArray
+from omnidyn.model.robot import Robot
+from omnidyn.model.uncertainty import DRAWS, Ends, plausible
+from omnidyn.run import CHANNELS, WHEEL, Run
+from omnidyn.simulation.simulate import simulate
+
+PREDICTED = ("voltage", "current", "wheel_speed", "twist", "pose")
+MOST_THREADS = 8
+
+
+class Band(NamedTuple):
+    """The ends of a 95 % interval of a run, sample by sample and component by component: what a robot may do whose
+    numbers are off as its file says. What sensors add is not in it. draws: robots that were run.
+
+    The low end is no run of one robot: where one goes further along x, it may go less far along y.
+    """
+
+    low: Run
+    high: Run
+    draws: int
+
+
+def band(
+    robot: Robot, voltage: ArrayLike | None = None, dt: ArrayLike | None = None, *, draws: int = DRAWS, seed: int = 0,
+    **options: Any,
+) -> Band:  # fmt: skip
+    """The band of `simulate(robot, voltage, dt, **options)`: the same run by so many plausible robots.
+
+    Raises InsufficientDataError where no number of the robot has a std, and what `simulate` raises.
+    """
+    return band_of(plausible(robot, draws, seed), lambda each: simulate(each, voltage, dt, **options))
+
+
+def band_of(robots: Sequence[Robot], run_of: Callable[[Robot], Run]) -> Band:
+    """The band over the runs of some robots, all at the same times. The kernels let other threads run."""
+    first, ends = run_of(robots[0]), Ends(len(robots))
+    ends.add(_predicted(first))
+    threads = min(os.cpu_count() or 1, MOST_THREADS)
+    with ThreadPoolExecutor(threads) as pool:
+        for begin in range(1, len(robots), threads):  # no more runs at a time than there are threads: they are large
+            for run in pool.map(run_of, robots[begin : begin + threads]):
+                ends.add(_predicted(run))
+    low, high = (_as_run(first, end, words) for end, words in zip(ends.interval, ("low", "high"), strict=True))
+    return Band(low, high, len(robots))
+
+
+def _predicted(run: Run) -> FloatArray:
+    return np.hstack([getattr(run, name) for name in PREDICTED])
+
+
+def _as_run(like: Run, end: FloatArray, which: str) -> Run:
+    channels, column = {}, 0
+    for name in PREDICTED:
+        width = (like.wheels or 0) if CHANNELS[name] == WHEEL else 3
+        channels[name] = end[:, column : column + width]
+        column += width
+    return Run(t=like.t, **channels, source=f"{like.source}, {which} end of the 95 % band")
