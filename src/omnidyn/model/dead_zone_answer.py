@@ -49,7 +49,7 @@ class Breakaway:
 
 @dataclass(frozen=True)
 class RestsOn:
-    """A number behind the answer: its key, its origin, whether it is a guess, its std, and by which share the answer changes with it.
+    """A number behind the answer: key, origin, whether it is a guess, std, and by which share the answer changes with it.
 
     By its std alone, or by 1 % where it has none. Correlations make the whole less, or more, than the sum of these.
     duty: whether it changes the duty alone, as a supply does, not the volts.
