@@ -11,13 +11,13 @@ from omnidyn.document import Document, apart
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.check import check
 from omnidyn.findings.finding import FATAL, Verdict
+from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.advice import advice, verdict_advice
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit, fit_output_error
-from omnidyn.identification.output_error.inputs import why_no_inputs
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.identification.question import AUTO, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
-from omnidyn.identification.output_error.inputs import why_no_inputs
 from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
 from omnidyn.identification.output_error.prepare import (
     EXACT,
@@ -25,7 +25,6 @@ from omnidyn.identification.output_error.prepare import (
     Group,
     expand_keys,
     free_by_default,
-    is_exact,
     known_priors,
     make_engine,
     make_group,
