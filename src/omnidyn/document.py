@@ -85,12 +85,14 @@ class Document:
     """What a result says: its parts in the order in which text tells them, and its values as JSON can hold them.
 
     warnings: what a reader of `data` alone must be told too. ascii: text has an escape for every other character.
+    verdict: the result in a sentence; it stands first, and under "verdict" for machines.
     """
 
     parts: Sequence[Part]
     data: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[str] = ()
     ascii: bool = False
+    verdict: str = ""
 
     def __getitem__(self, name: str) -> Points | Table:
         """The points or the table of this name. Raises KeyError."""
@@ -106,11 +108,17 @@ class Document:
 
     def to_text(self, width: int = WIDTH, paint: Paint = lambda word, tone: word) -> str:
         """The document for people, without a line break at its end. paint: how signs get their colours."""
-        lines: list[str] = []
+        lines: list[str] = [*Words(self.verdict).lines(width, paint), ""] if self.verdict else []
         for part in self.parts:
             lines += [part] if isinstance(part, str) else part.lines(width, paint)
         text = "\n".join(lines)
         return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
+
+
+def all_of(names: Sequence[str]) -> str:
+    """Names in a sentence: "x", "x and y", "x, y and z"; "" for none."""
+    *most, last = names or ("",)
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def apart(*blocks: Sequence[Part]) -> list[Part]:

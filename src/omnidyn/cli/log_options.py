@@ -138,8 +138,11 @@ class Maps:
 
             check_output(save, force)
 
-    def show(self, path: str, columns: ColumnMap) -> None:
-        """Say a map on stderr, unless it was said before; write the first where --save-map asks."""
+    def show(self, path: str, columns: ColumnMap, doubts: bool = True) -> None:
+        """Say a map on stderr, unless it was said before; write the first where --save-map asks.
+
+        Not `doubts`: the result itself says what was not taken and not used.
+        """
         from omnidyn.logs.columns.mapping import save_map
 
         lines = (*columns.lines(), *(f"doubt: {words}" for words in columns.doubts))
@@ -149,7 +152,7 @@ class Maps:
             save_map(columns, self.save, self.force)
         self.said.add(lines)
         say(f"omnidyn: columns of {path}:")
-        for line in lines:
+        for line in lines if doubts else columns.lines():
             say(f"omnidyn:   {line}")
-        if columns.unused:
+        if doubts and columns.unused:
             say(f"omnidyn:   not used: {', '.join(columns.unused)}")

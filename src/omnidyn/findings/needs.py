@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from omnidyn.model.actuation import asked_voltage
 from omnidyn.model.drive import SPEED
 from omnidyn.model.motor import DYNAMIC
@@ -79,3 +81,8 @@ def motor_input(runs: Sequence[Run], kinds: Sequence[str] = MOTOR_INPUTS) -> str
 def turns_known(run: Run) -> bool:
     """Whether a speed or an angle of the wheels was logged."""
     return run.wheel_speed is not None or run.wheel_angle is not None
+
+
+def loses_in_gear(robot: Robot) -> bool:
+    """Whether a gear loses power, which a steady state would count as friction."""
+    return bool(np.any(np.asarray(robot.motor.gear_efficiency) < 1.0))

@@ -43,6 +43,12 @@ class Log:
     current_unsigned: bool = False
     notes: tuple[str, ...] = ()
 
+    @classmethod
+    def of_run(cls, run: Run) -> Log:
+        """A Run as a log of its measured values: what was interpolated is blank, lines count its samples from 0."""
+        measured = run.as_measured()
+        return cls(measured.t, measured.channels, np.arange(len(run)), source=run.source, notes=run.warnings)
+
     def __len__(self) -> int:
         return len(self.t)
 

@@ -63,7 +63,7 @@ def guess_columns(table: Table, robot: Robot | None = None, assume: Mapping[str,
     used = {column.name for column in found.columns.values()}
     unused = tuple(name for name in table.names if name not in used)
     ordered = dict(sorted(found.columns.items(), key=lambda item: _order(item[0])))
-    return ColumnMap(ordered, unused, found.doubt_words(), found.note_words())
+    return ColumnMap(ordered, unused, found.doubt_words(), found.note_words(), found.doubted())
 
 
 def _order(component: str) -> tuple[int, str, int]:
