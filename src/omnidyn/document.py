@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from omnidyn.glossary import explained
+
 WIDTH = 100  # columns of text that knows no terminal
 GAP = "  "  # between two columns of a table
 TINY_CHANCE = 0.001
@@ -77,6 +79,10 @@ class Table:
         return self.align[min(column, len(self.align) - 1)]
 
 
+def _bare(word: str, tone: str) -> str:
+    return word
+
+
 Part = str | Words | Points | Table  # plain text is a line as it stands
 
 
@@ -85,7 +91,8 @@ class Document:
     """What a result says: its parts in the order in which text tells them, and its values as JSON can hold them.
 
     warnings: what a reader of `data` alone must be told too. ascii: text has an escape for every other character.
-    verdict: the result in a sentence; it stands first, and under "verdict" for machines.
+    verdict: the result in a sentence; it stands first, and under "verdict" for machines. Words of the trade are
+    explained at the end of the text, those that occur.
     """
 
     parts: Sequence[Part]
@@ -106,11 +113,19 @@ class Document:
         several = [part for part in map(self.__getitem__, names) if isinstance(part, Points)]
         return Points([words for part in several for words in part.words])
 
-    def to_text(self, width: int = WIDTH, paint: Paint = lambda word, tone: word) -> str:
+    def legend(self) -> list[str]:
+        """A line for each word of the trade that occurs in the parts."""
+        told = (part if isinstance(part, str) else "\n".join(part.lines(WIDTH, _bare)) for part in self.parts)
+        return explained("\n".join(told))
+
+    def to_text(self, width: int = WIDTH, paint: Paint = _bare) -> str:
         """The document for people, without a line break at its end. paint: how signs get their colours."""
         lines: list[str] = [*Words(self.verdict).lines(width, paint), ""] if self.verdict else []
         for part in self.parts:
             lines += [part] if isinstance(part, str) else part.lines(width, paint)
+        if legend := self.legend():
+            lines.append("")
+            lines += [line for words in legend for line in Words(words, rest="  ").lines(width, paint)]
         text = "\n".join(lines)
         return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
 
