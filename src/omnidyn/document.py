@@ -130,6 +130,11 @@ class Document:
         return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
 
 
+def sentence(words: str) -> str:
+    """Words with a capital at their begin and a full stop at their end."""
+    return f"{words[:1].upper()}{words[1:]}."
+
+
 def all_of(names: Sequence[str]) -> str:
     """Names in a sentence: "x", "x and y", "x, y and z"; "" for none."""
     *most, last = names or ("",)

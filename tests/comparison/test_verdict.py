@@ -35,8 +35,7 @@ def test_a_half_good_model():
 def test_a_bad_model():
     scores = {"w1": Score(12.0, -60.0), "vx": Score(0.4, 30.0)}
     assert compared_words(["axebot"], [scores], {}) == (
-        "The model does not follow the log: speed over the ground hardly (70 %), wheel speeds not at all (rms error 12 "
-        "rad/s)."
+        "The model does not follow: speed over the ground hardly (70 %), wheel speeds not at all (rms error 12 rad/s)."
     )
 
 
@@ -94,4 +93,4 @@ def test_wheels_that_turn_the_other_way_are_not_followed(run):
     found = compare(
         load_robot("axebot"), run.replace(wheel_speed=-run.wheel_speed, twist=None, pose=None, current=None)
     )
-    assert found.verdict.startswith("The model does not follow the log: wheel speeds not at all (rms error ")
+    assert found.verdict.startswith("The model does not follow: wheel speeds not at all (rms error ")

@@ -47,7 +47,7 @@ def compare(
     """Compare a model, or two, with the logs of a robot.
 
     The model runs free under the logged voltages (or duties, or set speeds through the speed loop of the robot file),
-    from gap to gap. Below: how far it ends up from what was measured.
+    from gap to gap. First a sentence: what it follows, and what not; then how far it ends up from what was measured.
     """
     from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
 

@@ -8,12 +8,13 @@ import typer
 
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.telling import tell
-from omnidyn.document import Document
+from omnidyn.document import Document, all_of
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
 
 AXES = ("x", "y", "yaw")
+WAYS = {"x": "forward", "y": "sideways", "yaw": "turning"}
 
 
 def deadzone(
@@ -36,7 +37,8 @@ def deadzone(
     if picture:
         _draw(loaded, picture, force)
     head = f"{loaded.name} at rest: it starts to move when the voltages of the wheels exceed"
-    told = Document([head, "", *(_line(loaded, row) for row in rows)], {"robot": loaded.name, "dead_zone": rows})
+    lines, data = [head, "", *(_line(loaded, row) for row in rows)], {"robot": loaded.name, "dead_zone": rows}
+    told = Document(lines, data, verdict=_verdict(loaded, rows))
     tell(told, json, provenance([source]))
 
 
@@ -61,6 +63,21 @@ def _row(robot: Robot, pattern: list[float]) -> dict[str, Any]:
     moving = [axis for axis, moved in zip(AXES, moves(robot, just_beyond), strict=True) if moved]
     voltage = np.multiply(scale, pattern) + 0.0
     return {"axis": "+".join(moving), "pattern": pattern, "breakaway_scale_V": scale, "voltage_V": voltage.tolist()}
+
+
+def _verdict(robot: Robot, rows: list[dict[str, Any]]) -> str:
+    """From which voltage of the most loaded motor it moves, and which way; and what its motors never reach."""
+
+    def name(row: dict[str, Any]) -> str:
+        return all_of([WAYS[axis] for axis in (row["axis"] or "").split("+") if axis]) or "along the pattern"
+
+    starts = [row for row in rows if row["voltage_V"] is not None and not _limit_note(robot, row["voltage_V"])]
+    stuck = [name(row) for row in rows if row not in starts]
+    volts = {name(row): max(map(abs, row["voltage_V"])) for row in starts}
+    words = f"{robot.name} starts to move {all_of([f'{way} from {volt:.2f} V' for way, volt in volts.items()])}"
+    if not starts:
+        return f"{robot.name} does not move {all_of(stuck)}, whatever voltage its motors can have."
+    return f"{words}{f'; {all_of(stuck)} its motors cannot move it' if stuck else ''}."
 
 
 def _line(robot: Robot, row: dict[str, Any]) -> str:

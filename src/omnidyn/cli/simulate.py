@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -114,11 +115,24 @@ def _document(run: Run) -> Document:
         "final_pose": {"x_m": x, "y_m": y, "heading_rad": heading},
         "warnings": run.warnings,
     }
-    still = "it never moved: the voltages stay within the dead zone (see: omnidyn deadzone)"
     lines = [
         f"{run.source}: {len(run)} samples, {duration:.6g} s",
-        *([] if moved else [still]),
         f"at the end   vx {vx:.4f} m/s   vy {vy:.4f} m/s   omega {omega:.4f} rad/s",
         f"             x {x:.4f} m   y {y:.4f} m   heading {heading:.4f} rad",
     ]
-    return Document(lines, data)
+    return Document(lines, data, verdict=_verdict(run, moved))
+
+
+def _verdict(run: Run, moved: bool) -> str:
+    """How far the robot came, and whether it still moves at the end."""
+    assert run.twist is not None
+    assert run.pose is not None
+    if not moved:
+        return "It never moved: the voltages stay within the dead zone (see: omnidyn deadzone)."
+    east, north, turned = (run.pose[-1] - run.pose[0]).tolist()
+    rest = "at rest" if not run.twist[-1].any() else "still in motion"
+    doubts = f"; {len(run.warnings)} thing{'s' * (len(run.warnings) > 1)} to heed" if run.warnings else ""
+    return (
+        f"In {run.t[-1] - run.t[0]:.4g} s the robot came {math.hypot(east, north):.3g} m from where it began and "
+        f"turned by {math.degrees(turned):.3g} degrees; it is {rest} at the end{doubts}."
+    )

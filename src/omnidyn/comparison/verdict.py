@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from omnidyn.comparison.traces import unit
-from omnidyn.document import all_of
+from omnidyn.document import all_of, sentence
 from omnidyn.logs.channels import place
 
 FOLLOWS, HALF, NOTHING = 0.2, 0.5, 1.0  # error over spread
@@ -40,7 +40,7 @@ class Scored(Protocol):
 @dataclass(frozen=True)
 class Followed:
     """How a model follows one kind of measurement. name: in plain words. level: WELL to NOT. share: error over spread,
-    of the worst component. error: its rms, in `unit`.
+    and error: its rms in `unit`, each the largest of the components.
     """
 
     name: str
@@ -77,9 +77,9 @@ def followed(scores: Mapping[str, Scored]) -> list[Followed]:
         for member in members:
             alike.setdefault(member[1].level, []).append(member)
         for same in alike.values():
-            worst = max((each for _, each in same), key=lambda each: each.share)
+            share, error = (max(values) for values in zip(*((each.share, each.error) for _, each in same), strict=True))
             called = plain if len(alike) == 1 else f"{all_of([name for name, _ in same])} ({plain})"
-            found.append(Followed(called, worst.level, worst.share, worst.error, worst.unit))
+            found.append(Followed(called, same[0][1].level, share, error, same[0][1].unit))
     return sorted(found, key=lambda each: each.level)
 
 
@@ -110,7 +110,7 @@ def follows(who: str, found: Sequence[Followed]) -> str:
     if not found:
         return f"nothing that was measured changes: how well {who} follows cannot be told"
     if found[0].level >= HARDLY:
-        return f"{who} does not follow the log: {', '.join(each.words() for each in found)}"
+        return f"{who} does not follow: {', '.join(each.words() for each in found)}"
     good = [each.words() for each in found if each.level <= ROUGHLY]
     bad = [each.words() for each in found if each.level >= HARDLY]
     return f"{who} follows {all_of(good)}{f', but {all_of(bad)}' if bad else ''}"
@@ -121,8 +121,7 @@ def compared_words(
 ) -> str:
     """A comparison in a sentence. better: component -> the robot that is surely nearer, None where none is."""
     if len(robots) == 1:
-        words = follows("the model", followed(scores[0]))
-        return f"{words[0].upper()}{words[1:]}."
+        return sentence(follows("the model", followed(scores[0])))
     each = [follows(robot, followed(own)) for robot, own in zip(robots, scores, strict=True)]
     nearer = [
         f"{robot} is surely nearer in {all_of(own)}" for robot in robots

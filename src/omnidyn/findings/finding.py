@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from omnidyn.arrays import BoolArray, IntArray
-from omnidyn.document import Document, Words, plain
+from omnidyn.document import Document, Words, plain, sentence
 from omnidyn.findings.use import Use, good_for
 from omnidyn.statistics import stretches
 
@@ -91,7 +91,7 @@ class Verdict:
         heed = self.counts[WARN]
         words = good_for(self.uses) if self.uses else "no row to judge by"
         told = f"; {heed} thing{'s' * (heed > 1)} to heed" if heed else "; nothing to heed"
-        return f"{words[0].upper()}{words[1:]}{told}."
+        return sentence(f"{words}{told}")
 
     def of(self, code: str) -> tuple[Finding, ...]:
         """The findings of one kind."""

@@ -10,7 +10,7 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import Validation
-from omnidyn.model.keys import unit
+from omnidyn.model.keys import in_words, unit
 
 SHOWN = 6  # findings of a log that are named
 
@@ -52,10 +52,12 @@ def difference_table(differences: Sequence[Difference]) -> Table:
     """What differs between groups, and what may."""
     rows = [
         (d.key, f"{d.first} {d.values[0]:.4g}", f"{d.second} {d.values[1]:.4g}", f"{d.difference:+.4g}", f"{d.std:.2g}",
-         interval_cell((d.low, d.high)), unit(d.key), "differs" if d.differs else "no difference seen")
+         interval_cell((d.low, d.high)), unit(d.key), "differs" if d.differs else "no difference seen", in_words(d.key))
         for d in differences
     ]  # fmt: skip
-    return Table(("number", "first", "second", "difference", "std error", "95 % interval", "unit", ""), rows)
+    return Table(
+        ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "", "in words"), rows
+    )
 
 
 def verdict_table(verdicts: Sequence[Verdict]) -> Table:

@@ -27,6 +27,7 @@ from omnidyn.identification.steady.study import SteadyStudy, identify_steady
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.validation import Validation, validate
+from omnidyn.identification.verdict import fits_verdict, lines_verdict, steady_verdict
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
@@ -139,8 +140,20 @@ class Identification:
         """The estimate of the first group; the only one where there are no groups."""
         return next(iter(self.estimates.values()))
 
+    @property
+    def verdict(self) -> str:
+        """What it came to, in a sentence: whether the model follows, and how well its numbers are known."""
+        if self.study is not None:
+            return steady_verdict(self.study)
+        if self.method == OUTPUT_ERROR:
+            return fits_verdict(self.fits, self.validations or {}, self.verdicts, self.interrupted)
+        return lines_verdict(self.estimates)
+
     def document(self) -> Document:
         """All of it, as text, page and machines have it."""
+        return replace(self._told(), verdict=self.verdict)
+
+    def _told(self) -> Document:
         if self.study is not None:
             return study_document(self.study)
         if self.method == OUTPUT_ERROR:

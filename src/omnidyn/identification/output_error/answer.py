@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from omnidyn.document import Part, Points, interval_cell, plain
+from omnidyn.document import Part, Points, all_of, interval_cell, plain
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.steady.study_parts import Difference
 
@@ -29,7 +29,7 @@ class OutputErrorEstimate(Estimate):
     Student's t without its wild samples, of counts before the encoder rounds.
     unidentifiable: names of what the data do not determine; they keep what the robot had, std and interval are
     infinite. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
-    iterations, converged: of the minimisation.
+    iterations, converged: of the minimisation. not_followed: outputs that the model does not follow.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -39,6 +39,14 @@ class OutputErrorEstimate(Estimate):
     covariance: str = ""
     iterations: int = 0
     converged: bool = True
+    not_followed: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """How well its numbers are known, in a sentence; they mean nothing where the model does not follow."""
+        if self.not_followed:
+            return f"The model does not follow {all_of(self.not_followed)}: its numbers mean nothing until it does."
+        return super().verdict
 
     def _parts(self) -> list[Part]:
         """The numbers of the log, the noise and what the data do not show, after the rest."""

@@ -77,6 +77,7 @@ def conclude(
         covariance=known.kind,
         iterations=solution.iterations,
         converged=solution.converged,
+        not_followed=tuple(missed),
     )
 
 
