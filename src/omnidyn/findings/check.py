@@ -13,7 +13,7 @@ import numpy as np
 
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, Verdict, in_order, merged
+from omnidyn.findings.finding import FATAL, NOTE, Finding, Verdict, in_order, merged
 from omnidyn.findings.fitness import uses
 from omnidyn.findings.limits import check_limits
 from omnidyn.findings.motion import check_motion
@@ -101,7 +101,7 @@ def _about_columns(log: Log) -> list[Finding]:
     for words in columns.doubts:
         message, _, remedy = words.partition("; say ")
         remedy = f"say {remedy}" if remedy else "give the column another name, or say what it is: `column`"
-        found.append(Finding(DOUBT, WARN, "", message, remedy, (), 0, {}))
+        found.append(Finding(DOUBT, NOTE, "", message, remedy, (), 0, {}))
     doubted = " ".join(columns.doubts)
     unused = [name for name in columns.unused if name not in doubted]
     if unused:
