@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from omnidyn.glossary import explained
+
 WIDTH = 100  # columns of text that knows no terminal
 GAP = "  "  # between two columns of a table
 TINY_CHANCE = 0.001
@@ -77,6 +79,10 @@ class Table:
         return self.align[min(column, len(self.align) - 1)]
 
 
+def _bare(word: str, tone: str) -> str:
+    return word
+
+
 Part = str | Words | Points | Table  # plain text is a line as it stands
 
 
@@ -85,12 +91,15 @@ class Document:
     """What a result says: its parts in the order in which text tells them, and its values as JSON can hold them.
 
     warnings: what a reader of `data` alone must be told too. ascii: text has an escape for every other character.
+    verdict: the result in a sentence; it stands first, and under "verdict" for machines. Words of the trade are
+    explained at the end of the text, those that occur.
     """
 
     parts: Sequence[Part]
     data: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[str] = ()
     ascii: bool = False
+    verdict: str = ""
 
     def __getitem__(self, name: str) -> Points | Table:
         """The points or the table of this name. Raises KeyError."""
@@ -104,13 +113,32 @@ class Document:
         several = [part for part in map(self.__getitem__, names) if isinstance(part, Points)]
         return Points([words for part in several for words in part.words])
 
-    def to_text(self, width: int = WIDTH, paint: Paint = lambda word, tone: word) -> str:
+    def legend(self) -> list[str]:
+        """A line for each word of the trade that occurs in the parts."""
+        told = (part if isinstance(part, str) else "\n".join(part.lines(WIDTH, _bare)) for part in self.parts)
+        return explained("\n".join(told))
+
+    def to_text(self, width: int = WIDTH, paint: Paint = _bare) -> str:
         """The document for people, without a line break at its end. paint: how signs get their colours."""
-        lines: list[str] = []
+        lines: list[str] = [*Words(self.verdict).lines(width, paint), ""] if self.verdict else []
         for part in self.parts:
             lines += [part] if isinstance(part, str) else part.lines(width, paint)
+        if legend := self.legend():
+            lines.append("")
+            lines += [line for words in legend for line in Words(words, rest="  ").lines(width, paint)]
         text = "\n".join(lines)
         return text.encode("ascii", "backslashreplace").decode() if self.ascii else text
+
+
+def sentence(words: str) -> str:
+    """Words with a capital at their begin and a full stop at their end."""
+    return f"{words[:1].upper()}{words[1:]}."
+
+
+def all_of(names: Sequence[str]) -> str:
+    """Names in a sentence: "x", "x and y", "x, y and z"; "" for none."""
+    *most, last = names or ("",)
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def apart(*blocks: Sequence[Part]) -> list[Part]:

@@ -186,3 +186,36 @@ def test_a_map_never_replaces_a_log(call):
     assert code == 3
     assert "the result would replace its own input" in err
     assert Path("clean.csv").read_bytes() == before
+
+
+def test_a_log_that_nothing_can_be_done_with_is_exit_code_4(call, run):
+    write_run(Run(t=run.t, wheel_speed=run.wheel_speed), "speeds.csv")
+    code, out, _ = call("speeds.csv", "--robot", "axebot")
+    assert code == 4
+    assert out.startswith("Nothing can be done with this log: it holds no voltage and no duty.\n")
+    assert "0 fatal, 0 to heed, 0 to know, good for nothing" in " ".join(out.split())
+
+
+def test_what_reading_left_open_is_part_of_the_result(call):
+    rows = "\n".join(f"{0.02 * k:.2f},{100 + k % 50},{k},on" for k in range(100))
+    Path("pwm.csv").write_text(f"time_s,PWM1,PWM2,mode\n{rows}\n")
+    code, out, err = call("pwm.csv")
+    assert code == 4
+    assert "not_taken: PWM1, PWM2 look like d1, d2" in " ".join(out.split())
+    assert "--assume d=V or --assume d=duty" in " ".join(out.split())
+    assert "columns that nobody took: mode" in out
+    assert "doubt" not in err
+    assert "time: t <- time_s [s]" in err
+    code, out, _ = call("pwm.csv", "--json")
+    (log,) = json.loads(out)["logs"]
+    assert [each["code"] for each in log["findings"]] == ["no_channel", "not_taken", "not_used"]
+    assert log["verdict"] == json.loads(out)["verdict"]
+    assert log["useless"]
+
+
+def test_several_logs_begin_with_a_sentence_about_all(call):
+    code, out, _ = call("clean.csv", "swapped.csv", "missing.csv", "--robot", "axebot")
+    assert code == 3
+    assert out.startswith(
+        "Of 3 logs 2 are good for whole logs, motors and geometry; 1 is fatally wrong; 1 is unreadable."
+    )

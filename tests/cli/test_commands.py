@@ -1,5 +1,7 @@
 """The commands, in process: what they print, write and refuse."""
 
+import json
+import re
 import sys
 
 import numpy as np
@@ -79,7 +81,7 @@ def test_robots_lists_every_preset(call):
 def test_deadzone_has_the_paper_s_numbers(call):
     code, out, _ = call("deadzone", "axebot")
     assert code == 0
-    lines = [line.split() for line in out.splitlines()[2:5]]
+    lines = [line.split() for line in out.splitlines()[4:7]]
     assert [(line[0], line[1]) for line in lines] == [("x", "0.670"), ("y", "0.528"), ("yaw", "0.174")]
     assert [line[-1] for line in lines] == ["0.112", "0.088", "0.029"]  # duty of 6 V
     assert "no interval: no number of the robot file has a std; identify writes them" in out
@@ -143,7 +145,7 @@ def test_a_dead_zone_beyond_the_motors_is_said(call, here):
     from omnidyn import save_robot
 
     save_robot(weak, here / "weak.toml")
-    lines = call("deadzone", "weak.toml")[1].splitlines()[2:5]
+    lines = call("deadzone", "weak.toml")[1].splitlines()[4:7]
     assert [line.endswith("(beyond the limit of the motors)") for line in lines] == [True, True, False]
 
 
@@ -279,7 +281,7 @@ def test_parquet_without_pyarrow_ends_with_6_before_any_work(call, here, monkeyp
 
 def test_a_robot_that_never_moves_is_said(call, here):
     (here / "low.csv").write_text("t_s,u1_V,u2_V,u3_V\n0,0,0.6,-0.6\n1,0,0,0\n")
-    assert "it never moved" in call("simulate", "axebot", "low.csv")[1]
+    assert "It never moved" in call("simulate", "axebot", "low.csv")[1]
 
 
 def test_clipped_voltages_are_a_warning_on_stderr_and_in_the_result(call, here):
@@ -446,3 +448,27 @@ def test_simulate_refuses_a_speed_file_for_a_drive_that_takes_volts(here, call):
     code, _, error = call("simulate", "axebot", "w.csv")
     assert code == 3
     assert "the drive of axebot takes no wheel_speed_command" in error
+
+
+def test_deadzone_begins_with_a_sentence(call, here):
+    from omnidyn import save_robot
+
+    assert call("deadzone", "axebot")[1].splitlines()[0] == (
+        "axebot starts to move forward from 0.67 V, sideways from 0.53 V and turning from 0.17 V."
+    )
+    weak = load_robot("axebot")
+    save_robot(weak.replace(motor=weak.motor.replace(voltage_limit=0.5)), here / "weak.toml")
+    assert call("deadzone", "weak.toml")[1].splitlines()[0] == (
+        "axebot starts to move turning from 0.17 V; forward and sideways its motors cannot move it."
+    )
+    save_robot(weak.replace(motor=weak.motor.replace(voltage_limit=0.1)), here / "weaker.toml")
+    told = json.loads(call("deadzone", "weaker.toml", "--json")[1])
+    assert told["verdict"] == (
+        "axebot does not move forward, sideways and turning, whatever voltage its motors can have."
+    )
+
+
+def test_simulate_begins_with_a_sentence(call, here):
+    (here / "turn.csv").write_text("t_s,u1_V,u2_V,u3_V\n0,3,3,3\n1,0,0,0\n")
+    out = call("simulate", "axebot", "turn.csv")[1]
+    assert re.match(r"In 2 s the robot came \S+ m from where it began and turned by \S+ degrees; it is at rest", out)

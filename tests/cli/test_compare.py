@@ -35,7 +35,8 @@ def call(tmp_path, monkeypatch, capsys):
 def test_one_robot_one_log(call):
     code, out, err = call("run.csv", "--robot", "axebot")
     assert code == 0
-    assert out.startswith("axebot against run.csv: 1 free run,")
+    assert out.startswith("The model follows speed over the ground within 2 %, ")
+    assert "\n\naxebot against run.csv: 1 free run," in out
     assert "applied: the logged voltage" in out
     rows = {line.split()[0]: line.split() for line in out.splitlines() if line.startswith(("vx ", "w3 ", "heading "))}
     assert float(rows["vx"][3]) == pytest.approx(0.01, rel=0.15)

@@ -6,6 +6,7 @@ import typer
 
 import omnidyn
 from omnidyn.cli import check, compare, deadzone, demo, identify, init, robots, simulate, warm
+from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.streams import show
 
 app = typer.Typer(
@@ -40,4 +41,4 @@ for _command in (
     demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, deadzone.deadzone,
     robots.robots, warm.warm,
 ):  # fmt: skip
-    app.command()(_command)
+    app.command(cls=Grouped)(_command)

@@ -55,10 +55,11 @@ def check(
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="The verdicts for machines."),
 ) -> None:
-    """Say what is wrong with logs: which rows, why, and what to do.
+    """Say what logs are good for and what is wrong with them: which rows, why, and what to do.
 
-    Time base, sensors, units, wiring, scales, slip, lag, limits, energy, and what the log excites. Without a robot what
-    needs none is checked. Exit code 4 when a finding is fatal, 3 when a log could not be read; the rest is still shown.
+    First what a log is good for: whole logs, steady state, motors, geometry. Then time base, sensors, units, wiring,
+    scales, slip, lag, limits, energy, and what the log excites. Without a robot what needs none is checked. Exit code 4
+    when a finding is fatal or nothing can be done with a log, 3 when one could not be read; the rest is still shown.
     """
     if picture and (len(log) > 1 or os.path.isdir(log[0])):
         raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
@@ -78,7 +79,7 @@ def check(
         _draw(done[0], picture, force)
     if any(each.error is not None for each in done):
         raise typer.Exit(BAD_INPUT)
-    if any(each.verdict is not None and each.verdict.fatal for each in done):
+    if any(each.verdict is not None and (each.verdict.fatal or each.verdict.useless) for each in done):
         raise typer.Exit(INSUFFICIENT)
 
 
@@ -106,7 +107,7 @@ def _checked(
 
         log, only, blocks = _first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=said)))
         if log is not None:
-            maps.show(path, log.columns)
+            maps.show(path, log.columns, doubts=False)
             done.notes = log.notes
         done.verdict = check_log(log, robot) if log is not None and only else check_blocks(blocks, robot)
         done.log = log if picture else None
@@ -183,6 +184,8 @@ def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
         show_json(_document(done, robot))
         return
     read = [each for each in done if each.verdict is not None]
+    if len(done) > 1:
+        show(_overall(done) + "\n")
     for each in read:
         assert each.verdict is not None
         for note in each.notes if full or len(read) <= WHOLE else ():
@@ -204,19 +207,44 @@ def _document(done: list[Checked], robot: str) -> dict[str, Any]:
     inputs = [{"role": "log", "name": each.path, "sha256": each.sha256} for each in done if each.verdict is not None]
     record = provenance([*([robot_input(robot)] if robot else []), *inputs])
     fatal = any(log["fatal"] for log in logs)
-    return {"logs": logs, "unread": errors, "fatal": fatal, "provenance": record}
+    verdict = logs[0]["verdict"] if len(done) == 1 and logs else _overall(done)
+    return {"verdict": verdict, "logs": logs, "unread": errors, "fatal": fatal, "provenance": record}
+
+
+def _overall(done: list[Checked]) -> str:
+    """All logs in a sentence: how many are good for what, and how many cannot be used as they stand."""
+    from omnidyn.document import all_of
+
+    read = [each.verdict for each in done if each.verdict is not None]
+    alike: dict[int, list[str]] = {}
+    for use in read[0].uses if read else ():
+        count = sum(each.good for verdict in read for each in verdict.uses if each.name == use.name)
+        alike.setdefault(count, []).append(use.name)
+    words = [f"{_are(count)} good for {all_of(names)}" for count, names in sorted(alike.items(), reverse=True) if count]
+    bad = {
+        "fatally wrong": sum(verdict.fatal and not verdict.useless for verdict in read),
+        "good for nothing": sum(verdict.useless for verdict in read),
+        "unreadable": len(done) - len(read),
+    }
+    words += [f"{_are(count)} {what}" for what, count in bad.items() if count]
+    return f"Of {len(done)} logs {'; '.join(words)}."
+
+
+def _are(count: int) -> str:
+    return f"{count} {'is' if count == 1 else 'are'}"
 
 
 def _brief(verdict: Verdict) -> str:
     """One log in a line: its findings by name."""
     from omnidyn.findings.finding import FATAL, LABELS, WARN
+    from omnidyn.findings.use import good_for
 
     parts = []
     for level in (FATAL, WARN):
         codes = [f"{each.code} {each.where}".rstrip() for each in verdict.findings if each.level == level]
         if codes:
             parts.append(f"{painted(LABELS[level], level)} {', '.join(codes)}")
-    return f"{verdict.source}: {'; '.join(parts) or 'nothing to heed'}"
+    return f"{verdict.source}: {'; '.join(parts) or 'nothing to heed'}; {good_for(verdict.uses)}"
 
 
 def _summary(done: list[Checked], read: list[Checked]) -> str:

@@ -48,7 +48,7 @@ def compare(
     """Compare a model, or two, with the logs of a robot.
 
     The model runs free under the logged voltages (or duties, or set speeds through the speed loop of the robot file),
-    from gap to gap. Below: how far it ends up from what was measured.
+    from gap to gap. First a sentence: what it follows, and what not; then how far it ends up from what was measured.
     """
     if len(robot) > MOST_ROBOTS:
         raise typer.BadParameter(f"--robot may be given once or twice, not {len(robot)} times.")

@@ -11,6 +11,7 @@ import typer
 
 from omnidyn.cli import log_options as options
 from omnidyn.cli.terminal.flags import flags
+from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say
 from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
@@ -20,7 +21,7 @@ INTERRUPTED, FAILED = 130, 4
 
 
 def _asks(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option for every field of a Question that has a flag, before its other options."""
+    """The command with an option for every field of a Question that has a flag, after --robot, --out and --report."""
     asked = []
     for each in fields_of_question():
         if each.metadata["flag"] is None:
@@ -30,10 +31,13 @@ def _asks(command: Callable[..., None]) -> Callable[..., None]:
         default: Any = [] if many else "" if each.default is None else each.default
         kind: Any = list[str] if many else type(default)
         least, metavar = 0 if kind is int else None, each.metadata["metavar"] or None
-        option = typer.Option(default, flags()[each.name], metavar=metavar, help=words, min=least)
+        panel = None if each.metadata["first"] else MORE
+        option = typer.Option(
+            default, flags()[each.name], metavar=metavar, help=words, min=least, rich_help_panel=panel
+        )
         asked.append(inspect.Parameter(each.name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind))
     own = [p for p in inspect.signature(command).parameters.values() if p.kind is not p.VAR_KEYWORD]
-    command.__signature__ = inspect.Signature([*own[:2], *asked, *own[2:]])  # type: ignore[attr-defined]
+    command.__signature__ = inspect.Signature([*own[:4], *asked, *own[4:]])  # type: ignore[attr-defined]
     return command
 
 
@@ -44,9 +48,9 @@ def identify(
     ),
     robot: str = typer.Option("", metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
     *,
-    report: str = typer.Option("", metavar="FILE.html", help="A page with pictures, numbers and what they say."),
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Robot file to write (TOML), one per group."),
-    force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+    report: str = typer.Option("", metavar="FILE.html", help="A page with pictures, numbers and what they say."),
+    force: bool = typer.Option(False, "--force", help="Replace files that exist.", rich_help_panel=MORE),
     json: bool = typer.Option(False, "--json", help="The result for machines."),
     map_file: str = options.MAP,
     column: list[str] = options.COLUMN,

@@ -9,7 +9,7 @@ from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.cli.terminal.streams import say
 
 if TYPE_CHECKING:
-    from omnidyn.identification.geometry import Geometry
+    from omnidyn.logs.geometry import Geometry
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
 
@@ -18,7 +18,7 @@ GEARED = 1.5  # logged speeds so many times those of the wheels are speeds befor
 
 def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool) -> Geometry:
     """Azimuths, and the radius of the robot where it turned, from logs; what is given on the command line stays."""
-    from omnidyn.identification.geometry import as_mecanum, wheel_geometry
+    from omnidyn.logs.geometry import as_mecanum, wheel_geometry
 
     runs, maps = [], logs.Maps()
     for path, each in logs.load_logs(logs.log_files(log), None, options):

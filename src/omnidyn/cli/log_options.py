@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.streams import say
 
 if TYPE_CHECKING:
@@ -21,18 +22,33 @@ ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".parquet", ".pq", ".log")  # what is
 MAX_FILES = 100_000
 
 LOGS = typer.Argument(metavar="LOG...", help="Logs (CSV, Parquet), or folders of them.")
-MAP = typer.Option("", "--map", metavar="FILE", help="Which column is what (TOML), instead of a guess.")
+MAP = typer.Option(
+    "", "--map", metavar="FILE", help="Which column is what (TOML), instead of a guess.", rich_help_panel=MORE
+)
 COLUMN = typer.Option(
     [], "--column", metavar="CH=COL:UNIT", help="One column: u1=motor_1_volts:V, w2=-m2vel:rpm@motor. Repeatable."
 )
 ASSUME = typer.Option([], "--assume", metavar="NAME=UNIT", help="Unit of a column, or of all u, w, vx, ... Repeatable.")
-LATENCY = typer.Option([], "--latency", metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.")
-SAVE_MAP = typer.Option("", "--save-map", metavar="FILE", help="Write the map that was used (TOML).")
-SORT = typer.Option(False, "--sort", help="Sort rows whose time goes back, instead of refusing them.")
-NO_HEADER = typer.Option(False, "--no-header", help="The file has no header: columns are c1, c2, ...")
-SKIP_BAD_ROWS = typer.Option(False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.")
+LATENCY = typer.Option(
+    [], "--latency", metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.", rich_help_panel=MORE
+)
+SAVE_MAP = typer.Option(
+    "", "--save-map", metavar="FILE", help="Write the map that was used (TOML).", rich_help_panel=MORE
+)
+SORT = typer.Option(
+    False, "--sort", help="Sort rows whose time goes back, instead of refusing them.", rich_help_panel=MORE
+)
+NO_HEADER = typer.Option(
+    False, "--no-header", help="The file has no header: columns are c1, c2, ...", rich_help_panel=MORE
+)
+SKIP_BAD_ROWS = typer.Option(
+    False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.", rich_help_panel=MORE
+)
 CURRENT_UNSIGNED = typer.Option(
-    False, "--current-unsigned", help="Currents are |i|: they get the sign of the commanded speed."
+    False,
+    "--current-unsigned",
+    help="Currents are |i|: they get the sign of the commanded speed.",
+    rich_help_panel=MORE,
 )
 
 
@@ -151,8 +167,11 @@ class Maps:
 
             check_output(save, force)
 
-    def show(self, path: str, columns: ColumnMap) -> None:
-        """Say a map on stderr, unless it was said before; write the first where --save-map asks."""
+    def show(self, path: str, columns: ColumnMap, doubts: bool = True) -> None:
+        """Say a map on stderr, unless it was said before; write the first where --save-map asks.
+
+        Not `doubts`: the result itself says what was not taken and not used.
+        """
         from omnidyn.logs.columns.mapping import save_map
 
         lines = (*columns.lines(), *(f"doubt: {words}" for words in columns.doubts))
@@ -162,7 +181,7 @@ class Maps:
             save_map(columns, self.save, self.force)
         self.said.add(lines)
         say(f"omnidyn: columns of {path}:")
-        for line in lines:
+        for line in lines if doubts else columns.lines():
             say(f"omnidyn:   {line}")
-        if columns.passed_over:
+        if doubts and columns.passed_over:
             say(f"omnidyn:   not used: {', '.join(columns.passed_over)}")

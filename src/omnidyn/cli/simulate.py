@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -163,13 +164,13 @@ def _document(run: Run, job: _Job, ends: Band | None, files: list[str]) -> Docum
         "rests_on_guesses": job.guesses,
         "warnings": run.warnings,
     }
-    still = "it never moved: the voltages stay within the dead zone (see: omnidyn deadzone)"
     lines = [
         f"{run.source}: {len(run)} samples, {duration:.6g} s",
-        *([] if moved else [still]),
         *_last_lines(run, ends),
     ]
-    return _with_band([*lines, *filter(None, [guess_line(job.guesses)])], data, job.robot, ends, files)
+    return _with_band(
+        [*lines, *filter(None, [guess_line(job.guesses)])], data, job.robot, ends, files, _verdict(run, moved)
+    )
 
 
 def _last(run: Run) -> dict[str, dict[str, float]]:
@@ -193,10 +194,12 @@ def _last_lines(run: Run, ends: Band | None) -> list[str]:
     return [f"at the end   {'   '.join(words[:3])}", f"             {'   '.join(words[3:])}"]
 
 
-def _with_band(lines: list[str], data: dict[str, Any], robot: Robot, ends: Band | None, files: list[str]) -> Document:
+def _with_band(
+    lines: list[str], data: dict[str, Any], robot: Robot, ends: Band | None, files: list[str], verdict: str
+) -> Document:
     """The summary, with what its band rests on."""
     if ends is None:
-        return Document(lines, data)
+        return Document(lines, data, verdict=verdict)
     from omnidyn.model.told import told
 
     known = told(robot)
@@ -205,4 +208,19 @@ def _with_band(lines: list[str], data: dict[str, Any], robot: Robot, ends: Band 
     )
     sides = {"low": _last(ends.low), "high": _last(ends.high)}
     band = {"draws": ends.draws, **sides, "guesses": list(known.guessed), "output": files or None}
-    return Document([*lines, words], {**data, "band": band})
+    return Document([*lines, words], {**data, "band": band}, verdict=verdict)
+
+
+def _verdict(run: Run, moved: bool) -> str:
+    """How far the robot came, and whether it still moves at the end."""
+    assert run.twist is not None
+    assert run.pose is not None
+    if not moved:
+        return "It never moved: the voltages stay within the dead zone (see: omnidyn deadzone)."
+    east, north, turned = (run.pose[-1] - run.pose[0]).tolist()
+    rest = "at rest" if not run.twist[-1].any() else "still in motion"
+    doubts = f"; {len(run.warnings)} thing{'s' * (len(run.warnings) > 1)} to heed" if run.warnings else ""
+    return (
+        f"In {run.t[-1] - run.t[0]:.4g} s the robot came {math.hypot(east, north):.3g} m from where it began and "
+        f"turned by {math.degrees(turned):.3g} degrees; it is {rest} at the end{doubts}."
+    )

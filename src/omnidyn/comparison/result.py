@@ -13,6 +13,7 @@ from omnidyn.comparison import text
 from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
+from omnidyn.comparison.verdict import compared_words
 from omnidyn.document import Document, Part, Points, Words
 from omnidyn.logs.channels import place
 from omnidyn.model.first_guess import guess_line
@@ -101,6 +102,12 @@ class Comparison(Shown):
         found = self.difference[component].better
         return None if found is None else self.robots[found]
 
+    @property
+    def verdict(self) -> str:
+        """How well the model follows the logs, in a sentence; of two models also which is nearer."""
+        better = {name: self.better(name) for name in self.difference}
+        return compared_words(self.robots, [self.overall[robot] for robot in self.robots], better)
+
     def trace(self, robot: str, component: str, segment: Segment) -> Trace:
         """Measured and model of one component over one segment."""
         real, ours = self.measured[segment.log], self.simulated[robot][segment.log]
@@ -152,7 +159,7 @@ class Comparison(Shown):
         parts += text.legend([each for found in self.overall.values() for each in found.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
         parts.append(Points(self.warnings, "warning:"))
-        return Document(parts, self.to_dict(), self.warnings, ascii=True)
+        return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
     def _title(self, robot: str) -> tuple[Words, ...]:
         """Which robot met which logs, what drove it, and what of it is a guess."""
@@ -184,6 +191,7 @@ class Comparison(Shown):
             for name in self.robots
         }
         return {
+            "verdict": self.verdict,
             "logs": [run.source for run in self.measured],
             "segments": [asdict(segment) for segment in self.segments],
             "units": {name: unit(name) for name in self.channels},

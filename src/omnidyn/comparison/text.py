@@ -45,7 +45,7 @@ def difference_table(robots: Sequence[str], found: Mapping[str, ModelDifference]
 
 def legend(shown: Sequence[Metrics]) -> Iterator[str]:
     """What the columns mean, where it is not plain."""
-    yield "error = model - measured. white p < 0.05: the errors have a memory, the model misses something."
+    yield "error = model - measured."
     if any(each.lag for each in shown):
         yield "lag: the robot is later than the model by so much, where that explains clearly more; a hint."
     if any(each.fit_percent is None for each in shown):

@@ -1,5 +1,6 @@
 """Is a log fit for use? check runs one family of faults after the other, finding is what they say.
 
 signal/ is what all families stand on (log_under_check is their contract). Families: time_base, values/, limits,
-wiring/, slip, scale/, energy, motion, oddities, excitation.
+wiring/, slip, scale/, energy, motion, oddities, excitation. What the log is good for: needs are the rules, which
+`identify` goes by too, fitness asks them, use is their answer.
 """

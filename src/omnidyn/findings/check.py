@@ -16,6 +16,7 @@ from omnidyn.arguments import check_order
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
 from omnidyn.findings.finding import FATAL, NOTE, Finding, Verdict, in_order, merged
+from omnidyn.findings.fitness import uses
 from omnidyn.findings.limits import check_limits
 from omnidyn.findings.motion import check_motion
 from omnidyn.findings.oddities import check_oddities
@@ -24,6 +25,7 @@ from omnidyn.findings.scale.scale import check_dead_wheels, check_scale
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.slip import check_slip
 from omnidyn.findings.time_base import begin, between
+from omnidyn.findings.use import joined as joined_uses
 from omnidyn.findings.values.values import check_values
 from omnidyn.findings.wiring.wheels import check_wiring
 from omnidyn.logs.log import Log
@@ -40,6 +42,9 @@ FAMILIES: tuple[Family, ...] = (
 
 # What only a whole log can show: dropped unless every block shows it.
 WHOLE = ("never_moved", "few_rows")
+# What is said of the columns, once for all blocks of a log.
+DOUBT, UNUSED, READING = "not_taken", "not_used", "reading"
+OF_COLUMNS = (DOUBT, UNUSED, READING)
 OF_EXCITATION = ("not_excited", "one_way", "one_speed")
 
 
@@ -47,8 +52,8 @@ def check(log: Log | Run, robot: Robot | None = None) -> Verdict:
     """Everything that a log shows about itself, and, with a robot, about how the two fit together.
 
     log: as `load_log` reads it, or a Run in memory: then rows are its samples, counted from 0, and faults of its time
-    base are gone, for a Run has none. The verdict is fatal where the log gives wrong results as it stands; it keeps the
-    log, to be drawn by its `plot()`.
+    base are gone, for a Run has none. The verdict is fatal where the log gives wrong results as it stands; it says
+    what the log is good for, and keeps it, to be drawn by its `plot()`.
     Never raises for what the log holds; InputError for what is neither, or where log and robot are swapped.
     """
     check_order("check(log) or check(log, robot)", (log, (Log, Run)), (robot, (Robot, type(None))))
@@ -61,15 +66,16 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing: NaN is the answer wanted
         found, work = begin(log, robot)
-        found += _no_channel(log) + _other_count(log, robot)
+        found += _no_channel(log) + _other_count(log, robot) + _about_columns(log)
         for family in FAMILIES:
             more, work = family(work)
             found += more
+        good = uses(log, robot, {each.code for each in found})
     length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
     return Verdict(
         in_order(found), work.known.get("excitation", {}), len(log), length,
         1.0 / work.step if work.step > 0.0 else 0.0, tuple(name for name in log.channels if work_has(log, name)),
-        log.source,
+        log.source, good,
     )  # fmt: skip
 
 
@@ -89,6 +95,25 @@ def _no_channel(log: Log) -> list[Finding]:
     )]  # fmt: skip
 
 
+def _about_columns(log: Log) -> list[Finding]:
+    """What reading the log left open: columns that look like something and were not taken, and those nobody took.
+
+    Of a Run, what its reader said.
+    """
+    columns = log.columns
+    found = []
+    for words in columns.doubts:
+        message, _, remedy = words.partition("; say ")
+        remedy = f"say {remedy}" if remedy else "give the column another name, or say what it is: `column`"
+        found.append(Finding(DOUBT, NOTE, "", message, remedy, (), 0, {}))
+    doubted = " ".join(columns.doubts)
+    unused = [name for name in columns.unused if name not in doubted]
+    if unused:
+        found.append(Finding(UNUSED, NOTE, "", f"columns that nobody took: {', '.join(unused)}", "", (), 0, {}))
+    notes = () if columns.columns else log.notes
+    return found + [Finding(READING, NOTE, "", words, "", (), 0, {}) for words in notes]
+
+
 def _other_count(log: Log, robot: Robot | None) -> list[Finding]:
     if robot is None or log.wheels is None or log.wheels == robot.wheels.count:
         return []
@@ -104,16 +129,19 @@ def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
     Findings of one kind and place are joined; what only a whole log can show has to hold in every block.
     """
     found: dict[tuple[str, str], list[Finding]] = {}
-    parts, rows, duration, rates, channels, source = [], 0, 0.0, [], (), ""
+    parts, good, rows, duration, rates, channels, source = [], [], 0, 0.0, [], (), ""
     last: tuple[float, int] | None = None
     count = 0
     for block in blocks:
         count += 1
         verdict = check_log(block, robot)
+        good.append(verdict.uses)
         more, last = between(last, block, verdict.rate)
         for finding in (*more, *verdict.findings):
-            if finding.code not in OF_EXCITATION:
-                found.setdefault((finding.code, finding.where), []).append(finding)
+            of_columns = finding.code in OF_COLUMNS
+            if finding.code not in OF_EXCITATION and not (of_columns and count > 1):
+                place = finding.message if of_columns else finding.where
+                found.setdefault((finding.code, place), []).append(finding)
         parts.append(verdict.excitation)
         rows, duration = rows + verdict.rows, duration + verdict.duration
         rates.append(verdict.rate)
@@ -122,4 +150,5 @@ def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
     known = joined(parts)
     length = float(np.mean(robot.wheels.robot_radius)) if robot is not None else 0.15
     rate = float(np.median(rates)) if rates else 0.0
-    return Verdict(in_order([*together, *judge(known, length)]), known, rows, duration, rate, channels, source)
+    findings = in_order([*together, *judge(known, length)])
+    return Verdict(findings, known, rows, duration, rate, channels, source, joined_uses(good))

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import BoolArray, IntArray
-from omnidyn.document import Document, Words, plain
+from omnidyn.document import Document, Words, plain, sentence
+from omnidyn.findings.use import Use, good_for
 from omnidyn.logs.log import Log
 from omnidyn.shown import FIGURE, Shown, make
 from omnidyn.statistics import stretches
@@ -60,8 +61,8 @@ class Verdict(Shown):
     """All findings of one log, gravest first, and what the log excites.
 
     excitation: name of a measure -> value (see excitation.py). rows: of the log. duration [s]. rate [Hz].
-    channels: that were recorded. source: the path. log: what was checked; None where it came in blocks, and was not
-    kept.
+    channels: that were recorded. source: the path. uses: what the log is good for, and why not for the rest. log: what
+    was checked; None where it came in blocks, and was not kept.
     """
 
     findings: tuple[Finding, ...]
@@ -71,6 +72,7 @@ class Verdict(Shown):
     rate: float = 0.0
     channels: tuple[str, ...] = ()
     source: str = ""
+    uses: tuple[Use, ...] = ()
     log: Log | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
@@ -88,6 +90,26 @@ class Verdict(Shown):
         """Whether any finding is fatal."""
         return any(finding.level == FATAL for finding in self.findings)
 
+    @property
+    def useless(self) -> bool:
+        """Whether nothing can be done with the log: no use of it is good, whatever its findings are."""
+        return bool(self.uses) and not any(use.good for use in self.uses)
+
+    @property
+    def verdict(self) -> str:
+        """What the log is good for, in a sentence."""
+        if self.useless:
+            return f"Nothing can be done with this log: {self.uses[0].words.rstrip('.')}."
+        fatal = [each for each in self.findings if each.level == FATAL]
+        if fatal:
+            more = f" (and {len(fatal) - 1} more)" if fatal[1:] else ""
+            rest = f"; once that is mended, {good_for(self.uses)}" if self.uses else ""
+            return f"Not to be used as it stands: {fatal[0].message.rstrip('.')}{more}{rest}."
+        heed = self.counts[WARN]
+        words = good_for(self.uses) if self.uses else "no row to judge by"
+        told = f"; {heed} thing{'s' * (heed > 1)} to heed" if heed else "; nothing to heed"
+        return sentence(f"{words}{told}")
+
     def of(self, code: str) -> tuple[Finding, ...]:
         """The findings of one kind."""
         return tuple(finding for finding in self.findings if finding.code == code)
@@ -103,22 +125,25 @@ class Verdict(Shown):
         parts = [f"{counts[FATAL]} fatal", f"{counts[WARN]} to heed", f"{counts[NOTE]} to know"]
         size = f"{self.rows} rows, {self.duration:.4g} s"
         rate = f" at {self.rate:.4g} Hz" if self.rate > 0.0 else ""
+        parts += ["good for nothing"] if self.useless else []
         return f"{self.source or 'log'}: {size}{rate}: {', '.join(parts)}"
 
     def as_text(self, width: int = 110) -> str:
-        """The verdict for people: headline, then a paragraph per finding. ASCII only."""
+        """The verdict for people: a sentence, a headline, the uses, then a paragraph per finding. ASCII only."""
         return self.document().to_text(max(LEAST_WIDTH, width))
 
     def document(self) -> Document:
-        """The verdict: headline, then what is the case and what to do about it, gravest first."""
+        """The verdict: what the log is good for, then what is the case and what to do about it, gravest first."""
         paragraphs = [words for finding in self.findings for words in _paragraphs(finding)]
-        return Document([self.headline(), *paragraphs, _excited(self.excitation)], self.to_dict())
+        parts = [Words(self.headline()), *(use.told() for use in self.uses), *paragraphs, _excited(self.excitation)]
+        return Document(parts, self.to_dict(), ascii=True, verdict=self.verdict)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, without NaN."""
         return plain({
             "source": self.source, "rows": self.rows, "duration_s": float(self.duration), "rate_Hz": float(self.rate),
-            "channels": self.channels, "fatal": self.fatal, "counts": self.counts,
+            "channels": self.channels, "verdict": self.verdict, "fatal": self.fatal, "useless": self.useless,
+            "counts": self.counts, "uses": [use.to_dict() for use in self.uses],
             "findings": [finding.to_dict() for finding in self.findings],
             "excitation": {name: float(value) for name, value in self.excitation.items()},
         })  # fmt: skip

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Points, Table, interval_cell, plain
+from omnidyn.document import Document, Part, Points, Table, all_of, interval_cell, plain, sentence
 from omnidyn.errors import shortened
 from omnidyn.model.first_guess import rests_on, rests_on_guesses
-from omnidyn.model.keys import unit
+from omnidyn.model.keys import in_words, unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
 from omnidyn.shown import FIGURE, Shown, make
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 NOT_DETERMINED = "not determined"  # in the place of an interval: the data do not give one
 UNKNOWN = {"std": None, "ci95": [None, None]}  # the same for machines
+NAMED = 4  # numbers that a sentence names
+UNKNOWN_FROM = 0.5  # std over value from which a number is as good as not known
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
 
@@ -71,13 +74,43 @@ class Estimate(Shown):
         """Friction against speed along x, along y and about yaw, with its 95 % band, as a matplotlib Figure."""
         return make(FIGURE, self)
 
+    @property
+    def verdict(self) -> str:
+        """How well its numbers are known, in a sentence."""
+        return sentence(self.numbers_known())
+
+    def numbers_known(self) -> str:
+        """ "all 6 numbers are known, the widest (viscous friction forward) within 9 %"; what is not known is named."""
+        share = self._shares()
+        missing = [in_words(name) for name, each in share.items() if not each <= UNKNOWN_FROM]
+        known = {name: each for name, each in share.items() if each <= UNKNOWN_FROM and name not in self.at_bound}
+        named = all_of([*missing[:NAMED], *([f"{len(missing) - NAMED} more"] if len(missing) > NAMED else [])])
+        if len(missing) == len(share):
+            return f"no number is known{f': not {named}' if named else ''}"
+        one = f"{in_words(next(iter(share)))} is known" if len(share) == 1 else ""
+        count = f"{len(share) - len(missing)} of" if missing else "all"
+        words = one or f"{count} {len(share)} numbers are known"
+        if known:
+            widest = max(known, key=lambda name: known[name])
+            which = "" if one else f", the widest ({in_words(widest)})"
+            words += f"{which} within {max(0.1, 100.0 * known[widest]):.2g} %"
+        return f"{words}; not {named}" if missing else words
+
+    def _shares(self) -> dict[str, float]:
+        """Name -> std over value: 0 at a bound, infinite for what the data do not determine."""
+        return {
+            name: 0.0 if name in self.at_bound
+            else math.inf if name in self.unidentifiable or not value else self.std[name] / abs(value)
+            for name, value in self.value.items()
+        }  # fmt: skip
+
     def summary(self) -> str:
         """The estimate as a plain table, for reading. ASCII only."""
         return self.document().to_text() + "\n"
 
     def document(self) -> Document:
         """What the estimate says."""
-        return Document(self._parts(), self.to_dict(), self.warnings, ascii=True)
+        return Document(self._parts(), self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
     def _parts(self) -> list[Part]:
         """Its words and its table, in the order of reading."""
@@ -91,13 +124,13 @@ class Estimate(Shown):
         rows = []
         for name, value in self.value.items():
             if name in self.unidentifiable:
-                rows.append((name, f"{value:.4g}", "", NOT_DETERMINED, unit(name)))
+                rows.append((name, f"{value:.4g}", "", NOT_DETERMINED, unit(name), in_words(name)))
                 continue
             mark = "  at bound" if name in self.at_bound else ""
             interval = interval_cell(self.ci95[name])
-            rows.append((name, f"{value:.4g}", f"{self.std[name]:.3g}", interval, unit(name) + mark))
-        head = ("parameter", "value", "std error", "95 % interval", "unit")
-        return Table(head, rows, "<>>><", least=(0, 10, 10, 24))
+            rows.append((name, f"{value:.4g}", f"{self.std[name]:.3g}", interval, unit(name) + mark, in_words(name)))
+        head = ("parameter", "value", "std error", "95 % interval", "unit", "in words")
+        return Table(head, rows, "<>>><")
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it: no NaN, no infinity (null instead); the robot as the text of its file."""
@@ -105,7 +138,7 @@ class Estimate(Shown):
             name: {
                 "value": value, "std": self.std[name], "ci95": self.ci95[name],
                 "degrees_of_freedom": int(self.degrees_of_freedom[name]), "at_bound": name in self.at_bound,
-                "unit": unit(name),
+                "unit": unit(name), "words": in_words(name),
             }
             | (UNKNOWN if name in self.unidentifiable else {})
             for name, value in self.value.items()

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from omnidyn.document import Document, Part, Points, Table, Words, apart, interval_cell
+from omnidyn.document import Document, Part, Points, Table, apart, interval_cell
 from omnidyn.findings.finding import FATAL, WARN, Verdict
 from omnidyn.identification.estimate import NOT_DETERMINED
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import Validation
-from omnidyn.model.keys import unit
+from omnidyn.model.keys import in_words, unit
 
 SHOWN = 6  # findings of a log that are named
 
 
 def fit_document(
     fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], differences: Sequence[Difference],
-    verdicts: Sequence[Verdict], advice: Sequence[str], verdict: str = "", ok: bool = True,
+    verdicts: Sequence[Verdict], advice: Sequence[str],
 ) -> Document:  # fmt: skip
-    """The verdict, the fit of each group beside its logs, the differences between groups, and what to do next."""
-    blocks: list[Sequence[Part]] = [[Words(verdict)] if verdict else []]
+    """The fit of each group beside its logs, the differences between groups, and what to do next."""
+    blocks: list[Sequence[Part]] = []
     groups = {}
     for group, fit in fits.items():
         beside = [validations[group].document()] if group in validations else []
@@ -31,8 +31,7 @@ def fit_document(
     blocks.append([difference_table(differences)] if differences else [])
     blocks.append(["next:", Points(advice, name="next")] if advice else [])
     data = {
-        "method": OUTPUT_ERROR, "verdict": {"ok": ok, "words": verdict},
-        **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
+        "method": OUTPUT_ERROR, **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
         "differences": [{**vars(each), "differs": each.differs} for each in differences], "next": advice,
         "check": [{"source": each.source, "fatal": each.fatal, "counts": each.counts} for each in verdicts],
     }  # fmt: skip
@@ -64,10 +63,12 @@ def difference_table(differences: Sequence[Difference]) -> Table:
     """What differs between groups, and what may."""
     rows = [
         (d.key, f"{d.first} {d.values[0]:.4g}", f"{d.second} {d.values[1]:.4g}", f"{d.difference:+.4g}", f"{d.std:.2g}",
-         interval_cell((d.low, d.high)), unit(d.key), "differs" if d.differs else "no difference seen")
+         interval_cell((d.low, d.high)), unit(d.key), "differs" if d.differs else "no difference seen", in_words(d.key))
         for d in differences
     ]  # fmt: skip
-    return Table(("number", "first", "second", "difference", "std error", "95 % interval", "unit", ""), rows)
+    return Table(
+        ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "", "in words"), rows
+    )
 
 
 def verdict_table(verdicts: Sequence[Verdict]) -> Table:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.document import Document, apart
+from omnidyn.document import Document, apart, sentence
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.check import check_log
 from omnidyn.findings.finding import FATAL, Verdict
+from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.advice import advice, verdict_advice
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
@@ -21,7 +22,6 @@ from omnidyn.identification.grouping import group_names, held_out
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit, fit_output_error
-from omnidyn.identification.output_error.inputs import why_no_inputs
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STEADY, STEADY_STATE, Question
@@ -32,6 +32,7 @@ from omnidyn.identification.steady.study import SteadyStudy, identify_steady
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.validation import Validation, validate
+from omnidyn.identification.verdict import fits_verdict, lines_verdict, steady_verdict
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
@@ -194,29 +195,31 @@ class Identification(Shown):
         return tuple(words)
 
     @property
-    def verdict(self) -> str:
-        """The answer in one sentence, failures first; "" of a method without free runs."""
-        if self.failures:
-            return f"failed: {'; '.join(self.failures)}: the numbers mean nothing until that is mended"
-        held = [v.held_out is not None for v in (self.validations or {}).values()]
-        if not held:
-            return ""
-        return f"the model follows the logs{', held-out ones too' if all(held) else ' that it was fitted to'}"
-
-    @property
     def estimate(self) -> Estimate:
         """The estimate of the first group; the only one where there are no groups."""
         return next(iter(self.estimates.values()))
 
+    @property
+    def verdict(self) -> str:
+        """What it came to, in a sentence, failures first: whether the model follows, how well its numbers are known."""
+        if self.failures and not self.interrupted:
+            return sentence(f"failed: {'; '.join(self.failures)}: the numbers mean nothing until that is mended")
+        if self.study is not None:
+            return steady_verdict(self.study)
+        if self.method == OUTPUT_ERROR:
+            return fits_verdict(self.fits, self.validations or {}, self.verdicts, self.interrupted)
+        return lines_verdict(self.estimates)
+
     def document(self) -> Document:
         """All of it, as text, page and machines have it."""
+        return replace(self._told(), verdict=self.verdict)
+
+    def _told(self) -> Document:
         if self.study is not None:
             return study_document(self.study)
         if self.method == OUTPUT_ERROR:
-            return fit_document(
-                self.fits, self.validations or {}, self.differences, self.verdicts, self.advice, self.verdict,
-                not self.failures,
-            )  # fmt: skip
+            told = fit_document(self.fits, self.validations or {}, self.differences, self.verdicts, self.advice)
+            return replace(told, data={"ok": not self.failures, **told.data})
         lines = {group: estimate.document() for group, estimate in self.estimates.items()}
         data = {"shape": self.question.shape, "groups": {group: each.data for group, each in lines.items()}}
         return Document(apart(*(each.parts for each in lines.values())), data, ascii=True)

@@ -32,14 +32,15 @@ WRONG = {
 
 def _option(
     default: Any, words: str, more: str = "", *, of: Sequence[tuple[str, str]], choices: Sequence[str] = (),
-    metavar: str = "", flag: str | None = "",
+    metavar: str = "", flag: str | None = "", first: bool = False,
 ) -> Any:  # fmt: skip
     """A field: `words` say what it does, `more` what only Python need know.
 
     of: who takes it. choices: the words that it may be. metavar, flag: on the command line; "" for the name of the
-    field, None for an option that the command line does not have.
+    field, None for an option that the command line does not have; first: one that a user needs first, in its help.
     """
-    about = {"words": words, "more": more, "of": tuple(of), "choices": tuple(choices), "metavar": metavar, "flag": flag}
+    about = {"words": words, "more": more, "of": tuple(of), "choices": tuple(choices)}
+    about |= {"metavar": metavar, "flag": flag, "first": first}
     return field(default=default, metadata=about)
 
 
@@ -53,7 +54,7 @@ class Question:
     method: str = _option(
         AUTO, "output-error (whole logs; the default) or steady-state (the paper's).",
         '"auto": the first where robot and logs support it, or the one that has the options that are given.',
-        of=EVERYONE, choices=(*METHODS, AUTO),
+        of=EVERYONE, choices=(*METHODS, AUTO), first=True,
     )  # fmt: skip
     free: tuple[str, ...] | None = _option(
         None, "Fit this instead of the friction and all guesses; friction is all of it.",
@@ -62,10 +63,10 @@ class Question:
         "not. The EMF constant follows the torque constant, wheel by wheel, unless both are listed. Breakaway "
         'follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" asks for its interval, without '
         '"[0]" for all.',
-        of=(FIT,), metavar="KEY",
+        of=(FIT,), metavar="KEY", first=True,
     )  # fmt: skip
     fixed: tuple[str, ...] = _option(
-        (), "Leave this as the robot file has it.", of=(FIT,), metavar="KEY", flag="fix",
+        (), "Leave this as the robot file has it.", of=(FIT,), metavar="KEY", flag="fix", first=True,
     )  # fmt: skip
     nuisances: tuple[str, ...] | None = _option(
         None, "Fit what the log does: latency, gain, dead_band, fade, tilt, none; default: auto.",
@@ -79,11 +80,11 @@ class Question:
     )
     hold_out: tuple[str, ...] = _option(
         (), "Do not fit these logs: predict them.", "Globs, or folders, of the sources of runs.",
-        of=(FIT, MOTOR_FIT), metavar="GLOB",
+        of=(FIT, MOTOR_FIT), metavar="GLOB", first=True,
     )  # fmt: skip
     per: tuple[str, ...] = _option(
         (), "A group with friction of its own.", "NAME=GLOB each, of the sources of runs.", of=(FIT,),
-        metavar="NAME=GLOB",
+        metavar="NAME=GLOB", first=True,
     )  # fmt: skip
     per_free: tuple[str, ...] = _option(
         (), "What each group has for itself instead.",
@@ -104,12 +105,10 @@ class Question:
     start: str = _option(
         AUTO, "How logs begin: rest, free, or auto: at rest where that shows.", of=(FIT,), choices=(AUTO, REST, FREE)
     )
-    between: str = _option(
-        AUTO, "Of the motors: input holds, mean of two rows, or a curve; default: auto.", of=(MOTOR_FIT,)
-    )
+    between: str = _option(AUTO, "Of the motors: input holds, mean of two rows, or a curve.", of=(MOTOR_FIT,))
     what: str = _option(
         FRICTION, "friction, or motors: the line of each motor, wheels off the ground.", of=EVERYONE,
-        choices=(FRICTION, MOTORS),
+        choices=(FRICTION, MOTORS), first=True,
     )  # fmt: skip
     shape: str = _option(
         AUTO, "box, disc, ellipse, wheel, wheels, disc+wheel, ...; auto: the best; line: per axis, the paper.",
@@ -253,7 +252,7 @@ def _shares(window: Any) -> tuple[float, float] | None:
 
 
 def options() -> tuple[Field[Any], ...]:
-    """The fields of a Question, in their order; `metadata` has "words", "more", "of", "choices", "metavar", "flag"."""
+    """The fields of a Question, in their order; `metadata` has what `_option` takes, by the names there."""
     return fields(Question)
 
 

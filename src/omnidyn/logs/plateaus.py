@@ -10,9 +10,9 @@ friction.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -69,14 +69,21 @@ def find_plateaus(run: Run, *, start: float | None = None, end: float | None = N
     from 40 % to 95 % of its rows). Returns no window where none is long enough and steady.
     Raises InputError when only one of the two is given, or when they are not 0 <= start < end <= 1.
     """
-    fixed = _fixed(start, end)
-    angle, run_segments, found = live_angle(run), segments(run.t), []
+    return tuple(_plateaus(run, _fixed(start, end)))
+
+
+def first_plateaus(run: Run, most: int) -> tuple[Plateau, ...]:
+    """The first steady windows of a run, as `find_plateaus` finds them: no more than are asked for."""
+    return tuple(islice(_plateaus(run, None), most))
+
+
+def _plateaus(run: Run, fixed: tuple[float, float] | None) -> Iterator[Plateau]:
+    angle, run_segments = live_angle(run), segments(run.t)
     for number, hold in enumerate(holds(run)):
         for segment in _between_gaps(run_segments, _share(hold, *fixed) if fixed else hold):
             rows = segment if fixed else _settled(run, segment, angle)
             if rows is not None and _long_enough(run, rows) and (fixed or _is_steady(run, rows, angle)):
-                found.append(replace(_plateau(run, rows, angle), hold=number))
-    return tuple(found)
+                yield replace(_plateau(run, rows, angle), hold=number)
 
 
 def pool(plateaus: Sequence[Plateau]) -> tuple[Plateau, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Table, Words, plain
+from omnidyn.document import Document, Part, Table, Words, all_of, plain, sentence
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
 from omnidyn.model.robot import GUESS, Robot
@@ -19,6 +19,7 @@ from omnidyn.model.told import numbers_told, told
 from omnidyn.model.uncertainty import DRAWS, Interval, effects, interval_of
 
 AXES = ("x", "y", "yaw")
+WAYS = {"x": "forward", "y": "sideways", "yaw": "turning"}
 AROUND = np.radians(np.arange(0.0, 360.0, 5.0))  # directions of travel that are answered for
 HALVINGS = 20  # of a drawn robot: a millionth of its voltage
 BEYOND = 1.0 + 1e-9
@@ -49,7 +50,7 @@ class Breakaway:
 
 @dataclass(frozen=True)
 class RestsOn:
-    """A number behind the answer: key, origin, whether it is a guess, std, and by which share the answer changes with it.
+    """A number behind the answer: key, origin, whether it is a guess, std, and the share that the answer changes by.
 
     By its std alone, or by 1 % where it has none. Correlations make the whole less, or more, than the sum of these.
     duty: whether it changes the duty alone, as a supply does, not the volts.
@@ -100,7 +101,20 @@ class DeadZone:
         intervals = self.table() if self.band is not None else None
         if intervals is not None:
             parts += ["", "95 % intervals, from the std and the correlations of the file", "", intervals]
-        return Document(parts, self.to_dict(), [words for words in doubts if self.guesses or self.band is None])
+        told = [words for words in doubts if self.guesses or self.band is None]
+        return Document(parts, self.to_dict(), told, verdict=self.verdict)
+
+    @property
+    def verdict(self) -> str:
+        """From which voltage of the most loaded motor it moves, and which way; and what its motors never reach."""
+        starts = {_way(row): float(np.abs(row.voltage).max()) for row in self.rows if row.reachable and row.axis}
+        stuck = [_way(row) for row in self.rows if not (row.reachable and row.axis)]
+        if not starts:
+            return f"{self.robot.name} does not move {all_of(stuck)}, whatever voltage its motors can have."
+        words = all_of([f"{way} from {volts:.2f} V" for way, volts in starts.items()])
+        return sentence(
+            f"{self.robot.name} starts to move {words}{f'; {all_of(stuck)} its motors cannot move it' if stuck else ''}"
+        )
 
     def table(self) -> Table:
         """A row per pattern: volts and duty with their intervals."""
@@ -231,6 +245,11 @@ def _rests_on(robot: Robot, patterns: FloatArray) -> tuple[RestsOn, ...]:
         for key, size in effects(robot, both, [*own]).items() if size > FELT
     ]  # fmt: skip
     return tuple(sorted(found, key=lambda each: (each.duty, -each.effect)))
+
+
+def _way(row: Breakaway) -> str:
+    """Which way a pattern moves the robot, in words."""
+    return all_of([WAYS[axis] for axis in row.axis.split("+") if axis]) or "along the pattern"
 
 
 def _line(row: Breakaway) -> str:

@@ -292,7 +292,7 @@ def _times(value: Any, factor: float | tuple[float, ...]) -> Any:
 def guessed(robot: Robot) -> list[str]:
     """What of a robot is a guess, as short names: ["inertia", "resistance", ...]; all friction is one word."""
     keys = [Key.parse(key) for key, prior in robot.priors.items() if prior.origin == GUESS]
-    return list(dict.fromkeys(FRICTION if key.level else key.words for key in keys))
+    return list(dict.fromkeys(FRICTION if key.level else Key(key.name).words for key in keys))
 
 
 def rests_on(robot: Robot, at_rest: bool = False) -> list[str]:

@@ -36,6 +36,9 @@ _UNITS = {
     "_Vs_rad": "V s/rad", "_V": "V", "_A": "A", "_V_s_rad": "V s/rad", "_V_rad": "V/rad", "_Hz": "Hz",
 }  # fmt: skip
 _FORM = re.compile(r"(\w+(?:\.\w+)*)(?:\[(\d{1,9})\])?", re.ASCII)
+_FRICTIONS = {
+    COULOMB: "Coulomb friction", VISCOUS: "viscous friction", BREAKAWAY: "breakaway friction",
+}  # fmt: skip
 _LETTERS = {COULOMB: "C", VISCOUS: "B", BREAKAWAY: "S", "yaw_coulomb": "C yaw", "yaw_viscous": "B yaw"}
 
 
@@ -107,8 +110,25 @@ class Key:
 
     @property
     def words(self) -> str:
-        """What people call the number, whatever its index: "torque constant", "yaw coulomb"."""
-        return _places()[self.name].path[-1].replace("_", " ")
+        """What people call the number: "torque constant", "Coulomb friction forward", "resistance of motor 2"."""
+        if self.level:
+            return f"{_FRICTIONS[self.level]}{self._acts()}"
+        name = _places()[self.name].path[-1].removesuffix("_deg").replace("_", " ")
+        name = f"{name} of the speed loop" if self.name in GAINS else name
+        if self.wheel is None:
+            return name
+        return f"{name} of {'motor' if self.part == 'motor' else 'wheel'} {self.wheel + 1}"
+
+    def _acts(self) -> str:
+        """Where a friction acts, in words: " forward", " turning", " of wheel 2"; "" for that of a whole list."""
+        if self.table == WHEELS:
+            back = " backward" if self.field.endswith("_backward") else ""
+            return f"{back} at the wheels" if self.index is None else f"{back} of wheel {self.index + 1}"
+        if self.axis == YAW:
+            return " turning"
+        if self.index is None:
+            return " along travel" if self.table == DIRECTION and self.level == VISCOUS else ""
+        return (" forward", " sideways")[self.index]
 
     @property
     def symbol(self) -> str:
@@ -233,6 +253,12 @@ def unit(name: str) -> str:
     """The unit of a number by its key; "" for a name that is no key."""
     key = find_key(name)
     return key.unit if key else ""
+
+
+def in_words(name: str) -> str:
+    """What people call a number, by its key; the name itself where it is no key."""
+    key = find_key(name)
+    return key.words if key else name
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from omnidyn.document import WIDTH, Document
 
 def as_json(document: Document, record: dict[str, Any], **written: Any) -> dict[str, Any]:
     """The result for machines. record: its provenance; written: which files hold what."""
-    return {**document.data, **written, "provenance": record}
+    verdict = {"verdict": document.verdict} if document.verdict else {}
+    return {**verdict, **document.data, **written, "provenance": record}
 
 
 def tell(document: Document, json: bool, record: dict[str, Any], *, width: int = WIDTH, **written: Any) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
+from omnidyn.findings.needs import MOTOR_INPUTS, motor_input
 from omnidyn.logs.plateaus import live_angle
 from omnidyn.logs.segments import segments
 from omnidyn.model.robot import Robot
@@ -17,7 +18,8 @@ from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import stretches
 
-INPUTS = {"voltage": ("V", 1.0), "duty": ("%", 100.0), "current": ("A", 1.0)}  # unit, and how many of it in one SI unit
+# Unit of each input, and how many of it in one SI unit.
+INPUTS: dict[str, tuple[str, float]] = dict(zip(MOTOR_INPUTS, (("V", 1.0), ("%", 100.0), ("A", 1.0)), strict=True))
 WHEEL, GROUND = "wheel", "ground"
 HEADING = "heading, the robot turning on the spot"
 
@@ -68,9 +70,8 @@ def motor_logs(
     if kind and kind not in kinds:
         raise InputError("no such input", got=kind, expected=", ".join(kinds), where="input")
     wanted = [kind] if kind else kinds
-    for name in wanted:
-        if runs and all(getattr(run, name) is not None for run in runs):
-            return [_motor_log(run, name, speed, robot) for run in runs]
+    if found := motor_input(runs, wanted):
+        return [_motor_log(run, found, speed, robot) for run in runs]
     lacking = next((run for run in runs if all(getattr(run, name) is None for name in wanted)), None)
     lacking = lacking or (runs[0] if runs else None)
     raise InputError(

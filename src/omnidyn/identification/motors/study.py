@@ -18,6 +18,7 @@ from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.free_run import fit_rmse
 from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import MotorLog, motor_logs
+from omnidyn.identification.motors.verdict import motors_verdict
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import MOTOR_FIT, MOTOR_LINES, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
@@ -57,6 +58,11 @@ class MotorStudy:
         return tuple(words)
 
     @property
+    def verdict(self) -> str:
+        """Which motors answer to their input, and at which input they start, in a sentence."""
+        return motors_verdict(self.motors)
+
+    @property
     def doubts(self) -> tuple[str, ...]:
         """Of the logs, then of each motor."""
         words = list(self.warnings)
@@ -79,7 +85,7 @@ class MotorStudy:
             Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
             Points(self.statements, name="statements"), Points(self.doubts, "warning:", "doubts"),
         ]  # fmt: skip
-        return Document(parts, self.to_dict(), self.doubts)
+        return Document(parts, self.to_dict(), self.doubts, verdict=self.verdict)
 
     def to_dict(self) -> dict[str, Any]:
         """The study as JSON can hold it."""
@@ -87,7 +93,8 @@ class MotorStudy:
         for own, plain in zip(motors, self.plain, strict=False):
             own["without_dead_band"] = plain.to_dict()
         return {
-            "method": self.method, "input": self.kind, "unit": self.unit, "speed_from": self.speed_from,
+            "verdict": self.verdict, "method": self.method, "input": self.kind, "unit": self.unit,
+            "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
             "statements": list(self.statements), "warnings": list(self.doubts),
         }  # fmt: skip

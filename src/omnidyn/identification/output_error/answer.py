@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from omnidyn.document import Part, Points, interval_cell, plain
+from omnidyn.document import Part, Points, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.steady.study_parts import Difference
 
@@ -44,6 +44,7 @@ class OutputErrorEstimate(Estimate):
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
     together. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
     unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the minimisation.
+    not_followed: outputs that the model does not follow.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -54,6 +55,14 @@ class OutputErrorEstimate(Estimate):
     unused: tuple[str, ...] = ()
     iterations: int = 0
     converged: bool = True
+    not_followed: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """How well its numbers are known, in a sentence; they mean nothing where the model does not follow."""
+        if self.not_followed:
+            return f"The model does not follow {all_of(self.not_followed)}: its numbers mean nothing until it does."
+        return super().verdict
 
     def _parts(self) -> list[Part]:
         """The numbers of the log, the noise and what the data do not show, after the rest."""

@@ -96,6 +96,7 @@ def conclude(
         unused=_unused(records),
         iterations=solution.iterations,
         converged=solution.converged,
+        not_followed=tuple(missed),
     )
 
 

@@ -14,10 +14,10 @@ from typing import Unpack
 
 from omnidyn.arguments import check_order
 from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.conclusion import conclude
-from omnidyn.identification.output_error.inputs import why_no_inputs
 from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
 from omnidyn.identification.output_error.prepare import (
     EXACT,
@@ -28,7 +28,6 @@ from omnidyn.identification.output_error.prepare import (
     expand_keys,
     free_by_default,
     guesses,
-    is_exact,
     make_engine,
     make_group,
     read_records,

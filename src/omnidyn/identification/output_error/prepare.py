@@ -10,6 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
@@ -44,10 +45,8 @@ from omnidyn.model.keys import (
     friction_keys,
     unit,
 )
-from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.run import Run
-from omnidyn.simulation.exact.march import why_not_exact
 
 EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
@@ -209,11 +208,6 @@ def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactE
 def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> str:
     """Which engine fits these keys of the robot to the records."""
     return LOOP if looped(records) else EXACT if is_exact(robot) and stays_exact(robot, keys) else IMPLICIT
-
-
-def is_exact(robot: Robot) -> bool:
-    """Whether the exact engine knows this robot."""
-    return not why_not_exact(robot) and robot.motor.electrical != DYNAMIC
 
 
 def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:

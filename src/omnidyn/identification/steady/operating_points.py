@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.findings.needs import CURRENT, VOLTAGE, force_origin
 from omnidyn.identification.recordings import count_once
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
@@ -32,7 +33,6 @@ SPEEDS = {
     SET: "set speed",
     GROUND: "speed over the ground",
 }
-CURRENT, VOLTAGE = "current", "voltage"
 STILL_SHARE = 1e-6  # of the fastest rim: slower is not moving, whatever the speed is
 STILL_ERRORS = 2.0  # standard errors: a measured speed below is not known to move
 AT_REST = 1e-3  # [m/s] at the rim
@@ -148,10 +148,8 @@ def _origin(runs: Sequence[Run], asked: str) -> str:
         raise InputError("no such origin of the force", got=asked, expected="current or voltage", where="force_from")
     if asked:
         return asked
-    if all(run.current is not None for run in runs):
-        return CURRENT
-    if all(run.voltage is not None or run.duty is not None for run in runs):
-        return VOLTAGE
+    if origin := force_origin(runs):
+        return origin
     lacking = next(run for run in runs if run.current is None)
     raise InputError(
         "no force can be had from this run", got=", ".join(lacking.channels) or "no channels",

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.findings.needs import loses_in_gear
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents, wrench_from_currents
 from omnidyn.model.robot import Robot
@@ -177,7 +178,7 @@ def _at_limit(robot: Robot, twist: FloatArray, voltage: FloatArray) -> tuple[str
 
 def refuse_losses(robot: Robot) -> None:
     """Raises UnsupportedError for a gear that loses power: it would be counted as friction."""
-    if np.any(np.asarray(robot.motor.gear_efficiency) < 1.0):
+    if loses_in_gear(robot):
         raise UnsupportedError(
             "steady points know no such loss yet",
             got="gear_efficiency below 1",

@@ -69,8 +69,11 @@ def _level_table(study: SteadyStudy) -> Table:
         for key, value in estimate.value.items():
             mark, interval = " at bound" if key in estimate.at_bound else "", interval_cell(estimate.ci95[key])
             name = Key.parse(key)
-            rows.append((group, name.symbol, f"{value:.4g}", f"{estimate.std[key]:.2g}", interval, name.unit + mark))
-    return Table(("group", "level", "value", "std error", "95 % interval", "unit"), rows, name="levels")
+            std, measure = f"{estimate.std[key]:.2g}", name.unit + mark
+            rows.append((group, name.symbol, f"{value:.4g}", std, interval, measure, name.words))
+    return Table(
+        ("group", "level", "value", "std error", "95 % interval", "unit", "in words"), rows, "<<>>><", name="levels"
+    )
 
 
 def _data(study: SteadyStudy) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def guess_columns(
             name, table, (*found.columns, *(each.component for each in found.doubts), *(taken or {}).values())
         )
     )
-    return ColumnMap(ordered, unused, (*found.doubt_words(), *idle), found.note_words())
+    return ColumnMap(ordered, unused, (*found.doubt_words(), *idle), found.note_words(), found.doubted())
 
 
 def _is_used(name: str, table: Table, components: Iterable[str]) -> bool:

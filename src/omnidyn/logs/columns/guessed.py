@@ -33,10 +33,18 @@ class Guess:
 
     def doubt_words(self) -> tuple[str, ...]:
         """The doubts, columns of one kind in one sentence."""
-        groups: dict[tuple, list[Doubt]] = {}
+        return tuple(_doubt_sentence(*kind, each) for kind, each in self._alike().items())
+
+    def _alike(self) -> dict[tuple[str, str, tuple[str, ...]], list[Doubt]]:
+        """The doubts about columns of one kind, by letter, reason and the units that would settle them."""
+        groups: dict[tuple[str, str, tuple[str, ...]], list[Doubt]] = {}
         for doubt in self.doubts:
             groups.setdefault((letter_of(doubt.component), doubt.why, doubt.units), []).append(doubt)
-        return tuple(_doubt_sentence(letter, why, units, each) for (letter, why, units), each in groups.items())
+        return groups
+
+    def doubted(self) -> dict[str, str]:
+        """Component -> which columns look like it and why they were not taken, with what would settle it."""
+        return {each.component: _in_brief(*kind, alike) for kind, alike in self._alike().items() for each in alike}
 
     def note_words(self) -> tuple[str, ...]:
         if not self.si:
@@ -56,11 +64,23 @@ def _doubt_sentence(letter: str, why: str, units: tuple[str, ...], doubts: list[
     looks = "looks" if len(doubts) == 1 else "look"
     if not units:
         return f"{names} {looks} like {like}, {why}: not taken"
+    return f"{names} {looks} like {like}, but {why}: not taken; say {_remedy(letter, units, doubts)}"
+
+
+def _in_brief(letter: str, why: str, units: tuple[str, ...], doubts: list[Doubt]) -> str:
+    """PWM1 .. PWM4, no unit is given (say `assume` d=V, duty, % or duty/255)."""
+    names = f"{doubts[0].name} .. {doubts[-1].name}" if len(doubts) > 2 else " and ".join(d.name for d in doubts)
+    reason = why.removeprefix("but ").partition(", and ")[0]
+    *more, last = units or ("",)
+    first = _remedy(letter, ((f"{', '.join(more)} or {last}" if more else last),), doubts)
+    return f"{names}, {reason}{f' (say {first})' if units else ''}"
+
+
+def _remedy(letter: str, units: tuple[str, ...], doubts: list[Doubt]) -> str:
+    """What to say so that the columns are taken."""
     if len(doubts) == 1 and letter == doubts[0].component:
-        remedy = " or ".join(f'`column` "{like}={names}:{unit}"' for unit in units)
-    else:
-        remedy = " or ".join(f"`assume` {letter}={unit}" for unit in units)
-    return f"{names} {looks} like {like}, but {why}: not taken; say {remedy}"
+        return " or ".join(f'`column` "{letter}={doubts[0].name}:{unit}"' for unit in units)
+    return " or ".join(f"`assume` {letter}={unit}" for unit in units)
 
 
 def is_numeric(cells: FloatArray | tuple[str, ...]) -> bool:

@@ -32,7 +32,8 @@ class ColumnMap:
     """Component ("t", "u1", "vx_cmd", ...) -> Column.
 
     unused: columns that nobody took. doubts: columns that were not taken because something was not sure, and what to
-    say about them. notes: what was decided, in words.
+    say about them. notes: what was decided, in words. doubted: component -> the doubt about what looks like it, in
+    brief.
     Raises InputError for a name that is no component, or a unit of another quantity.
     """
 
@@ -40,6 +41,7 @@ class ColumnMap:
     unused: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    doubted: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for component, column in self.columns.items():
@@ -56,7 +58,8 @@ class ColumnMap:
         kept = {name: column for name, column in self.columns.items() if column.name not in taken}
         unused = tuple(name for name in self.unused if name not in taken)
         doubts = tuple(words for words in self.doubts if not any(words.startswith(f"{name} ") for name in taken))
-        return replace(self, columns={**kept, **more}, unused=unused, doubts=doubts)
+        doubted = {name: words for name, words in self.doubted.items() if name not in more}
+        return replace(self, columns={**kept, **more}, unused=unused, doubts=doubts, doubted=doubted)
 
     @property
     def passed_over(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.findings.needs import LOOP_REMEDY, has_set_speeds
 from omnidyn.identification.output_error.problem.outputs import outputs_of
 from omnidyn.logs.segments import segments
 from omnidyn.model.actuation import asked_voltage, clip_voltage
@@ -20,10 +21,6 @@ from omnidyn.run import Run
 from omnidyn.statistics import stretches
 
 SHORTEST = 3  # rows of a piece that is used
-LOOP_REMEDY = (
-    'write the speed loop of the firmware into the robot file: [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz '
-    "(the gains may be guesses: they are fitted)"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +148,7 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
             "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
             remedy="add supply_V to the robot file",
         )  # fmt: skip
-    if run.wheel_speed_command is not None or run.twist_command is not None:
+    if has_set_speeds(run):
         raise UnsupportedError(
             "only set speeds are logged, and the robot has no speed loop to follow them", got=", ".join(run.channels),
             expected="voltage or duty, or the speed loop of the firmware", where=run.source, remedy=LOOP_REMEDY,

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn import load_robot
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.geometry import as_mecanum, wheel_geometry
+from omnidyn.logs.geometry import as_mecanum, wheel_geometry
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 

@@ -51,8 +51,7 @@ def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:
     InsufficientDataError where the runs go in one direction only.
     """
     for body, wheels in SOURCES:
-        pairs = [(getattr(run, body), getattr(run, wheels)) for run in runs]
-        usable = [_rows(twist, speed) for twist, speed in pairs if twist is not None and speed is not None]
+        usable = [_rows(twist, speed) for twist, speed in _pairs(runs, body, wheels)]
         usable = [pair for pair in usable if len(pair[0])]
         if usable:
             twist, speed = (np.concatenate(parts) for parts in zip(*usable, strict=True))
@@ -62,6 +61,17 @@ def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:
         expected="twist_command and wheel_speed_command, or twist and wheel_speed, all components of them",
         remedy=f"say which columns they are (`column` w1=NAME), or leave the logs out and give {instead}",
     )  # fmt: skip
+
+
+def shows_both(run: Run) -> bool:
+    """Whether a run has the motion of the body and of the wheels."""
+    return any(_pairs([run], body, wheels) for body, wheels in SOURCES)
+
+
+def _pairs(runs: Sequence[Run], body: str, wheels: str) -> list[tuple[FloatArray, FloatArray]]:
+    """The two channels of each run that has both."""
+    pairs = [(getattr(run, body), getattr(run, wheels)) for run in runs]
+    return [(twist, speed) for twist, speed in pairs if twist is not None and speed is not None]
 
 
 def as_mecanum(seen: Geometry) -> Geometry:

@@ -1,0 +1,130 @@
+"""How well a model follows what was measured, in a sentence: the same words for `compare` and for `identify`.
+
+The error of a component as a share of its spread is 1 - fit / 100 (metrics.py). Up to FOLLOWS of it the model follows,
+up to HALF roughly; errors that are white are the noise of the sensor, whatever their share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from omnidyn.comparison.traces import unit
+from omnidyn.document import all_of, sentence
+from omnidyn.logs.channels import place
+
+FOLLOWS, HALF, NOTHING = 0.2, 0.5, 1.0  # error over spread
+WHITE = 0.05  # p-value from which errors are noise
+WELL, NOISE, ROUGHLY, HARDLY, NOT = range(5)  # how a component is followed, best first
+PLAIN = {
+    ("twist", 0): "speed over the ground", ("twist", 1): "speed over the ground", ("twist", 2): "turn rate",
+    ("pose", 0): "position", ("pose", 1): "position", ("pose", 2): "heading",
+}  # fmt: skip
+OF_WHEELS = {
+    "wheel_speed": "wheel speeds", "wheel_angle": "wheel angles", "current": "currents", "voltage": "voltages",
+}  # fmt: skip
+
+
+class Scored(Protocol):
+    """What a comparison, or a validation, knows of a component."""
+
+    @property
+    def rmse(self) -> float: ...
+    @property
+    def fit_percent(self) -> float | None: ...
+    @property
+    def whiteness(self) -> float | None: ...
+
+
+@dataclass(frozen=True)
+class Followed:
+    """How a model follows one kind of measurement. name: in plain words. level: WELL to NOT. share: error over spread,
+    and error: its rms in `unit`, each the largest of the components.
+    """
+
+    name: str
+    level: int
+    share: float
+    error: float
+    unit: str
+
+    def words(self) -> str:
+        """ "wheel speeds within 3 %", "heading not at all (rms error 1.2 rad)"."""
+        percent = max(1.0, round(100.0 * self.share))
+        if self.level == NOT:
+            return f"{self.name} not at all (rms error {self.error:.2g} {self.unit})"
+        how = {
+            WELL: f"within {percent:.0f} %", NOISE: f"as far as noise lets it ({percent:.0f} %)",
+            ROUGHLY: f"roughly ({percent:.0f} %)", HARDLY: f"hardly ({percent:.0f} %)",
+        }  # fmt: skip
+        return f"{self.name} {how[self.level]}"
+
+
+def followed(scores: Mapping[str, Scored]) -> list[Followed]:
+    """How well each kind of measurement is followed, best first; components of one kind apart where they differ.
+
+    What never changes is left out: there is nothing to follow.
+    """
+    kinds: dict[str, list[tuple[str, Followed]]] = {}
+    for name, score in scores.items():
+        if score.fit_percent is not None:
+            each = Followed(name, _level(score), _share(score), score.rmse, unit(name))
+            kinds.setdefault(plain_name(name), []).append((name, each))
+    found = []
+    for plain, members in kinds.items():
+        alike: dict[int, list[tuple[str, Followed]]] = {}
+        for member in members:
+            alike.setdefault(member[1].level, []).append(member)
+        for same in alike.values():
+            share, error = (max(values) for values in zip(*((each.share, each.error) for _, each in same), strict=True))
+            called = plain if len(alike) == 1 else f"{all_of([name for name, _ in same])} ({plain})"
+            found.append(Followed(called, same[0][1].level, share, error, same[0][1].unit))
+    return sorted(found, key=lambda each: each.level)
+
+
+def plain_name(component: str) -> str:
+    """The kind of measurement that a component belongs to, in plain words."""
+    where = place(component)
+    if where is None:
+        return component
+    return OF_WHEELS.get(where[0]) or PLAIN.get(where, component)
+
+
+def _share(score: Scored) -> float:
+    assert score.fit_percent is not None
+    return 1.0 - score.fit_percent / 100.0
+
+
+def _level(score: Scored) -> int:
+    share = _share(score)
+    if share <= FOLLOWS:
+        return WELL
+    if score.whiteness is not None and score.whiteness >= WHITE:
+        return NOISE
+    return ROUGHLY if share <= HALF else HARDLY if share < NOTHING else NOT
+
+
+def follows(who: str, found: Sequence[Followed]) -> str:
+    """ "the model follows wheel speeds within 3 % and turn rate within 5 %, heading not at all (..)", no full stop."""
+    if not found:
+        return f"nothing that was measured changes: how well {who} follows cannot be told"
+    if found[0].level >= HARDLY:
+        return f"{who} does not follow: {', '.join(each.words() for each in found)}"
+    good = [each.words() for each in found if each.level <= ROUGHLY]
+    bad = [each.words() for each in found if each.level >= HARDLY]
+    return f"{who} follows {all_of(good)}{f', but {all_of(bad)}' if bad else ''}"
+
+
+def compared_words(
+    robots: Sequence[str], scores: Sequence[Mapping[str, Scored]], better: Mapping[str, str | None]
+) -> str:
+    """A comparison in a sentence. better: component -> the robot that is surely nearer, None where none is."""
+    if len(robots) == 1:
+        return sentence(follows("the model", followed(scores[0])))
+    each = [follows(robot, followed(own)) for robot, own in zip(robots, scores, strict=True)]
+    nearer = [
+        f"{robot} is surely nearer in {all_of(own)}" for robot in robots
+        if (own := [name for name, best in better.items() if best == robot])
+    ]  # fmt: skip
+    return f"{'; '.join([*(nearer or ['neither is surely nearer']), *each])}."

@@ -1,0 +1,85 @@
+"""What each use of a log needs of it. `identify` chooses its method by these rules, and `check` says what they say.
+
+A rule answers with the reason why not, in words, "" where nothing is lacking; it never raises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from omnidyn.model.actuation import asked_voltage
+from omnidyn.model.drive import SPEED
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+from omnidyn.simulation.exact.march import why_not_exact
+
+OUTPUTS = ("twist", "wheel_speed", "wheel_angle", "current", "pose")  # what a model predicts
+CURRENT, VOLTAGE = "current", "voltage"  # where the force of the motors is from
+MOTOR_INPUTS: tuple[str, ...] = ("voltage", "duty", "current")
+LOOP_REMEDY = (
+    'write the speed loop of the firmware into the robot file: [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz '
+    "(the gains may be guesses: they are fitted)"
+)
+
+
+def is_exact(robot: Robot) -> bool:
+    """Whether the exact engine of a fit knows this robot."""
+    return not why_not_exact(robot) and robot.motor.electrical != DYNAMIC
+
+
+def why_no_inputs(runs: Sequence[Run], robot: Robot) -> str:
+    """Which log has no input that the robot follows, or no output, in words; "" where all have both."""
+    for run in runs:
+        why = why_not_whole(run, robot)
+        if why:
+            return f"{run.source or 'a log'} {why}"
+    return ""
+
+
+def why_not_whole(run: Run, robot: Robot | None) -> str:
+    """Why a log cannot be fitted whole: it "holds no voltage and no duty". Without a robot: for none that there is."""
+    none = run.voltage is None and run.duty is None
+    if none and has_set_speeds(run):
+        if robot is not None and robot.drive.kind != SPEED:
+            return f"holds set speeds only; to fit it whole, {LOOP_REMEDY}"
+    elif none:
+        return "holds no voltage and no duty"
+    if not any(getattr(run, name) is not None for name in OUTPUTS):
+        return "holds no speed, angle, current or pose"
+    return ""
+
+
+def has_set_speeds(run: Run) -> bool:
+    """Whether speeds that were asked for are logged."""
+    return run.wheel_speed_command is not None or run.twist_command is not None
+
+
+def needs_supply(run: Run, robot: Robot | None) -> bool:
+    """Whether a duty stands alone: no voltage, and no battery, neither logged nor in the robot file."""
+    nominal = robot.drive.supply if robot is not None else None
+    return run.duty is not None and asked_voltage(run.voltage, run.duty, run.supply, nominal) is None
+
+
+def force_origin(runs: Sequence[Run]) -> str:
+    """Where the force of the motors can be had from in all runs: "current" first, else "voltage", else ""."""
+    if all(run.current is not None for run in runs):
+        return CURRENT
+    return VOLTAGE if all(run.voltage is not None or run.duty is not None for run in runs) else ""
+
+
+def motor_input(runs: Sequence[Run], kinds: Sequence[str] = MOTOR_INPUTS) -> str:
+    """The first of `kinds` that all runs have as input of their motors; "" where there is none."""
+    return next((kind for kind in kinds if runs and all(getattr(run, kind) is not None for run in runs)), "")
+
+
+def turns_known(run: Run) -> bool:
+    """Whether a speed or an angle of the wheels was logged."""
+    return run.wheel_speed is not None or run.wheel_angle is not None
+
+
+def loses_in_gear(robot: Robot) -> bool:
+    """Whether a gear loses power, which a steady state would count as friction."""
+    return bool(np.any(np.asarray(robot.motor.gear_efficiency) < 1.0))

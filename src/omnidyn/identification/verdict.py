@@ -1,0 +1,80 @@
+"""What an identification came to, in a sentence: whether the model follows, and how well its numbers are known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from omnidyn.comparison.verdict import HARDLY, followed, follows
+from omnidyn.document import all_of, sentence
+from omnidyn.findings.finding import FATAL, Verdict
+from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.steady.study import SteadyStudy
+from omnidyn.identification.validation import FITTED, HELD_OUT, Validation
+
+NAMED = 4  # shapes that are named
+WHERE = {FITTED: "on the fitted logs", HELD_OUT: "on logs held out"}
+MISSES = 0.5  # of the force: a shape that leaves more explains nothing
+
+
+def fit_verdict(fit: OutputErrorEstimate, validation: Validation | None = None) -> str:
+    """A fit to whole logs. Where logs were held out, these say whether the model follows."""
+    if validation is None:
+        return f"{fit.verdict[:-1]}; no log was compared with the model."
+    which = HELD_OUT if HELD_OUT in validation.scores else FITTED
+    found = followed(validation.scores[which])
+    words = f"{WHERE[which]} {follows('the model', found)}"
+    if fit.not_followed or (found and found[0].level >= HARDLY):
+        return sentence(f"{words}: its numbers mean nothing until it does")
+    return sentence(f"{words}; {fit.numbers_known()}")
+
+
+def fits_verdict(
+    fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], verdicts: Sequence[Verdict] = (),
+    cut: str = "",
+) -> str:  # fmt: skip
+    """Fits of all groups. verdicts: of `check` on the logs. cut: what an interrupt cut off, in words."""
+    words = [sentence(f"cut short: {cut}")] if cut else []
+    faults = [finding for each in verdicts for finding in each.findings if finding.level == FATAL]
+    if faults:
+        logs = sum(each.fatal for each in verdicts)
+        of = "the log has" if len(verdicts) == 1 else f"{logs} of {len(verdicts)} logs have"
+        words.append(sentence(f"{of} a fatal fault, to be mended first: {faults[0].message}"))
+    told = {group: fit_verdict(fit, validations.get(group)) for group, fit in fits.items()}
+    return " ".join([*words, *(each if len(told) == 1 else f"{group}: {each}" for group, each in told.items())])
+
+
+def steady_verdict(study: SteadyStudy) -> str:
+    """Friction from steady windows."""
+    score, forces = study.choice.score, study.points.wrench[:, :2]
+    size = float(np.sqrt(np.mean((forces**2).sum(axis=1))))
+    share = score.loo / size if size > 0.0 else math.inf
+    several = len(study.travel) > 1
+    levels = all_of([f"{each.mean:.3g} N{f' ({name})' * several}" for name, each in study.travel.items()])
+    if not share <= MISSES:
+        return (
+            f"No shape of friction explains the forces: the best, {score.name}, misses {score.loo:.2g} N of "
+            f"{size:.2g} N in a direction that was left out."
+        )
+    ties = [each.name for each in study.choice.scores if not each.told_apart and each.name != score.name]
+    alike = f"; as good, as far as these data tell: {all_of(ties[:NAMED])}" if ties else ""
+    lack = study.lack_of_fit
+    misfit = f"; but no offered shape fits: {all_of([r.words for r in lack.remedies[:1]]) or 'its errors repeat'}"
+    alike = misfit if lack.found else alike
+    known = _of_groups({group: each.numbers_known() for group, each in study.estimates.items()})
+    return (
+        f"Friction along travel is {levels}; its shape, {score.name} ({score.words.partition(';')[0]}), predicts "
+        f"the force in a direction that was left out within {max(1.0, round(100.0 * share)):.0f} %{alike}; {known}."
+    )
+
+
+def lines_verdict(estimates: Mapping[str, Estimate]) -> str:
+    """The paper's line on each axis."""
+    return sentence(_of_groups({group: each.numbers_known() for group, each in estimates.items()}))
+
+
+def _of_groups(told: Mapping[str, str]) -> str:
+    return "; ".join(each if len(told) == 1 else f"{group}: {each}" for group, each in told.items())

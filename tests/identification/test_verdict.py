@@ -1,0 +1,166 @@
+"""What an identification came to, in a sentence: a good model, a half-good one, a bad one."""
+
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from omnidyn.findings.finding import FATAL, Finding, Verdict
+from omnidyn.identification.estimate import Correlation, Estimate
+from omnidyn.identification.identify import Identification
+from omnidyn.identification.motors.verdict import motors_verdict
+from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_verdict
+from omnidyn.model.keys import BOX
+from omnidyn.model.robot_file import load_robot
+from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation, noisy_draw
+
+AXEBOT = load_robot("axebot")
+
+
+class Score(NamedTuple):
+    rmse: float
+    fit_percent: float | None
+    whiteness: float | None = 0.0
+
+
+def estimate(std, kind: Any = OutputErrorEstimate, **more) -> Any:
+    """An estimate of the paper's six numbers, each 2, with these standard errors."""
+    names = BOX[: len(std)]
+    return kind(
+        robot=AXEBOT, value=dict.fromkeys(names, 2.0), std=dict(zip(names, std, strict=True)),
+        ci95={name: (2.0 - 2.0 * s, 2.0 + 2.0 * s) for name, s in zip(names, std, strict=True)},
+        correlation=Correlation(names, np.eye(len(names))), degrees_of_freedom=dict.fromkeys(names, 100), **more,
+    )  # fmt: skip
+
+
+def beside(scores, which="fitted") -> Any:
+    return SimpleNamespace(scores={which: scores})
+
+
+GOOD = {"w1": Score(0.1, 97.0), "w2": Score(0.1, 99.0)}
+BAD = {"w1": Score(9.0, -50.0)}
+
+
+def test_a_good_fit():
+    fit = estimate([0.02, 0.18, 0.02, 0.02, 0.02, 0.02])
+    assert fit_verdict(fit, beside(GOOD, "held out")) == (
+        "On logs held out the model follows wheel speeds within 3 %; all 6 numbers are known, the widest (viscous "
+        "friction sideways) within 9 %."
+    )
+    assert fit.verdict == "All 6 numbers are known, the widest (viscous friction sideways) within 9 %."
+
+
+def test_a_half_good_fit():
+    fit = estimate([0.02, 1.8, np.inf, 0.02, 0.02, 0.02], unidentifiable=(BOX[2],))
+    scores = GOOD | {"heading": Score(1.2, -20.0)}
+    assert fit_verdict(fit, beside(scores)) == (
+        "On the fitted logs the model follows wheel speeds within 3 %, but heading not at all (rms error 1.2 rad); "
+        "4 of 6 numbers are known, the widest (viscous friction forward) within 1 %; not "
+        "viscous friction sideways and viscous friction turning."
+    )
+
+
+def test_a_bad_fit():
+    assert fit_verdict(estimate([0.02] * 6), beside(BAD)) == (
+        "On the fitted logs the model does not follow: wheel speeds not at all (rms error 9 rad/s): "
+        "its numbers mean nothing until it does."
+    )
+    lost = estimate([0.02] * 6, not_followed=("wheel_speed[0]",))
+    assert lost.verdict == "The model does not follow wheel_speed[0]: its numbers mean nothing until it does."
+    assert fit_verdict(lost, beside(GOOD)).endswith("its numbers mean nothing until it does.")
+
+
+def test_no_number_is_known():
+    fit = estimate([2.0] * 6)
+    assert fit.verdict == (
+        "No number is known: not viscous friction forward, viscous friction sideways, viscous friction turning, "
+        "Coulomb friction forward and 2 more."
+    )
+    assert estimate([0.02], Estimate).verdict == "Viscous friction forward is known within 1 %."
+
+
+def test_groups_faults_and_interrupts_are_said():
+    verdicts = [Verdict((Finding("swapped", FATAL, "w1 w2", "two wheels are swapped"),))]
+    fits = {"all": estimate([0.02] * 6)}
+    assert fits_verdict(fits, {}, verdicts).startswith(
+        "The log has a fatal fault, to be mended first: two wheels are swapped. All 6 numbers are known"
+    )
+    both = fits_verdict({"oak": fits["all"], "felt": fits["all"]}, {"oak": beside(GOOD)}, cut="the best so far")
+    assert both.startswith(
+        "Cut short: the best so far. oak: On the fitted logs the model follows wheel speeds within 3 %"
+    )
+    assert "felt: All 6 numbers are known" in both
+
+
+def test_the_sentence_stands_first():
+    run = noisy_draw(simulate(AXEBOT, excitation(10.0), 0.01), 1)
+    found = Identification.of(run, AXEBOT)
+    text = found.document().to_text(400)
+    assert text.splitlines()[0] == found.verdict
+    assert found.verdict.startswith("On the fitted logs the model follows speed over the ground within ")
+    assert "numbers are known" in found.verdict
+    assert "Coulomb friction turning" in text
+    assert "nuisance:" not in text.splitlines()[-1]
+    assert text.count("\nstd error: ") == 1
+
+
+# ---- steady state -----------------------------------------------------------------------------------------
+
+
+def study(loo, ties=(), std=0.02) -> Any:
+    """A disc of 10 N, which misses `loo` N in a direction that was left out."""
+    one = SimpleNamespace(name="disc", words="equal in all directions", loo=loo, told_apart=not ties)
+    scores = [one, *(SimpleNamespace(name=name, told_apart=False) for name in ties)]
+    return SimpleNamespace(
+        choice=SimpleNamespace(score=one, scores=scores), travel={"all": SimpleNamespace(mean=10.0)},
+        points=SimpleNamespace(wrench=np.array([[10.0, 0.0, 0.0], [0.0, -10.0, 0.0]])),
+        estimates={"all": estimate([std] * 6, Estimate)},
+    )  # fmt: skip
+
+
+def test_a_good_shape():
+    assert steady_verdict(study(0.5)) == (
+        "Friction along travel is 10 N; its shape, disc (equal in all directions), predicts the force in a direction "
+        "that was left out within 5 %; all 6 numbers are known, the widest (viscous friction forward) within 1 %."
+    )
+
+
+def test_a_shape_that_others_equal():
+    words = steady_verdict(study(2.0, ["ellipse", "box"]))
+    assert "within 20 %; as good, as far as these data tell: ellipse and box; " in words
+
+
+def test_no_shape_fits():
+    assert steady_verdict(study(7.0)) == (
+        "No shape of friction explains the forces: the best, disc, misses 7 N of 10 N in a direction that was left out."
+    )
+
+
+# ---- motors -----------------------------------------------------------------------------------------------
+
+
+def motor(number, band=0.5, seen=True, slope=(0.1, 0.2)) -> Any:
+    return SimpleNamespace(
+        motor=number, name="all motors" if number is None else f"motor {number + 1}", unit="V", dead_band_seen=seen,
+        value={"dead_band": band}, ci95={"slope": slope},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "motors, words",
+    [
+        ([motor(0, 0.52), motor(1, 0.61), motor(None)], "All 2 motors start at 0.52 to 0.61 V."),
+        ([motor(0, 0.5), motor(1, seen=False)],
+         "Motor 1 starts at 0.5 V; motor 2 answers too, and shows no dead band."),
+        ([motor(0, seen=False), motor(1, seen=False)], "All 2 motors answer, and show no dead band."),
+        ([motor(0), motor(1, seen=False, slope=(-0.1, 0.2))],
+         "Motor 1 starts at 0.5 V; motor 2 is not seen to answer to the input."),
+        ([motor(0, seen=False, slope=(-0.1, 0.2))],
+         "No motor is seen to answer to its input: the slope of motor 1 may as well be 0."),
+    ],
+)  # fmt: skip
+def test_motors(motors, words):
+    assert motors_verdict(motors) == words
