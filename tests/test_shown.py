@@ -83,7 +83,7 @@ def test_a_robot_says_where_its_numbers_come_from():
     robot = omnidyn.load_robot("robotino")
     rows = {row[0]: row for row in robot.document()["numbers"].rows}
     assert rows["body.mass_kg"][1:4] == ("8", "1", "given")
-    assert rows["friction.direction.coulomb"][1:4] == ("42.5, 36.1", "0.2, 0.2", "measured")
+    assert rows["friction.direction.coulomb"][1:4] == ("42.5, 36.1", "0.2, 0.2", "identified")
     assert not [key for key in rows if key.startswith("friction.axes")]  # it has none
 
 

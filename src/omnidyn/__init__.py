@@ -10,6 +10,7 @@ Names are imported on first use, so that `import omnidyn` costs nothing.
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from omnidyn import shown
@@ -31,7 +32,7 @@ _HOME = {
     "breakaway_voltage": "omnidyn.model.deadzone",
     "check": "omnidyn.findings.check",
     "compare": "omnidyn.comparison.compare",
-    "dead_zone": "omnidyn.model.dead_zone_answer",
+    "dead_zone": "omnidyn.model.known.dead_zone",
     "dead_zone_map": "omnidyn.model.deadzone",
     "fit_output_error": "omnidyn.identification.output_error.fit",
     "fit_steady_state": "omnidyn.identification.steady.steady_state",
@@ -42,7 +43,7 @@ _HOME = {
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
-    "plausible": "omnidyn.model.uncertainty",
+    "plausible": "omnidyn.model.known.uncertainty",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
     "read_log": "omnidyn.logs.read_log",
@@ -58,12 +59,8 @@ _HOME = {
 __all__ = ["__version__", *_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame  # pyright: ignore[reportMissingImports]
-
     from omnidyn.comparison.compare import compare
     from omnidyn.comparison.result import Comparison
-    from omnidyn.document import Document
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate
@@ -78,38 +75,31 @@ if TYPE_CHECKING:
     from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
-    from omnidyn.model.dead_zone_answer import dead_zone
     from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
     from omnidyn.model.dynamics import acceleration
+    from omnidyn.model.known.dead_zone import dead_zone
+    from omnidyn.model.known.uncertainty import plausible
     from omnidyn.model.robot import Robot
     from omnidyn.model.robot_file import load_robot, preset_names, save_robot
     from omnidyn.model.statespace import state_space
-    from omnidyn.model.uncertainty import plausible
     from omnidyn.run import Run
     from omnidyn.simulation.band import band
     from omnidyn.simulation.simulate import simulate
 
 
-def _html(document: Document) -> str:
-    from omnidyn.report.notebook import document_html
-
-    return document_html(document)
-
-
-def _figure(result: Any, **options: Any) -> Figure:
-    from omnidyn.report.plots import plot
-
-    return plot(result, **options)
+# What stands above every result is handed down: see shown.py. A table as well: no kernel depends on it.
+_MAKERS = {
+    shown.HTML: ("omnidyn.report.notebook", "document_html"),
+    shown.FIGURE: ("omnidyn.report.plots", "plot"),
+    shown.FRAME: ("omnidyn.interop.dataframe", "to_dataframe"),
+}
 
 
-def _frame(run: Run) -> DataFrame:
-    from omnidyn.interop.dataframe import to_dataframe
-
-    return to_dataframe(run)
+def _maker(module: str, name: str) -> Callable[..., Any]:
+    return lambda value, **options: getattr(importlib.import_module(module), name)(value, **options)
 
 
-# What stands above every result is handed down here: see shown.py.
-shown.made_by(html=_html, figure=_figure, frame=_frame)
+shown.made_by(**{what: _maker(*place) for what, place in _MAKERS.items()})
 
 
 def __getattr__(name: str) -> Any:

@@ -46,7 +46,7 @@ def test_a_drive_that_the_file_states_stays(duties):
 
 @pytest.mark.parametrize("white", [True, False])
 def test_a_longer_log_is_asked_for_against_noise_only(monkeypatch, white):
-    fit = SimpleNamespace(value={"body.mass_kg": 2.0}, std={"body.mass_kg": 0.6}, at_bound=())
+    fit = SimpleNamespace(value={"body.mass_kg": 2.0}, std={"body.mass_kg": 0.6}, at_bound=(), unidentifiable=())
     validation = SimpleNamespace(scores={advice.FITTED: {}})
     monkeypatch.setattr(advice, "coloured", lambda scores: {} if white else {"w1": 0.0})
     (words,) = advice._wide(fit, validation)

@@ -117,7 +117,7 @@ def study(loo, ties=(), std=0.02) -> Any:
     return SimpleNamespace(
         choice=SimpleNamespace(score=one, scores=scores), travel={"all": SimpleNamespace(mean=10.0)},
         points=SimpleNamespace(wrench=np.array([[10.0, 0.0, 0.0], [0.0, -10.0, 0.0]])),
-        estimates={"all": estimate([std] * 6, Estimate)},
+        estimates={"all": estimate([std] * 6, Estimate)}, lack_of_fit={},
     )  # fmt: skip
 
 

@@ -6,10 +6,10 @@ import pytest
 from omnidyn.errors import InputError
 from omnidyn.model.correlation import KeyCorrelation
 from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.known.told import correlation_of, told, with_correlation
+from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import PRESETS, load_robot, parse_robot, robot_to_toml
-from omnidyn.model.told import correlation_of, told, with_correlation
-from omnidyn.model.uncertainty import plausible
 
 AXEBOT = load_robot("axebot")
 TEXT = (PRESETS / "axebot.toml").read_text("utf-8")

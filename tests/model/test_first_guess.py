@@ -11,7 +11,6 @@ from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.first_guess import (
     AXES,
     WHY,
-    WITH_THE_FIT,
     default_prior,
     even_azimuths,
     first_guess,
@@ -24,7 +23,7 @@ from omnidyn.model.first_guess import (
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key, all_keys
-from omnidyn.model.robot import GUESS, Prior
+from omnidyn.model.robot import GUESS, WITH_THE_FIT, Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, preset_names, robot_to_toml
 from omnidyn.model.wheels import Wheels
 from omnidyn.simulation.simulate import simulate
@@ -218,7 +217,7 @@ def test_the_guess_is_near_a_robot_it_has_never_seen():
 def test_what_an_answer_rests_on_is_named_once(axebot):
     """At rest no mass, inertia or back-EMF has a say; what a fit changed together with others is not a guess alone."""
     robot = first_guess("new", axebot.wheels, 1.5)
-    every = "inertia, resistance, torque constant, emf constant, gear ratio, voltage limit, friction"
+    every = "inertia, resistance, torque constant, emf constant, gear ratio, voltage limit, rotor inertia, friction"
     assert rests_on_guesses(robot) == f"rests on guesses of the robot file: {every}"
     still = "resistance, torque constant, gear ratio, voltage limit, friction"
     assert rests_on_guesses(robot, at_rest=True) == f"rests on guesses of the robot file: {still}"

@@ -7,7 +7,7 @@ from typing import get_args
 
 import pytest
 
-from omnidyn.identification.output_error.fit import known_priors
+from omnidyn.identification.output_error.prepare import known_priors
 from omnidyn.model.first_guess import guessed, reasons
 from omnidyn.model.keys import DIRECTION, EMF, TORQUE, all_keys
 from omnidyn.model.robot import Origin, Prior
@@ -87,5 +87,9 @@ def test_an_origin_that_is_given_counts_whatever_the_words(origin, source):
 
 @pytest.mark.parametrize("name", preset_names())
 def test_the_guesses_of_a_preset_are_marked(name):
-    wanted = ["inertia", "voltage limit", "kp", "rate", "friction"] if name == "robotino" else []
+    wanted = (
+        ["inertia", "voltage limit", "kp of the speed loop", "rate of the speed loop", "friction"]
+        if name == "robotino"
+        else []
+    )
     assert guessed(load_robot(name)) == wanted

@@ -1,6 +1,5 @@
 """Pictures, whatever the environment and the names in them."""
 
-import dataclasses
 import os
 import subprocess
 import sys
@@ -40,4 +39,4 @@ def test_a_name_is_text_and_no_formula(name):
     robot = load_robot("axebot")
     robot = robot.replace(name=name)
     picture = draw_dead_zone_map({robot.name: robot, "axebot": robot})
-    assert dataclasses.asdict(picture)["svg"].startswith(b"<?xml")
+    assert picture.svg.startswith(b"<?xml")

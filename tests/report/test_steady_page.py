@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.study import identify_steady
-from omnidyn.model.dead_zone_answer import dead_zone
+from omnidyn.model.known.dead_zone import dead_zone
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.figures.shapes import shape_pictures

@@ -11,7 +11,7 @@ from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.telling import tell
 
 if TYPE_CHECKING:
-    from omnidyn.model.dead_zone_answer import DeadZone
+    from omnidyn.model.known.dead_zone import DeadZone
 
 
 def deadzone(
@@ -27,7 +27,7 @@ def deadzone(
     keep_inputs([], [robot], [], picture)
     from omnidyn.cli.terminal.numbers import number_list
     from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.model.dead_zone_answer import dead_zone
+    from omnidyn.model.known.dead_zone import dead_zone
     from omnidyn.model.robot_file import load_robot
 
     loaded, source = load_robot(robot), robot_input(robot)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from omnidyn.cli import log_options as logs
+from omnidyn.cli.init_answers import LEAST_WHEELS, MOST_WHEELS, Answers, complete
 from omnidyn.cli.init_logs import as_seen, from_logs
 from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.cli.terminal.streams import say, show
@@ -23,27 +20,11 @@ if TYPE_CHECKING:
     from omnidyn.model.wheels import Wheels
 
 MAX_NAME = 60
-LEAST_WHEELS, MOST_WHEELS = 3, 16
-DEFAULTS = {"wheel_radius": 0.05, "robot_radius": 0.15, "mass": 3.0}  # [m], [m], [kg], shown at a terminal
 KEYS = {
     "azimuth": "wheels.azimuth_deg", "wheel_radius": "wheels.wheel_radius_m", "robot_radius": "wheels.robot_radius_m",
     "mass": "body.mass_kg", "voltage_limit": "motor.voltage_limit_V", "roller": "wheels.roller_angle_deg",
     "gear_ratio": "motor.gear_ratio", "rotor_inertia": "motor.rotor_inertia_kg_m2",
 }  # fmt: skip
-QUESTIONS = {
-    "azimuth": "where the wheels stand, counter-clockwise from forward [degree]",
-    "wheel_radius": "radius of a wheel [m]",
-    "robot_radius": "from the centre of the robot to a wheel [m]",
-    "mass": "mass of the robot [kg]",
-}
-
-
-@dataclass
-class Answers:
-    """What is known of the robot: name of an option -> its value. accepted: answered with Enter at a terminal."""
-
-    value: dict[str, Any]
-    accepted: set[str] = field(default_factory=set)
 
 
 def init(
@@ -103,7 +84,7 @@ def init(
     options = logs.log_options(map_file, column, assume, no_header=no_header)
     seen = from_logs(given, log, options, mecanum) if log else None
     found = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
-    answers = _complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
+    answers = complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
     robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))
     _write(robot, path, force, json, like)
 
@@ -195,128 +176,6 @@ def _preset(like: str) -> Robot | None:
     from omnidyn.model.robot_file import load_robot
 
     return load_robot(like) if like else None
-
-
-def _complete(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Answers:
-    """Answers to all that is needed: from options, at a terminal from its user, from the preset."""
-    if mecanum:
-        value["wheels"] = 4
-    answers = Answers(value)
-    needed = [key for key in QUESTIONS if key not in value and not (mecanum and key == "azimuth")]
-    if _at_terminal() and needed:
-        _ask_for(needed, answers, preset)
-    elif preset is not None:
-        answers.accepted = {key for key in needed if key != "azimuth" or _fits(preset, value)}
-        needed = [key for key in needed if key not in answers.accepted]
-    if not _at_terminal() and needed:
-        flags = ", ".join(f"--{key.replace('_', '-')}" for key in needed)
-        raise typer.BadParameter(f"{flags} missing; without them it asks, but only at a terminal.")
-    return answers
-
-
-def _fits(preset: Robot, value: dict[str, Any]) -> bool:
-    """Whether the preset has the number of wheels that was asked for."""
-    return value.get("wheels", preset.wheels.count) == preset.wheels.count
-
-
-def _at_terminal() -> bool:
-    return sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
-
-
-def _ask_for(needed: list[str], answers: Answers, preset: Robot | None) -> None:
-    """Ask one by one; Enter takes what stands in brackets."""
-    say("Enter takes what stands in brackets.")
-    for key in needed:
-        if key == "azimuth":
-            _ask_for_wheels(answers, preset)
-            continue
-        default = getattr(preset.body if key == "mass" else preset.wheels, key) if preset else DEFAULTS[key]
-        typed = _ask(f"{QUESTIONS[key]} [{number_words(default)}]: ", lambda text, key=key: _checked(key, _one(text)))
-        if typed is None:
-            answers.accepted.add(key)
-            if preset is None:
-                answers.value[key] = default
-        else:
-            answers.value[key] = typed
-
-
-def _ask_for_wheels(answers: Answers, preset: Robot | None) -> None:
-    from omnidyn.model.first_guess import even_azimuths
-
-    count = answers.value.get("wheels")
-    if count is None:
-        usual = preset.wheels.count if preset else 3
-        count = _ask(f"how many wheels [{usual}]: ", _count) or usual
-        answers.value["wheels"] = count
-    taken = preset is not None and preset.wheels.count == count
-    default = preset.wheels.azimuth_deg if preset is not None and taken else even_azimuths(count)
-    typed = _ask(
-        f"{QUESTIONS['azimuth']} [{number_words(default)}]: ", lambda text: _checked("azimuth", _several(text, count))
-    )
-    if typed is not None or not taken:
-        answers.value["azimuth"] = list(default) if typed is None else typed
-    if typed is None:
-        answers.accepted.add("azimuth")
-
-
-def _ask(question: str, understood: Callable[[str], Any]) -> Any:
-    """An answer, asked for on stderr until it can be used; None for Enter."""
-    from omnidyn.errors import InputError
-
-    while True:
-        with contextlib.suppress(BrokenPipeError):
-            print(question, end="", file=sys.stderr, flush=True)
-        line = sys.stdin.readline()
-        if not line:
-            say("")
-            raise InputError("the input ended before all was answered", remedy="or give the numbers as options")
-        if not line.strip():
-            return None
-        try:
-            return understood(line.strip())
-        except InputError as error:
-            say(f"omnidyn: {error}")
-
-
-def _one(text: str) -> float:
-    return _several(text, 1, "one number, such as 0.05")[0]
-
-
-def _several(text: str, count: int, expected: str = "") -> list[float]:
-    from omnidyn.cli.terminal.numbers import number_list
-    from omnidyn.errors import InputError
-
-    try:
-        values = number_list("", text)
-    except InputError:
-        values = []
-    if len(values) != count:
-        raise InputError(
-            "cannot use this answer", got=text, expected=expected or f"{count} numbers, such as 60,180,300"
-        )
-    return values
-
-
-def _count(text: str) -> int:
-    from omnidyn.errors import InputError
-
-    if text not in map(str, range(LEAST_WHEELS, MOST_WHEELS + 1)):
-        raise InputError("cannot use this answer", got=text, expected=f"{LEAST_WHEELS} to {MOST_WHEELS} wheels")
-    return int(text)
-
-
-def _checked(key: str, value: Any) -> Any:
-    """The value, if a robot may have it. Raises InputError."""
-    from omnidyn.model.first_guess import even_azimuths
-    from omnidyn.model.robot import Body
-    from omnidyn.model.wheels import Wheels
-
-    if key == "mass":
-        Body(mass=value, inertia=1.0)
-    else:
-        usual = {"azimuth_deg": even_azimuths(3), "wheel_radius": 0.1, "robot_radius": 0.1}
-        Wheels(**{**usual, "azimuth_deg" if key == "azimuth" else key: value})
-    return value
 
 
 def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, friction: str) -> Robot:

@@ -200,7 +200,7 @@ def _with_band(
     """The summary, with what its band rests on."""
     if ends is None:
         return Document(lines, data, verdict=verdict)
-    from omnidyn.model.told import told
+    from omnidyn.model.known.told import told
 
     known = told(robot)
     words = (

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from omnidyn.comparison.replay import HOLD, replay
 from omnidyn.comparison.result import Comparison
+from omnidyn.model.known.told import told
+from omnidyn.model.known.uncertainty import DRAWS, plausible
 from omnidyn.model.robot import Robot
-from omnidyn.model.told import told
-from omnidyn.model.uncertainty import DRAWS, plausible
 from omnidyn.simulation.band import Band, band_of
 
 COARSE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest

@@ -61,9 +61,10 @@ def steady_verdict(study: SteadyStudy) -> str:
         )
     ties = [each.name for each in study.choice.scores if not each.told_apart and each.name != score.name]
     alike = f"; as good, as far as these data tell: {all_of(ties[:NAMED])}" if ties else ""
-    lack = study.lack_of_fit
-    misfit = f"; but no offered shape fits: {all_of([r.words for r in lack.remedies[:1]]) or 'its errors repeat'}"
-    alike = misfit if lack.found else alike
+    lacks = [each for each in study.lack_of_fit.values() if each.found]
+    if lacks:
+        best = next((remedy.words for each in lacks for remedy in each.remedies), "the errors repeat")
+        alike = f"; but no offered shape fits: {best}"
     known = _of_groups({group: each.numbers_known() for group, each in study.estimates.items()})
     return (
         f"Friction along travel is {levels}; its shape, {score.name} ({score.words.partition(';')[0]}), predicts "

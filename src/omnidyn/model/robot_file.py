@@ -13,11 +13,11 @@ from omnidyn.arguments import check_order
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
 from omnidyn.model.keys import TABLES, is_told
+from omnidyn.model.known.told import correlation_of, refuse_strange_keys
 from omnidyn.model.presets import PRESETS as PRESETS
 from omnidyn.model.presets import preset_names as preset_names
 from omnidyn.model.presets import robot_path
 from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, SCHEMA, Origin, Prior, Robot
-from omnidyn.model.told import correlation_of, refuse_strange_keys
 from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 
 TOGETHER = "correlation"

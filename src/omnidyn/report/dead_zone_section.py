@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from omnidyn.document import Points
-from omnidyn.model.dead_zone_answer import dead_zone
+from omnidyn.model.known.dead_zone import dead_zone
 from omnidyn.model.robot import Robot
 from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 from omnidyn.report.html import Section, content, paragraph

@@ -15,8 +15,8 @@ from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import Validation, output_name
 from omnidyn.logs.path import Path, body_twist, driven, path_of
+from omnidyn.model.known.uncertainty import DRAWS
 from omnidyn.model.robot import Robot
-from omnidyn.model.uncertainty import DRAWS
 from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.overlay import draw_overlay

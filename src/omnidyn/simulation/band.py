@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
+from omnidyn.model.known.uncertainty import DRAWS, Ends, plausible
 from omnidyn.model.robot import Robot
-from omnidyn.model.uncertainty import DRAWS, Ends, plausible
 from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.simulate import simulate
 

@@ -48,9 +48,7 @@ def test_which_keys_the_exact_engine_can_follow(axebot, keys, exact):
 def test_the_choice_is_made_once_a_fit(axebot, log, monkeypatch):
     """It builds a state space: four times a fit was a tenth of it."""
     asked = []
-    monkeypatch.setattr(
-        "omnidyn.identification.output_error.prepare.why_not_exact", lambda robot: asked.append(robot) or []
-    )
+    monkeypatch.setattr("omnidyn.findings.needs.why_not_exact", lambda robot: asked.append(robot) or [])
     fit = Fit.of(log, axebot, Question(nuisances=(), start="rest"))
     fit.answer(fit.solve())
     assert len(asked) <= 1

@@ -9,7 +9,7 @@ from omnidyn.identification.output_error.prepare import expand_keys, free_by_def
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.validation import validate
 from omnidyn.model.first_guess import first_guess
-from omnidyn.model.keys import BOX, Key
+from omnidyn.model.keys import BOX, ROTOR, Key
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.statespace import damping, push_per_volt
@@ -26,8 +26,16 @@ VISCOUS = (DIRECTION[2], DIRECTION[4])
 
 
 @pytest.fixture(scope="module")
-def robot():
+def new():
+    """As `init` writes it: its rotors are a guess, too."""
     return first_guess("new", load_robot("axebot").wheels, 1.5)
+
+
+@pytest.fixture(scope="module")
+def robot(new):
+    """The same, without rotors: all forces scale with a mass that is known."""
+    priors = {key: prior for key, prior in new.priors.items() if key != ROTOR}
+    return new.replace(motor=new.motor.replace(rotor_inertia=0.0), priors=priors)
 
 
 def test_it_is_the_friction_that_the_robot_has(robot):
@@ -64,6 +72,19 @@ def test_guesses_are_free_so_that_friction_comes_out_right_beside_a_wrong_motor(
     assert {DIRECTION[0], DIRECTION[1], DIRECTION[3], RESISTANCE, "body.inertia_kg_m2"} <= told
     for name in told:
         assert abs(fit.value[name] - Key.parse(name).get(true)) < 4.0 * fit.std[name], name
+
+
+def test_rotors_that_are_a_guess_are_in_the_intervals(new):
+    """They may weigh a tenth of the robot: friction is told to a tenth, and no better."""
+    log, true = log_of(new, 0.6)
+    fit = fit_output_error(log, new, start="rest", nuisances=())
+    assert set(fit.value) == {*DIRECTION, *GUESSES, ROTOR}
+    assert ROTOR in fit.unidentifiable
+    for name in (DIRECTION[0], DIRECTION[1], DIRECTION[3], RESISTANCE):
+        assert name not in fit.unidentifiable
+        value = Key.parse(name).get(true)
+        assert abs(fit.value[name] - value) < 3.0 * fit.std[name]
+        assert 0.05 * value < fit.std[name] < 0.2 * value
 
 
 def test_what_only_the_guess_holds_is_not_determined_and_named(wrong):

@@ -6,8 +6,8 @@ import pytest
 from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.steady_table import SteadyTable
-from omnidyn.model.dead_zone_answer import dead_zone
 from omnidyn.model.keys import BOX, EMF, TORQUE
+from omnidyn.model.known.dead_zone import dead_zone
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
 from omnidyn.simulation.band import band

@@ -91,7 +91,7 @@ def halved(friction):
 def test_the_rotor_itself_can_be_fitted(friction):
     """Mass and motors known, friction and rotor free: both engines."""
     start = heavy(halved(friction), 0.6e-6)
-    fit = fit_output_error([log(friction)], start, free=("friction", ROTOR), use_priors=False)
+    fit = fit_output_error([log(friction)], start, free=("friction", ROTOR))
     print(fit.value[ROTOR], fit.std[ROTOR])
     assert abs(fit.value[ROTOR] - J) < 4.0 * fit.std[ROTOR]
     assert fit.std[ROTOR] < 0.1 * J
@@ -101,7 +101,7 @@ def test_the_rotor_itself_can_be_fitted(friction):
 def test_the_rotor_of_one_motor():
     """It couples the axes: fitted by the engine that knows that, from a robot that the other one could serve."""
     robot = heavy(BOX, (J, J, 3 * J, J))
-    fit = fit_output_error([log_of(robot)], heavy(BOX, J), free=("friction", f"{ROTOR}[2]"), use_priors=False)
+    fit = fit_output_error([log_of(robot)], heavy(BOX, J), free=("friction", f"{ROTOR}[2]"))
     print(fit.value[f"{ROTOR}[2]"], fit.std[f"{ROTOR}[2]"])
     assert abs(fit.value[f"{ROTOR}[2]"] - 3 * J) < 4.0 * fit.std[f"{ROTOR}[2]"]
     assert fit.std[f"{ROTOR}[2]"] < 0.2 * J

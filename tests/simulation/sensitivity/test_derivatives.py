@@ -70,7 +70,7 @@ REFERENCES = {}
 
 def turning(robot):
     """The reference over TURNING, once for each robot: two tests ask for the same ones."""
-    name = repr(robot)
+    name = robot.model_dump_json()  # of every number; `repr` names a robot only
     if name not in REFERENCES:
         REFERENCES[name] = reference(robot, TURNING, 0.01)
     return REFERENCES[name]

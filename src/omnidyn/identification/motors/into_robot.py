@@ -32,8 +32,8 @@ from omnidyn.identification.motors.estimate import BAND, INERTIA, SLOPE, MotorEs
 from omnidyn.identification.motors.log import HEADING
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
+from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Prior, Robot
-from omnidyn.model.told import with_correlation
 from omnidyn.model.wheels import per_wheel
 
 COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"

@@ -25,8 +25,8 @@ from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
 from omnidyn.model.keys import VISCOUS, Key, with_priors
+from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
-from omnidyn.model.told import with_correlation
 
 IN_METRES = (("twist", 0), ("twist", 1), ("position", 0), ("position", 1))  # outputs that know of no wheel radius
 LEAST_SHARE = 1e-4  # of a lost direction that a number lost with it must have to be named
@@ -78,12 +78,7 @@ def conclude(
         method=f"output error, maximum likelihood, {loss}, {known.kind} covariance",
         lower_bound=dict(lower_bound),
         data=data,
-        scale=scale_of_motion(
-            problem.robot,
-            names[:own],
-            any(name == "current" for name, _ in problem.columns),
-            any(column in IN_METRES for column in problem.columns),
-        ),
+        scale=_scale(problem),
         nuisances={
             name: Nuisance(float(values[own + j]), std[name], ci95[name], _unit(name))
             for j, name in enumerate(names[own:])
@@ -98,6 +93,13 @@ def conclude(
         converged=solution.converged,
         not_followed=tuple(missed),
     )
+
+
+def _scale(problem: Problem) -> str:
+    """What all forces scale with, in words."""
+    names = [p.name for p in problem.robot_parameters]
+    amps = any(name == "current" for name, _ in problem.columns)
+    return scale_of_motion(problem.robot, names, amps, any(column in IN_METRES for column in problem.columns))
 
 
 def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:

@@ -23,8 +23,8 @@ from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
 from omnidyn.logs.steady_table import AXES, SteadyTable
 from omnidyn.model.friction import AxesFriction
 from omnidyn.model.keys import unit, with_priors
+from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Robot
-from omnidyn.model.told import with_correlation
 
 REST = ("bound", "line", "ignore")
 MAX_FRICTION = 1e6  # what a robot file takes

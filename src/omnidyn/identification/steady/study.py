@@ -33,9 +33,9 @@ from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
 from omnidyn.model.keys import AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
+from omnidyn.model.known.told import with_correlation
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import GUESS, Prior, Robot
-from omnidyn.model.told import with_correlation
 from omnidyn.run import Run
 from omnidyn.statistics import t_quantile
 

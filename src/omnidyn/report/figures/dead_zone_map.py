@@ -11,8 +11,8 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.dead_zone_answer import DeadZone
 from omnidyn.model.deadzone import dead_zone_force, dead_zone_map
+from omnidyn.model.known.dead_zone import DeadZone
 from omnidyn.model.robot import Robot
 from omnidyn.report.style import (
     BLUE,

@@ -40,8 +40,9 @@ WHITE, SANDWICH = "white", "sandwich"
 # shows each keeps 0.71 of its own, of three 0.82, however long the log.
 TOLD = 0.5
 # The same where more than half of the variance is what priors, of any number, leave open: the logs must then have said
-# most of it. Viscous friction beside the back-EMF of motors that are guesses keeps 0.3 to 0.7, a resistance 0.02.
-TOLD_BY_OTHERS, MOST = 0.1, 0.5
+# most of it. Viscous friction beside the back-EMF of motors that are guesses keeps 0.3 to 0.7; Coulomb friction beside
+# rotors that may weigh 0.1 of the robot keeps 0.08 to 0.15, which its interval tells.
+TOLD_BY_OTHERS, MOST = 0.25, 0.5
 RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 
 

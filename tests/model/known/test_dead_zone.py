@@ -7,11 +7,11 @@ import pytest
 from scipy.stats import norm
 
 from omnidyn.errors import InputError
-from omnidyn.model.dead_zone_answer import dead_zone
 from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.known.dead_zone import dead_zone
+from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.told import with_correlation
 
 AXEBOT = load_robot("axebot")
 Z = norm.ppf(0.975)

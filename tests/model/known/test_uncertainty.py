@@ -7,10 +7,10 @@ from scipy.stats import norm
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
+from omnidyn.model.known.told import with_correlation
+from omnidyn.model.known.uncertainty import Ends, effects, interval_of, plausible
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, robot_to_toml
-from omnidyn.model.told import with_correlation
-from omnidyn.model.uncertainty import Ends, effects, interval_of, plausible
 
 AXEBOT = load_robot("axebot")
 C_X, R, K_T = "friction.axes.coulomb[0]", "motor.resistance_ohm", "motor.torque_constant_Nm_A"

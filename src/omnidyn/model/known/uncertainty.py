@@ -28,8 +28,8 @@ from scipy.special import ndtri
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import BREAKAWAY, Key
+from omnidyn.model.known.told import ANGLES, Told, is_log, numbers_told, told
 from omnidyn.model.robot import Robot
-from omnidyn.model.told import ANGLES, Told, is_log, numbers_told, told
 
 DRAWS = 100
 NOISE = 1e-13  # of an eigenvalue of a correlation: less is rounding, and numbers that are one stay one

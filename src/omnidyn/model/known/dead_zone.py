@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Table, Words, all_of, plain, sentence
+from omnidyn.document import Document, Part, Table, Words, all_of, plain
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
+from omnidyn.model.known.told import numbers_told, told
+from omnidyn.model.known.uncertainty import DRAWS, Interval, effects, interval_of
 from omnidyn.model.robot import GUESS, Robot
-from omnidyn.model.told import numbers_told, told
-from omnidyn.model.uncertainty import DRAWS, Interval, effects, interval_of
 
 AXES = ("x", "y", "yaw")
 WAYS = {"x": "forward", "y": "sideways", "yaw": "turning"}
@@ -112,9 +112,8 @@ class DeadZone:
         if not starts:
             return f"{self.robot.name} does not move {all_of(stuck)}, whatever voltage its motors can have."
         words = all_of([f"{way} from {volts:.2f} V" for way, volts in starts.items()])
-        return sentence(
-            f"{self.robot.name} starts to move {words}{f'; {all_of(stuck)} its motors cannot move it' if stuck else ''}"
-        )
+        never = f"; {all_of(stuck)} its motors cannot move it" if stuck else ""
+        return f"{self.robot.name} starts to move {words}{never}."
 
     def table(self) -> Table:
         """A row per pattern: volts and duty with their intervals."""
