@@ -87,9 +87,5 @@ def test_an_origin_that_is_given_counts_whatever_the_words(origin, source):
 
 @pytest.mark.parametrize("name", preset_names())
 def test_the_guesses_of_a_preset_are_marked(name):
-    wanted = (
-        ["inertia", "voltage limit", "kp of the speed loop", "rate", "friction"]
-        if name == "robotino"
-        else []
-    )
+    wanted = ["inertia", "voltage limit", "kp of the speed loop", "rate", "friction"] if name == "robotino" else []
     assert guessed(load_robot(name)) == wanted

@@ -15,6 +15,7 @@ from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import Validation, output_name
 from omnidyn.logs.path import Path, body_twist, driven, path_of
+from omnidyn.model.keys import in_words
 from omnidyn.model.known.uncertainty import DRAWS
 from omnidyn.model.robot import Robot
 from omnidyn.report.dead_zone_section import dead_zone_section
@@ -63,7 +64,7 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
         Section("scores", "How near the model comes", _each(validations, lambda group, each: content(each.table()))),
         Section("data", "The logs, and what check says of them", checked),
     ]
-    return page(f"{robot}: identified from whole logs", introduction, sections, provenance)
+    return page(f"{robot}: identified from whole logs", introduction, sections, provenance, verdict=found.verdict)
 
 
 def _named(group: str, words: str, fits: Mapping[str, Any]) -> str:
@@ -76,8 +77,9 @@ def _findings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
         for name, value, _, interval, unit, mark in number_table(fit).rows:
             if name in fit.nuisances:
                 continue  # of the log, not of the robot: they stand in the table
-            text = f"{name} = {value} {unit}, 95 % {interval}".replace("  ", " ")
-            found.append(_named(group, f"{text}{f' ({mark})' if mark else ''}", fits))
+            plain = f"{in_words(name)}, " if in_words(name) != name else ""
+            known = f" = {value} {unit}".rstrip() + f", 95 % {interval}" if interval else ""
+            found.append(_named(group, f"{plain}{name}{known}{f' ({mark})' if mark else ''}", fits))
     return found
 
 

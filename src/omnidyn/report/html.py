@@ -42,15 +42,17 @@ def content(*parts: Table | Points | Picture) -> str:
 
 
 def page(
-    title: str, introduction: str, sections: Sequence[Section], provenance: Mapping[str, Any], *, lead: str = ""
-) -> str:
-    """The page as HTML. lead: HTML between the introduction and the links.
+    title: str, introduction: str, sections: Sequence[Section], provenance: Mapping[str, Any], *, lead: str = "",
+    verdict: str = "",
+) -> str:  # fmt: skip
+    """The page as HTML. verdict: the result in a sentence, before all else. lead: HTML between introduction and links.
 
     provenance: version ("omnidyn"), "command" and "inputs" (role, name, sha256); it is the last section.
     """
     every = [*sections, Section("made", "How this was made", provenance_table(provenance))]
     links = "".join(f'<a href="#{escape(each.key, quote=True)}">{escape(each.title)}</a>' for each in every)
-    head = f"<header><h1>{escape(title)}</h1><p>{escape(introduction)}</p>{lead}<nav>{links}</nav></header>"
+    first = f"<p><strong>{escape(verdict)}</strong></p>" if verdict else ""
+    head = f"<header><h1>{escape(title)}</h1>{first}<p>{escape(introduction)}</p>{lead}<nav>{links}</nav></header>"
     parts = (
         f'<section id="{escape(each.key, quote=True)}"><h2>{escape(each.title)}</h2>{each.content}</section>'
         for each in every

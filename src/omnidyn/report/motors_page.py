@@ -30,4 +30,5 @@ def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
         *([section("figures", "Figures", *pictures)] if pictures else []),
         section("numbers", "Numbers, with 95 % intervals", told["motors"]),
     ]
-    return page("Motors from logs", WINDOWS if study.windows is not None else FREE_RUNS, sections, provenance)
+    how = WINDOWS if study.windows is not None else FREE_RUNS
+    return page("Motors from logs", how, sections, provenance, verdict=study.verdict)

@@ -9,6 +9,7 @@ from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.steady.study_words import FORCES
+from omnidyn.identification.verdict import steady_verdict
 from omnidyn.logs.path import driven
 from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.shapes import shape_pictures
@@ -35,4 +36,5 @@ def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
         dead_zone_section({group: each.robot for group, each in study.estimates.items()}),
         section("data", "What was used", told["travel"]),
     ]
-    return page(f"{study.robot.name}: friction from logs", introduction, sections, provenance)
+    title, verdict = f"{study.robot.name}: friction from logs", steady_verdict(study)
+    return page(title, introduction, sections, provenance, verdict=verdict)
