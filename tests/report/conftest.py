@@ -3,7 +3,7 @@
 import pytest
 
 from omnidyn.model.robot_file import load_robot
-from omnidyn.report.figures import paper_pictures
+from omnidyn.report.figures.paper_pictures import paper_pictures
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ from omnidyn.identification.steady.band import confidence_band
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.model.robot_file import load_robot, preset_names
 from omnidyn.paper.friction import table_1_points
-from omnidyn.report.figures import paper_pictures
+from omnidyn.report.figures.paper_pictures import paper_pictures
 from omnidyn.report.figures.robot import draw_robot, wheel_places
 from omnidyn.report.style import AXIS_COLOUR, LEVEL_COLOURS, LOOK, look, new_figure, picture
 from tests.support.figures import shown_texts
@@ -113,7 +113,7 @@ def test_the_settings_of_matplotlib_are_as_before(robot):
 
 def test_no_pyplot_and_no_window(tmp_path):
     script = (
-        "import sys\nfrom omnidyn import load_robot\nfrom omnidyn.report.figures import draw_robot\n"
+        "import sys\nfrom omnidyn import load_robot\nfrom omnidyn.report.figures.robot import draw_robot\n"
         "draw_robot(load_robot('axebot'))\nprint('matplotlib.pyplot' in sys.modules)"
     )
     sources = str(Path(__file__).resolve().parents[2] / "src")

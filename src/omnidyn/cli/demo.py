@@ -51,7 +51,7 @@ def _made(now: Any) -> tuple[tuple[Claim, ...], list[Picture], dict[str, Any]]:
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.model.robot_file import load_robot
     from omnidyn.paper.claims import PRESET, all_claims
-    from omnidyn.report.figures import paper_pictures
+    from omnidyn.report.figures.paper_pictures import paper_pictures
 
     now("computing the claims (the first run compiles the simulation)")
     claims = all_claims()

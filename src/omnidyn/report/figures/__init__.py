@@ -1,39 +1,5 @@
-"""The figures of the paper as far as they can be made from its numbers: one file each."""
+"""Pictures, one file each; each function returns a `Picture`.
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
-from omnidyn.identification.steady.steady_state import fit_steady_state
-from omnidyn.model.robot import Robot
-from omnidyn.paper.experiments import dead_zone_ramps, step_responses, table1_runs
-from omnidyn.paper.friction import table_1_points
-from omnidyn.paper.reconcile import reconciliations
-from omnidyn.report.figures.dead_zone import draw_dead_zone
-from omnidyn.report.figures.friction import TREATMENTS, draw_friction
-from omnidyn.report.figures.reconcile import draw_reconciliation
-from omnidyn.report.figures.robot import draw_robot
-from omnidyn.report.figures.steps import draw_steps
-from omnidyn.report.figures.traces import draw_traces
-from omnidyn.report.style import Picture
-
-__all__ = [
-    "draw_dead_zone",
-    "draw_friction",
-    "draw_reconciliation",
-    "draw_robot",
-    "draw_steps",
-    "draw_traces",
-    "paper_pictures",
-]
-
-
-def paper_pictures(robot: Robot) -> Iterator[Picture]:
-    """Figs. 1 to 5 for this robot beside the numbers of the paper, and what would reconcile the two."""
-    yield draw_robot(robot)
-    yield draw_traces(table1_runs(robot))
-    points = table_1_points()
-    yield draw_friction({rest: fit_steady_state(robot, points, rest=rest) for rest in TREATMENTS})
-    yield draw_steps(step_responses(robot))
-    yield draw_dead_zone(dead_zone_ramps(robot))
-    yield draw_reconciliation(reconciliations(robot))
+Of the paper, all together in paper_pictures: robot, traces, friction, steps, dead_zone, reconcile. Of logs: raw_log,
+overlay, path. Of a fit: residuals, correlation, friction_speed, shapes, motor_lines, dead_zone_map. channels is shared.
+"""
