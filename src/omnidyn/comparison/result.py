@@ -115,12 +115,12 @@ class Comparison(Shown):
 
     def band(self, robot: str, component: str, segment: Segment) -> tuple[FloatArray, FloatArray] | None:
         """(low, high) end of the band of one component over one segment, None where there is none."""
-        own = self.bands.get(robot, {}).get(segment.log)
-        if own is None:
+        own, channel = self.bands.get(robot, {}).get(segment.log), (place(component) or ("",))[0]
+        if own is None or getattr(own.low, channel, None) is None:
             return None
         real = self.measured[segment.log]
         low, high = (trace_of(component, real, end, segment.rows).model for end in (own.low, own.high))
-        if self.current_unsigned and (place(component) or ("",))[0] == "current":
+        if self.current_unsigned and channel == "current":
             inside = (low < 0.0) & (high > 0.0)
             low, high = np.where(inside, 0.0, np.minimum(abs(low), abs(high))), np.maximum(abs(low), abs(high))
         return low, high

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.model.known.uncertainty import DRAWS, Ends, plausible
 from omnidyn.model.robot import Robot
-from omnidyn.run import CHANNELS, WHEEL, Run
+from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
-PREDICTED = ("voltage", "current", "wheel_speed", "twist", "pose")
+COMMANDED = ("duty", "wheel_speed_command", "twist_command", "supply")  # the same for every robot
 MOST_THREADS = 8
 
 
@@ -57,13 +57,14 @@ def band_of(robots: Sequence[Robot], run_of: Callable[[Robot], Run]) -> Band:
 
 
 def _predicted(run: Run) -> FloatArray:
-    return np.hstack([getattr(run, name) for name in PREDICTED])
+    """What follows from the robot, side by side. Shape (samples, columns)."""
+    return np.hstack([values for name, values in run.channels.items() if name not in COMMANDED])
 
 
 def _as_run(like: Run, end: FloatArray, which: str) -> Run:
     channels, column = {}, 0
-    for name in PREDICTED:
-        width = (like.wheels or 0) if CHANNELS[name] == WHEEL else 3
-        channels[name] = end[:, column : column + width]
-        column += width
+    for name, values in like.channels.items():
+        if name not in COMMANDED:
+            channels[name] = end[:, column : column + values.shape[1]]
+            column += values.shape[1]
     return Run(t=like.t, **channels, source=f"{like.source}, {which} end of the 95 % band")
