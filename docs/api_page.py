@@ -23,6 +23,29 @@ OUTCOME = r"(?:Returns|Raises|Never raises|Errors:)"
 BEGINS = r"(?:^|(?<=\n)|(?<=[.;] ))"  # of the text, a line or a sentence
 NO_SIGNATURE = ("Comparison", "Estimate", "Identification", "Robot", "Question", "OmnidynError")  # made by functions
 
+# What an argument is where its docstring need not say it.
+COMMON = {
+    "robot": "as `load_robot` gives it", "run": "of `read_log` or `simulate`", "runs": "of `read_log` or `simulate`",
+    "path": "of the file", "force": "replace a file that is there", "draws": "how many plausible robots",
+    "count": "how many", "seed": "of the draws", "question": "all options in one value",
+    "log": "as `load_log` reads it",
+    "duration": "of the whole [s]", "max_steps": "most rows", "wheels": "how many the robot has",
+    "progress": "is told what is being done", "watch": "is told what is being done",
+}  # fmt: skip
+
+FIELDS = {
+    "name": "of the robot", "source": "where it comes from, in words", "body": "mass, inertia, turning frame",
+    "wheels": "where they stand, their radii and rollers", "motor": "its constants, gear and limits",
+    "drive": "what a command is", "friction": "on the axes, along the direction of travel, at the wheels",
+}  # fmt: skip
+
+
+class Shown:
+    """A default that is no value to type in: a function, or one made anew each time."""
+
+    def __repr__(self) -> str:
+        return "..."
+
 
 class Argument(NamedTuple):
     """An argument of a function, or a field of a value."""
@@ -41,11 +64,13 @@ class Told(NamedTuple):
 
 
 def arguments_of(thing: Any) -> list[Argument]:
-    """What a function takes, without the options of a Question; what a value holds."""
+    """What a function takes, options of a Question as one; what a value holds."""
     if inspect.isclass(thing):
         return _fields_of(thing)
-    parameters = [each for each in _parameters(thing) if each.name not in _options_of(thing)]
-    return [Argument(_starred(each), short_type(each.annotation), _default(each.default)) for each in parameters]
+    options = _options_of(thing)
+    parameters = [each for each in _parameters(thing) if each.name not in options]
+    found = [Argument(_starred(each), short_type(each.annotation), _default(each.default)) for each in parameters]
+    return [*found, Argument("**options", "", "")] if options else found
 
 
 def _parameters(thing: Any) -> list[inspect.Parameter]:
@@ -83,7 +108,12 @@ def _written(thing: type, name: str) -> Any:
 
 
 def _default(value: Any) -> str:
-    return "" if value is inspect.Parameter.empty else repr(value)
+    return "" if value is inspect.Parameter.empty else repr(_shown(value))
+
+
+def _shown(value: Any) -> Any:
+    made = inspect.isfunction(value) or "factory" in type(value).__name__.lower()
+    return Shown() if made else value
 
 
 def short_type(annotation: Any) -> str:
@@ -108,7 +138,9 @@ def signature_of(thing: Any) -> tuple[str, str]:
         return "", ""
     options = _options_of(thing)
     plain = [
-        each.replace(annotation=inspect.Parameter.empty) for each in _parameters(thing) if each.name not in options
+        each.replace(annotation=each.empty, default=_shown(each.default))
+        for each in _parameters(thing)
+        if each.name not in options
     ]
     if options:
         plain.append(inspect.Parameter("options", inspect.Parameter.VAR_KEYWORD))
@@ -176,7 +208,7 @@ def as_rst(thing: Any, text: str) -> list[str]:
     options = [] if inspect.isclass(thing) or not takes else _options_of(thing)
     if options:
         named = ", ".join(f"``{name}``" for name in options)
-        lines += [f"``**options`` are those of :py:class:`omnidyn.Question`: {named}.", ""]
+        lines += [f"Options are those of :py:class:`omnidyn.Question`: {named}.", ""]
     for each in parts.outcome:
         lines += [*_escaped(each), ""]
     return lines
@@ -184,8 +216,11 @@ def as_rst(thing: Any, text: str) -> list[str]:
 
 def _table(takes: Iterable[Argument], words: dict[str, str], fields_of_a_value: bool) -> list[str]:
     head = ("holds" if fields_of_a_value else "argument", "type", "default", "what it is")
-    rows = [(f"``{a.name}``", a.type and f"``{a.type}``", a.default and f"``{a.default}``",
-             *_escaped(words.get(a.name.lstrip("*"), ""))) for a in takes]  # fmt: skip
+    common = FIELDS if fields_of_a_value else COMMON
+    rows = [
+        (f"``{a.name}``", a.type and f"``{a.type}``", a.default and f"``{a.default}``",
+         *_escaped(words.get(a.name.lstrip("*"), common.get(a.name, "")))) for a in takes
+    ]  # fmt: skip
     return _list_table(_without_empty([head, *rows]))
 
 

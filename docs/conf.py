@@ -24,6 +24,8 @@ myst_heading_anchors = 3
 html_theme = "furo"
 html_title = f"omnidyn {version}"
 html_show_sourcelink = False
+html_static_path = ["_static"]
+html_css_files = ["wide.css"]
 
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"

@@ -23,7 +23,6 @@ class Options(TypedDict, total=False):
     fixed: Names
     nuisances: Names | None
     loss: Literal["gaussian", "student-t"]
-    use_priors: bool
     hold_out: Names
     per: Names
     per_free: Names
