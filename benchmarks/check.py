@@ -1,7 +1,7 @@
 """`omnidyn check` on 12 faults put into 200 clean simulated logs each, and on 1000 clean logs.
 
 python -m benchmarks check              the table
-python -m benchmarks check --publish    the same, into docs/check.md, and its pictures into docs/images
+python -m benchmarks check --publish    the same, into docs/check-figures.md, and its pictures into docs/images
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def speed() -> float:
 
 
 def measure(logs: int = LOGS, clean_logs: int = CLEAN) -> Table:
-    """Recall of each fault, false alarms, speed; and the pictures of docs/check.md."""
+    """Recall of each fault, false alarms, speed; and the pictures of docs/check-figures.md."""
     outcomes = {name: run_fault(name, logs) for name in FAULTS}
     table = table_of(outcomes, run_clean(clean_logs), clean_logs)
     table.pictures |= {"check_recall.png": lambda: draw_recall(outcomes), "check_log.png": draw_example}

@@ -45,8 +45,9 @@ class Run(Shown):
     """One run. All channels have the length of `t`; one that was not measured is None, a missing value is NaN.
 
     t: time [s], strictly increasing, need not be regular. Shape (samples,).
-    voltage [V], duty [-1..1], current [A], wheel_angle (turned since the start, not wrapped) [rad], wheel_speed and
-    wheel_speed_command [rad/s], all at the wheel, behind the gear. Shape (samples, wheels).
+    voltage: of the motors [V]. duty: -1..1 of the supply. current: signed as the voltage is [A]. wheel_angle: turned
+    since the start, not wrapped [rad]. wheel_speed, wheel_speed_command: [rad/s]. All of these at the wheel, behind the
+    gear; shape (samples, wheels).
     twist and twist_command: (v_x, v_y, omega) in the body frame [m/s, m/s, rad/s]. Shape (samples, 3).
     pose: (x, y, heading) in the world [m, m, rad], heading not wrapped. Shape (samples, 3).
     supply: voltage of the battery [V]. Shape (samples,).

@@ -66,7 +66,10 @@ def read_log(
 
     robot: settles what names leave open, and is needed for speeds of the motor shaft. columns: a ColumnMap, the path of
     one (TOML), or overrides such as {"u1": "motor_1_volts:V"}. sort: rows whose time goes back are sorted instead of
-    refused. The other options: see LogOptions.
+    refused.
+    assume: unit by column or letter of a component, where the file gives none, such as {"d": "duty/255"}. latency: how
+    late components were recorded, by their letter [s]. header: whether there is one. skip_bad_rows: leave out rows that
+    cannot be read. current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage.
     Raises InputError for what cannot be read or is doubtful, with file, line and remedy.
     """
     given = columns if isinstance(columns, ColumnMap) else None

@@ -43,9 +43,10 @@ def simulate(
 ) -> Run:
     """Simulate a robot under commands held from row to row, eqs (1)-(14).
 
-    voltage: one row per step [V], shape (n, wheels); what exceeds the motor's limit is clipped, with a warning. Or
-    duty [-1..1] of the supply [V]; or, for a drive with a speed loop, wheel_speed_command [rad/s], shape (n, wheels),
-    or twist_command [m/s, m/s, rad/s], shape (n, 3).
+    voltage: one row per step [V], shape (n, wheels); what exceeds the motor's limit is clipped, with a warning.
+    duty: in place of a voltage, -1..1 of the supply, shape (n, wheels). supply: voltage of the battery behind a duty
+    [V], a number or shape (n,). wheel_speed_command: in place of a voltage, for a drive with a speed loop [rad/s],
+    shape (n, wheels). twist_command: the same for the body [m/s, m/s, rad/s], shape (n, 3).
     dt: length of the rows [s], a number or shape (n,). twist, pose, current: where it starts, shapes (3,), (3,),
     (wheels,); current [A] matters for dynamic electrics only.
     tol: global error of the implicit engine [m/s], 10 tol [rad/s]; None takes one fixed step per row. The exact

@@ -1,0 +1,61 @@
+"""docs/api.md has every public name; docs/api_page.py makes tables of the arguments in their docstrings."""
+
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+import omnidyn
+from tests.support.robot_keys import generator
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE = (DOCS / "api.md").read_text("utf-8")
+MADE = generator("api_page")
+NAMES = [name for name in omnidyn.__all__ if not name.startswith("_")]
+
+
+def rst(name):
+    thing = getattr(omnidyn, name)
+    return "\n".join(MADE.as_rst(thing, inspect.getdoc(thing)))
+
+
+def test_every_public_name_is_on_the_page_once():
+    assert sorted(re.findall(r"^\.\. auto\w+:: omnidyn\.(\w+)$", PAGE, re.MULTILINE)) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_type_is_a_wall(name):
+    types = [each.type for each in MADE.arguments_of(getattr(omnidyn, name))]
+    assert not [each for each in types if "Annotated" in each or len(each) > 80]
+    assert "Annotated" not in "".join(MADE.signature_of(getattr(omnidyn, name)))
+
+
+def test_arguments_are_told_from_the_prose_around_them():
+    thing = omnidyn.simulate
+    parts = MADE.told(inspect.getdoc(thing), [each.name for each in MADE.arguments_of(thing)])
+    assert parts.lead[0] == "Simulate a robot under commands held from row to row, eqs (1)-(14)."
+    assert parts.words["dt"] == "length of the rows [s], a number or shape (n,)."
+    assert parts.words["twist"] == parts.words["pose"] == parts.words["current"]
+    assert [each.split()[0] for each in parts.outcome] == ["Returns", "Raises"]
+
+
+def test_a_formula_stays_as_it_is():
+    text = "A line.\n\n    x' = A x + B u\n      + K sgn(x)\n\nrobot: whose.\n"
+    parts = MADE.told(text, ["robot"])
+    assert parts.lead == ("A line.", ["x' = A x + B u", "  + K sgn(x)"])
+    assert parts.words == {"robot": "whose."}
+
+
+def test_options_of_a_question_are_named_and_linked_not_repeated():
+    signature, back = MADE.signature_of(omnidyn.identify)
+    assert signature == "(runs, robot, *, question=None, **options)"
+    assert back == "Estimate"
+    assert ":py:class:`omnidyn.Question`" in rst("identify")
+    assert "``nuisances``" in rst("identify")
+    assert all(f"- ``{name}``" in rst("Question") for name in omnidyn.Question.__dataclass_fields__)
+
+
+def test_annotations_that_check_are_left_out():
+    assert MADE.short_type("Annotated[PerWheel, number(0.0, 1.0), Field(alias='x')] | None") == "PerWheel | None"
+    assert MADE.short_type("dict[str, Annotated[float, number(0.0, 1.0)]]") == "dict[str, float]"
