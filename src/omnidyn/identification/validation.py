@@ -174,7 +174,7 @@ def validate(
     """
     fitted = _compared(fit, runs, progress)
     other = _compared(fit, held_out, progress) if held_out else None
-    scores = {FITTED: _scores(fit, fitted)} | ({HELD_OUT: _scores(fit, other)} if other else {})
+    scores = {FITTED: _scores(fit, fitted, runs)} | ({HELD_OUT: _scores(fit, other, held_out)} if other else {})
     return Validation(fitted, other, scores)
 
 
@@ -190,14 +190,14 @@ def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[
     return replace(found, applied=dict.fromkeys(found.robots, words))
 
 
-def _scores(fit: OutputErrorEstimate, found: Comparison) -> dict[str, Score]:
+def _scores(fit: OutputErrorEstimate, found: Comparison, logged: Sequence[Run]) -> dict[str, Score]:
     """The score of each component. What was not fitted has no noise, and no chi2.
 
     An encoder at rest repeats what it rounds off: of a counted angle nothing tells whether errors are white.
     """
     scores = {}
     for name, each in found.overall[found.robots[0]].items():
-        tick = _tick(found, name)
+        tick = _tick(logged, name)
         chi2, white = _chi2(fit, found, name, tick), None if tick else each.whiteness
         scores[name] = Score(each.samples, each.rmse, each.fit_percent, chi2, white, each.lag)
     return scores
@@ -215,12 +215,15 @@ def _errors(found: Comparison, name: str) -> list[FloatArray]:
     return [trace.error for trace in traces[name]]
 
 
-def _tick(found: Comparison, name: str) -> float:
-    """The largest tick of a counted angle in any log [rad]; 0 for what is not counted."""
+def _tick(logged: Sequence[Run], name: str) -> float:
+    """The largest tick of a counted angle in any log [rad]; 0 for what is not counted.
+
+    logged: as recorded. What a fitted latency has moved is interpolated, and shows no tick.
+    """
     channel, column = place(name) or ("", 0)
     if channel != "wheel_angle":
         return 0.0
-    angles = [run.wheel_angle for run in found.measured if run.wheel_angle is not None]
+    angles = [run.wheel_angle for run in logged if run.wheel_angle is not None]
     return max((find_tick(angle[:, column]) for angle in angles), default=0.0)
 
 
