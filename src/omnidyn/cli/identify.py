@@ -44,7 +44,8 @@ def _asks(command: Callable[..., None]) -> Callable[..., None]:
 @_asks
 def identify(
     logs: list[str] = typer.Argument(
-        metavar="LOG...", help="Logs (CSV, Parquet) or folders of them; or one table, axis,speed,force or (motors) input,speed."
+        metavar="LOG...",
+        help="Logs (CSV, Parquet) or folders of them; or one table: axis,speed,force, or input,speed of motors.",
     ),
     robot: str = typer.Option("", metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
     *,

@@ -1,7 +1,8 @@
 """Tables of the steady speeds of motors, one row per point, without a time: CSV `input,speed[,motor]`.
 
-The input is told by its column: `voltage_V`, `duty` (0 to 1), `duty_%`, `pwm_%`, `current_A`, or `input` in whatever units it
-has. The speed is in rad/s, or `speed_rpm`, `rpm`. motor: counted from 1; all rows are one motor without it.
+The input is told by its column: `voltage_V`, `duty` (0 to 1), `duty_%`, `pwm_%`, `current_A`, or `input` in
+whatever units it has. The speed is in rad/s, or `speed_rpm`, `rpm`. motor: counted from 1; all rows are one motor
+without it.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ _INPUTS: dict[str, tuple[str, str, float]] = {
 }  # fmt: skip
 _RPM = 2.0 * math.pi / 60.0
 _SPEEDS = {"speed": 1.0, "speed_rad_s": 1.0, "w_rad_s": 1.0, "w1_rad_s": 1.0, "rpm": _RPM, "speed_rpm": _RPM}
-_UNITS = {"V": "input_v", "%": "input_%", "A": "input_a", "duty": "input_duty"}  # of a column `input`, by a row of units
+# Of a column `input`, by a row of units
+_UNITS = {"V": "input_v", "%": "input_%", "A": "input_a", "duty": "input_duty"}
 _SPEED_UNITS = {"rad/s": 1.0, "SI": 1.0, "rpm": _RPM}
 MOTOR = "motor"
 MOST_DUTY = 1.0

@@ -56,7 +56,7 @@ def test_each_direction_has_its_own_start_stop_line_and_lag():
         assert each.value["stop"] < each.value["offset"] + 0.02 < each.value["start"]
         assert each.value["slope"] == pytest.approx(STICKY.slope, rel=0.02)
         assert each.value["lag"] == pytest.approx(STICKY.inertia / STICKY.slope, abs=DT)
-    assert study.verdict == "Motor 1 starts at 0.604 V (+) and 0.898 V (-)."
+    assert study.verdict == "Motor 1 starts at 0.603 V (+) and 0.898 V (-)."
     told = study.to_dict()["starts"]
     assert told[0]["parameters"]["start"]["ci95"][0] <= 0.6 <= told[0]["parameters"]["start"]["ci95"][1]
     assert len(study.document()["starts"].rows) == 2
@@ -76,7 +76,7 @@ def test_a_bend_of_the_line_moves_no_start():
 
 @pytest.mark.parametrize("how", [{}, {"noise": 0.5}, {"ticks": 400}, {"ticks": 2000}], ids=str)
 def test_the_intervals_hold_the_truth(how):
-    """Five draws of each; the study of many is `long`."""
+    """Three draws of each; the study of many is `long`."""
     found = coverage([STICKY, EQUAL], 3, ALL, **how)
     assert min(found.values()) >= 0.75
 

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.statistics import t_quantile
 
 NUMBERS = 3  # fitted beside t0, the lag among them
@@ -52,14 +52,16 @@ def _left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: 
     return resting + (_stop_left if stop else _start_left)(t, put_in, speed, at, lag, moving)
 
 
-def _start_left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, moving: FloatArray) -> float:
+def _start_left(
+    t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, moving: BoolArray
+) -> float:
     """Least sum of squares of the rows after a start."""
     above = put_in - put_in[max(int(np.searchsorted(t, at, "right")) - 1, 0)]
     weight = _lagged(t[moving], t, at, lag)
     return _not_negative(np.stack([weight @ above[:-1], weight.sum(axis=1)], axis=1), speed[moving])
 
 
-def _stop_left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, moving: FloatArray) -> float:
+def _stop_left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, moving: BoolArray) -> float:
     """Least sum of squares of the rows before a stop."""
     weight = _lagged(np.append(t[moving], at), t, float(t[0]), lag)
     decay = np.exp(-(np.append(t[moving], at) - t[0]) / lag)

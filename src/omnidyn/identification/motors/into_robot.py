@@ -31,7 +31,7 @@ import numpy as np
 from omnidyn.document import Part, Points, Table, apart, plain
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import identified
-from omnidyn.identification.motors.estimate import BAND, INERTIA, SLOPE, MotorEstimate
+from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import HEADING
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
@@ -86,7 +86,7 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     priors: dict[str, Prior] = {}
     for each in motors if supply else ():
         wheel = _Wheel(robot, each.motor or 0, study.kind)
-        found, own = wheel.numbers(each, supply)
+        found, own = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
         words += [f"{each.name}: {text}" for text in own]
         for key, (number, spread) in found.items():
             robot = wheel.put(robot, key, number)
@@ -142,8 +142,12 @@ class _Wheel:
     def key(self, name: str) -> str:
         return f"{name}[{self.wheel}]"
 
-    def numbers(self, line: MotorEstimate, scale: float) -> tuple[dict[str, tuple[float, float]], list[str]]:
-        """(key -> (value, std), words). scale: volts or ampere in one unit of the line."""
+    def numbers(
+        self, line: MotorEstimate, scale: float, smear: float
+    ) -> tuple[dict[str, tuple[float, float]], list[str]]:
+        """(key -> (value, std), words). scale: volts or ampere in one unit of the line. smear [s]: that of
+        `MotorWindows`, 0 of free runs.
+        """
         if BAND in line.unidentifiable or SLOPE in line.unidentifiable or not line.ci95[SLOPE][0] > 0.0:
             return {}, ["slope and dead band are not determined: nothing is written"]
         at = np.array([line.value[SLOPE], line.value[BAND]]) * scale
@@ -165,7 +169,7 @@ class _Wheel:
                 words.append(f"{name} is not written: {why}")
         if not line.dead_band_seen:
             words.append(f"{COULOMB} is not written: no dead band is seen")
-        inertia, more = self._of_inertia(line, at[0], scale) if found else ({}, [])
+        inertia, more = self._of_inertia(line, at[0], scale, smear) if found else ({}, [])
         return found | inertia, words + more
 
     def _laws(self, with_band: bool) -> Iterator[tuple[str, Callable[[float, float], float], str]]:
@@ -198,16 +202,19 @@ class _Wheel:
         return per_ampere if self.kind == "current" else per_ampere / self.resistance
 
     def _of_inertia(
-        self, line: MotorEstimate, slope: float, scale: float
+        self, line: MotorEstimate, slope: float, scale: float, smear: float
     ) -> tuple[dict[str, tuple[float, float]], list[str]]:
         """Of the rotor: (key -> (value, std), words)."""
         if not line.ci95[INERTIA][0] > 0.0:
             return {}, [f"{ROTOR} is not written: the logs do not determine an inertia"]
+        if line.value[LAG] < smear:
+            lag = f"a lag of {1e3 * line.value[LAG]:.2g} ms is too short for windows, which blur {1e3 * smear:.2g} ms"
+            return {}, [f"{ROTOR} is not written: {lag}; `method` output-error fits it"]
         of_volt = self._push(self._torque(slope)) * self.radius * scale  # N m at the wheel by one unit of the input
-        total = line.value[INERTIA] * of_volt
+        total = float(line.value[INERTIA] * of_volt)
         inertia = (total - self.wheel_inertia) / self.gear**2
         if not inertia > 0.0:
-            return {}, [f"{ROTOR} is not written: the wheel of the file explains all of {total:.3g} kg m^2 at the wheel"]
+            return {}, [f"{ROTOR} is not written: the wheel of the file explains all of {total:.3g} kg m^2 there"]
         # K_t goes with the slope where it is the same number as K_v: both are off, as if independent
         share = line.std[SLOPE] / line.value[SLOPE] if self.tied and self.kind != "current" else 0.0
         spread = total * math.hypot(line.std[INERTIA] / line.value[INERTIA], share) / self.gear**2

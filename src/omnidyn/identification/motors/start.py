@@ -27,7 +27,7 @@ from omnidyn.identification.motors.edge import edge_interval
 from omnidyn.identification.motors.estimate import BAND, LAG, SLOPE, MotorEstimate
 from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import MotorLog
-from omnidyn.identification.motors.windows import MotorWindows
+from omnidyn.identification.motors.windows import EDGE_SHARE, LENGTHS, MotorWindows, motor_windows
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.statistics import MAD_TO_STD, sensor_step, stretches
 
@@ -44,6 +44,7 @@ SHARP = 0.5  # a start whose interval is narrower than this share of it is one t
 LOST = 0.25  # of the largest speed: where only faster motion can be told from noise, rest cannot
 BLOCK = 0.25  # [s]
 LAGS_AT_REST = 1.0
+HIDDEN = 0.02  # of the change of speed over a window: noise by which the inertia may come out too small
 CURRENT = "current"
 ONE_WAY = 0.98  # of the sides of a window, so that it belongs to one direction
 
@@ -142,7 +143,8 @@ def motor_starts(
     found, row = [], max(float(np.median(np.diff(log.t))) for log in logs if len(log.t) > 1)
     for motor in motors:
         way = orientation([(log.put_in[:, motor], log.motion[:, motor]) for log in logs])
-        lines = {side: line_one_way(windows, motor, side) for side in (1.0, -1.0)}
+        own = windows_for_a_lag(logs, windows, motor)
+        lines = {side: line_one_way(own, motor, side) for side in (1.0, -1.0)}
         for side, line in lines.items():
             lag = line.value[LAG] if line is not None else math.nan
             up, down = _edges(logs, motor, side, way, lag)
@@ -194,6 +196,33 @@ def unknown_line() -> dict[str, tuple[float, tuple[float, float]]]:
 # ---- the line of one direction ------------------------------------------------------------------------------
 
 
+def windows_for_a_lag(logs: Sequence[MotorLog], windows: MotorWindows | None, motor: int) -> MotorWindows | None:
+    """The windows, or longer ones where noise hides the change of speed over them.
+
+    Noise in that column, like any in what a line goes over, would make the inertia come out too small by its share.
+    """
+    if windows is None or windows.settled:
+        return windows
+    noise = max(_noise_of(log.motion[:, motor]) for log in logs)
+    row = max(float(np.median(np.diff(log.t))) for log in logs if len(log.t) > 1)
+    for least in (each for each in LENGTHS if each >= windows.length):
+        try:
+            found = motor_windows(logs, least=least) if least > windows.length else windows
+        except InsufficientDataError:
+            break
+        windows, change = found, found.change[found.motor == motor]
+        rows = 2 * max(1, round(0.5 * EDGE_SHARE * found.length / row)) + 1  # that tell the speed at an end
+        if 2.0 * noise**2 / rows / found.length**2 <= HIDDEN * float(np.var(change)):
+            break
+    return windows
+
+
+def _noise_of(speed: FloatArray) -> float:
+    """Standard deviation of the noise of a speed, or of the steps in which it is read [rad/s]."""
+    known = speed[np.isfinite(speed)]
+    return max(_noise(known), sensor_step(known) / math.sqrt(6.0)) if len(known) > LEAST_REST else 0.0
+
+
 def line_one_way(windows: MotorWindows | None, motor: int, side: float) -> MotorEstimate | None:
     """The line through the windows in which a motor turns one way; None where there are too few."""
     if windows is None:
@@ -206,9 +235,7 @@ def line_one_way(windows: MotorWindows | None, motor: int, side: float) -> Motor
         return None
 
 
-def _numbers(
-    line: MotorEstimate | None, way: float, row: float
-) -> dict[str, tuple[float, tuple[float, float]]]:
+def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tuple[float, tuple[float, float]]]:
     """Slope, offset and lag of a line, as the direction has them.
 
     The interval of the lag is wider by a row [s], of which the log does not tell: an input that is held from row to
@@ -249,9 +276,7 @@ class _Edge(NamedTuple):
     stop: bool
 
 
-def _edges(
-    logs: Sequence[MotorLog], motor: int, side: float, way: float, lag: float
-) -> tuple[list[Span], list[Span]]:
+def _edges(logs: Sequence[MotorLog], motor: int, side: float, way: float, lag: float) -> tuple[list[Span], list[Span]]:
     """(starts, stops) of one direction of one motor."""
     if logs[0].kind == CURRENT:
         return [], []
@@ -428,5 +453,3 @@ def _rested(column: _Column) -> Iterator[float]:
 def starts_of(starts: Sequence[MotorStart], motor: int | None) -> list[MotorStart]:
     """Those of one motor."""
     return [each for each in starts if each.motor == motor]
-
-

@@ -42,7 +42,7 @@ def points_of_logs(logs: Sequence[MotorLog]) -> MotorTable:
     """
     later = _answered_later(logs)
     parts = [part for log in logs for m in range(log.motors) for part in _points(log, m, later)]
-    put_in, speed, motor, run = (np.concatenate(each) if parts else np.zeros(0) for each in zip(*parts, strict=True)) if parts else [np.zeros(0)] * 4
+    put_in, speed, motor, run = (np.concatenate(each) for each in zip(*parts, strict=True))
     return MotorTable(
         put_in, speed, motor.astype(np.int64), logs[0].kind, logs[0].unit, run=run.astype(np.int64),
         source=logs[0].run.source,
@@ -170,7 +170,7 @@ def _in_order(level: FloatArray, turns: FloatArray, run: FloatArray) -> tuple[li
 def line_of_speed(
     put_in: FloatArray, speed: FloatArray
 ) -> tuple[tuple[float, tuple[float, float]], tuple[float, tuple[float, float]]]:
-    """(slope, interval) and (offset, interval) of u = slope w + offset, the speeds having the error. Shape (points,)."""
+    """(slope, interval) and (offset, interval) of u = slope w + offset, whose error is in w. Shape (points,)."""
     middle, count = float(put_in.mean()), len(put_in)
     spread = float(((put_in - middle) ** 2).sum())
     if spread <= 0.0:

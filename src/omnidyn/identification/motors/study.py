@@ -104,7 +104,8 @@ class MotorStudy:
             "verdict": self.verdict, "method": self.method, "input": self.kind, "unit": self.unit,
             "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
-            "starts": [each.to_dict() for each in self.starts], "statements": list(self.statements), "warnings": list(self.doubts),
+            "starts": [each.to_dict() for each in self.starts], "statements": list(self.statements),
+            "warnings": list(self.doubts),
         }  # fmt: skip
 
 
@@ -182,7 +183,7 @@ def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object
         pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
-    starts = motor_starts(logs, _windows_of(logs), motors)
+    starts = starts_of_points(points_of_logs(logs)) if is_slow(logs) else motor_starts(logs, _windows_of(logs), motors)
     return MotorStudy(
         OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs)
     )  # fmt: skip
