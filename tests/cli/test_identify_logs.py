@@ -208,9 +208,6 @@ def test_motors_from_a_table_without_a_time(call, tmp_path):
     code, out, _ = call(str(table), "--what", "motors")
     assert "Motor 1 starts at 0.7 V." in out
     assert "the dead band is 0.7 V" in out
-    code, _, err = call(str(table), "--what", "motors", "--method", "output-error")
-    assert code == 3
-    assert "a table of steady speeds has no time in it" in err
 
 
 def test_motors_go_into_a_robot_file(call, bench, tmp_path):

@@ -14,11 +14,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.estimate import SLOPE
 from omnidyn.identification.motors.log import MotorLog
-from omnidyn.identification.motors.start import OFFSET, MotorStart, Span, direction_of, orientation, unknown_line
+from omnidyn.identification.motors.rest import Span
+from omnidyn.identification.motors.start import OFFSET, MotorStart, direction_of, orientation, unknown_line
 from omnidyn.identification.motors.windows import MotorWindows
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.statistics import t_quantile
@@ -150,7 +151,7 @@ def _in_table(level: FloatArray, turns: FloatArray) -> tuple[list[Span], list[Sp
     return [Span(float(rest), float(moves))], []
 
 
-def _in_order(level: FloatArray, turns: FloatArray, run: FloatArray) -> tuple[list[Span], list[Span]]:
+def _in_order(level: FloatArray, turns: FloatArray, run: IntArray) -> tuple[list[Span], list[Span]]:
     """(starts, stops) from each row to the next one."""
     up, down = [], []
     for k, j in pairwise(range(len(level))):
