@@ -194,6 +194,22 @@ def test_motors_in_words(call, bench):
     assert "-o is not used" in err
 
 
+def test_motors_from_a_table_without_a_time(call, tmp_path):
+    """u = 0.5 w + 0.4: at rest up to 0.6 V, and 0.8 V moves it."""
+    table, report = tmp_path / "table.csv", tmp_path / "m.html"
+    rows = [(u, (u - 0.4) / 0.5 if u > 0.7 else 0.0) for u in np.arange(0.0, 4.0, 0.2).tolist()]
+    table.write_text("voltage_V,speed\n" + "".join(f"{u},{w}\n" for u, w in rows))
+    code, out, _ = call(str(table), "--what", "motors", "--json", "--report", str(report))
+    assert code == 0
+    (start,) = json.loads(out)["starts"]
+    assert start["parameters"]["start"]["ci95"] == pytest.approx([0.6, 0.8])
+    assert start["parameters"]["offset"]["value"] == pytest.approx(0.4)
+    assert "Where each direction starts" in report.read_text("utf-8")
+    code, out, _ = call(str(table), "--what", "motors")
+    assert "Motor 1 starts at 0.7 V." in out
+    assert "the dead band is 0.7 V" in out
+
+
 def test_motors_go_into_a_robot_file(call, bench, tmp_path):
     """u = 0.5 w + 0.4 sgn w at two wheels of three: K_v = 0.5 V s/rad over the gear of 16, c = g 0.4 V."""
     out = tmp_path / "fit.toml"

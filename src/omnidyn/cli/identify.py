@@ -44,7 +44,8 @@ def _asks(command: Callable[..., None]) -> Callable[..., None]:
 @_asks
 def identify(
     logs: list[str] = typer.Argument(
-        metavar="LOG...", help="Logs (CSV, Parquet) or folders of them; or one table axis,speed,force."
+        metavar="LOG...",
+        help="Logs (CSV, Parquet) or folders of them; or one table: axis,speed,force, or input,speed of motors.",
     ),
     robot: str = typer.Option("", metavar="ROBOT", help="The robot to start from: a preset or a robot file."),
     *,
@@ -70,7 +71,7 @@ def identify(
     speed, or from a table of steady points. The answer carries standard errors, 95 % intervals and warnings in words,
     and says what the data cannot tell.
     """
-    from omnidyn.cli.identify_logs import Reading, is_steady_table
+    from omnidyn.cli.identify_logs import Reading, is_motor_table, is_steady_table
     from omnidyn.cli.identify_show import Out, tell_table
     from omnidyn.files import check_output
 
@@ -85,6 +86,11 @@ def identify(
     options.refuse_missing(logs)
     if question.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
         tell_table(logs[0], robot, question, to)
+        return
+    if question.what == MOTORS and len(logs) == 1 and is_motor_table(logs[0]):
+        from omnidyn.cli.identify_motors import tell_motor_table
+
+        tell_motor_table(logs[0], robot, question, to)
         return
     how = options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
     _identify(logs, robot, question, Reading(how, sort, options.Maps(save_map, force)), to)

@@ -39,22 +39,34 @@ class Loaded(NamedTuple):
 
 def is_steady_table(path: str) -> bool:
     """Whether a file is a table axis,speed,force: told by the names of its columns."""
+    names = _first_names(path)
+    return "axis" in names and bool(names & {"speed", "force"})
+
+
+def is_motor_table(path: str) -> bool:
+    """Whether a file is a table input,speed[,motor]: told by the names of its columns."""
+    from omnidyn.logs import motor_table
+
+    return motor_table.is_motor_table(_first_names(path))
+
+
+def _first_names(path: str) -> set[str]:
+    """The cells of the first line of a text file, in small letters; none of a folder, or of a file too large."""
     from omnidyn.errors import InputError
     from omnidyn.files import read_bytes
 
     if os.path.isdir(path):
-        return False
+        return set()
     try:
         text = read_bytes(path).decode("utf-8-sig", "replace")[:SNIFF_BYTES]
     except InputError as error:
         if "too large" in str(error):  # a log; no table of points is that long
-            return False
+            return set()
         raise
     lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
     first = next(lines, "").replace(";", ",").replace("\t", ",")
     cells = first.split(",") if "," in first else first.split()
-    names = {cell.strip().strip('"').lower() for cell in cells}
-    return "axis" in names and bool(names & {"speed", "force"})
+    return {cell.strip().strip('"').lower() for cell in cells}
 
 
 def load_runs(arguments: Sequence[str], question: Question, robot: Robot | None, reading: Reading, now: Any) -> Loaded:

@@ -26,6 +26,23 @@ def run_motors(
 
     study = identify_motors(loaded.runs, robot, question=question, now=now)
     now("writing")
+    _tell(study, robot, record, to)
+
+
+def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> None:
+    """The same from a table input,speed[,motor], which has no time."""
+    from omnidyn.cli.terminal.session import provenance, robot_input
+    from omnidyn.identification.motors.study import identify_motors
+    from omnidyn.logs.motor_table import read_motor_table
+    from omnidyn.model.robot_file import load_robot
+
+    start, data = load_robot(robot) if robot else None, read_motor_table(table)
+    study = identify_motors(data, start, question=question)
+    inputs = [{"role": "data", "name": table, "sha256": data.sha256}]
+    _tell(study, start, provenance([*([robot_input(robot)] if robot else []), *inputs]), to)
+
+
+def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out) -> None:
     told, numbers = study.document(), _into_file(study, robot, to)
     if numbers is not None:
         told = replace(told, parts=apart(told.parts, numbers.parts()))

@@ -28,6 +28,7 @@ def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
         section("findings", "What the data say", told["statements"]),
         section("doubts", "Doubts", told["doubts"], none="None."),
         *([section("figures", "Figures", *pictures)] if pictures else []),
+        *([section("starts", "Where each direction starts", told["starts"])] if study.starts else []),
         section("numbers", "Numbers, with 95 % intervals", told["motors"]),
     ]
     how = WINDOWS if study.windows is not None else FREE_RUNS

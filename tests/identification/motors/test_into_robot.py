@@ -6,18 +6,19 @@ import pytest
 from omnidyn.errors import InputError
 from omnidyn.identification.motors.into_robot import motors_into_robot
 from omnidyn.identification.motors.study import identify_motors
+from omnidyn.model.motor import mass_at_rim
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
 
 EMF, TORQUE, COULOMB = "motor.emf_constant_Vs_rad", "motor.torque_constant_Nm_A", "friction.wheels.coulomb"
-VISCOUS = "friction.wheels.viscous"
+VISCOUS, ROTOR = "friction.wheels.viscous", "motor.rotor_inertia_kg_m2"
 DT, FINE, ROWS = 0.01, 20, 800
 GEAR, RADIUS, RESISTANCE = 16.0, 0.04, 5.95  # of the preset robotino
 TRUE = ((0.050, 3.0), (0.052, 4.0), (0.048, 2.0))  # K_v = K_t [V s/rad], c [N] of each motor
 INERTIA = 4e-4  # at the wheel [kg m^2]
 
 
-def wheel(voltage, constant, coulomb, viscous=0.0, drop=0.0):
+def wheel(voltage, constant, coulomb, viscous=0.0, drop=0.0, inertia=INERTIA):
     """J w' = l K i - r (b r w + c sgn w), R i = u - K l w less the drop, stick at 0: (speed, current) at the rows."""
     w, found = 0.0, []
     for u in voltage:
@@ -30,7 +31,7 @@ def wheel(voltage, constant, coulomb, viscous=0.0, drop=0.0):
             if w == 0.0 and abs(torque) <= RADIUS * coulomb:
                 continue
             side = np.sign(w) or np.sign(torque)
-            new = w + DT / FINE / INERTIA * (torque - RADIUS * coulomb * side)
+            new = w + DT / FINE / inertia * (torque - RADIUS * coulomb * side)
             w = new if new * side > 0.0 else 0.0
         found.append(rows[0])
     return np.array(found).T
@@ -65,8 +66,49 @@ def test_the_numbers_come_back(method):
             own = f"{key}[{m}]"
             assert abs(numbers.value[own] - true) < 4.0 * numbers.std[own] + 0.02 * true
             assert numbers.std[own] < 0.1 * true
-    assert len(numbers.value) == 9
-    assert any("rotor_inertia" in words for words in numbers.words)
+    if method == "output-error":
+        assert len(numbers.value) == 12
+    else:  # 3.7 ms, with rows every 10 ms
+        assert len(numbers.value) == 9
+        assert any("is too short for windows" in words for words in numbers.words)
+
+
+HEAVY = 4e-3  # at the wheel [kg m^2]: a lag of 37 ms
+
+
+@pytest.mark.parametrize("method", ["steady-state", "output-error"])
+def test_a_rotor_comes_back(method):
+    """Within four standard errors, and what steps of 0.5 ms are off by."""
+    how = {"between": "hold", "nuisances": "none"} if method == "output-error" else {}
+    numbers = motors_into_robot(identify_motors([log(inertia=HEAVY)], method=method, **how), tied())
+    for m in range(3):
+        rotor, true = f"{ROTOR}[{m}]", HEAVY / GEAR**2
+        assert abs(numbers.value[rotor] - true) < 4.0 * numbers.std[rotor] + 0.02 * true
+        assert numbers.std[rotor] < 0.1 * true
+    assert any("holds the wheel too" in words for words in numbers.words)
+
+
+def test_the_rotor_is_what_the_wheel_leaves():
+    """In the file as in the mass matrix: J l^2 + J_w is what was measured."""
+    study, robot = identify_motors([log(inertia=HEAVY)]), tied()
+    bare = motors_into_robot(study, robot)
+    heavy = motors_into_robot(study, robot.replace(wheels=robot.wheels.replace(wheel_inertia=1e-4)))
+    for m in range(3):
+        key = f"{ROTOR}[{m}]"
+        assert heavy.value[key] * GEAR**2 + 1e-4 == pytest.approx(bare.value[key] * GEAR**2)
+        assert mass_at_rim(heavy.robot.motor, heavy.robot.wheels)[m] == pytest.approx(
+            mass_at_rim(bare.robot.motor, bare.robot.wheels)[m]
+        )
+    assert not any("holds the wheel too" in words for words in heavy.words)
+    all_wheel = motors_into_robot(study, robot.replace(wheels=robot.wheels.replace(wheel_inertia=1e-1)))
+    assert not [key for key in all_wheel.value if key.startswith(ROTOR)]
+    assert any("the wheel of the file explains all" in words for words in all_wheel.words)
+
+
+def test_steady_windows_give_no_inertia_and_say_so():
+    numbers = motors_into_robot(identify_motors([log(hold=100)], window=(0.5, 1.0)), tied())
+    assert not [key for key in numbers.value if key.startswith(ROTOR)]
+    assert any(f"{ROTOR} is not written" in words for words in numbers.words)
 
 
 def test_they_stand_in_the_file_with_std_and_source():
@@ -76,7 +118,7 @@ def test_they_stand_in_the_file_with_std_and_source():
     for key, number in numbers.value.items():
         name, index = key[:-3], int(key[-2])
         table = robot.friction.wheels if name == COULOMB else robot.motor
-        field = {EMF: "emf_constant", TORQUE: "torque_constant", COULOMB: "coulomb"}[name]
+        field = {EMF: "emf_constant", TORQUE: "torque_constant", COULOMB: "coulomb", ROTOR: "rotor_inertia"}[name]
         assert getattr(table, field)[index] == number
         assert robot.priors[key].std == pytest.approx(numbers.std[key])
         assert "bench.csv" in robot.priors[key].source

@@ -73,8 +73,10 @@ class MotorEstimate:
         """The latencies that were fitted [s]."""
         return {name: value for name, value in self.value.items() if name.startswith(LATENCY)}
 
-    def statement(self) -> str:
-        """The estimate in a sentence."""
+    def statement(self, *, started: bool = False) -> str:
+        """The estimate in a sentence. started: its starts from rest were seen, so that they are its dead band, and not
+        where the line meets speed 0.
+        """
         spread = f" +- {self.std[SLOPE]:.2g}" if math.isfinite(self.std[SLOPE]) else ""
         words = f"{self.name}: slope {self.value[SLOPE]:.5g}{spread} {self.unit} s/rad"
         if self.ci95[LAG][0] > 0.0:
@@ -83,6 +85,10 @@ class MotorEstimate:
             words += f", {name.partition('.')[2]} late by {1e3 * value:.3g} +- {1e3 * self.std[name]:.2g} ms"
         if self.left_out:
             words += f" ({self.left_out} rows left out: their input changes too much from row to row)"
+        if started and self.dead_band_seen:
+            low, high = self.ci95[BAND]
+            band = f"{self.value[BAND]:.3g} +- {self.std[BAND]:.2g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
+            return f"{words}; its line, both ways together, meets speed 0 at {band}"
         return f"{words}; {self._of_dead_band()}"
 
     def _of_dead_band(self) -> str:

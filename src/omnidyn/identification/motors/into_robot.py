@@ -11,9 +11,12 @@ A wheel of radius r with friction b v + c sgn v at its rim, behind a gear l, at 
     duty       the same, times the supply
     current    b = g slope/r                                             c = g dead_band
 
-Where the file has K_t = K_v, which are one number of the magnet, K_t goes along. The rotor and the wheel have the
-inertia J = inertia g r at the wheel, but a robot file has no `rotor_inertia` to take it. R, K_t, l, r and the supply
-are those of the file, as if they were exact.
+Where the file has K_t = K_v, which are one number of the magnet, K_t goes along. What spins has the inertia
+
+    J l^2 + J_w = inertia g r                                            rotor J behind the gear, and wheel J_w
+
+of which J is written: the wheel has what the file says, and where that is nothing, J holds the wheel too, as the mass
+matrix takes only their sum. R, K_t, l, r and the supply are those of the file, as if they were exact.
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ import numpy as np
 from omnidyn.document import Part, Points, Table, apart, plain
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import identified
-from omnidyn.identification.motors.estimate import BAND, INERTIA, SLOPE, MotorEstimate
+from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import HEADING
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
@@ -37,6 +40,7 @@ from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.wheels import per_wheel
 
 COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"
+ROTOR = "motor.rotor_inertia_kg_m2"
 STEP = 1e-6  # of a standard error: the differences by which errors propagate
 
 
@@ -82,7 +86,7 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     priors: dict[str, Prior] = {}
     for each in motors if supply else ():
         wheel = _Wheel(robot, each.motor or 0, study.kind)
-        found, own = wheel.numbers(each, supply)
+        found, own = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
         words += [f"{each.name}: {text}" for text in own]
         for key, (number, spread) in found.items():
             robot = wheel.put(robot, key, number)
@@ -132,13 +136,18 @@ class _Wheel:
         self.resistance = own(motor.resistance)
         self.torque, self.efficiency = own(motor.torque_constant), own(motor.gear_efficiency)
         self.tied = self.torque == own(motor.emf_constant)
+        self.wheel_inertia = own(robot.wheels.wheel_inertia)
         self.drop, self.viscous = own(motor.voltage_drop), own(robot.friction.wheels.viscous)
 
     def key(self, name: str) -> str:
         return f"{name}[{self.wheel}]"
 
-    def numbers(self, line: MotorEstimate, scale: float) -> tuple[dict[str, tuple[float, float]], list[str]]:
-        """(key -> (value, std), words). scale: volts or ampere in one unit of the line."""
+    def numbers(
+        self, line: MotorEstimate, scale: float, smear: float
+    ) -> tuple[dict[str, tuple[float, float]], list[str]]:
+        """(key -> (value, std), words). scale: volts or ampere in one unit of the line. smear [s]: that of
+        `MotorWindows`, 0 of free runs.
+        """
         if BAND in line.unidentifiable or SLOPE in line.unidentifiable or not line.ci95[SLOPE][0] > 0.0:
             return {}, ["slope and dead band are not determined: nothing is written"]
         at = np.array([line.value[SLOPE], line.value[BAND]]) * scale
@@ -160,7 +169,8 @@ class _Wheel:
                 words.append(f"{name} is not written: {why}")
         if not line.dead_band_seen:
             words.append(f"{COULOMB} is not written: no dead band is seen")
-        return found, words + self._of_inertia(line, at[0], scale)
+        inertia, more = self._of_inertia(line, at[0], scale, smear) if found else ({}, [])
+        return found | inertia, words + more
 
     def _laws(self, with_band: bool) -> Iterator[tuple[str, Callable[[float, float], float], str]]:
         """(key, its number of slope and dead band, why there is none where that is not above 0)."""
@@ -191,14 +201,25 @@ class _Wheel:
         per_ampere = self.efficiency * self.gear * torque / self.radius
         return per_ampere if self.kind == "current" else per_ampere / self.resistance
 
-    def _of_inertia(self, line: MotorEstimate, slope: float, scale: float) -> list[str]:
+    def _of_inertia(
+        self, line: MotorEstimate, slope: float, scale: float, smear: float
+    ) -> tuple[dict[str, tuple[float, float]], list[str]]:
+        """Of the rotor: (key -> (value, std), words)."""
         if not line.ci95[INERTIA][0] > 0.0:
-            return []
-        inertia = line.value[INERTIA] * scale * self._push(self._torque(slope)) * self.radius
-        return [
-            f"rotor and wheel have {inertia:.3g} kg m^2 at the wheel, which is not written: a robot file has no "
-            "rotor_inertia yet"
-        ]
+            return {}, [f"{ROTOR} is not written: the logs do not determine an inertia"]
+        if line.value[LAG] < smear:
+            lag = f"a lag of {1e3 * line.value[LAG]:.2g} ms is too short for windows, which blur {1e3 * smear:.2g} ms"
+            return {}, [f"{ROTOR} is not written: {lag}; `method` output-error fits it"]
+        of_volt = self._push(self._torque(slope)) * self.radius * scale  # N m at the wheel by one unit of the input
+        total = float(line.value[INERTIA] * of_volt)
+        inertia = (total - self.wheel_inertia) / self.gear**2
+        if not inertia > 0.0:
+            return {}, [f"{ROTOR} is not written: the wheel of the file explains all of {total:.3g} kg m^2 there"]
+        # K_t goes with the slope where it is the same number as K_v: both are off, as if independent
+        share = line.std[SLOPE] / line.value[SLOPE] if self.tied and self.kind != "current" else 0.0
+        spread = total * math.hypot(line.std[INERTIA] / line.value[INERTIA], share) / self.gear**2
+        words = [] if self.wheel_inertia else [f"{ROTOR} holds the wheel too, which the file gives no inertia"]
+        return {self.key(ROTOR): (inertia, spread)}, words
 
     def put(self, robot: Robot, key: str, number: float) -> Robot:
         """The robot with a number; other levels of Coulomb friction at the wheel go along where they have to."""

@@ -10,7 +10,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from omnidyn.document import Document, Points, Table
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.grouping import held_out
 from omnidyn.identification.motors.choice import is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
@@ -18,10 +18,13 @@ from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.free_run import fit_rmse
 from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import MotorLog, motor_logs
+from omnidyn.identification.motors.start import STARTS_HEAD, MotorStart, motor_starts
+from omnidyn.identification.motors.static import is_slow, points_of_logs, starts_of_points, windows_of_points
 from omnidyn.identification.motors.verdict import motors_verdict
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import MOTOR_FIT, MOTOR_LINES, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 
@@ -31,8 +34,9 @@ class MotorStudy:
     """motors: an estimate each, the last for all together where there are several in windows.
 
     plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
-    found. windows: that the lines go through, None of free runs. supply [V]: of a
-    duty, the mean of the logs; NaN where it is not logged. warnings: of the logs, in words.
+    found. windows: that the lines go through, None of free runs. starts: each direction of each motor by itself, with
+    the input at which it sets off. supply [V]: of a duty, the mean of the logs; NaN where it is not logged.
+    warnings: of the logs, in words.
     """
 
     method: str
@@ -42,25 +46,27 @@ class MotorStudy:
     motors: tuple[MotorEstimate, ...]
     plain: tuple[MotorEstimate, ...] = ()
     windows: MotorWindows | None = None
+    starts: tuple[MotorStart, ...] = ()
     supply: float = math.nan
     warnings: tuple[str, ...] = ()
 
     @property
     def statements(self) -> tuple[str, ...]:
         """What the logs say of each motor, and whether its dead band is any use on held-out logs."""
-        words = [each.statement() for each in self.motors]
+        known = {each.motor for each in self.starts if each.sharp}
+        words = [each.statement(started=each.motor in known) for each in self.motors]
         for band, plain in zip(self.motors, self.plain, strict=False):
             if band.dead_band_seen and band.held_out > (1.0 - PAYS) * plain.held_out:
                 words.append(
                     f"{band.name}: held-out logs are met no better with the dead band (error {band.held_out:.4g} "
                     f"rad/s, {plain.held_out:.4g} without): it may stand for something else"
                 )
-        return tuple(words)
+        return (*words, *(each.statement() for each in self.starts))
 
     @property
     def verdict(self) -> str:
         """Which motors answer to their input, and at which input they start, in a sentence."""
-        return motors_verdict(self.motors)
+        return motors_verdict(self.motors, self.starts)
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -71,18 +77,20 @@ class MotorStudy:
             own += ["the intervals allow for errors that have a memory"] if each.covariance == "sandwich" else []
             own += [] if each.converged else ["the fit was cut short: the numbers are of its last step"]
             words += [f"{each.name}: {text}" for text in own]
-        return tuple(words)
+        return (*words, *(f"{each.name}: {text}" for each in self.starts for text in each.doubts))
 
     def document(self) -> Document:
         """What the study says: a row per motor, with a dead band and without, then words."""
         how = "free runs of whole logs"
         if self.windows is not None:
-            long = f"windows of {self.windows.length:g} s in integral form"
-            how = "steady windows" if self.windows.settled else long
+            how = f"windows of {self.windows.length:g} s in integral form"
+            if self.windows.settled:
+                how = "steady windows" if math.isfinite(self.windows.length) else "a point per row"
         pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((each,) for each in self.motors)
         parts = [
             f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", "",
             Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
+            *([Table(STARTS_HEAD, [each.row() for each in self.starts], name="starts"), ""] if self.starts else []),
             Points(self.statements, name="statements"), Points(self.doubts, "warning:", "doubts"),
         ]  # fmt: skip
         return Document(parts, self.to_dict(), self.doubts, verdict=self.verdict)
@@ -96,13 +104,14 @@ class MotorStudy:
             "verdict": self.verdict, "method": self.method, "input": self.kind, "unit": self.unit,
             "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
-            "statements": list(self.statements), "warnings": list(self.doubts),
+            "starts": [each.to_dict() for each in self.starts], "statements": list(self.statements),
+            "warnings": list(self.doubts),
         }  # fmt: skip
 
 
 @shows_options(MOTOR_FIT, MOTOR_LINES)
 def identify_motors(
-    runs: Run | Sequence[Run], robot: Robot | None = None, *, question: Question | None = None,
+    runs: Run | Sequence[Run] | MotorTable, robot: Robot | None = None, *, question: Question | None = None,
     now: Callable[[str], object] = lambda words: None, **options: Unpack[Options],
 ) -> MotorStudy:  # fmt: skip
     """Slope, dead band, lag and inertia of every motor of some logs.
@@ -110,25 +119,52 @@ def identify_motors(
     Steady state, which is the default, takes windows in integral form and gives the line of all motors together too;
     output error takes free runs of whole logs, with and without a dead band. question, options: see `Question`, such as
     method=, input=, window= or hold_out=. robot: whose heading is the speed, where that is "ground". now: is told what
-    is done.
+    is done. runs may be a table of inputs and steady speeds, `read_motor_table`, and rows of a log that are more than
+    0.1 s apart are points like those of a table. Each direction of each motor has its own start, stop, line and lag in
+    `MotorStudy.starts`.
     Raises InputError for options of another method and for a run without the channels, InsufficientDataError where the
     motors say nothing.
     """
-    every = as_list(runs)
     asked = (question or Question()).but({**options, "what": MOTORS})
+    if isinstance(runs, MotorTable):
+        if asked.method_asked() == OUTPUT_ERROR:
+            raise InputError("a table of steady speeds has no time in it", got="a table input,speed",
+                             expected="logs, or `method` steady-state", where="method")  # fmt: skip
+        return _of_points(runs, "a table", ())
+    every = as_list(runs)
     if asked.method_asked() == OUTPUT_ERROR:
         return _free_runs(every, asked, now)
     return _lines(motor_logs(every, asked.input, asked.speed, robot), asked)
 
 
 def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
+    if is_slow(logs):
+        points = points_of_logs(logs)
+        words = "the rows are more than 0.1 s apart: each is a point of steady speed, and nothing is known of a lag"
+        study = _of_points(points, logs[0].motion_from, (words,))
+        return replace(study, supply=_supply(logs))
     windows = motor_windows(logs, steady=asked.steady, share=asked.window)
     source = named([log.run.source for log in logs])
-    motors = [int(motor) for motor in np.unique(windows.motor)]
-    lines = tuple(fit_line(windows, motor, source) for motor in (*motors, *([None] if motors[1:] else [])))
+    motors, lines = _of_each(windows, source)
     return MotorStudy(
-        STEADY_STATE, windows.kind, windows.unit, windows.speed_from, lines, (), windows, _supply(logs),
-        tuple(_of_windows(windows, lines)),
+        STEADY_STATE, windows.kind, windows.unit, windows.speed_from, lines, (), windows,
+        motor_starts(logs, windows, motors), _supply(logs), tuple(_of_windows(windows, lines)),
+    )  # fmt: skip
+
+
+def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[MotorEstimate, ...]]:
+    """(numbers of the motors, a line each, and one of all where there are several)."""
+    motors = [int(motor) for motor in np.unique(windows.motor)]
+    return motors, tuple(fit_line(windows, motor, source) for motor in (*motors, *([None] if motors[1:] else [])))
+
+
+def _of_points(points: MotorTable, origin: str, words: Sequence[str]) -> MotorStudy:
+    """The study of points of steady speed."""
+    windows = windows_of_points(points, origin)
+    _, lines = _of_each(windows, points.source)
+    return MotorStudy(
+        STEADY_STATE, points.kind, points.unit, origin, lines, (), windows, starts_of_points(points),
+        warnings=(*points.notes, *words, *_of_windows(windows, lines)),
     )  # fmt: skip
 
 
@@ -147,7 +183,18 @@ def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object
         pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
-    return MotorStudy(OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, supply=_supply(logs))
+    starts = starts_of_points(points_of_logs(logs)) if is_slow(logs) else motor_starts(logs, _windows_of(logs), motors)
+    return MotorStudy(
+        OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs)
+    )  # fmt: skip
+
+
+def _windows_of(logs: Sequence[MotorLog]) -> MotorWindows | None:
+    """The windows through which the line of a direction goes; None where there are none."""
+    try:
+        return motor_windows(logs)
+    except InsufficientDataError:
+        return None
 
 
 def _latency(nuisances: Sequence[str] | None) -> bool | None:

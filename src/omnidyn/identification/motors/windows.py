@@ -7,6 +7,7 @@ divided by the length of the window. The integral needs no derivative of a noisy
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -41,7 +42,8 @@ class MotorWindows:
     rest: per motor the largest mean input [unit] under which it stayed at rest, NaN where it never rested.
     unresolved, resting: windows left out because the log does not resolve their input, or because the motor rested.
     settled: start-ups were left out, so that nothing is known of the inertia. every: of a very long log, only every so
-    many-th window was used.
+    many-th window was used. smear [s]: over which the speed at an end of a window is averaged; a lag that is shorter
+    comes out too short. NaN where nothing is known of the inertia.
     """
 
     put_in: FloatArray
@@ -60,6 +62,7 @@ class MotorWindows:
     resting: int
     settled: bool
     every: int
+    smear: float = math.nan
 
     def of(self, motor: int | None) -> tuple[FloatArray, ...]:
         """(put_in, speed, speed_std, side, change, block) of one motor, or of all."""
@@ -68,16 +71,16 @@ class MotorWindows:
 
 
 def motor_windows(
-    logs: Sequence[MotorLog], *, steady: bool = False, share: tuple[float, float] | None = None
+    logs: Sequence[MotorLog], *, steady: bool = False, share: tuple[float, float] | None = None, least: float = 0.0
 ) -> MotorWindows:
     """Windows of the motors in logs.
 
     They are as short as gives a sharp mean speed; where nothing does and the input comes in steps, a window is the last
     two thirds of each step. steady: take the steady windows of `find_plateaus` instead; share: with these shares of
-    each command's rows. Raises InsufficientDataError where no window is left.
+    each command's rows. least [s]: no window is shorter. Raises InsufficientDataError where no window is left.
     """
     usual = _usual_speed(logs)
-    length, sharp = _length(logs, usual)
+    length, sharp = _length(logs, usual, least)
     if not sharp and not steady and share is None and all(map(_in_steps, logs)):
         share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
@@ -103,6 +106,7 @@ def motor_windows(
         *table[:, :5].T, motor=table[:, 5].astype(np.int64), block=table[:, 6].astype(np.int64), unit=first.unit,
         kind=first.kind, speed_from=first.motion_from, length=length, unresolved=unresolved, resting=resting,
         rest=np.fmax.reduce([each.rest for each in readers]), settled=steady or share is not None, every=every,
+        smear=max(_smear(log, length) for log in logs),
     )  # fmt: skip
 
 
@@ -117,14 +121,20 @@ def _usual_speed(logs: Sequence[MotorLog]) -> float:
     return float(np.quantile(known, 0.75)) if known.size else 0.0
 
 
+def _smear(log: MotorLog, length: float) -> float:
+    """Time over which `_Reader` averages the speed at an end of a window [s]."""
+    row = float(np.median(np.diff(log.t))) if len(log.t) > 1 else 0.0
+    return 2.0 * row * max(1, round(EDGE_SHARE * length / row / 2.0)) if row > 0.0 else 0.0
+
+
 def _in_steps(log: MotorLog) -> bool:
     """Whether the input stands still most of the time."""
     return bool(np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE)
 
 
-def _length(logs: Sequence[MotorLog], usual: float) -> tuple[float, bool]:
+def _length(logs: Sequence[MotorLog], usual: float, least: float) -> tuple[float, bool]:
     """The shortest length of a window whose mean speed is sharp and that has rows enough; whether there is one."""
-    for length in LENGTHS:
+    for length in (each for each in LENGTHS if each >= least):
         errors, rows = [], []
         for log in logs:
             for window in _windows(log, length)[:: max(1, len(log.t) // 500)]:

@@ -1,0 +1,235 @@
+"""Where a motor of a log rests and where it turns, and the inputs of the times that it goes from one to the other.
+
+Rows move where the speed, averaged until its noise is no motion, is beyond that noise; a few rows of either do not
+count. Rest is told from a speed that passes zero, which goes from one side to the other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.identification.motors.edge import edge_interval
+from omnidyn.identification.motors.log import MotorLog
+from omnidyn.logs.resolved import unresolved_rows
+from omnidyn.statistics import MAD_TO_STD, sensor_step, stretches
+
+RISK = 0.05
+AROUND = 40  # rows on either side of a start or stop that tell of it
+LEAST_REST, LEAST_MOTION = 5, 3  # rows in a row
+SIGNS = 5.0  # standard deviations of the noise, from which a speed is motion
+SLOW = 0.01  # of the largest speed: what is slower may be the noise of a sensor that reads in steps
+MOST = 40  # starts of one motor that are looked at, evenly among all
+LOST = 0.25  # of the largest speed: where only faster motion can be told from noise, rest cannot
+BLOCK = 0.25  # [s]
+LAGS_AT_REST = 1.0
+CURRENT = "current"
+
+
+class Span(NamedTuple):
+    """Inputs between which a start, or a stop, lies. high: infinite where the motor never set off."""
+
+    low: float
+    high: float
+
+
+class _Column(NamedTuple):
+    """One motor between two gaps, signed so that the direction looked at is forward."""
+
+    t: FloatArray
+    put_in: FloatArray
+    speed: FloatArray
+    moving: FloatArray  # +1.0, 0.0, -1.0 by row
+    tick: float  # of a sensor that reads in steps, 0 where it does not
+    rough: BoolArray  # rows whose input changes faster than the log tells
+
+
+class _Edge(NamedTuple):
+    """A change from rest to motion, or back. row: where it shows; first, last: of the rows that tell of it."""
+
+    column: _Column
+    row: int
+    first: int
+    last: int
+    stop: bool
+
+
+def starts_and_stops(
+    logs: Sequence[MotorLog], motor: int, side: float, way: float, lag: float
+) -> tuple[list[Span], list[Span]]:
+    """(starts, stops) of one direction of one motor."""
+    if logs[0].kind == CURRENT:
+        return [], []
+    columns = [
+        column._replace(put_in=way * side * column.put_in, speed=side * column.speed, moving=side * column.moving)
+        for column in _columns(logs, motor)
+    ]  # fmt: skip
+    found = [edge for column in columns for edge in _edges_of(column) if _is_slow_enough(edge, lag)]
+    spans: tuple[list[Span], list[Span]] = [], []
+    for stop in (False, True):
+        own = [edge for edge in found if edge.stop is stop]
+        own = own[:: max(1, -(-len(own) // MOST))]
+        every = [_span(edge, lag, RISK / len(own)) for edge in own]
+        spans[stop].extend(span for span in every if stop or span.high > 0.0)
+    bounds = [bound for column in columns for bound in _rested(column)]
+    if bounds:
+        spans[0].append(Span(max(bounds), math.inf))
+    return spans
+
+
+def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_Column]:
+    """The pieces of all logs in which input and speed of a motor are known, and which way it turns in each row."""
+    largest = max((_largest(log, motor) for log in logs), default=0.0)
+    for log in logs:
+        known = np.isfinite(log.put_in[:, motor]) & np.isfinite(log.motion[:, motor])
+        rough = unresolved_rows(log.put_in[:, motor])
+        for piece in log.pieces:
+            for a, b in stretches(known[piece]).tolist():
+                rows = slice(piece.start + a, piece.start + b)
+                if b - a >= LEAST_REST + LEAST_MOTION:
+                    column = _column(log, motor, rows, largest, rough[rows])
+                    if column is not None:
+                        yield column
+
+
+def _largest(log: MotorLog, motor: int) -> float:
+    """The largest speed that lasts [rad/s]: of medians over BLOCK seconds, which spikes do not move."""
+    known = log.motion[np.isfinite(log.motion[:, motor]), motor]
+    rows = max(1, round(BLOCK / float(np.median(np.diff(log.t))))) if len(log.t) > 1 else 1
+    whole = len(known) - len(known) % rows
+    medians = np.median(known[:whole].reshape(-1, rows), axis=1) if whole else known
+    return float(np.abs(medians).max(initial=0.0))
+
+
+def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolArray) -> _Column | None:
+    """None where the speed is lost in noise."""
+    t, speed = log.t[rows], log.motion[rows, motor]
+    if log.angle is not None:  # of the row before, not of both sides: else a start would show a row early
+        steps = np.diff(log.angle[rows, motor]) / np.diff(t)
+        speed = np.concatenate([steps[:1], steps])
+    tick = sensor_step(speed)
+    noise = noise_of_rows(speed)
+    count = _averaged(noise, tick, largest, len(speed))
+    padded = np.pad(speed, (count // 2, count - 1 - count // 2), mode="edge")
+    smooth = np.convolve(padded, np.full(count, 1.0 / count), "valid")
+    level = max(SIGNS * noise / math.sqrt(count), SLOW * largest)
+    if level > LOST * largest:
+        return None
+    moving = _without_flicker(np.where(np.abs(smooth) > level, np.sign(smooth), 0.0))
+    return _Column(t, log.put_in[rows, motor], speed, moving, tick, rough)
+
+
+def _without_flicker(moving: FloatArray) -> FloatArray:
+    """A motion of a few rows is noise; so is a rest of a few rows within a motion one way, as one creeps off."""
+    moving = moving.copy()
+    for a, b, side in _runs(moving):
+        if side != 0.0 and b - a < LEAST_MOTION:
+            moving[a:b] = 0.0
+    runs = _runs(moving)
+    for before, (a, b, side), after in zip(runs, runs[1:], runs[2:], strict=False):
+        if side == 0.0 and b - a < LEAST_REST and before[2] == after[2]:
+            moving[a:b] = before[2]
+    return moving
+
+
+def noise_of_rows(speed: FloatArray) -> float:
+    """Standard deviation of the noise, as it shows from row to row."""
+    return float(np.median(np.abs(np.diff(speed, n=2)))) * MAD_TO_STD / math.sqrt(6.0)
+
+
+def _averaged(noise: float, tick: float, largest: float, rows: int) -> int:
+    """Over how many rows a speed is averaged, so that its noise is no motion: an odd number."""
+    wanted = 5.0 * SLOW * largest  # motion is told from a twentieth of the largest speed on
+    size = max(noise, 0.5 * tick)
+    count = math.ceil((SIGNS * size / wanted) ** 2) if wanted > 0.0 else 1
+    return min(count, max(1, rows // 20)) | 1
+
+
+def _edges_of(column: _Column) -> Iterator[_Edge]:
+    """Starts and stops of the forward direction."""
+    runs = _runs(column.moving)
+    for (a, b, one), (c, d, other) in pairwise(runs):
+        if one == 0.0 and other > 0.0 and _rests(column, a, b) and d - c >= LEAST_MOTION:
+            yield _Edge(column, c, max(a, c - AROUND), min(d, c + AROUND), False)
+        if one > 0.0 and other == 0.0 and _rests(column, c, d) and b - a >= LEAST_MOTION:
+            yield _Edge(column, c, max(a, c - AROUND), min(d, c + AROUND), True)
+
+
+def _is_slow_enough(edge: _Edge, lag: float) -> bool:
+    """Whether the log tells the input around an edge, and the rest lasts longer than the motor remembers."""
+    column = edge.column
+    if column.rough[edge.first : edge.last].any():
+        return False
+    rest = column.t[edge.last - 1] - column.t[edge.row] if edge.stop else column.t[edge.row] - column.t[edge.first]
+    return not lag > 0.0 or bool(rest >= LAGS_AT_REST * lag)
+
+
+def _runs(moving: FloatArray) -> list[tuple[int, int, float]]:
+    """(first row, row after the last, +1.0, 0.0 or -1.0) of each stretch of rows alike."""
+    cuts = [0, *(1 + np.flatnonzero(np.diff(moving))).tolist(), len(moving)]
+    return [(a, b, float(moving[a])) for a, b in pairwise(cuts)]
+
+
+def _rests(column: _Column, first: int, last: int) -> bool:
+    """Whether rows without visible motion are rest: a motor that passes zero goes from one side to the other there."""
+    own = column.speed[first:last]
+    if len(own) < LEAST_REST:
+        return False
+    third = max(len(own) // 3, 1)
+    early, late = own[:third], own[-third:]
+    middle = own[third:-third] if len(own) > 2 * third else own
+    reach = max(float(np.abs(middle).max()), column.tick)
+    error = (noise_of_rows(own) if len(own) > LEAST_REST else reach) * math.sqrt(2.0 / third)
+    return abs(float(np.median(late) - np.median(early))) <= max(SIGNS * error, column.tick, 1e-9 * reach)
+
+
+def _span(edge: _Edge, lag: float, risk: float) -> Span:
+    """The inputs between which a start, or a stop, lies."""
+    column, rows = edge.column, slice(edge.first, edge.last)
+    t, put_in = column.t[rows], column.put_in[rows]
+    tries = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
+    first, last = edge_interval(
+        t, put_in, column.speed[rows], tries, lags=_lags(lag, float(np.median(np.diff(t)))), stop=edge.stop,
+        least_std=column.tick / math.sqrt(6.0), risk=risk,
+    )  # fmt: skip
+    # a row on either side: loggers write an input in the row in which it is set, or in which it is answered
+    begin = edge.first + max(int(np.searchsorted(t, first, "right")) - 2, 0)
+    end = min(edge.first + int(np.searchsorted(t, last, "right")), len(column.t) - 1)
+    changed = begin - _since_change(column.put_in[: begin + 1])
+    own = column.put_in[max(changed - 1, 0) : end + 1]
+    return Span(float(own.min()) + 0.0, float(own.max()) + 0.0)  # no -0
+
+
+def _since_change(put_in: FloatArray) -> int:
+    """Rows since the last change of the input, up to the last row."""
+    same = put_in[:-1] != put_in[-1]
+    return len(put_in) - 2 - int(np.flatnonzero(same)[-1]) if same.any() else len(put_in) - 1
+
+
+def _lags(lag: float, row: float) -> list[float]:
+    """Lags that are tried [s]: around that of the line, and from a part of a row up."""
+    around = [lag * factor for factor in (0.5, 0.7, 1.0, 1.4, 2.0)] if lag > 0.0 else []
+    return [0.3 * row, *around] if around else [row * factor for factor in (0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)]
+
+
+def _rested(column: _Column) -> Iterator[float]:
+    """Inputs under which the motor rested for LEAST_REST rows, and did not set off forward afterwards."""
+    runs = _runs(column.moving)
+    for k, (a, b, side) in enumerate(runs):
+        before, after = runs[k - 1][2] if k else 0.0, runs[k + 1][2] if k + 1 < len(runs) else 0.0
+        if side != 0.0 or after > 0.0 or column.rough[a:b].any() or not _rests(column, a, b):
+            continue
+        if before > 0.0:  # where it still ran out is no rest under that input: from the least input on
+            a += int(np.argmin(column.put_in[a:b]))
+        if b - a < LEAST_REST:
+            continue
+        own, speed = column.put_in[a:b], column.speed[a:b]
+        held = float(np.min([own[n : len(own) - LEAST_REST + 1 + n] for n in range(LEAST_REST)], axis=0).max())
+        under = speed[own >= held]
+        if held > 0.0 and float(under.mean()) <= 3.0 * noise_of_rows(speed) / math.sqrt(len(under)):
+            yield held

@@ -1,0 +1,233 @@
+"""Where a motor starts and where it comes to rest, each direction by itself; and the line of that direction.
+
+The start is the input at which the motor sets off from rest: no line through its whole range, which bends with drag, or
+crosses zero at the level of sliding friction where that of rest is higher. Every time it sets off, the instant has an
+interval (edge.py), and the input of that time another one: from the row before the last change of the input, for the
+motor rested under that, to the row after. A start that several of these agree on is what they have in common. Where
+they disagree, the motor starts here and there (cogging, a bearing, a cable): the interval spans them, and says so.
+A motor that rested under a larger input still, and never set off, gives a bound from below. No start is told where the
+log does not resolve the input, where the speed is lost in noise, or where the input is a current: that is what the
+motor takes as it sets off, and over before the next row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.document import interval_cell, plain
+from omnidyn.errors import InsufficientDataError
+from omnidyn.identification.motors.estimate import BAND, LAG, SLOPE, MotorEstimate
+from omnidyn.identification.motors.line import fit_line
+from omnidyn.identification.motors.log import MotorLog
+from omnidyn.identification.motors.rest import LEAST_REST, Span, noise_of_rows, starts_and_stops
+from omnidyn.identification.motors.windows import EDGE_SHARE, LENGTHS, MotorWindows, motor_windows
+from omnidyn.statistics import sensor_step
+
+START, STOP, OFFSET = "start", "stop", "offset"
+STARTS_HEAD = ("motor", "direction", "start", "95 % interval", "stop", "95 % interval", "slope", "95 % interval",
+               "offset", "95 % interval", "lag ms", "95 % interval", "unit")  # fmt: skip
+SHARP = 0.5  # a start whose interval is narrower than this share of it is one that a sentence can name
+HIDDEN = 0.02  # of the change of speed over a window: noise by which the inertia may come out too small
+ONE_WAY = 0.98  # of the sides of a window, so that it belongs to one direction
+
+
+@dataclass(frozen=True, eq=False)
+class MotorStart:
+    """One direction of one motor. value, ci95: start, stop, slope, offset, lag by name, NaN where not known.
+
+    side: +1.0, -1.0: of its speed. Inputs are sizes in that direction: 0.6 V of the direction - is an input of -0.6 V.
+    start, stop [unit]: the input at which it sets off, and comes to rest; slope [unit s/rad] and offset [unit] of the
+    line u = slope w + offset in that direction, lag [s]. starts, stops: how many of them were seen.
+    """
+
+    motor: int
+    side: float
+    unit: str
+    value: Mapping[str, float]
+    ci95: Mapping[str, tuple[float, float]]
+    starts: int = 0
+    stops: int = 0
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return f"motor {self.motor + 1} {self.direction}"
+
+    @property
+    def direction(self) -> str:
+        return "+" if self.side > 0.0 else "-"
+
+    @property
+    def sharp(self) -> bool:
+        """Whether the start is known well enough to be named by one number."""
+        low, high = self.ci95[START]
+        return low > 0.0 and high - low <= SHARP * high < math.inf
+
+    def statement(self) -> str:
+        """The start, which is the dead band of this direction, in a sentence."""
+        low, high = self.ci95[START]
+        if math.isnan(low) or (low <= 0.0 and not math.isfinite(high)):
+            return f"{self.name}: no start from rest was seen; {self._of_line()}"
+        if not math.isfinite(high):
+            return f"{self.name}: it rests up to {low:.3g} {self.unit}, and never sets off"
+        if low <= 0.0:
+            return f"{self.name}: it sets off at {high:.3g} {self.unit} or below; a slow ramp from rest tells more"
+        words = f"{self.name}: the dead band is {self.value[START]:.3g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
+        words = words if self.sharp else f"{self.name}: it sets off between {low:.3g} and {high:.3g} {self.unit}"
+        down = self.ci95[STOP]
+        if math.isfinite(self.value[STOP]):
+            words += f"; on the way down it comes to rest at {self.value[STOP]:.3g} [{down[0]:.3g}, {down[1]:.3g}]"
+        left, right = self.ci95[OFFSET]
+        if self.sharp and (left > high or right < low):
+            words += (
+                f"; the line of its whole range meets speed 0 at {self.value[OFFSET]:.3g} instead, which is no start: "
+                "the line bends, or rest holds the motor harder than motion"
+            )
+        return words
+
+    def _of_line(self) -> str:
+        low, high = self.ci95[OFFSET]
+        if low > 0.0 and math.isfinite(high):
+            return f"its line meets speed 0 at {self.value[OFFSET]:.3g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
+        return "dead band not identifiable here"
+
+    def row(self) -> tuple[str, ...]:
+        """Cells under STARTS_HEAD."""
+        cells = [f"{self.motor + 1}", self.direction]
+        for name, form in ((START, ".4g"), (STOP, ".4g"), (SLOPE, ".5g"), (OFFSET, ".3g"), (LAG, ".3g")):
+            scale = 1e3 if name == LAG else 1.0
+            low, high = (scale * end for end in self.ci95[name])
+            number = scale * self.value[name]
+            cells += [f"{number:{form}}" if math.isfinite(number) else "-"]
+            cells += ["-" if math.isnan(low) else interval_cell((low, high), form)]
+        return (*cells, self.unit)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        numbers = {name: {"value": value, "ci95": self.ci95[name]} for name, value in self.value.items()}
+        return plain({
+            "motor": self.motor + 1, "direction": self.direction, "unit": self.unit, "parameters": numbers,
+            "starts": self.starts, "stops": self.stops, "doubts": self.doubts,
+        })  # fmt: skip
+
+
+def motor_starts(
+    logs: Sequence[MotorLog], windows: MotorWindows | None, motors: Sequence[int]
+) -> tuple[MotorStart, ...]:
+    """Both directions of each motor, as far as the logs show it to turn or to rest there."""
+    found, row = [], max(float(np.median(np.diff(log.t))) for log in logs if len(log.t) > 1)
+    for motor in motors:
+        way = orientation([(log.put_in[:, motor], log.motion[:, motor]) for log in logs])
+        own = windows_for_a_lag(logs, windows, motor)
+        lines = {side: line_one_way(own, motor, side) for side in (1.0, -1.0)}
+        for side, line in lines.items():
+            lag = line.value[LAG] if line is not None else math.nan
+            up, down = starts_and_stops(logs, motor, side, way, lag)
+            if up or down or line is not None:
+                found.append(direction_of(motor, side, logs[0].unit, up, down, _numbers(line, way, row)))
+    return tuple(found)
+
+
+def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
+    """+1.0 where a positive input turns a motor forward, -1.0 where it turns it backward. pairs: (input, speed)."""
+    return -1.0 if sum(float(np.nansum(put_in * speed)) for put_in, speed in pairs) < 0.0 else 1.0
+
+
+def direction_of(
+    motor: int, side: float, unit: str, up: Sequence[Span], down: Sequence[Span],
+    numbers: Mapping[str, tuple[float, tuple[float, float]]],
+) -> MotorStart:  # fmt: skip
+    """One direction from its starts, its stops and its line. numbers: name -> (value, interval)."""
+    doubts = []
+    known = {START: common(up), STOP: common(down)}
+    for name, (_, agree) in known.items():
+        if not agree:
+            doubts.append(f"its {name}s scatter by more than their intervals: the interval spans them")
+    every = {name: (_middle(span), (span.low, span.high)) for name, (span, _) in known.items()} | dict(numbers)
+    return MotorStart(
+        motor, side, unit, {name: each[0] for name, each in every.items()},
+        {name: each[1] for name, each in every.items()}, sum(math.isfinite(each.high) for each in up), len(down),
+        tuple(doubts),
+    )  # fmt: skip
+
+
+def common(spans: Sequence[Span]) -> tuple[Span, bool]:
+    """(what all spans have in common, True); where there is nothing, what spans them, False. NaN of no spans."""
+    if not spans:
+        return Span(math.nan, math.nan), True
+    low, high = max(spans, key=lambda each: each.low), min(spans, key=lambda each: each.high)
+    return (Span(low.low, high.high), True) if low.low <= high.high else (Span(high.low, low.high), False)
+
+
+def _middle(span: Span) -> float:
+    return 0.5 * (span.low + span.high) if math.isfinite(span.high) and span.low > 0.0 else math.nan
+
+
+def unknown_line() -> dict[str, tuple[float, tuple[float, float]]]:
+    """Numbers of a line that there is not."""
+    return {name: (math.nan, (math.nan, math.nan)) for name in (SLOPE, OFFSET, LAG)}
+
+
+# ---- the line of one direction ------------------------------------------------------------------------------
+
+
+def windows_for_a_lag(logs: Sequence[MotorLog], windows: MotorWindows | None, motor: int) -> MotorWindows | None:
+    """The windows, or longer ones where noise hides the change of speed over them.
+
+    Noise in that column, like any in what a line goes over, would make the inertia come out too small by its share.
+    """
+    if windows is None or windows.settled:
+        return windows
+    noise = max(_noise_of(log.motion[:, motor]) for log in logs)
+    row = max(float(np.median(np.diff(log.t))) for log in logs if len(log.t) > 1)
+    for least in (each for each in LENGTHS if each >= windows.length):
+        try:
+            found = motor_windows(logs, least=least) if least > windows.length else windows
+        except InsufficientDataError:
+            break
+        windows, change = found, found.change[found.motor == motor]
+        rows = 2 * max(1, round(0.5 * EDGE_SHARE * found.length / row)) + 1  # that tell the speed at an end
+        if 2.0 * noise**2 / rows / found.length**2 <= HIDDEN * float(np.var(change)):
+            break
+    return windows
+
+
+def _noise_of(speed: FloatArray) -> float:
+    """Standard deviation of the noise of a speed, or of the steps in which it is read [rad/s]."""
+    known = speed[np.isfinite(speed)]
+    return max(noise_of_rows(known), sensor_step(known) / math.sqrt(6.0)) if len(known) > LEAST_REST else 0.0
+
+
+def line_one_way(windows: MotorWindows | None, motor: int, side: float) -> MotorEstimate | None:
+    """The line through the windows in which a motor turns one way; None where there are too few."""
+    if windows is None:
+        return None
+    keep = (windows.motor == motor) & (windows.side * side > ONE_WAY)
+    names = ("put_in", "speed", "speed_std", "side", "change", "motor", "block")
+    try:
+        return fit_line(replace(windows, **{name: getattr(windows, name)[keep] for name in names}), motor, "")
+    except InsufficientDataError:
+        return None
+
+
+def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tuple[float, tuple[float, float]]]:
+    """Slope, offset and lag of a line, as the direction has them.
+
+    The interval of the lag is wider by a row [s], of which the log does not tell: an input that is held from row to
+    row, and one that goes on in between, are apart by half a row, and so are a speed and its mean over a row.
+    """
+    if line is None:
+        return unknown_line()
+    low, high = line.ci95[BAND]
+    turned = (low, high) if way > 0.0 else (-high, -low)
+    early, late = line.ci95[LAG]
+    return {
+        SLOPE: (line.value[SLOPE], line.ci95[SLOPE]), OFFSET: (way * line.value[BAND], turned),
+        LAG: (line.value[LAG], (early - row, late + row)),
+    }  # fmt: skip
