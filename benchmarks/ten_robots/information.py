@@ -2,8 +2,8 @@
 
     I = sum over sensors of J' J / noise^2 + priors,   J by central differences of world.drive
 
-Numbers that must be positive are taken by their logarithm, friction as it is. Latencies of each kind of sensor, the
-first angle of each wheel and the first pose are unknown too. Rounding to counts is noise of a tick/sqrt(12).
+Numbers that must be positive are taken by their logarithm, friction and rotors as they are. Latencies of each kind of
+sensor, the first angle of each wheel and the first pose are unknown too. Rounding to counts is noise of a tick/sqrt(12).
 """
 
 from __future__ import annotations
@@ -18,9 +18,11 @@ from benchmarks.ten_robots.world import ELLIPSE, World, currents, drive
 
 # Of a number, for central differences: a stop is found within 1e-6 s, which leaves 1e-5 m/s of it to chance; what
 # viscous friction does is small beside that, and linear.
-STEPS = {"viscous": 0.3, "coulomb": 0.03}
+STEPS = {"viscous": 0.3, "coulomb": 0.03, "rotor_inertia": 0.03}
 STEP = 0.01
 LEVELS = ("coulomb", "viscous")
+GEAR, TORQUE, ROTOR = "gear_ratio", "torque_constant", "rotor_inertia"
+LINEAR = (*LEVELS, "rotor_inertia")  # may be 0
 TOLD = 0.5  # std over that of the prior below which a log determines a number
 # Also open: a std above a tenth of its prior's, more than half of whose variance is what the priors leave open.
 TOLD_BY_OTHERS, MOST = 0.1, 0.5
@@ -36,7 +38,7 @@ class Number:
 
     @property
     def log(self) -> bool:
-        return self.field not in LEVELS
+        return self.field not in LINEAR
 
     def of(self, world: World) -> float:
         value = getattr(world, self.field)
@@ -91,10 +93,9 @@ def determined(case: Case, commands: np.ndarray, stds: Mapping[str, tuple[float,
             prior[j] = (value / std if number.log else 1.0 / std) ** 2
     size = np.sqrt((whole**2).sum(axis=0) + prior)
     size[size == 0.0] = 1.0
-    covariance = np.linalg.pinv(
-        (whole / size).T @ (whole / size) + np.diag(prior / size**2), rcond=1e-13, hermitian=True
-    )
-    covariance /= np.outer(size, size)
+    # Not by J' J: what priors alone hold is 1e-12 of what a million counts say.
+    root = np.linalg.pinv(np.vstack([whole / size, np.diag(np.sqrt(prior) / size)]), rcond=1e-12)
+    covariance = root @ root.T / np.outer(size, size)
     variance = np.diag(covariance)
     kept = np.sqrt(variance * prior)
     by_priors = np.einsum("ij,j,ij->i", covariance, prior, covariance) > MOST * variance
@@ -103,13 +104,20 @@ def determined(case: Case, commands: np.ndarray, stds: Mapping[str, tuple[float,
 
 
 def _slopes(case: Case, commands: np.ndarray, free: list[Number]) -> np.ndarray:
-    """Derivatives of all that is measured, each over its noise. Shape (measurements, numbers)."""
-    columns = []
-    for number in free:
+    """Derivatives of all that is measured, each over its noise. Shape (measurements, numbers).
+
+    A gear shows as K_t l and J l^2 only, so that its derivative is one of theirs. By differences of its own the three
+    would be told apart by what is left of their curvature, which millions of counts make much of.
+    """
+    found: dict[str, np.ndarray] = {}
+    for number in [each for each in free if each.field != GEAR]:
         step = STEP if number.log else STEPS[number.field] * max(abs(number.of(case.world)), 1e-6)
         up, down = (_seen(case, number.changed(case.world, side * step), commands) for side in (1.0, -1.0))
-        columns.append(np.concatenate([((a - b) / (2.0 * step)).ravel() for a, b in zip(up, down, strict=True)]))
-    return np.stack(columns, axis=1)
+        parts = [((a - b) / (2.0 * step)).ravel() for a, b in zip(up, down, strict=True)]
+        found[number.key] = np.concatenate(parts)
+    of = {number.field: found.get(number.key, 0.0) for number in free}
+    geared = np.asarray(of[TORQUE] + 2.0 * case.world.rotor_inertia * of.get(ROTOR, 0.0))
+    return np.stack([found.get(number.key, geared) for number in free], axis=1)
 
 
 def _seen(case: Case, world: World, commands: np.ndarray) -> list[np.ndarray]:

@@ -8,7 +8,7 @@ f_i = a_i (u_i - e_i s_i), cut where its current meets its limit, a = l K_t/(R r
 D = diag(m, m, I), J = diag((J_rotor l^2 + J_wheel)/r^2). Dry friction: a box (each body axis for itself) or an
 ellipse of the direction of travel plus yaw. What sticks keeps its speed at exactly 0 as long as the force that holds
 it there is within its level; the instant at which something sticks or lets go is found by halving the step down to
-SHORTEST.
+SHORTEST. In the plane friction turns with the motion: what is slower than CREEP and can be held is at rest.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from dataclasses import dataclass, field
 import numba
 import numpy as np
 
-STEP, SHORTEST = 2e-3, 1e-6  # [s]
+STEP, SHORTEST = 1e-3, 1e-6  # [s]
+CREEP = 3e-5  # [m/s] below it the plane rests where friction can hold it: an ellipse turns ever faster as it stops
 BOX, ELLIPSE = 0, 1
 
 
@@ -67,7 +68,7 @@ class World:
 
 @dataclass(frozen=True)
 class Motion:
-    """What happened at the n + 1 row times: twist, path (integral of the twist), pose, and the n voltages."""
+    """What happened at the n + 1 row times: twist, path (integral of the twist), pose; n voltages from there on."""
 
     t: np.ndarray
     twist: np.ndarray
@@ -221,6 +222,18 @@ def _stops(y0, y1, stuck, sign, shape):
 
 
 @numba.njit(cache=True)
+def _settles(y, stuck, sign, args, force, out):
+    """Whether the plane creeps, and rests if it is held. An ellipse only."""
+    if args[11] != ELLIPSE or stuck[0] or not 0.0 < np.hypot(y[0], y[1]) < CREEP:
+        return False
+    rest, held = y.copy(), stuck.copy()
+    rest[0] = rest[1] = 0.0
+    held[0] = held[1] = True
+    _slope(rest, held, sign, args, force, out)
+    return _overload(force, held, args[9], args[11])[0] < 0.0
+
+
+@numba.njit(cache=True)
 def _advance(y, span, step, stuck, sign, args, force):
     """Over a span of constant voltage."""
     coulomb, shape, scrap = args[9], args[11], np.zeros(9)
@@ -236,13 +249,14 @@ def _advance(y, span, step, stuck, sign, args, force):
         loads = _overload(force, stuck, coulomb, shape)
         happens = happens or max(loads[0], max(loads[1], max(loads[2], loads[3]))) > 0.0
         slow = shape == ELLIPSE and not stuck[0] and np.hypot(z[0], z[1]) < 8.0 * h  # it turns fast where it is slow
-        if (happens or (slow and h > 5e-5)) and h > SHORTEST:
+        if (happens or (slow and h > 2e-5)) and h > SHORTEST:
             h = 0.5 * h
             continue
         y[:] = z
         left -= h
-        if happens:
-            if stops[0]:
+        settles = _settles(y, stuck, sign, args, force, scrap)
+        if happens or settles:
+            if stops[0] or settles:
                 y[0] = y[1] = 0.0
                 stuck[0] = stuck[1] = True
             for a in range(2):
@@ -266,7 +280,7 @@ def _run(
     for n in range(len(command)):
         if not looped:
             u[:] = command[n]
-        now, end = n * dt, (n + 1) * dt
+        now, end, first = n * dt, (n + 1) * dt, True
         while now < end - 1e-12:
             until = end
             if looped:
@@ -280,10 +294,11 @@ def _run(
                             total[i] = more
                         u[i] = min(max(kp * error + total[i], -voltage_limit), voltage_limit)
                 until = min(end, ticks / rate)
+            if first:  # a current that is logged with the row is driven by this voltage
+                volts[n], first = u, False
             args = (u, G, M, Minv, mass, push, emf, resistance, limit, coulomb, viscous, shape)
             _advance(y, until - now, step, stuck, sign, args, force)
             now = until
             if now == end or abs(now - end) < 1e-12:
                 break
-        volts[n] = u
         states[n + 1] = y

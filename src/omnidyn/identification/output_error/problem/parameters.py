@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.keys import BREAKAWAY, EMF, TORQUE, Key, expand
+from omnidyn.model.keys import BREAKAWAY, EMF, ROTOR, TORQUE, WHEEL, Key, expand
 from omnidyn.model.robot import Robot
 
 FRICTION_LIMIT = 1e6  # what a robot file takes
 AT = "@"  # KEY@GROUP is the number that a group has for itself
 SPAN = 1e4  # a number that must be positive stays within so many times its start, either way
+LIGHT = 1e-3  # of its start, that what spins stays above: it has no place where it would be off, but slopes need a size
 
 LARGEST = 700.0  # e^709 is the last float
 
@@ -78,7 +79,9 @@ def robot_at(robot: Robot, parameters: Sequence[Parameter], values: Sequence[flo
 def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, others: Sequence[str] = ()) -> Parameter:
     """A number of the robot file as a free parameter; `others` are free beside it.
 
-    Friction may be 0: it has a linear scale and a bound at 0. What must be positive has a logarithmic one.
+    Friction may be 0: it has a linear scale and a bound at 0. So may what rotors and wheels weigh beside the body: on
+    a logarithmic scale 0 is infinitely far off, and a robot without rotors keeps some of the guess as mass. What must
+    be positive has a logarithmic scale.
     Raises InputError for an unknown key, and for a number that is not positive and has no bound at 0.
     """
     place = Key.parse(key)
@@ -87,6 +90,8 @@ def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, o
         return Parameter(key, value, 0.0, FRICTION_LIMIT, prior=prior)
     if value <= 0.0:
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")
+    if place.name in (ROTOR, WHEEL):
+        return Parameter(key, value, LIGHT * value, value * SPAN, prior=prior)
     also = tuple((str(each), float(each.get(robot)) / value) for each in _followers(robot, place, others))
     return Parameter(key, value, value / SPAN, value * SPAN, True, prior, also)
 

@@ -93,12 +93,14 @@ def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
 
 
 def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
-    """The point with the latencies that go with motors near their own; only currents need them.
+    """The point with the latencies that go with motors near their own.
 
     The latency of a current meets a jump at every row: a motor that is a wrong guess brings it to the wrong side of it,
-    and no descent brings it back. So motors come first, with every latency at its start.
+    and no descent brings it back. Of a path, half the force a tenth of a second earlier looks like the whole one: a
+    valley that ends in another minimum. So motors come first, with every latency at its start.
     """
-    if problem.where(CURRENTS) < 0:
+    late = [p.part == LATENCY for p in problem.parameters]
+    if not any(late):
         return point
     still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
     held = replace(problem, parameters=tuple(still))
@@ -109,7 +111,7 @@ def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
 def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
     """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes.
 
-    With the latencies that go with it, where currents need them.
+    With the latencies that go with it.
     """
     own, short = problem.start(), problem.shortened(FEW)
     solver = Solver(short, ImplicitEngine(short), nu)

@@ -24,14 +24,14 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.question import FREE, REST
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
-from omnidyn.model.robot import Robot
+from omnidyn.model.robot import GIVEN, Robot
 
 FINE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
 SETTING_OFF = 60  # rows of each log on which starts are tried
 STILL = 3  # rows at the beginning in which nothing may move
 CLEAR = 6.0  # standard errors, of the scatter of these rows, that count as motion
 LATENCY, CURRENTS = "latency", "latency.current"
-DRIVE = "drive"
+DRIVE, MOTOR = "drive", "motor"
 AROUND = 3  # periods of the loop, each way, in which a latency of the currents is tried
 GAIN_FACTORS, LEVEL_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 1.0, 3.0)
 LATE = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
@@ -47,7 +47,7 @@ def looped(records: Sequence[Record]) -> bool:
 
 
 def loop_keys(robot: Robot, moved: BoolArray, source: str = "") -> list[str]:
-    """What is free by default: friction, of axes that moved only, and the gains.
+    """What is free by default: friction, of axes that moved only, and the gains that nobody has given.
 
     Raises InsufficientDataError where nothing moved.
     """
@@ -58,7 +58,13 @@ def loop_keys(robot: Robot, moved: BoolArray, source: str = "") -> list[str]:
         )  # fmt: skip
     still = np.flatnonzero(~moved).tolist()
     kept = [key for key in friction_keys(robot) if Key.parse(key).axis not in still]
-    return [*kept, *gain_keys(robot)]
+    return [*kept, *(key for key in gain_keys(robot) if not _given(robot, key))]
+
+
+def _given(robot: Robot, key: str) -> bool:
+    """Whether the file says that its reader has set this number: then it is known."""
+    prior = robot.priors.get(key) or robot.priors.get(Key.parse(key).name)
+    return prior is not None and prior.origin == GIVEN and prior.std is None
 
 
 def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Piece]:
@@ -120,11 +126,28 @@ def _piece(record: Record, first: int, last: int) -> Piece:
 def solve_loop(problem: Problem, nu: float, watch: Progress) -> Solution:
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
     first = Solver(problem, LoopEngine(problem), nu)
-    coarse = first.minimise(loop_start(problem, nu, watch), FEW, watch)
+    coarse = _motors_first(first, first.minimise(loop_start(problem, nu, watch), FEW, watch), watch)
     coarse = first.minimise(retimed(first, coarse.state.point, watch), watch=watch)
     watch.doing("the same as exactly as it must be")
     fine = Solver(problem, LoopEngine(problem, FINE), nu)
     return beyond_jumps(fine.minimise(coarse.state.point, watch=watch), watch)
+
+
+def _motors_first(solver: Solver, found: Solution, watch: Progress) -> Solution:
+    """The better one of `found` and a fit from the robot as it is that takes motors first, every latency at its start.
+
+    With motors that are guesses a few rows of setting off look like a latency, and no descent comes back from there.
+    """
+    problem = solver.problem
+    parts = {p.part for p in problem.parameters}
+    if not {LATENCY, MOTOR} <= parts:
+        return found
+    still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
+    held = replace(problem, parameters=tuple(still))
+    aside = watch.aside("motors first")
+    first = Solver(held, solver.engine.on(held), solver.nu).minimise(problem.start(), watch=aside)
+    other = solver.minimise(first.state.point, FEW, watch.below(found.state.objective))
+    return min(found, other, key=lambda solution: solution.state.objective)
 
 
 def loop_start(problem: Problem, nu: float, watch: Progress) -> Point:
