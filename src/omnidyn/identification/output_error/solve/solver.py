@@ -85,6 +85,7 @@ class Solver(Generic[P]):
 
     def __init__(self, problem: P, engine: Engine[P], nu: float = 0.0, close: float = CLOSE, counted: bool = True):
         self.problem, self.engine, self.nu, self.close = problem, engine, nu, close
+        self.creep = CREEP * close if close > CLOSE else 0.0  # a speed loop may creep for long, and yet find its way
         self.tick = problem.tick if counted else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
         # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross.
@@ -145,7 +146,7 @@ class Solver(Generic[P]):
                     continue
                 damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
                 now = trial if better else now
-            creeping = creeping + 1 if better and before - now.objective < CREEP * self.close else 0
+            creeping = creeping + 1 if better and before - now.objective < self.creep else 0
             if self.scaled.any():
                 now, change = self._rescaled(now)
             if better and watch:
