@@ -13,7 +13,7 @@ FOUR = Wheels(azimuth_deg=(45.0, 135.0, 225.0, 315.0), robot_radius=0.2, wheel_r
 
 def test_a_rotor_that_is_not_there_costs_no_more_than_its_prior_says():
     """On a logarithmic scale 0 is infinitely far, and a robot without rotors kept 1 % of mass of the guess."""
-    mean = float(first_guess("mine", FOUR, 6.0, 12.0).motor.rotor_inertia)
+    mean = float(np.mean(first_guess("mine", FOUR, 6.0, 12.0).motor.rotor_inertia))
     rotor = robot_parameter(first_guess("mine", FOUR, 6.0, 12.0), ROTOR, (mean, mean))
     assert rotor.known is not None
     centre, std = rotor.known
