@@ -3,7 +3,7 @@
     I = sum over sensors of J' J / noise^2 + priors,   J by central differences of world.drive
 
 Numbers that must be positive are taken by their logarithm, friction and rotors as they are. Latencies of each kind of
-sensor, the first angle of each wheel and the first pose are unknown too. Rounding to counts is noise of a tick/sqrt(12).
+sensor, the first angle of each wheel and the first pose are unknown too. Rounding to counts is noise of tick/sqrt(12).
 """
 
 from __future__ import annotations

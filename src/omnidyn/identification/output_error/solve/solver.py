@@ -22,6 +22,7 @@ from omnidyn.identification.output_error.problem.problem import Fitted, PieceSum
 MAX_ITERATIONS = 60
 CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
 ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
+CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
 DAMPING, LEAST_DAMPING = 1e-4, 1e-10
 FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked by a jump
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
@@ -84,6 +85,7 @@ class Solver(Generic[P]):
 
     def __init__(self, problem: P, engine: Engine[P], nu: float = 0.0, close: float = CLOSE, counted: bool = True):
         self.problem, self.engine, self.nu, self.close = problem, engine, nu, close
+        self.creep = CREEP * close if close > CLOSE else 0.0  # a speed loop may creep for long, and yet find its way
         self.tick = problem.tick if counted else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
         # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross.
@@ -128,9 +130,9 @@ class Solver(Generic[P]):
     def _descend(self, now: State, limit: int, watch: Callable[[State], None] | None) -> Solution:
         damping, change = DAMPING, 0.0
         held = blocked = np.zeros(len(self.problem.parameters), bool)
-        released = False
+        released, creeping = False, 0
         for iteration in range(limit):
-            normal = Normal(self, now)
+            normal, before = Normal(self, now), now.objective
             held, better = normal.held, False
             still = held | blocked
             while not better and normal.distance_without(still) / (1.0 + damping) > (
@@ -144,10 +146,13 @@ class Solver(Generic[P]):
                     continue
                 damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
                 now = trial if better else now
+            creeping = creeping + 1 if better and before - now.objective < self.creep else 0
             if self.scaled.any():
                 now, change = self._rescaled(now)
             if better and watch:
                 watch(now)
+            if creeping >= STEPS and change < SCALE_CHANGE:
+                return Solution(now, held, iteration + 1, True, self)
             if not better and blocked.any() and not released:  # a shorter step may stay this side of the jump
                 blocked, released, damping = np.zeros_like(blocked), True, SHORT
             elif not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
