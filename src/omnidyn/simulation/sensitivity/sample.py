@@ -54,14 +54,14 @@ class Samples(NamedTuple):
     dgone: FloatArray  # (K, W)
 
 
-def empty_samples(t: FloatArray, late: FloatArray, size: int, keys: int, ways: int = TURN) -> Samples:
-    """Samples that have not been taken yet. size: S; keys: K; ways: W."""
+def empty_samples(t: FloatArray, late: FloatArray, size: int, keys: int, travel: int = TURN) -> Samples:
+    """Samples that have not been taken yet. size: S; keys: K; travel: W."""
     shape = (len(late), len(t))
     return Samples(
         np.ascontiguousarray(t - t[0]), np.array(late, dtype=float), np.zeros(len(late), np.int64),
-        np.full((*shape, size), np.nan), np.full((*shape, size), np.nan), np.full((*shape, ways), np.nan),
-        np.full((*shape, keys, size), np.nan), np.full((*shape, keys, ways), np.nan), np.zeros(ways),
-        np.zeros((keys, ways)),
+        np.full((*shape, size), np.nan), np.full((*shape, size), np.nan), np.full((*shape, travel), np.nan),
+        np.full((*shape, keys, size), np.nan), np.full((*shape, keys, travel), np.nan), np.zeros(travel),
+        np.zeros((keys, travel)),
     )  # fmt: skip
 
 

@@ -137,8 +137,8 @@ class ImplicitEngine:
         """(a look at the run for every latency, index of each direction among the slopes, their factors)."""
         t = piece.record.t[piece.first : piece.last + 1]
         voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
-        ways = ways_of(piece.record.columns)
-        seen, _ = late_samples(robot, t, voltage, directions, state[:N_AXES], late, self.tol, ways)
+        travel = travel_of(piece.record.columns)
+        seen, _ = late_samples(robot, t, voltage, directions, state[:N_AXES], late, self.tol, travel)
         return seen, at, factors
 
     def _shown(self, seen: list[LateSample], number: int, name: str, facing: float) -> Shown:
@@ -182,7 +182,7 @@ class ImplicitEngine:
         return voltage, directions, at, factors
 
 
-def ways_of(columns: Sequence[Column]) -> int:
+def travel_of(columns: Sequence[Column]) -> int:
     """What these outputs take of the way of a run, see simulation/sensitivity/sample.py."""
     names = {name for name, _ in columns}
     return PLACE if POSITION in names else PATH if "wheel_angle" in names else TURN

@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.exact import LATE
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, ways_of
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, travel_of
 from omnidyn.identification.output_error.engines.sums import Parts
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC
@@ -65,11 +65,13 @@ class LoopEngine(ImplicitEngine):
     ) -> tuple[list[LateSample], list[int], FloatArray]:  # fmt: skip
         """As of any run; where currents jump from tick to tick, a look a period after theirs is the last one."""
         count, (t, set_point) = self.problem.robot_count, _driven(piece)
-        ways = [Direction(p.name, up, down) for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True)]
+        directions = [
+            Direction(p.name, up, down) for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True)
+        ]
         own = self.problem.where(f"{LATE}current")
         more = [float(values[own]) - self._period] if own >= 0 and self._jumps(t) else []
         seen = looped_samples(
-            robot, t, set_point, ways, [*late, *more], self.tol, ways_of(piece.record.columns), SETTLED
+            robot, t, set_point, directions, [*late, *more], self.tol, travel_of(piece.record.columns), SETTLED
         )
         return seen, list(range(count)), 1.0 / np.array(scales[:count])
 

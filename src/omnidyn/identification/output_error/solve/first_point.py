@@ -17,7 +17,7 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solver, State
 from omnidyn.model.keys import FRICTION
 
-CURRENTS = f"{LATENCY}.current"
+CURRENTS, MOTOR = f"{LATENCY}.current", "motor"
 MANY = 100_000  # rows to which a long log is first fitted
 FEW = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
@@ -99,8 +99,8 @@ def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
     and no descent brings it back. Of a path, half the force a tenth of a second earlier looks like the whole one: a
     valley that ends in another minimum. So motors come first, with every latency at its start.
     """
-    late = [p.part == LATENCY for p in problem.parameters]
-    if not any(late):
+    parts = {p.part for p in problem.parameters}
+    if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
         return point
     still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
     held = replace(problem, parameters=tuple(still))
