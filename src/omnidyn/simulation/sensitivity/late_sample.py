@@ -130,8 +130,8 @@ def late_samples(
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
     t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors; start: (3,) twist; tol as for `simulate`;
-    travel: what is wanted of the way, see sample.py. Also returns the number of rows in which the friction solver hit its
-    cap. Raises InputError for a direction that changes friction or a gear loss which is off.
+    travel: what is wanted of the way, see sample.py. Also returns the number of rows in which the friction solver
+    hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
     """
     numbers, plants = _plants(robot, directions)
     rates = np.zeros((len(directions), *voltage.shape))
