@@ -24,7 +24,7 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
-from omnidyn.model.keys import VISCOUS, Key, with_priors
+from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
 
@@ -302,7 +302,10 @@ def _warnings(
     words += [implausible(name, value) for name, value in too_early(solver, solution).items()]
     for j, p in enumerate(solver.problem.parameters[: solver.problem.robot_count]):
         if known.held[j]:
-            words.append(f"{p.name} is at its bound {solution.state.point.values[j]:.4g}: the best fit lies beyond it")
+            bound = f"{p.name} is at its bound {solution.state.point.values[j]:.4g}"
+            still = Key.parse(p.name.partition("@")[0]).name in (ROTOR, WHEEL)
+            why = "nothing is seen to spin beside the body" if still else "the best fit lies beyond it"
+            words.append(f"{bound}: {why}")
     if known.kind == "sandwich":
         by = f" by the scatter from run to run ({known.runs} runs)" if known.runs else ""
         words.append(
