@@ -81,6 +81,7 @@ def _check_order(robot: Robot, voltage: object, dt: object) -> None:
 
 
 def as_tolerance(tol: float | None) -> float:
+    """The tolerance [m/s], 0 for None: a fixed step a row. Raises InputError outside 1e-10..1 m/s."""
     if tol is None:
         return 0.0
     if not 1e-10 <= tol <= 1.0:
