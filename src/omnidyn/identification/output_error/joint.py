@@ -13,11 +13,11 @@ from omnidyn.errors import InputError
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.prepare import EXACT, FINE, LOOP, Group, make_engine
 from omnidyn.identification.output_error.problem.parameters import AT, Parameter
-from omnidyn.identification.output_error.problem.problem import PieceSums, Point, Problem
+from omnidyn.identification.output_error.problem.problem import Parts, PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.first_point import first_point, moving_start
 from omnidyn.identification.output_error.solve.loop import loop_start
 from omnidyn.identification.output_error.solve.progress import Progress
-from omnidyn.identification.output_error.solve.solver import Engine, Solution, Solver, State
+from omnidyn.identification.output_error.solve.solver import RowEngine, Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import SHARE, Trust
 from omnidyn.model.keys import find_key
 
@@ -30,7 +30,7 @@ class Member:
 
     group: Group
     problem: Problem
-    engine: Engine
+    engine: RowEngine
     at: IntArray
     places: IntArray
 
@@ -69,6 +69,18 @@ class JointEngine:
             own = replace(weighting, variance=weighting.variance[columns])
             for place, sums in zip(member.places, member.engine.sums(member.point(point), own), strict=True):
                 found[int(place)] = _widened(sums, member.at, columns, len(self.problem.parameters))
+        return [found[k] for k in range(len(self.problem.pieces))]
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """(residuals, slopes, at) of every piece, see engines/sums.py; at: among the parameters of all groups."""
+        found: dict[int, Parts] = {}
+        for member in self.members:
+            more = len(self.problem.parameters) - len(member.at)
+            for place, (residual, slopes, at) in zip(
+                member.places, member.engine.residuals(member.point(point)), strict=True
+            ):
+                own = at < len(member.at)
+                found[int(place)] = residual, slopes, np.where(own, member.at[np.where(own, at, 0)], at + more)
         return [found[k] for k in range(len(self.problem.pieces))]
 
     def columns_of(self, member: Member) -> IntArray:

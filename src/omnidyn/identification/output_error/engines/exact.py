@@ -34,7 +34,7 @@ from omnidyn.identification.output_error.kernel.march_axis import (
     spread,
 )
 from omnidyn.identification.output_error.problem.primitives import Mapping, Primitives
-from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums, Point, Problem
+from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import at_motors
 from omnidyn.model.frames import body_to_world
 from omnidyn.model.layout import N_AXES
@@ -126,6 +126,15 @@ class ExactEngine:
             self._piece(piece, state, point.values, now, slopes, plain)[1]
             for piece, state in zip(self.problem.pieces, point.states, strict=True)
         ]
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """(residuals (C, rows), slopes (C, rows, U), at (U,)) of the rows of every piece; see engines/sums.py."""
+        found, count = [], len(self.problem.parameters)
+        for piece, (value, slopes) in zip(self.problem.pieces, self.outputs(point), strict=True):
+            rows, used = slice(piece.first, piece.last + 1), used_by(piece, count)
+            by = np.moveaxis(slopes[rows], 1, 0)[:, :, used]
+            found.append(((piece.record.outputs[rows] - value[rows]).T, np.nan_to_num(by), used))
+        return found
 
     def _axes(
         self, piece: Piece, state: FloatArray, now: Primitives, by: Primitives, weighting: Weighting

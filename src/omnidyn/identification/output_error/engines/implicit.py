@@ -16,8 +16,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of
 from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, Weighting
-from omnidyn.identification.output_error.engines.sums import Parts, added
-from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums, Point, Problem
+from omnidyn.identification.output_error.engines.sums import added
+from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot

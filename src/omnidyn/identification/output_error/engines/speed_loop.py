@@ -12,8 +12,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.exact import LATE
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, travel_of
-from omnidyn.identification.output_error.engines.sums import Parts
-from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
+from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel

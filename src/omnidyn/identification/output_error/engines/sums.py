@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march import FINAL, WAVES, add_waves, terms_of
-from omnidyn.identification.output_error.problem.problem import Column, Piece, PieceSums
+from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums
 from omnidyn.model.layout import N_AXES
-
-Parts = tuple[FloatArray, FloatArray, IntArray]
 
 
 def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weighting, count: int) -> PieceSums:

@@ -13,6 +13,7 @@ from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.robot import Robot
 
 Column = tuple[str, int]
+Parts = tuple[FloatArray, FloatArray, IntArray]  # residuals (C, rows), slopes (C, rows, U), which U among P and states
 
 LEAST_ROWS = 300  # of a piece that is cut
 

@@ -17,7 +17,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
-from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
+from omnidyn.identification.output_error.problem.problem import Fitted, Parts, PieceSums, Point, per_column
 
 MAX_ITERATIONS = 60
 CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
@@ -44,6 +44,14 @@ class Engine(Protocol[P]):
 
     def on(self, problem: P) -> Self:
         """The same engine on other pieces of the same logs, with the same parameters."""
+        ...
+
+
+class RowEngine(Engine[P], Protocol[P]):
+    """An engine that shows the rows as well, where memory may grow with the log."""
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """Residuals and slopes of every row of every piece."""
         ...
 
 
