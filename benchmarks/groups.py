@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import Answer
-from omnidyn.identification.output_error.fit import identify_groups
+from omnidyn.identification.whole_logs import identify_groups
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot

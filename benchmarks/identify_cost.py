@@ -32,7 +32,7 @@ def speed(table: Table, robot: Robot, clean: Run) -> None:
 _CHILD = """
 import json, resource, sys, time
 import numpy as np
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 with np.load(sys.argv[1]) as f:

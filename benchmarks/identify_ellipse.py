@@ -18,12 +18,12 @@ from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.identification.question import Question
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.identify_log import COUNTING, Draws
 from benchmarks.table import Table, machine
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.keys import Key, friction_keys, gain_keys
 from omnidyn.model.robot import Robot

@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.identify_log import SHARE, Draws
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.kernel.counts import information
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.question import Question
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot

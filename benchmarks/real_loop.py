@@ -7,8 +7,8 @@ import time
 import numpy as np
 
 from benchmarks.table import Table
-from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
 from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot

@@ -34,10 +34,10 @@ _HOME = {
     "compare": "omnidyn.comparison.compare",
     "dead_zone": "omnidyn.model.known.dead_zone",
     "dead_zone_map": "omnidyn.model.deadzone",
-    "fit_output_error": "omnidyn.identification.output_error.fit",
+    "fit_output_error": "omnidyn.identification.whole_logs",
     "fit_steady_state": "omnidyn.identification.steady.steady_state",
     "identify": "omnidyn.identification.identify",
-    "identify_groups": "omnidyn.identification.output_error.fit",
+    "identify_groups": "omnidyn.identification.whole_logs",
     "identify_motors": "omnidyn.identification.motors.study",
     "identify_steady": "omnidyn.identification.steady.study",
     "load_log": "omnidyn.logs.read_log",
@@ -66,11 +66,11 @@ if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identify import Identification, identify
     from omnidyn.identification.motors.study import identify_motors
-    from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
     from omnidyn.identification.question import Question
     from omnidyn.identification.steady.steady_state import fit_steady_state
     from omnidyn.identification.steady.study import identify_steady
     from omnidyn.identification.validation import validate
+    from omnidyn.identification.whole_logs import fit_output_error, identify_groups
     from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run

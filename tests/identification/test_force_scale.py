@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.identification.force_scale import scale_of_motion, scale_of_traction
 from omnidyn.identification.identify import identify
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import BOX, EMF, ROTOR, TORQUE
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.advice import advice
-from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.shape_residual import between_axes
 from omnidyn.identification.validation import validate
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

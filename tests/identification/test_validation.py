@@ -11,9 +11,10 @@ from omnidyn.errors import InputError
 from omnidyn.identification.as_fitted import as_fitted, mean_before
 from omnidyn.identification.identify import choose_method
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
-from omnidyn.identification.output_error.fit import NU, fit_output_error
+from omnidyn.identification.output_error.fit import NU
 from omnidyn.identification.question import Question
 from omnidyn.identification.validation import Score, coloured, validate
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot

@@ -21,7 +21,7 @@ from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
-from omnidyn.identification.output_error.fit import WHOLE, Fit, fit_output_error
+from omnidyn.identification.output_error.fit import WHOLE, Fit
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STEADY, STEADY_STATE, Question
@@ -33,6 +33,7 @@ from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.identification.verdict import fits_verdict, lines_verdict, steady_verdict
+from omnidyn.identification.whole_logs import answered, fit_output_error
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
@@ -325,7 +326,7 @@ def _answered(
     progress = Progress(better, lambda words: heard.now(f"fitting: {words}"))
     fit = Fit.of(runs, robot, asked, groups, progress)
     try:
-        return fit.answer(fit.solve(progress), progress), ""
+        return answered(fit, fit.solve(progress), progress), ""
     except KeyboardInterrupt:
         if not heard.keep_best or progress.best is None:
             raise

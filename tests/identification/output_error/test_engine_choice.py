@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.fit import Fit, fit_output_error
+from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.prepare import EXACT, is_exact, stays_exact
 from omnidyn.identification.question import Question
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import BOX, Key
 from omnidyn.simulation.simulate import simulate
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
 from omnidyn.identification.output_error.prepare import expand_keys
+from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate

@@ -5,10 +5,11 @@ import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.fit import INTERRUPTED, Fit, identify_groups
+from omnidyn.identification.output_error.fit import INTERRUPTED, Fit
 from omnidyn.identification.output_error.joint import join
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.question import Question
+from omnidyn.identification.whole_logs import identify_groups
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate

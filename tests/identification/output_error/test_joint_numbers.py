@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.steady.steady_state import fit_steady_state
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.keys import BOX, EMF, TORQUE
 from omnidyn.model.known.dead_zone import dead_zone

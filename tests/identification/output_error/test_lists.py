@@ -3,9 +3,9 @@ its entries."""
 
 import numpy as np
 
-from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.prepare import known_priors
 from omnidyn.identification.output_error.problem.parameters import robot_parameters
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, expand
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run

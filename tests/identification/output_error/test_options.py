@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.output_error import fit as whole
-from omnidyn.identification.output_error.fit import identify_groups
+from omnidyn.identification.whole_logs import identify_groups
 from omnidyn.model.keys import BOX
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy

@@ -6,7 +6,7 @@ The logs come from the Moreau stepper of tests/reference, which shares no code w
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import ROTOR
 from omnidyn.model.motor import Motor

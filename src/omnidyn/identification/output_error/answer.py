@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import Any
 
 from omnidyn.document import Part, Points, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.steady.study_parts import Difference
 
 
@@ -44,7 +47,7 @@ class OutputErrorEstimate(Estimate):
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
     together. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
     unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the minimisation.
-    not_followed: outputs that the model does not follow.
+    not_followed: outputs that the model does not follow. study: makes the diagnosis, on first access to it.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -56,6 +59,22 @@ class OutputErrorEstimate(Estimate):
     iterations: int = 0
     converged: bool = True
     not_followed: tuple[str, ...] = ()
+    study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
+
+    @cached_property
+    def diagnosis(self) -> Diagnosis | None:
+        """What the fit leaves out and what its numbers rest on, found when it is first asked for; None without logs."""
+        return self.study() if self.study else None
+
+    @property
+    def lack_of_fit(self) -> LackOfFit | None:
+        """Whether the residuals hold more than noise, and what would explain it."""
+        return self.diagnosis.lack_of_fit if self.diagnosis else None
+
+    @property
+    def rests_on(self) -> Mapping[str, Mapping[str, float]]:
+        """Number -> key of a number that was taken as it stands -> relative change of the first per percent of it."""
+        return self.diagnosis.rests_on if self.diagnosis else {}
 
     @property
     def verdict(self) -> str:
@@ -103,6 +122,7 @@ class Answer:
     own: tuple[str, ...]
     shared: tuple[str, ...]
     differences: tuple[Difference, ...]
+    solutions: tuple[Solution, ...] = ()
 
     @property
     def estimate(self) -> OutputErrorEstimate:

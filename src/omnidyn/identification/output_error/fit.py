@@ -8,15 +8,12 @@ correlation that the shared numbers bring about.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Unpack
 
-from omnidyn.arguments import check_order
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import is_exact, why_no_inputs
-from omnidyn.identification.options import Options, shows_options
-from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
+from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
 from omnidyn.identification.output_error.prepare import (
@@ -40,13 +37,13 @@ from omnidyn.identification.output_error.solve.first_point import coarse_point, 
 from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, Progress
-from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early, wanted
 from omnidyn.identification.output_error.trust.uncertainty import trust
-from omnidyn.identification.question import FIT, GAUSS, OUTPUT_ERROR, STUDENT, Question
+from omnidyn.identification.question import GAUSS, STUDENT, Question
 from omnidyn.identification.recordings import count_once
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
@@ -144,8 +141,8 @@ class Fit:
             estimate = conclude(
                 solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels, again.intervals
             )
-            return Answer({group.name: estimate}, (), solver.problem.names, ())
-        engine, estimates = solver.engine, {}
+            return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
+        engine, estimates, alones = solver.engine, {}, []
         assert isinstance(engine, JointEngine)
         for member in engine.members:
             words = [*warnings, *member.group.warnings]
@@ -155,10 +152,12 @@ class Fit:
                 seen.solver, seen, alone, member.group.records, loss, words, {}, member.group.moved, (), better
             )
             others = ", ".join(each.name for each in engine.members if each is not member)
+            alones.append(seen)
             estimates[member.name] = replace(estimate, method=f"{estimate.method}; fitted together with {others}")
         own = own_names(self.question.per_free, [member.problem for member in engine.members])
         shared = tuple(name for name in solver.problem.names if AT not in name)
-        return Answer(estimates, own, shared, differences(solution, known, again, own, [*estimates], profile, strata))
+        between = differences(solution, known, again, own, [*estimates], profile, strata)
+        return Answer(estimates, own, shared, between, tuple(alones))
 
     def _settled(self, group: Group, progress: Progress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
@@ -273,43 +272,6 @@ class Fit:
                 expected="friction on the body axes", where="free",
             )  # fmt: skip
         return find_breakaway(solution, axes, trust(solution.solver, solution, self.question.covariance))
-
-
-@shows_options(FIT)
-def fit_output_error(
-    runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None,
-    watch: Callable[[State], object] | None = None, **options: Unpack[Options],
-) -> OutputErrorEstimate:  # fmt: skip
-    """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
-
-    runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
-    question, options: those of `Question` that belong to output error, such as free=, nuisances=, loss=.
-    watch: is called with every better state on the way; a Progress is told in words what is done, too.
-
-    Returns an Estimate with nuisances, noise and what is not identifiable. Errors: see `Fit.of` and `Fit.answer`.
-    """
-    check_order("fit_output_error(runs, robot)", (runs, Run), (robot, Robot))
-    progress = Progress.of(watch)
-    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=progress)
-    return fit.answer(fit.solve(progress), progress).estimate
-
-
-@shows_options(FIT)
-def identify_groups(
-    runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, question: Question | None = None,
-    watch: Callable[[State], object] | None = None, **options: Unpack[Options],
-) -> Answer:  # fmt: skip
-    """Fit logs of several groups at once by output error.
-
-    groups: name of each run's group. question, options, watch: as in `fit_output_error`; per_free= names the numbers
-    that each group has for itself.
-    Raises InputError for what cannot be used, InsufficientDataError where a group says nothing about its numbers, or
-    has too few runs for a bootstrap, UnsupportedError for robots and logs that output error does not take.
-    """
-    check_order("identify_groups(runs, robot, groups)", (runs, Run), (robot, Robot))
-    progress = Progress.of(watch)
-    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
-    return fit.answer(fit.solve(progress), progress)
 
 
 def degrees(loss: str) -> float:

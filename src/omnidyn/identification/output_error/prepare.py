@@ -205,6 +205,11 @@ def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactE
     return ImplicitEngine(problem, tol if tol is None or not travels else min(tol, FINER))
 
 
+def engine_kind(engine: object) -> str:
+    """Which engine it is: EXACT, IMPLICIT or LOOP."""
+    return LOOP if isinstance(engine, LoopEngine) else IMPLICIT if isinstance(engine, ImplicitEngine) else EXACT
+
+
 def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> str:
     """Which engine fits these keys of the robot to the records."""
     return LOOP if looped(records) else EXACT if is_exact(robot) and stays_exact(robot, keys) else IMPLICIT

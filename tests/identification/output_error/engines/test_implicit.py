@@ -9,12 +9,12 @@ from scipy.optimize import least_squares
 
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.question import Question
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key, find_key
 from omnidyn.run import Run

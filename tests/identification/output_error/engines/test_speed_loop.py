@@ -9,13 +9,13 @@ from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.identify import identify
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
-from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.loop import retimed
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.identification.question import Question
+from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key, friction_keys, gain_keys
 from omnidyn.run import Run

@@ -7,8 +7,8 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr
 from scipy.stats import truncnorm
 
-from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
 from omnidyn.identification.output_error.kernel.counts import count_terms, information, rounding, tail
+from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.identification.as_fitted import as_fitted
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, voltages

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.fit import INTERRUPTED, Fit, fit_output_error
+from omnidyn.identification.output_error.fit import INTERRUPTED, Fit
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.identification.question import Question
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 

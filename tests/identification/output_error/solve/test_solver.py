@@ -1,9 +1,9 @@
 """The descent: what it asks the engine for."""
 
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.fit import fit_output_error
 from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.problem.record import record
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model import dynamics, statespace
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.fit import fit_output_error
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import EMF, TORQUE, Key
 from omnidyn.model.robot_file import load_robot

@@ -1,0 +1,102 @@
+"""LackOfFit: whether a fit leaves more than noise, and what would explain it; Diagnosis: and what it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from omnidyn.document import Part, Table, all_of, plain
+from omnidyn.model.keys import find_key, in_words
+
+
+@dataclass(frozen=True)
+class Found:
+    """A theme that residuals follow. f: mean square per direction over that of the noise; p: chance of as much."""
+
+    theme: str
+    f: float
+    p: float
+    directions: int
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """key: of the robot file, a nuisance or "change". words: what it is, with its value. gain: share of the squared
+    held-out error that it takes away, with its standard error. same_as: keys that the log cannot tell from it.
+    chi2: by how much it lowers the sum of squares, in those of the noise; numbers: how many it fits."""
+
+    key: str
+    words: str
+    gain: float
+    gain_std: float
+    same_as: tuple[str, ...] = ()
+    chi2: float = field(default=0.0, repr=False)
+    numbers: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class LackOfFit:
+    """Whether residuals hold more than noise, and what would explain it.
+
+    found: whether they do. channels: output -> share of the variance of its residuals that is no noise. sizes: output
+    -> what that is, root mean square, in the unit of the output. follows: what residuals follow, first what explains
+    most. remedies: best first; those that the log cannot tell from each other name each other in `same_as`. tested:
+    what they were tested for -> chance of as much by noise alone.
+    """
+
+    found: bool
+    channels: Mapping[str, float]
+    sizes: Mapping[str, float]
+    follows: tuple[Found, ...]
+    remedies: tuple[Remedy, ...]
+    tested: Mapping[str, float]
+
+    def words(self) -> str:
+        """In a sentence, "" for a model that fits."""
+        if not self.found:
+            return ""
+        worst = max(self.channels, key=lambda name: self.channels[name], default="")
+        share = f" ({100.0 * self.channels[worst]:.0f} % of the residual of {worst} is no noise)" if worst else ""
+        what = all_of([each.theme for each in self.follows[:2]])
+        words = f"the model leaves something out: what it misses follows {what}{share}" if what else (
+            "the model leaves something out"
+        )  # fmt: skip
+        if not self.remedies:
+            return f"{words}; no cause that is known here explains it"
+        best = self.remedies[0]
+        same = f", or what this log cannot tell from it ({', '.join(map(named, best.same_as))})" if best.same_as else ""
+        return f"{words}; most likely {best.words}{same}"
+
+    def parts(self) -> list[Part]:
+        """As lines and a table."""
+        if not self.found:
+            return ["the residuals hold nothing but noise, as far as this log can tell"]
+        rows = [
+            (r.key, r.words, f"{100.0 * r.gain:.2g} +- {100.0 * r.gain_std:.1g} %", ", ".join(r.same_as))
+            for r in self.remedies
+        ]  # fmt: skip
+        head = ("what may be missing", "in words", "held-out error less by", "the same to this log")
+        table = [Table(head, rows, "<<><")] if rows else []
+        return [f"{self.words()}", *table]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return plain({
+            "found": self.found, "channels": self.channels, "sizes": self.sizes,
+            "follows": [asdict(each) for each in self.follows],
+            "remedies": [asdict(each) for each in self.remedies], "tested": self.tested,
+        })  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """lack_of_fit, and rests_on: number -> fixed key -> relative change of the number per percent of the key."""
+
+    lack_of_fit: LackOfFit
+    rests_on: Mapping[str, Mapping[str, float]]
+
+
+def named(key: str) -> str:
+    """A remedy's key as people call it."""
+    return in_words(key) if find_key(key) else key

@@ -1,0 +1,156 @@
+"""What may be missing from the model, or stand wrong in the robot file: each tried by simulating the log anew.
+
+So a candidate needs no derivative, and may be a law that has none where it is off. It is tried at one size, or at
+several where none is small (a limit, a time). A new law comes in here with one entry: laws.py has those of the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import OmnidynError
+from omnidyn.identification.output_error.prepare import LOOP
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
+from omnidyn.identification.structure.motion import Motion
+from omnidyn.identification.structure.workbench import Workbench
+from omnidyn.logs.steady_table import AXES
+from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
+from omnidyn.model.keys import EMF, TORQUE, Key, in_words
+from omnidyn.model.layout import N_AXES, YAW
+from omnidyn.model.robot import Robot
+
+STEP = 0.02  # relative change that a smooth number is tried with
+CHANGE = "change"  # friction that is another one from some time of the log on
+WHEN = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What a change by 1 would change in the log, of each piece (C, rows, K), K numbers. at: where it is tried, such as
+    the level of a limit."""
+
+    shown: list[FloatArray]
+    at: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """key: of the robot file, a nuisance, or CHANGE. trials: one or more. told: its fitted change and where it was
+    tried, in words. one_sided: a change below 0 makes no sense."""
+
+    key: str
+    trials: Callable[[Workbench], list[Trial]]
+    told: Callable[[float, float], str]
+    one_sided: bool = False
+
+    def tried(self, bench: Workbench) -> list[Trial]:
+        """Its trials; none where the engine cannot simulate them."""
+        try:
+            return self.trials(bench)
+        except OmnidynError:
+            return []
+
+
+def as_it_is(words: str) -> Callable[[float, float], str]:
+    """Words that no value belongs to."""
+    return lambda _change, _at: words
+
+
+def numbers(bench: Workbench) -> Iterator[Candidate]:
+    """Numbers of the robot file that may be others: masses, radii, motors, one by one and all together."""
+    for key in ("body.mass_kg", "body.inertia_kg_m2", "wheels.robot_radius_m"):
+        yield from _number(bench.robot, key)
+    for name in ("wheels.wheel_radius_m", "motor.resistance_ohm", TORQUE):
+        beside = EMF if name == TORQUE else ""
+        yield from _number(bench.robot, name, beside)
+        for i in range(bench.robot.wheels.count):
+            yield from _number(bench.robot, f"{name}[{i}]", f"{beside}[{i}]" if beside else "")
+
+
+def _number(robot: Robot, key: str, beside: str = "") -> Iterator[Candidate]:
+    """A number, and another one that follows it. A list has no number of its own, only its entries have."""
+    changed = times(robot, key, 1.0 + STEP)
+    if changed is None:
+        return
+    if beside:
+        changed = times(changed, beside, 1.0 + STEP) or changed
+
+    def trials(bench: Workbench) -> list[Trial]:
+        return [Trial([own / STEP for own in bench.change(changed)])]
+
+    yield Candidate(key, trials, lambda change, _: f"{in_words(key)} {100.0 * change:+.2g} %")
+
+
+def times(robot: Robot, name: str, factor: float) -> Robot | None:
+    """The robot with a number, or every entry of a list of the same on all wheels, times a factor; None without it."""
+    key = Key.parse(name)
+    try:
+        if key.index is None:
+            return key.set(robot, key.get(robot) * factor, checked=False)
+        now = Key(key.name, key.index)
+        value = now.get(robot)
+        return now.set(robot, value * factor, checked=False)
+    except (OmnidynError, TypeError):
+        return None
+
+
+def of_the_log(bench: Workbench) -> Iterator[Candidate]:
+    """What a log does to a right model: nuisances that are not fitted, and a change on the way."""
+    if bench.kind != LOOP:
+        yield Candidate(GAIN, _driver(GAIN, Driver(gain=1.0 + STEP), STEP), lambda by, _: f"gain {1.0 + by:.3g}")
+        yield Candidate(
+            FADE, _driver(FADE, Driver(fade=STEP), STEP), lambda by, _: f"a voltage that fades by {100.0 * by:.2g} %"
+        )
+        yield Candidate(
+            DEAD_BAND, _driver(DEAD_BAND, Driver(dead_band=0.1), 0.1), lambda by, _: f"dead band {by:.2g} V", True
+        )
+    for axis, name in enumerate(AXES):
+        words, unit = (f"a constant force along {name}", "N") if axis < YAW else ("a constant torque", "N m")
+        yield Candidate(
+            f"{TILT}.{name}", _tilt(axis), lambda by, _, words=words, unit=unit: f"{words} of {by:.2g} {unit}"
+        )
+    for channel in dict.fromkeys(name for name, _ in bench.problem.columns):
+        words = channel.replace("_", " ")
+        yield Candidate(
+            f"{LATENCY}.{channel}", _late(channel), lambda by, _, words=words: f"{words} late by {1e3 * by:.3g} ms"
+        )
+    yield Candidate(CHANGE, _changes, lambda _, at: f"friction that changes {100.0 * at:.0f} % into the log")
+
+
+def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], list[Trial]]:
+    assert getattr(driver, name) != getattr(Driver(), name)
+    return lambda bench: [Trial([own / size for own in bench.change(driver=driver)])]
+
+
+def _tilt(axis: int) -> Callable[[Workbench], list[Trial]]:
+    def force(motion: Motion) -> FloatArray:
+        return np.tile(np.eye(N_AXES)[axis], (len(motion.t), 1, 1))
+
+    return lambda bench: [Trial(bench.by_force(force))]
+
+
+def _late(channel: str) -> Callable[[Workbench], list[Trial]]:
+    """A delay of a channel: it shows what was earlier."""
+
+    def trials(bench: Workbench) -> list[Trial]:
+        shown = []
+        for motion in bench.motions:
+            level = motion.shown(motion.twist[:, None, :])
+            own = np.array([name == channel for name, _ in motion.piece.record.columns])
+            shown.append(np.where(own[:, None, None], -np.gradient(level, motion.t, axis=1), 0.0))
+        return [Trial(shown)]
+
+    return trials
+
+
+def _changes(bench: Workbench) -> list[Trial]:
+    def force(motion: Motion, when: float) -> FloatArray:
+        later = (motion.share >= when).astype(float)[:, None, None]
+        each = np.eye(N_AXES) * np.sign(motion.twist)[:, None, :]
+        return -later * np.concatenate([each, np.eye(N_AXES) * motion.twist[:, None, :]], axis=1)
+
+    return [Trial(bench.by_force(lambda motion, when=when: force(motion, when)), when) for when in WHEN.tolist()]

@@ -1,0 +1,48 @@
+"""All that is asked of a fit beyond its numbers, once: misfit, remedies, and what the numbers rest on."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import chdtrc
+
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.identification.output_error.prepare import engine_kind
+from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
+from omnidyn.identification.structure.laws import candidates
+from omnidyn.identification.structure.linear import Rows
+from omnidyn.identification.structure.misfit import FALSE, Misfit, misfit
+from omnidyn.identification.structure.motion import motions
+from omnidyn.identification.structure.remedies import remedies
+from omnidyn.identification.structure.rests_on import rests_on
+from omnidyn.identification.structure.workbench import Workbench
+
+
+def diagnose(solution: Solution) -> Diagnosis:
+    """What is wrong with a fit at its best point."""
+    solver, point = solution.solver, solution.state.point
+    problem = solver.problem
+    engine: RowEngine = solver.engine  # pyright: ignore[reportAssignmentType]  # those of whole logs are
+    rows, moved = Rows.of(problem, point, engine.residuals(point)), motions(problem, point)
+    seen = misfit(rows, moved)
+    bench = Workbench(problem, point, engine_kind(solver.engine), moved)
+    tried = [(one, one.tried(bench)) for one in candidates(bench)]
+    ranked = remedies(seen.linear, [each for each in tried if each[1]])
+    strong = [r for r in ranked if chdtrc(r.numbers, r.chi2) * len(tried) < FALSE]
+    found = bool(seen.found or strong)
+    told = ranked if found else ()
+    names = [f"{name}[{i}]" for name, i in problem.columns]
+    lack = LackOfFit(
+        found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested
+    )
+    return Diagnosis(lack, rests_on(seen.linear, bench))
+
+
+def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:
+    square, number = np.zeros(len(names)), np.zeros(len(names))
+    rows = seen.linear.rows
+    for k, columns in enumerate(rows.column):
+        for j, c in enumerate(columns):
+            there = rows.there[k][j]
+            square[c] += float((seen.explained[k][j][there] ** 2).sum())
+            number[c] += int(there.sum())
+    return dict(zip(names, np.sqrt(square / np.maximum(number, 1)).tolist(), strict=True))

@@ -1,0 +1,191 @@
+"""What a wrong model may leave in the residuals: forces on the body, and faults of what measures, by what they follow.
+
+Each theme is a set of directions; none claims to be the law of anything. Together they span what robots are known to
+do: friction that is no line, or not the same both ways, or not alike in all directions of travel; mass and turning;
+motors that differ or give way; what changes in the course of a log; where the robot looks; sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.identification.structure.motion import Motion
+from omnidyn.model.layout import N_AXES, YAW
+
+Directions = Callable[[Motion, FloatArray], FloatArray]  # of a motion and its fastest twist (3,)
+
+
+@dataclass(frozen=True)
+class Theme:
+    """name: what the misfit follows, in words people read. directions: forces (n, K, 3), or what columns show
+    (C, n, K) where `sensed`."""
+
+    name: str
+    directions: Directions
+    sensed: bool = False
+
+
+def _on_axes(values: list[tuple[int, FloatArray]]) -> FloatArray:
+    """Forces (n, K, 3) each along one axis, from (axis, size (n,))."""
+    out = np.zeros((len(values[0][1]), len(values), N_AXES))
+    for k, (axis, size) in enumerate(values):
+        out[:, k, axis] = size
+    return out
+
+
+def _speed(motion: Motion, top: FloatArray) -> FloatArray:
+    """Friction against the speed of each axis: beside the line, curves that fall or rise at any speed."""
+    found = []
+    for axis in range(N_AXES):
+        side, share = np.sign(motion.twist[:, axis]), np.abs(motion.twist[:, axis]) / top[axis]
+        found += [(axis, side), (axis, side * share), (axis, side * share**2)]
+        found += [(axis, side * np.exp(-share / width)) for width in (0.03, 0.1, 0.3)]
+    return _on_axes(found)
+
+
+def _one_way(motion: Motion, top: FloatArray) -> FloatArray:
+    """Forces that do not turn with the direction: a slope, more friction forwards than backwards."""
+    found = []
+    for axis in range(N_AXES):
+        share = np.abs(motion.twist[:, axis]) / top[axis]
+        found += [(axis, np.ones(len(share))), (axis, (share > 0.0).astype(float)), (axis, share)]
+    return _on_axes(found)
+
+
+def _travel(motion: Motion, top: FloatArray) -> FloatArray:
+    """Friction along one axis that depends on the motion along the others."""
+    x, y, w = (motion.twist / top).T
+    size = np.hypot(motion.twist[:, 0], motion.twist[:, 1])
+    moving = np.where(size > 0.0, size, 1.0)
+    c, s = motion.twist[:, 0] / moving, motion.twist[:, 1] / moving
+    turns, turned = np.sign(w), np.abs(w)
+    found = [
+        (0, c), (1, s), (0, c**3), (1, s**3), (0, np.sign(x) * turned), (1, np.sign(y) * turned),
+        (0, np.sign(x) * (turned > 0.0)), (1, np.sign(y) * (turned > 0.0)), (YAW, turns * (size > 0.0)),
+        (YAW, turns * np.hypot(x, y)), (YAW, turns * c**2), (0, y), (1, x), (0, np.sign(y)), (1, np.sign(x)),
+        (YAW, x), (YAW, y), (YAW, np.sign(x)), (YAW, np.sign(y)), (0, w), (1, w), (0, turns), (1, turns),
+    ]  # fmt: skip
+    return _on_axes(found)
+
+
+def _wheels(motion: Motion, top: FloatArray) -> FloatArray:
+    """Friction and drag of single wheels."""
+    g = motion.robot.wheels.wrench_matrix
+    rim = motion.twist @ g
+    at_rim = np.concatenate([np.sign(rim), rim / max(float(np.abs(rim).max()), 1e-12)], axis=1)
+    return at_rim[:, :, None] * np.concatenate([g, g], axis=1).T
+
+
+def _acceleration(motion: Motion, top: FloatArray) -> FloatArray:
+    """Mass and inertia that are other than said, and the terms of a turning frame."""
+    pace = np.zeros_like(motion.twist)
+    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
+    x, y, w = motion.twist.T
+    found = [(axis, pace[:, other]) for axis in range(N_AXES) for other in range(N_AXES)]
+    return _on_axes([*found, (0, w * y), (1, w * x), (0, w**2), (1, w**2), (0, w * np.abs(w)), (1, w * np.abs(w))])
+
+
+def _inputs(motion: Motion, top: FloatArray) -> FloatArray:
+    """Motors and drivers that give more or less than said: each, by its voltage, its current and what all draw."""
+    g, u, i = motion.robot.wheels.wrench_matrix, motion.voltage, motion.current
+    most = max(float(np.abs(u).max()), 1e-12)
+    peak = max(float(np.abs(i).max()), 1e-12)
+    draw = np.abs(i).sum(axis=1, keepdims=True) / peak
+    share, load = u / most, i / peak
+    each = np.concatenate([share, np.sign(u)], axis=1)[:, :, None] * np.concatenate([g, g], axis=1).T
+    along = np.stack([
+        (share * np.abs(share)) @ g.T, (share * draw) @ g.T, (load * np.abs(load)) @ g.T, np.sign(i) @ g.T,
+        (np.sign(i) * np.maximum(np.abs(load) - 0.5, 0.0)) @ g.T, load @ g.T,
+        (np.sign(u) * np.exp(-np.abs(share) / 0.15)) @ g.T,
+    ], axis=1)  # fmt: skip
+    loaded = np.abs(load) @ np.abs(g).T
+    dry = np.sign(motion.twist) * loaded  # friction that grows with what the gears carry
+    return np.concatenate([each, along, _on_axes([(a, dry[:, a]) for a in range(N_AXES)])], axis=1)
+
+
+def _time(motion: Motion, top: FloatArray) -> FloatArray:
+    """What is not the same at the end of the log as at its start: friction, mass, supply."""
+    tau = 2.0 * motion.share - 1.0
+    g = motion.robot.wheels.wrench_matrix
+    share = motion.twist / top
+    found = []
+    for shape in (tau, tau**2, np.sign(tau - 0.0)):
+        found += [(a, np.sign(motion.twist[:, a]) * shape) for a in range(N_AXES)]
+        found += [(a, share[:, a] * shape) for a in range(N_AXES)]
+    drive = (motion.voltage @ g.T) / max(float(np.abs(motion.voltage).max()), 1e-12)
+    more = np.stack([drive * shape[:, None] for shape in (tau, tau**2, np.sign(tau))], axis=1)
+    return np.concatenate([_on_axes(found), more], axis=1)
+
+
+def _heading(motion: Motion, top: FloatArray) -> FloatArray:
+    """A force that stays in the room: a slope under a robot that turns, a cable."""
+    c, s = np.cos(motion.pose[:, 2]), np.sin(motion.pose[:, 2])
+    out = np.zeros((len(c), 2, N_AXES))
+    out[:, 0, 0], out[:, 0, 1], out[:, 1, 0], out[:, 1, 1] = c, -s, s, c
+    return out
+
+
+def _angles(motion: Motion, top: FloatArray) -> FloatArray:
+    """What comes back with every turn of a wheel: an eccentric wheel, a bent axle, teeth. On force and on speed."""
+    g = motion.robot.wheels.wrench_matrix
+    turned = np.zeros_like(motion.voltage)
+    radii = motion.robot.wheels.radii
+    middle = 0.5 * (motion.twist[1:] + motion.twist[:-1]) * np.diff(motion.t)[:, None]
+    turned[1:] = np.cumsum(middle @ g, axis=0) / radii
+    return np.concatenate(
+        [wave(n * turned)[:, :, None] * g.T for n in (1.0, 2.0) for wave in (np.cos, np.sin)], axis=1
+    )  # fmt: skip
+
+
+def _sensors(motion: Motion, top: FloatArray) -> FloatArray:
+    """Sensors that show more or less, later or one-sided: each column by itself. Shape (C, n, K)."""
+    speed = motion.shown(motion.twist[:, None, :])[:, :, 0]
+    count = len(speed)
+    dt = np.diff(motion.t)
+    out = np.zeros((count, len(motion.t), 4 * count))
+    for c, own in enumerate(speed):
+        pace = np.zeros_like(own)
+        pace[1:-1] = (own[2:] - own[:-2]) / (dt[1:] + dt[:-1])
+        most = max(float(np.abs(own).max()), 1e-12)
+        out[c, :, 4 * c : 4 * c + 4] = np.stack(
+            [own, pace, np.abs(own), own * np.abs(own) / most], axis=1
+        )  # fmt: skip
+    return out
+
+
+THEMES = (
+    Theme("the speed", _speed),
+    Theme("which way an axis moves", _one_way),
+    Theme("the direction of travel", _travel),
+    Theme("the speed of single wheels", _wheels),
+    Theme("the acceleration", _acceleration),
+    Theme("voltages and currents", _inputs),
+    Theme("the time in the log", _time),
+    Theme("the heading in the room", _heading),
+    Theme("the angle of the wheels", _angles),
+    Theme("what each sensor shows", _sensors, sensed=True),
+)
+
+
+def shown_by_themes(motion: Motion, top: FloatArray, themes: Sequence[Theme] = THEMES) -> tuple[FloatArray, list[int]]:
+    """(what all directions of all themes show of a motion (C, n, K), how many of the K each theme has)."""
+    forces = [theme.directions(motion, top) for theme in themes if not theme.sensed]
+    pushed = motion.shown_by(np.concatenate(forces, axis=1)) if forces else None
+    sensed = [theme.directions(motion, top) for theme in themes if theme.sensed]
+    counts, seen = [], 0
+    found = []
+    rest, more = iter(forces), iter(sensed)
+    for theme in themes:
+        if theme.sensed:
+            found.append(next(more))
+        else:
+            assert pushed is not None
+            k = next(rest).shape[1]
+            found.append(pushed[:, :, seen : seen + k])
+            seen += k
+        counts.append(found[-1].shape[2])
+    return np.concatenate(found, axis=2), counts

@@ -1,0 +1,134 @@
+"""Laws that a robot file can switch on, or take in the place of another: candidates for what a model leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.identification.structure.candidates import CHANGE, STEP, Candidate, Trial, as_it_is, numbers, of_the_log
+from omnidyn.identification.structure.motion import Motion
+from omnidyn.identification.structure.workbench import Workbench
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.keys import AXES as ON_AXES
+from omnidyn.model.keys import DIRECTION, WHEELS, find_key, in_words, unit
+from omnidyn.model.layout import N_AXES, YAW
+from omnidyn.model.motor import per_wheel
+from omnidyn.model.robot import Robot
+
+LOSS, SHARE = 0.05, 0.03  # of a gear; of the robot's mass that rotors may be, each a small one to try
+LIMITS = (0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of the largest current, at which a limit is tried
+ABOVE = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb friction
+
+
+def candidates(bench: Workbench) -> Iterator[Candidate]:
+    """All that may be asked of a fit: numbers, laws, and what the log does; what is free already is left out."""
+    taken = set(bench.problem.names)
+    taken |= {key.name for name in bench.problem.names if (key := find_key(name))}
+    for one in (*numbers(bench), *_of_the_body(bench), *_of_motors(bench), *_of_friction(bench), *of_the_log(bench)):
+        key = find_key(one.key)
+        if one.key == CHANGE or not (one.key in taken or (key and key.name in taken)):
+            yield one
+
+
+def _of_the_body(bench: Workbench) -> Iterator[Candidate]:
+    body = bench.robot.body
+    other = bench.robot.model_copy(update={"body": body.model_copy(update={"rotating_frame": not body.rotating_frame})})
+    words = "no forces of a turning frame" if body.rotating_frame else "the forces of a turning frame"
+    yield Candidate("body.rotating_frame", lambda b: [Trial(b.change(other))], as_it_is(words))
+
+
+def _of_motors(bench: Workbench) -> Iterator[Candidate]:
+    motor, n = bench.robot.motor, bench.robot.wheels.count
+    if motor.current_limit is None and any(np.any(m.current) for m in bench.motions):
+        yield Candidate("motor.current_limit_A", _limits, lambda _, at: f"a current limit of about {at:.2g} A")
+    peak = float(max(np.abs(m.voltage).max() for m in bench.motions))
+    at_rim = per_wheel(motor.gear_ratio, n) ** 2 / bench.robot.wheels.radii**2
+    spins = float(SHARE * bench.robot.body.mass / at_rim.sum())
+    if not np.any(motor.voltage_drop):
+        yield _switched_on(bench.robot, "motor.voltage_drop_V", "voltage_drop", STEP * peak)
+    if not np.any(motor.rotor_inertia):
+        yield _switched_on(bench.robot, "motor.rotor_inertia_kg_m2", "rotor_inertia", spins)
+    if np.all(per_wheel(motor.gear_efficiency, n) == 1.0):
+        lossy = _with(bench.robot, gear_efficiency=1.0 - LOSS)
+        yield Candidate(
+            "motor.gear_efficiency", lambda b: [Trial([own / LOSS for own in b.change(lossy)])],
+            lambda by, _: f"gear efficiency {1.0 - by:.2g}", True,
+        )  # fmt: skip
+
+
+def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
+    """A number of the motors that is 0, at a small size."""
+    on = _with(robot, **{field: size})
+    return Candidate(
+        key, lambda b: [Trial([own / size for own in b.change(on)])],
+        lambda by, _: f"{in_words(key)} {by:.2g} {unit(key)}", True,
+    )  # fmt: skip
+
+
+def _with(robot: Robot, **changes: Any) -> Robot:
+    return robot.model_copy(update={"motor": robot.motor.model_copy(update=changes)})
+
+
+def _limits(bench: Workbench) -> list[Trial]:
+    most = np.concatenate([np.abs(m.current).max(axis=1) for m in bench.motions])
+    levels = np.unique(np.quantile(most[most > 0.0], LIMITS)).tolist()
+    return [Trial(bench.change(_with(bench.robot, current_limit=level)), level) for level in levels]
+
+
+def _of_friction(bench: Workbench) -> Iterator[Candidate]:
+    """Breakaway; and friction along the direction of travel in place of that on the axes, the other way, or beside."""
+    friction = bench.robot.friction
+    axes, direction = friction.axes, friction.direction
+    boxed, round_ = any(axes.coulomb), any(direction.coulomb)
+    if boxed and axes.breakaway is None:
+        yield Candidate(f"{ON_AXES}.breakaway", _breakaway, as_it_is("breakaway above Coulomb friction"))
+    if boxed and not round_:
+        other = DirectionFriction(
+            coulomb=axes.coulomb[:2], viscous=0.5 * (axes.viscous[0] + axes.viscous[1]), yaw_coulomb=axes.coulomb[YAW],
+            yaw_viscous=axes.viscous[YAW],
+        )  # fmt: skip
+        yield Candidate(
+            DIRECTION, _in_place(Friction(direction=other, wheels=friction.wheels)),
+            as_it_is("Coulomb friction along the direction of travel, an ellipse"),
+        )  # fmt: skip
+    if round_ and not boxed:
+        viscous = (direction.viscous, direction.viscous, direction.yaw_viscous)
+        own = AxesFriction(viscous=viscous, coulomb=(*direction.coulomb, direction.yaw_coulomb))
+        yield Candidate(
+            ON_AXES, _in_place(Friction(axes=own, wheels=friction.wheels)),
+            as_it_is("Coulomb friction on each axis by itself, a box"),
+        )  # fmt: skip
+    if friction.wheels == WheelFriction():
+        yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
+
+
+def _in_place(friction: Friction) -> Callable[[Workbench], list[Trial]]:
+    """The same robot with other friction; a change by 1 is the whole of it."""
+    return lambda b: [Trial(b.change(b.robot.model_copy(update={"friction": friction})))]
+
+
+def _breakaway(bench: Workbench) -> list[Trial]:
+    friction = bench.robot.friction
+    found = []
+    for share in ABOVE:
+        columns = []
+        for axis in range(N_AXES):
+            levels = tuple(c * (1.0 + share * (a == axis)) for a, c in enumerate(friction.axes.coulomb))
+            axes = friction.axes.model_copy(update={"breakaway": levels})
+            robot = bench.robot.model_copy(update={"friction": friction.model_copy(update={"axes": axes})})
+            columns.append(bench.change(robot))
+        found.append(Trial([np.concatenate(each, axis=2) for each in zip(*columns, strict=True)], share))
+    return found
+
+
+def _at_wheels(bench: Workbench) -> list[Trial]:
+    g = bench.robot.wheels.wrench_matrix
+
+    def force(motion: Motion) -> FloatArray:
+        rim = motion.twist @ g
+        return -np.concatenate([np.sign(rim), rim], axis=1)[:, :, None] * np.concatenate([g, g], axis=1).T
+
+    return [Trial(bench.by_force(force))]

@@ -1,0 +1,159 @@
+"""A fit in rows, linear near its best point, its noise made white and the starts of its pieces taken out.
+
+    e = J d + Z z + noise        e: residuals, J: derivatives by the parameters, Z: what else may explain e
+
+Each column of each piece is divided by the standard deviation of its noise, after a filter that whitens it; what the
+start of a piece explains (Piece.free) is projected out, and what is known beforehand stands below as rows of its own.
+So every question about the fit is one of ordinary least squares with errors of variance 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
+from omnidyn.identification.structure.memory import Memory
+
+SAME = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
+Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The rows of a fit as they are: of each piece residuals (C, rows), and slopes (C, rows, P), (C, rows, S) of it.
+
+    there: of each piece (C, rows), which rows count. column: of each piece (C,), which column of the problem it is.
+    """
+
+    problem: Problem
+    point: Point
+    residual: list[FloatArray]
+    slopes: list[FloatArray]
+    own: list[FloatArray]
+    there: list[BoolArray]
+    column: list[list[int]]
+
+    @classmethod
+    def of(cls, problem: Problem, point: Point, parts: Sequence[Parts]) -> Rows:
+        """The rows that an engine shows at a point, by the numbers that the solver sees."""
+        count, every = len(problem.parameters), problem.columns
+        scale = [p.slope(float(v)) for p, v in zip(problem.parameters, point.values, strict=True)]
+        rows = cls(problem, point, [], [], [], [], [])
+        for piece, (residual, slopes, at) in zip(problem.pieces, parts, strict=True):
+            wide = np.zeros((*residual.shape, count))
+            mine = at < count
+            wide[:, :, at[mine]] = slopes[:, :, mine]
+            rows.residual.append(residual)
+            rows.slopes.append(wide * scale)
+            rows.own.append(slopes[:, :, ~mine])
+            rows.there.append(np.isfinite(residual) & np.isfinite(slopes).all(axis=2))
+            rows.column.append([every.index(column) for column in piece.record.columns])
+        return rows
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        return self.problem.pieces
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Rows made white. memory: of each column of the problem."""
+
+    rows: Rows
+    memory: Sequence[Memory]
+
+    def white(self, shown: Shown) -> FloatArray:
+        """What is shown in the rows, as the fit sees it: (N, K), starts projected out, a row of 0 for each prior."""
+        found = []
+        for k, (piece, values) in enumerate(zip(self.rows.pieces, shown, strict=True)):
+            own = self.of_piece(k, self.rows.own[k])
+            one = self.of_piece(k, values)
+            if own.shape[1]:
+                _, known = piece.start_prior(self.rows.point.states[k])
+                held = np.sqrt(known[piece.free[: len(known)]])
+                extra = np.zeros((len(held), own.shape[1]))
+                extra[np.arange(len(held)), np.arange(len(held))] = held
+                own = np.vstack([own, extra])
+                one = np.vstack([one, np.zeros((len(held), one.shape[1]))])
+                size = np.linalg.norm(own, axis=0)
+                left, size_, _ = np.linalg.svd(own[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+                left = left[:, size_ > 1e-9 * size_.max(initial=1e-300)]
+                one = one - left @ (left.T @ one)
+            found.append(one)
+        return np.concatenate([*found, np.zeros((len(self.rows.problem.parameters), found[0].shape[1]))])
+
+    def of_piece(self, k: int, values: FloatArray) -> FloatArray:
+        """Columns of piece k made white, its start still in them."""
+        parts = [self.memory[c].whitened(values[j], self.rows.there[k][j]) for j, c in enumerate(self.rows.column[k])]
+        return np.concatenate(parts) if parts else np.zeros((0, values.shape[2]))
+
+    def whole(self) -> tuple[FloatArray, FloatArray]:
+        """(e (N,), J (N, P)) of the fit itself, its priors as rows."""
+        e = self.white([r[:, :, None] for r in self.rows.residual])[:, 0]
+        j = self.white(self.rows.slopes)
+        count = len(self.rows.problem.parameters)
+        for i, (p, value) in enumerate(zip(self.rows.problem.parameters, self.rows.point.values, strict=True)):
+            if p.known is not None:
+                mean, std = p.known
+                j[len(j) - count + i, i] = 1.0 / std
+                e[len(e) - count + i] = (mean - p.inner(float(value))) / std
+        return e, j
+
+
+@dataclass(frozen=True, eq=False)
+class Gram:
+    """Scalar products of the columns of [e, J, Z], columns of J and Z scaled to length 1. rows: how many there are.
+
+    matrix (1 + P + K, 1 + P + K); size (1 + P + K,): what each column was divided by.
+    """
+
+    matrix: FloatArray
+    size: FloatArray
+    rows: int
+    count: int
+
+    @classmethod
+    def of(cls, linear: Linear, shown: Shown) -> Gram:
+        """Those of a fit and of what is shown beside it."""
+        e, j = linear.whole()
+        every = np.column_stack([e, j, linear.white(shown)])
+        size = np.linalg.norm(every, axis=0)
+        size[0] = 1.0
+        size[size == 0.0] = 1.0
+        every /= size
+        rows = len(e) - j.shape[1] + sum(p.known is not None for p in linear.rows.problem.parameters)
+        return cls(every.T @ every, size, rows, j.shape[1])
+
+    @property
+    def fitted(self) -> IntArray:
+        """Which columns belong to the parameters of the fit."""
+        return np.arange(1, 1 + self.count)
+
+    def left(self, known: IntArray) -> tuple[Gram, int]:
+        """(what is left of all columns once those `known` explain them, how many directions these are)."""
+        values, vectors = np.linalg.eigh(self.matrix[np.ix_(known, known)])
+        kept = values > SAME * max(float(values.max(initial=0.0)), 1e-300)
+        half = (vectors[:, kept] / np.sqrt(values[kept])).T @ self.matrix[known]
+        return replace(self, matrix=self.matrix - half.T @ half, rows=self.rows - int(kept.sum())), int(kept.sum())
+
+    def explained(self, by: IntArray, least: float) -> tuple[float, int]:
+        """(the part of the sum of e^2 that columns explain, in how many directions longer than sqrt(least))."""
+        if not len(by):
+            return 0.0, 0
+        values, vectors = np.linalg.eigh(self.matrix[np.ix_(by, by)])
+        kept = values > least
+        return float(((vectors[:, kept].T @ self.matrix[by, 0]) ** 2 / values[kept]).sum()), int(kept.sum())
+
+
+def solved(columns: FloatArray, right: FloatArray) -> FloatArray:
+    """The least squares solution of columns (N, K) for right (N,); directions that are one get the shortest."""
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    columns = columns / size
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    kept = values > SAME * max(float(values.max(initial=0.0)), 1e-300)
+    return (vectors[:, kept] @ ((vectors[:, kept].T @ (columns.T @ right)) / values[kept])) / size

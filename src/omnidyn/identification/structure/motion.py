@@ -1,0 +1,143 @@
+"""How a small force on the body shows in what a log holds: the motion of the fitted robot, and its linear answer.
+
+A force that no law of the model describes changes the twist by M d' = f + (dF/dv) d where the robot moves, and not at
+all where friction holds it. The answer is a direction to look in, not a prediction: it is exact to first order in the
+length of a row.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.identification.output_error.engines.actuation import driver_of
+from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
+from omnidyn.model.actuation import Driver, at_motors
+from omnidyn.model.drive import SPEED
+from omnidyn.model.dynamics import acceleration, settled_currents
+from omnidyn.model.layout import N_AXES, YAW
+from omnidyn.model.mass import mass_matrix
+from omnidyn.model.motor import per_wheel
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
+from omnidyn.simulation.simulate import simulate
+
+SMALL = 1e-4  # [m/s, rad/s] of a change of speed for a slope
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A piece as the fitted robot drives it. t (n,); twist (n, 3), pose (n, 3); voltage (n, W) at the motors from each
+    row on, current (n, W); share (n,): of the run that has gone by; decay (n - 1, 3, 3), gain (n - 1, 3, 3): of a
+    change of the twist, and per force, over a row."""
+
+    piece: Piece
+    robot: Robot
+    t: FloatArray
+    twist: FloatArray
+    pose: FloatArray
+    voltage: FloatArray
+    current: FloatArray
+    share: FloatArray
+    decay: FloatArray
+    gain: FloatArray
+
+    def twist_by(self, force: FloatArray) -> FloatArray:
+        """The change of the twist by forces [N, N, N m] from each row on. Shapes (n, K, 3) -> (n, K, 3)."""
+        out = np.zeros_like(force)
+        pushed = np.einsum("nij,nkj->nki", self.gain, force[:-1])
+        for k in range(len(self.decay)):
+            out[k + 1] = out[k] @ self.decay[k].T + pushed[k]
+        return out
+
+    def shown_by(self, force: FloatArray) -> FloatArray:
+        """What the columns of the log show of such forces. Shapes (n, K, 3) -> (C, n, K)."""
+        return self.shown(self.twist_by(force))
+
+    def shown(self, change: FloatArray) -> FloatArray:
+        """What the columns show of a change of the twist (n, K, 3). Shape (C, n, K)."""
+        step = np.diff(self.t)[:, None, None]
+        path = np.concatenate([np.zeros_like(change[:1]), np.cumsum(0.5 * (change[1:] + change[:-1]) * step, axis=0)])
+        found = []
+        for name, i in self.piece.record.columns:
+            if name == "twist":
+                found.append(change[..., i])
+            elif name == "wheel_speed":
+                found.append(wheel_speed(self.robot.wheels, change)[..., i])
+            elif name == "wheel_angle":
+                found.append(wheel_speed(self.robot.wheels, path)[..., i])
+            elif name == "heading":
+                found.append(path[..., YAW])
+            elif name == "current":
+                still = np.zeros((*change.shape[:-1], self.robot.wheels.count))
+                found.append(settled_currents(self.robot, change, still)[..., i])
+            else:
+                found.append(self._position(change, path[..., YAW])[..., i])
+        return np.stack(found)
+
+    def _position(self, change: FloatArray, turned: FloatArray) -> FloatArray:
+        c, s = np.cos(self.pose[:, 2])[:, None], np.sin(self.pose[:, 2])[:, None]
+        vx, vy = self.twist[:, :1], self.twist[:, 1:2]
+        east = c * (change[..., 0] - vy * turned) - s * (change[..., 1] + vx * turned)
+        north = s * (change[..., 0] - vy * turned) + c * (change[..., 1] + vx * turned)
+        both, step = np.stack([east, north], axis=-1), np.diff(self.t)[:, None, None]
+        return np.concatenate([np.zeros_like(both[:1]), np.cumsum(0.5 * (both[1:] + both[:-1]) * step, axis=0)])
+
+
+def motions(problem: Problem, point: Point) -> list[Motion]:
+    """The motion of every piece at a point."""
+    robot, (driver, _) = problem.robot_at(point.values), driver_of(problem, point.values)
+    return [_motion(piece, robot, state, driver) for piece, state in zip(problem.pieces, point.states, strict=True)]
+
+
+def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Motion:
+    record, rows = piece.record, slice(piece.first, piece.last)
+    t = record.t[piece.first : piece.last + 1]
+    if record.set_point is None:
+        asked, _ = at_motors(record.voltage[rows], record.share[rows], driver)
+        run = simulate(robot, asked, np.diff(t), twist=state[:N_AXES])
+    else:
+        run = simulate(robot, dt=np.diff(t), wheel_speed_command=record.set_point[rows])
+    assert run.twist is not None
+    assert run.pose is not None
+    assert run.voltage is not None
+    decay, gain = _answers(robot, run.twist, run.voltage, np.diff(t))
+    current = settled_currents(robot, run.twist, run.voltage)
+    share = record.share[piece.first : piece.last + 1]
+    return Motion(piece, robot, t, run.twist, run.pose, run.voltage, current, share, decay, gain)
+
+
+def _answers(robot: Robot, twist: FloatArray, voltage: FloatArray, dt: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(decay, gain) of every row, by the trapezoidal rule; an axis that rests at both ends of a row stays at rest."""
+    middle, held = 0.5 * (twist[1:] + twist[:-1]), voltage[:-1]
+    rests = (twist[1:] == 0.0) & (twist[:-1] == 0.0)
+    rate = np.empty((len(middle), N_AXES, N_AXES))
+    for axis in range(N_AXES):
+        change = SMALL * np.eye(N_AXES)[axis]
+        up, down = acceleration(robot, middle + change, held), acceleration(robot, middle - change, held)
+        rate[:, :, axis] = (up - down) / (2.0 * SMALL)
+    per_force = np.broadcast_to(np.linalg.inv(mass_matrix(robot)), rate.shape).copy()
+    if robot.drive.kind == SPEED and robot.drive.kp:
+        rate -= _by_the_loop(robot)
+    rate[rests[:, :, None] | rests[:, None, :]] = 0.0
+    per_force[rests] = 0.0
+    # What crosses zero within a row jumps in its friction, not in its slope: no rate may be faster than a row.
+    h = dt[:, None, None]
+    size = np.abs(rate * h).max(axis=(1, 2))
+    rate *= np.minimum(1.0, 1.0 / np.maximum(size, 1e-12))[:, None, None]
+    one = np.eye(N_AXES)
+    left = np.linalg.inv(one - 0.5 * h * rate)
+    decay = left @ (one + 0.5 * h * rate)
+    decay[rests] = 0.0
+    return decay, left @ (h * per_force)
+
+
+def _by_the_loop(robot: Robot) -> FloatArray:
+    """What the proportional part of the speed loop adds to the damping [1/s]. Shape (3, 3)."""
+    g, motor, n = robot.wheels.wrench_matrix, robot.motor, robot.wheels.count
+    push = per_wheel(motor.gear_ratio, n) * per_wheel(motor.torque_constant, n)
+    push = push / (per_wheel(motor.resistance, n) * robot.wheels.radii)
+    kp = per_wheel(robot.drive.kp, n)
+    return np.linalg.inv(mass_matrix(robot)) @ (g * (push * kp / robot.wheels.radii)) @ g.T

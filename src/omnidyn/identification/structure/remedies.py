@@ -1,0 +1,130 @@
+"""Which candidates would explain what a fit leaves, best first, and which of them the log cannot tell apart.
+
+Each is fitted beside all parameters, to first order, in rows made white; its worth is judged on blocks of the log that
+it was not fitted to, and by BIC, so that the simpler of two that explain the same comes first. Two are the same to a
+log where each leaves as much as the other and both together hardly less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.structure.candidates import Candidate, Trial
+from omnidyn.identification.structure.linear import SAME, Linear
+
+BLOCKS = 10  # of the log, each held out once
+TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A candidate at its best trial: where its columns stand, and what it explains."""
+
+    candidate: Candidate
+    trial: Trial
+    at: IntArray
+    chi2: float
+    size: FloatArray
+
+    @property
+    def bic(self) -> float:
+        return self.chi2
+
+
+class Blocks:
+    """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n)."""
+
+    def __init__(self, linear: Linear, shown: Sequence[FloatArray]):
+        e, j = linear.whole()
+        z = linear.white(shown)
+        every = np.column_stack([e, j, z])
+        self.size = np.linalg.norm(every, axis=0)
+        self.size[0] = 1.0
+        self.size[self.size == 0.0] = 1.0
+        every = every / self.size
+        self.count, self.rows = j.shape[1], len(e)
+        self.block = self._blocks(linear, len(e))
+        self.matrix = np.array([every[own].T @ every[own] for own in self.block])
+        self.total = self.matrix.sum(axis=0)
+
+    def _blocks(self, linear: Linear, rows: int) -> list[IntArray]:
+        """Rows by the time at which they stand, in blocks that are whole stretches of time; priors in all of them."""
+        when, pieces = [], linear.rows
+        whole = sum(r.shape[1] for r in pieces.residual)
+        seen = 0
+        for k, there in enumerate(pieces.there):
+            parts = [seen + np.flatnonzero(own) for own in there]
+            extra = int((pieces.pieces[k].start_prior(pieces.point.states[k])[1] > 0.0).sum())
+            own = np.concatenate(parts) if parts else np.zeros(0, int)
+            when.append(np.concatenate([own, np.full(extra if pieces.own[k].shape[2] else 0, seen)]))
+            seen += there.shape[1]
+        at = np.concatenate(when)
+        number = np.minimum(at * BLOCKS // max(whole, 1), BLOCKS - 1)
+        number = np.concatenate([number, np.full(rows - len(number), -1)])
+        return [np.flatnonzero(number == b) for b in range(BLOCKS)]
+
+    def fitted(self, matrix: FloatArray, at: IntArray) -> FloatArray:
+        """What the columns `at` are fitted by."""
+        values, vectors = np.linalg.eigh(matrix[np.ix_(at, at)])
+        kept = values > SAME * values[-1]
+        return vectors[:, kept] @ ((vectors[:, kept].T @ matrix[at, 0]) / values[kept])
+
+    def left(self, at: IntArray) -> float:
+        """The sum of squares that is left with these columns."""
+        by = self.fitted(self.total, at)
+        return float(self.total[0, 0] - by @ self.total[at, 0])
+
+    def held_out(self, at: IntArray) -> FloatArray:
+        """The squared error of each block by a fit to all others. Shape (B,)."""
+        found = []
+        for own in self.matrix:
+            by = self.fitted(self.total - own, at)
+            found.append(own[0, 0] - 2.0 * by @ own[at, 0] + by @ own[np.ix_(at, at)] @ by)
+        return np.array(found)
+
+
+def remedies(linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], most: int = 8) -> tuple[Remedy, ...]:
+    """The candidates that explain something, best first."""
+    flat = [(one, trial) for one, trials in tried for trial in trials]
+    if not flat:
+        return ()
+    shown = [np.concatenate([trial.shown[k] for _, trial in flat], axis=2) for k in range(len(linear.rows.residual))]
+    blocks = Blocks(linear, shown)
+    known = np.arange(1, 1 + blocks.count)
+    base, first, best = blocks.left(known), 1 + blocks.count, {}
+    before = blocks.held_out(known)
+    noise = base / max(blocks.rows - blocks.count, 1)
+    for one, trial in flat:
+        k = trial.shown[0].shape[2]
+        at = np.arange(first, first + k)
+        first += k
+        chi2 = (base - blocks.left(np.concatenate([known, at]))) / noise
+        size = blocks.fitted(blocks.total, np.concatenate([known, at]))[len(known) :] / blocks.size[at]
+        if one.one_sided and k == 1 and size[0] < 0.0:
+            continue
+        if one.key not in best or chi2 > best[one.key].chi2:
+            best[one.key] = Tried(one, trial, at, float(chi2), size)
+    penalty = np.log(max(blocks.rows, 2))
+    ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * len(t.at), reverse=True)
+    worth = [t for t in ranked if t.chi2 > penalty * len(t.at) + 2.0 * np.log(max(len(best), 1))][: 2 * most]
+    found = []
+    for t in worth:
+        after = blocks.held_out(np.concatenate([known, t.at]))
+        change = (before - after) / max(float(before.sum()), 1e-300)
+        gain, std = float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
+        same = tuple(o.candidate.key for o in worth if o is not t and _same(blocks, known, base, noise, t, o))
+        words = t.candidate.told(float(t.size[0]), t.trial.at)
+        found.append(Remedy(t.candidate.key, words, gain, std, same, t.chi2, len(t.at)))
+    return tuple(r for r in found if r.gain > 0.0)[:most]
+
+
+def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried, other: Tried) -> bool:
+    """Whether the log cannot tell two apart: as good as each other, and both hardly better than one."""
+    both = (base - blocks.left(np.concatenate([known, one.at, other.at]))) / noise
+    least = max(TOLD_APART, ROUGHLY * max(one.chi2, other.chi2))  # to first order, for either is a larger change
+    return abs(one.chi2 - other.chi2) < least and both - max(one.chi2, other.chi2) < least

@@ -1,0 +1,65 @@
+"""A fit at its best point, to be simulated anew with something changed: the robot, or what its driver does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.findings.needs import is_exact
+from omnidyn.identification.output_error.prepare import EXACT, IMPLICIT, make_engine
+from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.structure.motion import Motion
+from omnidyn.model.actuation import Driver, at_motors
+from omnidyn.model.robot import Robot
+
+IDEAL = Driver()
+
+
+@dataclass(frozen=True, eq=False)
+class Workbench:
+    """problem, point: of the fit. kind: of its engine. motions: of its pieces."""
+
+    problem: Problem
+    point: Point
+    kind: str
+    motions: Sequence[Motion]
+
+    @property
+    def robot(self) -> Robot:
+        """The fitted robot."""
+        return self.problem.robot_at(self.point.values)
+
+    def change(self, robot: Robot | None = None, driver: Driver = IDEAL) -> list[FloatArray]:
+        """What the columns show of another robot, or behind another driver, less what they show of the fitted one.
+
+        Of each piece (C, rows, 1), 0 where nothing was measured. Raises OmnidynError for what cannot be simulated.
+        """
+        other = robot or self.robot
+        kind = self.kind if self.kind != EXACT else EXACT if is_exact(other) else IMPLICIT
+        before, after = self._residuals(self.robot, IDEAL, kind), self._residuals(other, driver, kind)
+        return [np.nan_to_num(a - b)[:, :, None] for a, b in zip(before, after, strict=True)]
+
+    def by_force(self, force: Callable[[Motion], FloatArray]) -> list[FloatArray]:
+        """What forces (n, K, 3) on the body show. Of each piece (C, rows, K)."""
+        return [motion.shown_by(force(motion)) for motion in self.motions]
+
+    def _residuals(self, robot: Robot, driver: Driver, kind: str) -> list[FloatArray]:
+        known, records = self.problem.robot_count, dict[int, Record]()
+        pieces = [replace(piece, record=_driven(piece, driver, records)) for piece in self.problem.pieces]
+        bare = Problem(robot, self.problem.parameters[known:], 0, tuple(pieces))
+        parts = make_engine(kind, bare).residuals(Point(self.point.values[known:], self.point.states))
+        return [residual for residual, _, _ in parts]
+
+
+def _driven(piece: Piece, driver: Driver, records: dict[int, Record]) -> Record:
+    """The record of a piece with what the driver makes of its voltages; each record once."""
+    own = piece.record
+    if driver == IDEAL:
+        return own
+    if id(own) not in records:
+        records[id(own)] = replace(own, voltage=at_motors(own.voltage, own.share, driver)[0])
+    return records[id(own)]

@@ -1,0 +1,78 @@
+"""Fits to whole logs as people call them: output_error/, and what structure/ says of the fit when it is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Unpack
+
+from omnidyn.arguments import check_order
+from omnidyn.identification.lack_of_fit import Diagnosis
+from omnidyn.identification.options import Options, shows_options
+from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
+from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.solver import Solution, State
+from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+
+
+@shows_options(FIT)
+def fit_output_error(
+    runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None,
+    watch: Callable[[State], object] | None = None, **options: Unpack[Options],
+) -> OutputErrorEstimate:  # fmt: skip
+    """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
+
+    runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
+    question, options: those of `Question` that belong to output error, such as free=, nuisances=, loss=.
+    watch: is called with every better state on the way; a Progress is told in words what is done, too.
+
+    Returns an Estimate with nuisances, noise and what is not identifiable. Errors: see `Fit.of` and `Fit.answer`.
+    """
+    check_order("fit_output_error(runs, robot)", (runs, Run), (robot, Robot))
+    progress = Progress.of(watch)
+    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=progress)
+    return answered(fit, fit.solve(progress), progress).estimate
+
+
+@shows_options(FIT)
+def identify_groups(
+    runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, question: Question | None = None,
+    watch: Callable[[State], object] | None = None, **options: Unpack[Options],
+) -> Answer:  # fmt: skip
+    """Fit logs of several groups at once by output error.
+
+    groups: name of each run's group. question, options, watch: as in `fit_output_error`; per_free= names the numbers
+    that each group has for itself.
+    Raises InputError for what cannot be used, InsufficientDataError where a group says nothing about its numbers, or
+    has too few runs for a bootstrap, UnsupportedError for robots and logs that output error does not take.
+    """
+    check_order("identify_groups(runs, robot, groups)", (runs, Run), (robot, Robot))
+    progress = Progress.of(watch)
+    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
+    return answered(fit, fit.solve(progress), progress)
+
+
+def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
+    """What a solution says, each estimate with its diagnosis, which is made when it is first asked for."""
+    answer = fit.answer(solution, progress)
+    found = {
+        group: replace(estimate, study=_study(seen))
+        for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)
+    }
+    return replace(answer, estimates=found)
+
+
+def _study(solution: Solution) -> Callable[[], Diagnosis]:
+    """The diagnosis of a solution, made once."""
+
+    @cache
+    def study() -> Diagnosis:
+        from omnidyn.identification.structure.diagnosis import diagnose  # here, for it takes time to load
+
+        return diagnose(solution)
+
+    return study
