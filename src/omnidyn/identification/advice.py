@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from omnidyn.document import all_of
 from omnidyn.findings.finding import FATAL, Verdict
-from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.lack_of_fit import Remedy, named
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.shape_residual import between_axes
-from omnidyn.identification.validation import FITTED, HELD_OUT, Validation, coloured
+from omnidyn.identification.output_error.problem.nuisances import NUISANCES
+from omnidyn.identification.structure.candidates import CHANGE
+from omnidyn.identification.validation import Validation
 from omnidyn.logs.steady_table import AXES
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
 from omnidyn.model.robot import GUESS
 
+OFFERED = 2  # remedies that are worth a word
 WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
 LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
@@ -24,8 +27,8 @@ FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
 
 def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]:
     """What to measure or to ask for next, gravest first."""
-    words = [*_not_seen(fit), *_guesses(fit, validation), *_together(fit), *_wide(fit, validation)]
-    words += _from_validation(fit, validation)
+    words = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
+    words += _from_validation(validation)
     return list(dict.fromkeys(words))
 
 
@@ -75,7 +78,35 @@ def _axis(name: str) -> str:
     return "" if key is None or key.axis is None else AXES[key.axis]
 
 
-def _guesses(fit: OutputErrorEstimate, validation: Validation | None) -> Iterator[str]:
+def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
+    """What would mend a model that leaves something out: the best remedies, and how to ask for them."""
+    lack = fit.lack_of_fit
+    if lack is None or not lack.found:
+        return
+    told: set[str] = set()
+    for remedy in lack.remedies:
+        if remedy.key in told or len(told) > OFFERED:
+            continue
+        told |= {remedy.key, *remedy.same_as}
+        alike = f"; these logs cannot tell it from {all_of(list(map(named, remedy.same_as)))}" if remedy.same_as else ""
+        yield f"{remedy.words} would explain what the model leaves out{alike}: {how_to(remedy)}"
+
+
+def how_to(remedy: Remedy) -> str:
+    """What to do about a remedy, in words."""
+    if remedy.same_as:
+        return "measure or weigh one of them, or record what tells them apart (currents, another load)"
+    if remedy.key.partition(".")[0] in NUISANCES:
+        return f"fit it (`nuisances` {remedy.key})"
+    if remedy.key == CHANGE:
+        return "look what happened there; fit the parts as logs of their own"
+    key = find_key(remedy.key)
+    if key is not None and key.part in ("body", "wheels") and key.field != "rotating_frame":
+        return "measure it and put it into the robot file"
+    return f"put {remedy.key} into the robot file, and fit again"
+
+
+def _guesses(fit: OutputErrorEstimate) -> Iterator[str]:
     """What the robot file only guesses, where the model misses something: no friction makes up for a wrong motor."""
     guessed = [
         key for key, prior in fit.robot.priors.items()
@@ -83,12 +114,11 @@ def _guesses(fit: OutputErrorEstimate, validation: Validation | None) -> Iterato
     ]  # fmt: skip
     if FREEABLE[0] in fit.value:
         guessed = [key for key in guessed if key not in GOES_WITH_TORQUE]
-    missed = validation is not None and bool(coloured(validation.scores.get(HELD_OUT) or validation.scores[FITTED]))
-    if guessed and missed:
+    if guessed and _misses(fit):
         free = " ".join(f"`free` {key}" for key in FREEABLE if key in guessed)
         are = "is a guess" if len(guessed) == 1 else "are guesses"
         yield (
-            f"{', '.join(guessed)} {are} of the robot file, and the errors are not white: put in what you can "
+            f"{', '.join(guessed)} {are} of the robot file, and the model leaves something out: put in what you can "
             f"measure{f', or fit what shows in the logs (`free` friction {free})' if free else ''}"
         )
 
@@ -105,7 +135,7 @@ def _together(fit: OutputErrorEstimate) -> Iterator[str]:
         yield f"{', '.join(pairs)}: measure {one} otherwise, or drive at more different speeds"
 
 
-def _wide(fit: Estimate, validation: Validation | None) -> Iterator[str]:
+def _wide(fit: OutputErrorEstimate) -> Iterator[str]:
     """What is known too roughly. A longer log helps against noise only: not where the model itself misses something."""
     shares = {
         name: fit.std[name] / abs(value) for name, value in fit.value.items()
@@ -115,7 +145,7 @@ def _wide(fit: Estimate, validation: Validation | None) -> Iterator[str]:
     if wide:
         known = ", ".join(f"{name} is known within {100.0 * share:.0f} % only" for name, share in wide.items())
         longer = (max(wide.values()) / GOAL) ** 2
-        if validation is not None and coloured(validation.scores[FITTED]):
+        if _misses(fit):
             them = "it" if len(wide) == 1 else "them"
             yield f"{known}: what the model misses widens {them}, and no longer log mends that"
             return
@@ -126,31 +156,11 @@ def _wide(fit: Estimate, validation: Validation | None) -> Iterator[str]:
         )
 
 
-def _from_validation(fit: OutputErrorEstimate, validation: Validation | None) -> Iterator[str]:
-    if validation is None:
-        return
-    scores = validation.scores[FITTED]
-    late = {name: s.lag for name, s in scores.items() if s.lag}
-    if late and not any(name.startswith("latency") for name in fit.nuisances):
-        name, lag = next(iter(late.items()))
-        yield f"{name} is {lag:+.3f} s behind the model: fit it with `nuisances` latency"
-    if coloured(scores) and not fit.nuisances:
-        yield (
-            "errors are not white, so the model misses something: try `nuisances` latency, gain or dead_band, or free "
-            "motor.torque_constant_Nm_A"
-        )
-    yield from _shape(fit, validation)
-    if validation.held_out is None:
+def _misses(fit: OutputErrorEstimate) -> bool:
+    """Whether the model leaves out more than noise."""
+    return fit.lack_of_fit is not None and fit.lack_of_fit.found
+
+
+def _from_validation(validation: Validation | None) -> Iterator[str]:
+    if validation is not None and validation.held_out is None:
         yield "record one more log, of other drives, and hold it out (`hold_out`): only that shows what it is worth"
-
-
-def _shape(fit: OutputErrorEstimate, validation: Validation) -> Iterator[str]:
-    """Friction of another shape than that of the robot file, where errors that last depend on the direction."""
-    found = between_axes(validation.fitted, fit.robot) if coloured(validation.scores[FITTED]) else None
-    if found is not None and found.clear:
-        way = "faster" if found.change > 0.0 else "slower"
-        yield (
-            f"between its axes the robot is {abs(found.change):.2g} +- {found.std:.1g} m/s {way} against the model "
-            "than along them, as with friction of another shape than that of the robot file: `method` steady-state "
-            "says which shape the logs have"
-        )

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from omnidyn.document import Document, Part, Points, Table, apart, interval_cell
 from omnidyn.findings.finding import FATAL, WARN, Verdict
 from omnidyn.identification.estimate import NOT_DETERMINED
+from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_parts import Difference
@@ -26,8 +27,13 @@ def fit_document(
     for group, fit in fits.items():
         beside = [validations[group].document()] if group in validations else []
         told = [fit.document(), *beside]
+        found = fit.diagnosis
         blocks += [[f"group {group}"] if len(fits) > 1 else [], *(each.parts for each in told)]
-        groups[group] = {**fit.to_dict(), "validation": beside[0].data if beside else None}
+        blocks += _found(found) if found else []
+        groups[group] = {
+            **fit.to_dict(), "validation": beside[0].data if beside else None,
+            "lack_of_fit": found.lack_of_fit.to_dict() if found else None, "rests_on": fit.rests_on,
+        }  # fmt: skip
     blocks.append([difference_table(differences)] if differences else [])
     blocks.append(["next:", Points(advice, name="next")] if advice else [])
     data = {
@@ -36,6 +42,12 @@ def fit_document(
         "check": [{"source": each.source, "fatal": each.fatal, "counts": each.counts} for each in verdicts],
     }  # fmt: skip
     return Document(apart(*blocks), data, [words for fit in fits.values() for words in fit.warnings], ascii=True)
+
+
+def _found(diagnosis: Diagnosis) -> list[Sequence[Part]]:
+    """What the model leaves out, and what the numbers rest on."""
+    rests = diagnosis.table()
+    return [diagnosis.lack_of_fit.parts(), ["what each number rests on:", rests] if rests else []]
 
 
 def number_table(fit: OutputErrorEstimate) -> Table:

@@ -6,8 +6,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from omnidyn.arrays import FloatArray
 from omnidyn.document import Part, Table, all_of, plain
 from omnidyn.model.keys import find_key, in_words
+
+WORTH = 0.01  # share of the variance of a residual that is worth a line
+MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
 
 @dataclass(frozen=True)
@@ -36,13 +40,28 @@ class Remedy:
 
 
 @dataclass(frozen=True, eq=False)
+class Binned:
+    """Residuals of an output against something, in bins: at (n,), mean (n,) and two standard errors of it (n,).
+
+    unit: of the output; against: what, with its unit, in words.
+    """
+
+    output: str
+    unit: str
+    against: str
+    at: FloatArray
+    mean: FloatArray
+    error: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class LackOfFit:
     """Whether residuals hold more than noise, and what would explain it.
 
     found: whether they do. channels: output -> share of the variance of its residuals that is no noise. sizes: output
     -> what that is, root mean square, in the unit of the output. follows: what residuals follow, first what explains
     most. remedies: best first; those that the log cannot tell from each other name each other in `same_as`. tested:
-    what they were tested for -> chance of as much by noise alone.
+    what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst.
     """
 
     found: bool
@@ -51,6 +70,7 @@ class LackOfFit:
     follows: tuple[Found, ...]
     remedies: tuple[Remedy, ...]
     tested: Mapping[str, float]
+    pictures: tuple[Binned, ...] = ()
 
     def words(self) -> str:
         """In a sentence, "" for a model that fits."""
@@ -68,17 +88,27 @@ class LackOfFit:
         same = f", or what this log cannot tell from it ({', '.join(map(named, best.same_as))})" if best.same_as else ""
         return f"{words}; most likely {best.words}{same}"
 
-    def parts(self) -> list[Part]:
-        """As lines and a table."""
-        if not self.found:
-            return ["the residuals hold nothing but noise, as far as this log can tell"]
+    def table(self) -> Table:
+        """The remedies, a row each."""
         rows = [
-            (r.key, r.words, f"{100.0 * r.gain:.2g} +- {100.0 * r.gain_std:.1g} %", ", ".join(r.same_as))
+            (r.words, r.key, f"{100.0 * r.gain:.2g} +- {100.0 * r.gain_std:.1g} %", all_of(list(map(named, r.same_as))))
             for r in self.remedies
         ]  # fmt: skip
-        head = ("what may be missing", "in words", "held-out error less by", "the same to this log")
-        table = [Table(head, rows, "<<><")] if rows else []
-        return [f"{self.words()}", *table]
+        return Table(("what may be missing", "key", "held-out error less by", "the same to this log"), rows, "<<><")
+
+    def statements(self) -> list[str]:
+        """What was found, a sentence each."""
+        if not self.found:
+            return ["the residuals hold nothing but noise, as far as these logs tell"]
+        shares = [
+            f"{name}: {self.sizes[name]:.2g} of its residual is no noise, {100.0 * share:.0f} % of the variance"
+            for name, share in self.channels.items() if share >= WORTH
+        ]  # fmt: skip
+        return [self.words(), *shares]
+
+    def parts(self) -> list[Part]:
+        """As lines and a table."""
+        return [*self.statements(), *([self.table()] if self.remedies and self.found else [])]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -95,6 +125,15 @@ class Diagnosis:
 
     lack_of_fit: LackOfFit
     rests_on: Mapping[str, Mapping[str, float]]
+
+    def table(self) -> Table | None:
+        """What each number rests on, a row each; None where nothing moves any."""
+        rows = []
+        for name, by in self.rests_on.items():
+            told = [f"{named(key)} {100.0 * share:+.2g} %" for key, share in by.items() if abs(share) >= MOVES]
+            if told:
+                rows.append((named(name), name, ", ".join(told[:MOST_NAMED])))
+        return Table(("number", "key", "moves, for +1 % of"), rows, "<<<") if rows else None
 
 
 def named(key: str) -> str:

@@ -43,8 +43,14 @@ def fits_verdict(
         logs = sum(each.fatal for each in verdicts)
         of = "the log has" if len(verdicts) == 1 else f"{logs} of {len(verdicts)} logs have"
         words.append(sentence(f"{of} a fatal fault, to be mended first: {faults[0].message}"))
-    told = {group: fit_verdict(fit, validations.get(group)) for group, fit in fits.items()}
+    told = {group: _led_by_misfit(fit, fit_verdict(fit, validations.get(group))) for group, fit in fits.items()}
     return " ".join([*words, *(each if len(told) == 1 else f"{group}: {each}" for group, each in told.items())])
+
+
+def _led_by_misfit(fit: OutputErrorEstimate, words: str) -> str:
+    """The verdict of a fit, led by what it leaves out."""
+    lack = fit.lack_of_fit
+    return f"{sentence(lack.words())} {words}" if lack is not None and lack.found and not fit.not_followed else words
 
 
 def steady_verdict(study: SteadyStudy) -> str:

@@ -20,6 +20,7 @@ from omnidyn.model.known.uncertainty import DRAWS
 from omnidyn.model.robot import Robot
 from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.correlation import draw_correlation
+from omnidyn.report.figures.misfit import draw_misfit
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
 from omnidyn.report.figures.residuals import draw_residuals
@@ -57,6 +58,8 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
         section("friction", "Friction against speed", friction),
         dead_zone_section({group: fit.robot for group, fit in fits.items()}),
         *([section("path", "Where the logs went", draw_path(travelled))] if travelled else []),
+        Section("misfit", "What the model leaves out", _each(fits, _misfit)),
+        Section("rests", "What the numbers rest on", _each(fits, _rests)),
         Section("residuals", "What the model leaves", residuals),
         Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
         Section("numbers", "Numbers, with 95 % intervals", numbers),
@@ -95,6 +98,20 @@ def _runs(fits: Fits, group: str, validation: Validation) -> str:
     if validation.held_out is not None:
         pictures.append(_renamed(_overlay(robot, validation.held_out), f"overlay-held-out{group}", "on a log held out"))
     return content(*pictures)
+
+
+def _misfit(group: str, fit: OutputErrorEstimate) -> str:
+    """Whether residuals hold more than noise, with a picture of it, and what would explain it."""
+    lack = fit.lack_of_fit
+    if lack is None:
+        return paragraph("Not looked for: the fit was cut short.")
+    drawn = [draw_misfit(lack.pictures, _anchor(f"misfit{group}"))] if lack.pictures else []
+    return content(Points(lack.statements()), *drawn, *([lack.table()] if lack.found and lack.remedies else []))
+
+
+def _rests(_group: str, fit: OutputErrorEstimate) -> str:
+    table = fit.diagnosis.table() if fit.diagnosis else None
+    return content(table) if table else paragraph("On nothing that was taken as it stands.")
 
 
 def _measured(validations: Mapping[str, Validation]) -> list[tuple[str, Run]]:

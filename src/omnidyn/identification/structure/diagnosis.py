@@ -8,6 +8,7 @@ from scipy.special import chdtrc
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
+from omnidyn.identification.structure.binned import binned
 from omnidyn.identification.structure.laws import candidates
 from omnidyn.identification.structure.linear import Rows
 from omnidyn.identification.structure.misfit import FALSE, Misfit, misfit
@@ -16,12 +17,14 @@ from omnidyn.identification.structure.remedies import remedies
 from omnidyn.identification.structure.rests_on import rests_on
 from omnidyn.identification.structure.workbench import Workbench
 
+MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
+
 
 def diagnose(solution: Solution) -> Diagnosis:
     """What is wrong with a fit at its best point."""
     solver, point = solution.solver, solution.state.point
-    problem = solver.problem
-    engine: RowEngine = solver.engine  # pyright: ignore[reportAssignmentType]  # those of whole logs are
+    problem = solver.problem.shortened(MOST_ROWS)
+    engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     rows, moved = Rows.of(problem, point, engine.residuals(point)), motions(problem, point)
     seen = misfit(rows, moved)
     bench = Workbench(problem, point, engine_kind(solver.engine), moved)
@@ -31,9 +34,11 @@ def diagnose(solution: Solution) -> Diagnosis:
     found = bool(seen.found or strong)
     told = ranked if found else ()
     names = [f"{name}[{i}]" for name, i in problem.columns]
+    pictures = binned(rows, moved, int(np.argmax(seen.shares))) if found else ()
     lack = LackOfFit(
-        found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested
-    )
+        found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
+        pictures,
+    )  # fmt: skip
     return Diagnosis(lack, rests_on(seen.linear, bench))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ class Workbench:
     point: Point
     kind: str
     motions: Sequence[Motion]
+    _before: dict[str, list[FloatArray]] = field(default_factory=dict)
 
     @property
     def robot(self) -> Robot:
@@ -36,12 +37,15 @@ class Workbench:
     def change(self, robot: Robot | None = None, driver: Driver = IDEAL) -> list[FloatArray]:
         """What the columns show of another robot, or behind another driver, less what they show of the fitted one.
 
-        Of each piece (C, rows, 1), 0 where nothing was measured. Raises OmnidynError for what cannot be simulated.
+        Of each piece (C, rows, 1), 0 where nothing was measured. By a step a row where the implicit engine simulates:
+        what that is off by goes out of the difference. Raises OmnidynError for what cannot be simulated.
         """
         other = robot or self.robot
         kind = self.kind if self.kind != EXACT else EXACT if is_exact(other) else IMPLICIT
-        before, after = self._residuals(self.robot, IDEAL, kind), self._residuals(other, driver, kind)
-        return [np.nan_to_num(a - b)[:, :, None] for a, b in zip(before, after, strict=True)]
+        if kind not in self._before:
+            self._before[kind] = self._residuals(self.robot, IDEAL, kind)
+        after = self._residuals(other, driver, kind)
+        return [np.nan_to_num(a - b)[:, :, None] for a, b in zip(self._before[kind], after, strict=True)]
 
     def by_force(self, force: Callable[[Motion], FloatArray]) -> list[FloatArray]:
         """What forces (n, K, 3) on the body show. Of each piece (C, rows, K)."""
@@ -51,7 +55,7 @@ class Workbench:
         known, records = self.problem.robot_count, dict[int, Record]()
         pieces = [replace(piece, record=_driven(piece, driver, records)) for piece in self.problem.pieces]
         bare = Problem(robot, self.problem.parameters[known:], 0, tuple(pieces))
-        parts = make_engine(kind, bare).residuals(Point(self.point.values[known:], self.point.states))
+        parts = make_engine(kind, bare, None).residuals(Point(self.point.values[known:], self.point.states))
         return [residual for residual, _, _ in parts]
 
 
