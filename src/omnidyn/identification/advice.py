@@ -10,7 +10,7 @@ from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.shape_residual import between_axes
 from omnidyn.identification.validation import FITTED, HELD_OUT, Validation, coloured
-from omnidyn.logs.steady_table import AXES
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
 from omnidyn.model.robot import GUESS
 

@@ -20,7 +20,8 @@ from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.steady.doubts import ORIGIN, about_line, about_points
 from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
-from omnidyn.logs.steady_table import AXES, SteadyTable
+from omnidyn.logs.steady_table import SteadyTable
+from omnidyn.model.frames import AXES
 from omnidyn.model.friction import AxesFriction
 from omnidyn.model.keys import unit, with_priors
 from omnidyn.model.known.told import with_correlation

@@ -31,7 +31,7 @@ from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
+from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.layout import YAW
@@ -250,7 +250,7 @@ def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: boo
     coulomb = before.axes.coulomb[2] + before.direction.yaw_coulomb
     viscous = before.axes.viscous[2] + before.direction.yaw_viscous
     on_axes = fit.shape.name.startswith("box")
-    names = (f"{AXES}.coulomb[2]", f"{AXES}.viscous[2]") if on_axes else (
+    names = (f"{BODY_AXES}.coulomb[2]", f"{BODY_AXES}.viscous[2]") if on_axes else (
         f"{DIRECTION}.yaw_coulomb", f"{DIRECTION}.yaw_viscous"
     )  # fmt: skip
     kept = {key: level for key, level in zip(names, (coulomb, viscous), strict=True) if level > 0.0}

@@ -14,11 +14,11 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Table, Words, all_of, plain
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
+from omnidyn.model.frames import AXES
 from omnidyn.model.known.told import numbers_told, told
 from omnidyn.model.known.uncertainty import DRAWS, Interval, effects, interval_of
 from omnidyn.model.robot import GUESS, Robot
 
-AXES = ("x", "y", "yaw")
 WAYS = {"x": "forward", "y": "sideways", "yaw": "turning"}
 AROUND = np.radians(np.arange(0.0, 360.0, 5.0))  # directions of travel that are answered for
 HALVINGS = 20  # of a drawn robot: a millionth of its voltage
