@@ -1,4 +1,4 @@
-"""Doubts about steady points and the lines through them, in words that a reader can act on."""
+"""Warnings of steady points and the lines through them, in words that a reader can act on."""
 
 from __future__ import annotations
 
