@@ -87,7 +87,7 @@ def test_output_error_is_the_default_and_predicts_a_log_it_never_saw(call, tmp_p
     prior = robot.priors[COULOMB]
     assert abs(robot.friction.axes.coulomb[0] - 2.2) < 4.0 * prior.std
     page = (tmp_path / "r.html").read_text("utf-8")
-    for anchor in ("numbers", "dead-zone", "data", "runs", "residuals", "correlation", "doubts", "next", "made"):
+    for anchor in ("numbers", "dead-zone", "data", "runs", "residuals", "correlation", "warnings", "next", "made"):
         assert f'id="{anchor}"' in page
     assert "on a log held out" in page
     assert '<th scope="col">voltage V</th>' in page

@@ -24,10 +24,11 @@ def half(x):
 
 
 @pytest.fixture
-def few(monkeypatch):
+def few(monkeypatch, tmp_path):
     """One kernel, with a run that needs it, instead of all."""
     compiled = kernel(half)
     compiled._cache.flush()
+    monkeypatch.setattr("omnidyn.compiled.warmed.place", lambda: tmp_path / "warmed.json")
     monkeypatch.setattr("omnidyn.identification.first_runs.first_runs", lambda: [("halves", lambda: compiled(1.0))])
     monkeypatch.setattr("omnidyn.compiled.kernel.kept", lambda: [compiled._cache])
     yield compiled
@@ -47,6 +48,21 @@ def test_it_says_what_it_compiled_and_where_that_lies(few, capsys):
     out, err = warm(capsys)
     assert err == ""
     assert out.startswith("all is there (")
+
+
+def test_where_all_is_there_nothing_is_run(few, capsys, monkeypatch):
+    first = json.loads(warm(capsys, "--json").out)
+    monkeypatch.delattr("omnidyn.identification.first_runs.first_runs")
+    again = json.loads(warm(capsys, "--json").out)
+    assert again == first | {"compiled": [], "provenance": again["provenance"]}
+
+
+def test_what_was_dropped_meanwhile_is_made_again(few, capsys, monkeypatch):
+    warm(capsys)
+    few._cache.flush()
+    monkeypatch.setattr("omnidyn.identification.first_runs.first_runs", lambda: [("halves", lambda: kernel(half)(1.0))])
+    assert warm(capsys).out.startswith("1 compiled in ")
+    assert warm(capsys).out.startswith("all is there (")
 
 
 def test_for_machines(few, capsys):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from omnidyn.compiled import kernel as compiled
-from omnidyn.compiled.linking import Piece
+from omnidyn.compiled.linking import Linked
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -48,7 +48,7 @@ def test_a_piece_that_is_called_from_python_is_compiled_for_itself(piece):
 
 
 def test_an_unknown_numba_compiles_pieces_in_its_own_way(monkeypatch):
-    """With a version that nobody tried, older or newer: no Piece, no private option."""
+    """With a version that nobody tried, older or newer: no Linked, no private option."""
     monkeypatch.setattr(compiled, "TRIED", frozenset())
     inner = compiled.part(thrice_at)
     assert type(inner) is type(numba.njit(thrice_at))
@@ -60,7 +60,7 @@ def test_an_unknown_numba_compiles_pieces_in_its_own_way(monkeypatch):
 def test_this_numba_was_tried():
     """If this fails, another numba is installed: run tests/compiled, time a first run, and enter it in TRIED."""
     assert numba.version_info.short in compiled.TRIED
-    assert isinstance(compiled.part(thrice_at), Piece)
+    assert isinstance(compiled.part(thrice_at), Linked)
 
 
 @pytest.mark.parametrize("lock", ["core", "everything"])

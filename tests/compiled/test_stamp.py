@@ -24,7 +24,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 
 def forget():
-    for each in (stamp.reach, stamp.read, stamp._passed, stamp._tools):
+    for each in (stamp.reach, stamp.read, stamp._passed, stamp.tools):
         each.cache_clear()
 
 
@@ -225,7 +225,7 @@ def test_the_stamp_covers_compiler_and_settings(monkeypatch, fresh, what, name):
     before = stamp.stamp(home)
     assert hasattr(what, name)
     monkeypatch.setattr(what, name, "another")
-    stamp._tools.cache_clear()
+    stamp.tools.cache_clear()
     assert stamp.stamp(home) != before
 
 

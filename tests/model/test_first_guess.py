@@ -9,7 +9,7 @@ from omnidyn.errors import InputError, OmnidynError
 from omnidyn.model.deadzone import axis_patterns, dead_zone_force
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.first_guess import (
-    AXES,
+    BODY_AXES,
     WHY,
     default_prior,
     even_azimuths,
@@ -78,7 +78,7 @@ def test_it_reaches_a_metre_per_second_and_pushes_with_8_m_s2(wheels, shape):
 
 
 def test_a_disc_and_a_box_have_the_same_levels():
-    box = first_guess("mini", omni(), 8.0, shape=AXES)
+    box = first_guess("mini", omni(), 8.0, shape=BODY_AXES)
     assert box.friction == Friction(axes=AxesFriction(viscous=(3.14, 3.14, 0.0491), coulomb=(15.7, 15.7, 0.981)))
     assert box.motor == MINI.motor
 
@@ -89,7 +89,12 @@ def test_it_rests_up_to_its_friction():
 
 def test_every_number_says_where_it_comes_from_and_every_guess_how_wide():
     looped = first_guess("looped", omni(), 8.0, speed_loop=(100.0,))
-    for robot in (MINI, first_guess("box", omni(), 8.0, shape=AXES), first_guess("known", omni(), 8.0, 11.1), looped):
+    for robot in (
+        MINI,
+        first_guess("box", omni(), 8.0, shape=BODY_AXES),
+        first_guess("known", omni(), 8.0, 11.1),
+        looped,
+    ):
         for key in map(Key.parse, all_keys(robot)):
             prior, value = robot.priors.get(str(key)) or robot.priors[key.name], key.get(robot)
             assert (prior.std is not None) == (prior.origin == GUESS)
@@ -97,7 +102,7 @@ def test_every_number_says_where_it_comes_from_and_every_guess_how_wide():
         assert {key for key, _ in reasons(robot)} <= set(WHY)
         assert len(reasons(robot)) == len({Key.parse(key).name for key, p in robot.priors.items() if p.std})
     assert set(WHY) == {
-        key for robot in (MINI, first_guess("box", omni(), 8.0, shape=AXES), looped) for key, _ in reasons(robot)
+        key for robot in (MINI, first_guess("box", omni(), 8.0, shape=BODY_AXES), looped) for key, _ in reasons(robot)
     }
 
 

@@ -33,7 +33,7 @@ def page(found):
 
 
 def test_verdict_then_pictures_then_tables(page):
-    keys = ["findings", "doubts", "next", "runs", "friction", "path", "residuals", "correlation", "numbers", "scores"]
+    keys = ["findings", "warnings", "next", "runs", "friction", "path", "residuals", "correlation", "numbers", "scores"]
     places = [page.index(f'<section id="{key}">') for key in keys]
     assert places == sorted(places)
     first_table = page.index("<table")
@@ -55,7 +55,7 @@ def test_a_logged_duty_is_called_duty(page, found):
 
 
 def test_the_first_words_are_the_verdict_and_the_log_s_own_numbers_are_in_the_table_only(page, found):
-    findings = page[page.index('<section id="findings">') : page.index('<section id="doubts">')]
+    findings = page[page.index('<section id="findings">') : page.index('<section id="warnings">')]
     said = next(iter(found.validations.values())).statements()
     assert next(iter(said)) in Reader(findings).text
     assert "latency" not in findings

@@ -51,7 +51,7 @@ def test_it_is_whole_and_every_id_is_there_once(page):
         "data",
         "shapes",
         "forces",
-        "doubts",
+        "warnings",
         "next",
         "made",
         "force_polar",

@@ -219,8 +219,8 @@ def _verdict(run: Run, moved: bool) -> str:
         return "It never moved: the voltages stay within the dead zone (see: omnidyn deadzone)."
     east, north, turned = (run.pose[-1] - run.pose[0]).tolist()
     rest = "at rest" if not run.twist[-1].any() else "still in motion"
-    doubts = f"; {len(run.warnings)} thing{'s' * (len(run.warnings) > 1)} to heed" if run.warnings else ""
+    heed = f"; {len(run.warnings)} thing{'s' * (len(run.warnings) > 1)} to heed" if run.warnings else ""
     return (
         f"In {run.t[-1] - run.t[0]:.4g} s the robot came {math.hypot(east, north):.3g} m from where it began and "
-        f"turned by {math.degrees(turned):.3g} degrees; it is {rest} at the end{doubts}."
+        f"turned by {math.degrees(turned):.3g} degrees; it is {rest} at the end{heed}."
     )

@@ -18,15 +18,18 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
     """Compile all that first runs need, once.
 
     Small runs and fits of every kind are made; what is compiled for them stays on disk. Takes about a minute, and
-    seconds where all is there. After an update only what has changed is compiled.
+    a second where all is there. After an update only what has changed is compiled.
     """
     started = time.monotonic()
     with progress("loading", hint="") as now, heard() as compiling:
-        _make(now, compiling)
-    seconds = time.monotonic() - started
-    from omnidyn.compiled.kernel import kept
+        from omnidyn.compiled.warmed import circumstances, recalled, remember  # not above: `--help` needs no numba
 
-    caches = kept()
+        made_with = circumstances()
+        caches = recalled(made_with)
+        if not caches:
+            caches = _make(now, compiling)
+            remember(caches, made_with)
+    seconds = time.monotonic() - started
     if not caches:
         say("omnidyn: warning: no folder is writable, so each process compiles for itself; name one in NUMBA_CACHE_DIR")
         result: dict[str, Any] = {"folders": [], "entries": 0, "bytes": 0}
@@ -38,8 +41,9 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
     _tell({"compiled": [{"kernel": name, "seconds": s} for name, s in compiling.done], **result}, seconds, json)
 
 
-def _make(now: Callable[[str], None], compiling: Compiling) -> None:
-    """Every run and fit, in turn; says which of them had to wait, for what and how long."""
+def _make(now: Callable[[str], None], compiling: Compiling) -> list[Any]:
+    """Every run and fit, in turn; says which of them had to wait, for what and how long. Returns their kernels."""
+    from omnidyn.compiled.kernel import kept
     from omnidyn.identification.first_runs import first_runs
 
     every = first_runs()
@@ -50,6 +54,7 @@ def _make(now: Callable[[str], None], compiling: Compiling) -> None:
         new = compiling.done[done:]
         if new:
             say(f"omnidyn: {step}: {', '.join(f'{name} {seconds:.1f} s' for name, seconds in new)}")
+    return kept()
 
 
 def _tell(result: dict[str, Any], seconds: float, json: bool) -> None:

@@ -68,7 +68,7 @@ def compare(
         difference=_differences([*traces.values()], kept, seed) if len(robots) == 2 else {},
         current_unsigned=current_unsigned,
         rests_on={name: tuple(rests_on(model)) for name, model in robots.items()},
-        warnings=(*_warnings(runs, replays), *_sign_doubts(runs, traces, current_unsigned)),
+        warnings=(*_warnings(runs, replays), *_sign_warnings(runs, traces, current_unsigned)),
     )
     if not band:
         return found
@@ -178,7 +178,7 @@ def _applied(replays: Sequence[Replay]) -> str:
     return "; or ".join(dict.fromkeys(each.words for each in replays))
 
 
-def _sign_doubts(
+def _sign_warnings(
     runs: Sequence[Run], traces: Mapping[str, Mapping[str, list[Trace]]], current_unsigned: bool
 ) -> Iterator[str]:
     """Currents that are never negative where a model has them both ways: the sensor may have no sign."""

@@ -64,14 +64,14 @@ def replay(
     try:
         refuse_other_robot(robot, run)
         applied = choose_input(robot, run, apply)
-        pieces, inputs, supply, doubts = _prepared(run, applied, hold)
+        pieces, inputs, supply, warnings = _prepared(run, applied, hold)
         parts = [_free_run(robot, run, rows, applied, inputs, supply, tol) for rows in pieces]
     except OmnidynError as error:
         raise error.at(run.source) if run.source else error from None
-    doubts += [*_from_simulation(parts), *_loop_doubts(robot, run, applied, parts)]
+    warnings += [*_from_simulation(parts), *_loop_warnings(robot, run, applied, parts)]
     whole = _assembled(run, robot, pieces, [part for part, _ in parts])
     words = _words(robot, applied, supply)
-    return Replay(whole, tuple(pieces), applied, words, tuple(doubts))
+    return Replay(whole, tuple(pieces), applied, words, tuple(warnings))
 
 
 def refuse_other_robot(robot: Robot, run: Run) -> None:
@@ -155,14 +155,16 @@ def _prepared(run: Run, applied: str, hold: float) -> tuple[list[slice], FloatAr
             expected=f"{FEWEST} rows in a row without a gap", remedy="look at the log with omnidyn check",
         )  # fmt: skip
     left = len(run) - sum(piece.stop - piece.start for piece in kept)
-    doubts = []
+    warnings = []
     if len(stretches) > 1:
         gaps = "1 gap" if len(stretches) == 2 else f"{len(stretches) - 1} gaps"
-        doubts.append(f"{gaps} in time: each piece starts anew from the measured state")
+        warnings.append(f"{gaps} in time: each piece starts anew from the measured state")
     if left:
-        doubts.append(f"{left} of {len(run)} rows are not replayed: inputs missing for more than {hold:g} s, or alone")
+        warnings.append(
+            f"{left} of {len(run)} rows are not replayed: inputs missing for more than {hold:g} s, or alone"
+        )
     width = inputs.shape[1]
-    return kept, held[:, :width], held[:, width] if supply is not None else None, doubts
+    return kept, held[:, :width], held[:, width] if supply is not None else None, warnings
 
 
 def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatArray, BoolArray]:
@@ -245,23 +247,23 @@ def _from_simulation(parts: list[tuple[Run, str]]) -> list[str]:
     return [*words[:SHOWN], *more, *told]
 
 
-def _loop_doubts(robot: Robot, run: Run, applied: str, parts: list[tuple[Run, str]]) -> list[str]:
+def _loop_warnings(robot: Robot, run: Run, applied: str, parts: list[tuple[Run, str]]) -> list[str]:
     """What a log does not tell about the speed loop in the firmware."""
-    doubts, drive = [], robot.drive
+    warnings, drive = [], robot.drive
     if drive.kind != SPEED:
-        return doubts
+        return warnings
     moving = sum(bool(np.any(part.twist[0])) for part, _ in parts if part.twist is not None)
     if applied in SET_SPEEDS and moving and np.any(np.asarray(drive.ki) > 0.0):
-        doubts.append(
+        warnings.append(
             f"the integral of the speed loop was not logged: it starts at 0 in {moving} pieces that start moving"
         )
     usual = float(np.median(np.diff(run.t)))
     if applied == "voltage" and usual * (drive.rate or 0.0) > 1.5:
-        doubts.append(
+        warnings.append(
             f"the speed loop sets the voltage every {1e3 / (drive.rate or 1.0):.3g} ms, the log has one every "
             f"{1e3 * usual:.3g} ms: between its rows the voltage is taken as held"
         )
-    return doubts
+    return warnings
 
 
 def _words(robot: Robot, applied: str, supply: FloatArray | None) -> str:

@@ -1,6 +1,6 @@
 """How machine code is made of Python functions, kept on disk, and never served stale.
 
 `kernel`: the one way to compile: entry points and the parts they are made of. `stamp`: what the machine code of a
-kernel depends on. `entries`: its place on disk. `linking`: parts are optimised once, in the kernel that calls them.
-`hearing`: who waits for a compiler can hear of it. Read `kernel` first.
+kernel depends on. `entries`: its place on disk. `warmed`: that all of them are there. `linking`: parts are optimised
+once, in the kernel that calls them. `hearing`: who waits for a compiler can hear of it. Read `kernel` first.
 """

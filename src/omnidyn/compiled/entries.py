@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from numba.core.caching import FunctionCache, _Cache
 from numba.core.serialize import dumps
@@ -40,6 +40,7 @@ class Entries(_Cache):
         self._stem = re.sub(r"[^\w.]", "", f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}")
         self._enabled = True
         self.stamp = stamp(function)
+        self.asked: set[Path] = set()  # the entries that this process has needed, found or not
 
     @property
     def cache_path(self) -> Any:
@@ -50,7 +51,9 @@ class Entries(_Cache):
         """The compiled function; None where there is none of this stamp, or none that is whole."""
         target_context.refresh()
         key = self._key(sig, target_context.codegen())
-        content = self._content(self._file(key)) if self._enabled else None
+        file = self._file(key)
+        self.asked.add(file)
+        content = self.content(file) if self._enabled else None
         if content is None:
             return None
         try:
@@ -94,7 +97,7 @@ class Entries(_Cache):
     def _head(self, content: bytes) -> bytes:
         return self.stamp.encode() + hashlib.sha256(content).digest()
 
-    def _content(self, file: Path) -> bytes | None:
+    def content(self, file: Path) -> bytes | None:
         """What stands in an entry behind its head; None where the head is not the right one."""
         try:
             whole = file.read_bytes()
@@ -102,6 +105,15 @@ class Entries(_Cache):
             return None
         size = len(self._head(b""))
         return whole[size:] if whole[:size] == self._head(whole[size:]) else None
+
+
+class Keeper(Protocol):
+    """What taking stock needs to know of a kernel: its stamp, and the folder of its entries."""
+
+    @property
+    def stamp(self) -> str: ...
+    @property
+    def cache_path(self) -> str: ...
 
 
 @dataclass(frozen=True)
@@ -114,7 +126,7 @@ class Stock:
     dropped: int
 
 
-def take_stock(caches: Sequence[Entries]) -> Stock:
+def take_stock(caches: Sequence[Keeper]) -> Stock:
     """Count the entries of all kernels, and drop those beside them that none would take.
 
     A kernel replaces its own entries. Those of one that has been renamed, or is no more, would stay for ever.

@@ -55,7 +55,7 @@ def kept() -> list[Any]:
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A piece of a kernel: compiled into the kernels that call it, never cached by itself.
+    """A function inside kernels: compiled into the kernels that call it, never cached by itself.
 
     It works in arrays that its kernel holds, and does not count who holds them: numba lets it neither make nor return
     one.
@@ -64,12 +64,12 @@ def part(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def maker(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A piece of a kernel that makes arrays, for kernels and other makers: a part would never let go of them."""
+    """A function inside kernels that makes arrays, for kernels and other makers: a part would never let go of them."""
     return _linked(function, counted=True)
 
 
 def _linked(function: Callable[..., Any], counted: bool) -> Any:
-    """A piece of kernels; where numba is switched off, for debuggers, the function itself.
+    """A function inside kernels; where numba is switched off, for debuggers, the function itself.
 
     numba counts who holds an array: it adds and removes one, atomically, around nearly every call that has a branch. In
     small functions of arithmetic that costs three times as much as the rest.
@@ -79,6 +79,6 @@ def _linked(function: Callable[..., Any], counted: bool) -> Any:
     whole = numba.njit(error_model=ERROR_MODEL, **options)(function)
     if whole is function or not tried:
         return whole
-    from omnidyn.compiled.linking import Piece
+    from omnidyn.compiled.linking import Linked
 
-    return Piece(whole)
+    return Linked(whole)

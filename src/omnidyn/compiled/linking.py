@@ -1,9 +1,9 @@
 """Parts of kernels: code to link, optimised once, in the kernel that calls it.
 
 numba makes wrappers and machine code of every function, and to that end optimises each together with all that it calls:
-a formula at the bottom once for every function above it. Only kernels are ever called from outside. A piece therefore
-stays as it was written until a kernel takes it: a first run takes half the time, with the same numbers to the last bit.
-Compilers of one's own are open to users of numba, the library of code is private to it: tests watch.
+a formula at the bottom once for every function above it. Only kernels are ever called from outside. A linked function
+therefore stays as it was written until a kernel takes it: a first run takes half the time, with the same numbers to the
+last bit. Compilers of one's own are open to users of numba, the library of code is private to it: tests watch.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.registry import CPUDispatcher
 
 
-class Piece(CPUDispatcher):
+class Linked(CPUDispatcher):
     """A function that kernels link; called from Python, which only tests do, it is compiled for itself as well."""
 
     def __init__(self, whole: Any):
         options = whole.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        super().__init__(whole.py_func, targetoptions=options, pipeline_class=PieceCompiler)
+        super().__init__(whole.py_func, targetoptions=options, pipeline_class=LinkedCompiler)
         self.whole = whole
 
     def __call__(self, *arguments: Any, **names: Any) -> Any:
@@ -37,8 +37,8 @@ class Piece(CPUDispatcher):
         self.overloads[tuple(cres.signature.args)] = cres
 
 
-class PieceLibrary(JITCodeLibrary):
-    """The code of a piece as it was written, which is optimised where it is linked."""
+class LinkedLibrary(JITCodeLibrary):
+    """The code of a linked function as it was written, which is optimised where it is linked."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
         ll_module.data_layout = self._codegen._data_layout
@@ -50,16 +50,16 @@ class PieceLibrary(JITCodeLibrary):
         self._finalized = True
 
     def _get_module_for_linking(self) -> Any:
-        """The piece and all that it calls, each once: asked for by the kernels that call it, not by other pieces."""
+        """The function and all that it calls, each once: asked for by the kernels that call it, by no other."""
         self._ensure_finalized()
         if self._shared_module is None:
             module = self._final_module.clone()
             for library in self._below({}):
-                other = library._final_module if isinstance(library, PieceLibrary) else None
+                other = library._final_module if isinstance(library, LinkedLibrary) else None
                 module.link_in(other or library._get_module_for_linking(), preserve=True)
             for function in module.functions:
                 if not function.is_declaration and function.linkage == Linkage.external:
-                    function.linkage = "linkonce_odr"  # there may be the same code from another piece
+                    function.linkage = "linkonce_odr"  # there may be the same code from another one
             self._shared_module = module
         return self._shared_module
 
@@ -68,14 +68,14 @@ class PieceLibrary(JITCodeLibrary):
         for library in self._linking_libraries:
             if library not in found:
                 found[library] = None
-                if isinstance(library, PieceLibrary):
+                if isinstance(library, LinkedLibrary):
                     library._below(found)
         return found
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _IntoALibrary(LoweringPass):
-    """Before a piece is lowered: the library that takes its code."""
+    """Before a function is lowered: the library that takes its code."""
 
     _name = "omnidyn_into_a_library"
 
@@ -83,14 +83,14 @@ class _IntoALibrary(LoweringPass):
         super().__init__()
 
     def run_pass(self, state: Any) -> Any:
-        state.library = PieceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         return True
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _KnownToCallers(LoweringPass):
-    """After a piece has been lowered: callers find it. Its name is an object: there is no machine code to point to."""
+    """After it has been lowered: callers find it. Its name is an object: there is no machine code to point to."""
 
     _name = "omnidyn_known_to_callers"
 
@@ -104,7 +104,7 @@ class _KnownToCallers(LoweringPass):
         return True
 
 
-class PieceCompiler(compiler.CompilerBase):
+class LinkedCompiler(compiler.CompilerBase):
     """numba's own compiler with these two passes."""
 
     def define_pipelines(self) -> list[Any]:

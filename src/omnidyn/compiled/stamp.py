@@ -39,14 +39,15 @@ def stamp(function: Callable[..., Any]) -> str:
     """SHA-256, 64 hex digits, of sources, compiler and settings. Raises OSError where there is no source to read."""
     code = function.__code__
     file = os.path.realpath(code.co_filename)
-    digest = hashlib.sha256(f"{_tools()} {code.co_qualname}:{code.co_firstlineno}\n".encode())
+    digest = hashlib.sha256(f"{tools()} {code.co_qualname}:{code.co_firstlineno}\n".encode())
     for name, content in sorted((each.removeprefix(PACKAGE), read(each)[0]) for each in reach(file)):
         digest.update(f"{name} {content}\n".encode())
     return digest.hexdigest()
 
 
 @cache
-def _tools() -> str:
+def tools() -> str:
+    """Versions of what makes machine code, and how it is set."""
     versions = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, numpy.__version__)
     return " ".join([*versions, *(f"{name}={getattr(config, name, None)}" for name in SETTINGS)])
 

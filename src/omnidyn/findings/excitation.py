@@ -11,9 +11,9 @@ from omnidyn.findings.finding import NOTE, SECTORS, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import smooth
+from omnidyn.model.frames import AXES
 from omnidyn.model.wheels import twist_from_wheel_speed
 
-AXES = ("x", "y", "yaw")
 HARDLY = 0.1  # of the motion along the axis that moves most
 SPEEDS = 2.0  # fastest over slowest motion, below which viscous and dry friction look alike
 

@@ -12,7 +12,7 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
 from omnidyn.identification.structure.candidates import CHANGE
 from omnidyn.identification.validation import Validation
-from omnidyn.logs.steady_table import AXES
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
 from omnidyn.model.robot import GUESS
 

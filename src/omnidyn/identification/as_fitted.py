@@ -12,8 +12,8 @@ from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
 from omnidyn.identification.output_error.problem.primitives import primitives
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.logs.segments import segments
-from omnidyn.logs.steady_table import AXES
 from omnidyn.model.actuation import Driver, at_motors
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import GAINS, Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run

@@ -8,7 +8,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import Estimate
-from omnidyn.logs.steady_table import AXES
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import BREAKAWAY, FRICTION, Key, expand, find_key
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import sliding_wrench

@@ -18,8 +18,8 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
+from omnidyn.model.frames import AXES
 
-AXES = ("x", "y", "yaw")
 ALIASES = {"v": "x", "v_n": "y", "vn": "y", "w": "yaw", "omega": "yaw"}  # the paper's letters
 FORCE_SOURCES = ("table", "current", "voltage")
 

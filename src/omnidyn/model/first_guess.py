@@ -26,7 +26,7 @@ from omnidyn.model.motor import Motor
 from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Origin, Prior, Robot
 from omnidyn.model.wheels import PerWheel, Wheels
 
-DIRECTION, AXES = "direction", "axes"
+DIRECTION, BODY_AXES = "direction", "axes"
 GEAR, RATE = "motor.gear_ratio", "drive.rate_Hz"
 GRAVITY = 9.81  # [m/s^2]
 

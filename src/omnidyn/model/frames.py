@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 
+AXES = ("x", "y", "yaw")  # their names, in the order of every last axis
+
 
 def body_to_world(heading: ArrayLike) -> FloatArray:
     """Rotation that takes a body twist to the world frame: pose' = body_to_world(heading) @ twist.

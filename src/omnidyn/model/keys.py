@@ -23,9 +23,9 @@ from omnidyn.model.value import keys_of
 
 TABLES = ("body", "wheels", "motor", "drive", "friction")
 FRICTION = "friction"  # stands for all friction that a robot has
-AXES, DIRECTION, WHEELS = "friction.axes", "friction.direction", "friction.wheels"
+BODY_AXES, DIRECTION, WHEELS = "friction.axes", "friction.direction", "friction.wheels"
 VISCOUS, COULOMB, BREAKAWAY = "viscous", "coulomb", "breakaway"
-BOX = tuple(f"{AXES}.{level}[{axis}]" for level in (VISCOUS, COULOMB) for axis in range(3))
+BOX = tuple(f"{BODY_AXES}.{level}[{axis}]" for level in (VISCOUS, COULOMB) for axis in range(3))
 """The six numbers of friction on the body axes, the paper's."""
 TORQUE, EMF = "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad"
 ROTOR, WHEEL = "motor.rotor_inertia_kg_m2", "wheels.inertia_kg_m2"
@@ -56,7 +56,7 @@ class Key:
     def parse(cls, text: str) -> Key:
         """The key that a text names. Raises InputError where it names no number of a robot file."""
         if not isinstance(text, str):
-            raise InputError("not a key", got=text, expected=f'text such as "body.mass_kg", "{AXES}.coulomb[1]"')
+            raise InputError("not a key", got=text, expected=f'text such as "body.mass_kg", "{BODY_AXES}.coulomb[1]"')
         return _parsed(text)
 
     def __str__(self) -> str:
@@ -87,7 +87,7 @@ class Key:
     @property
     def axis(self) -> int | None:
         """The body axis (x, y, yaw: 0, 1, 2) along which this number alone acts; None for all other numbers."""
-        if self.table == AXES:
+        if self.table == BODY_AXES:
             return self.index
         return YAW if self.field.startswith("yaw_") else None
 
@@ -313,7 +313,7 @@ def _has_float(annotation: Any) -> bool:
 def _parsed(text: str) -> Key:
     form = _FORM.fullmatch(text)
     if form is None:
-        raise InputError("not a key", got=text, expected=f'such as "body.mass_kg", "{AXES}.coulomb[1]"')
+        raise InputError("not a key", got=text, expected=f'such as "body.mass_kg", "{BODY_AXES}.coulomb[1]"')
     name, index = form[1], None if form[2] is None else int(form[2])
     place = _places().get(name)
     if place is None:

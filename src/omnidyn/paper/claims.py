@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 from omnidyn.document import Document, Points, Words
+from omnidyn.model.frames import AXES
 from omnidyn.model.robot_file import load_robot
 from omnidyn.paper.claim import RULE, Claim, ClaimVerdict
 from omnidyn.paper.friction import friction_claims
@@ -14,7 +15,6 @@ from omnidyn.paper.mismatch import mismatch_claims
 from omnidyn.paper.motion import motion_claims
 from omnidyn.paper.motors import motor_claims
 from omnidyn.paper.speeds import speed_claims
-from omnidyn.paper.tables import AXES
 from omnidyn.paper.validation import validation_claims
 
 __all__ = ["PRESET", "RULE", "Claim", "ClaimVerdict", "all_claims", "claims_document", "headlines", "verdict_counts"]

@@ -8,9 +8,10 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import breakaway_voltage
+from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.paper.steady import measured_speed, pattern_of, settled_speed
-from omnidyn.paper.tables import AXES, DEAD_ZONE_TEXT, TABLE_1, TABLE_4, Three
+from omnidyn.paper.tables import DEAD_ZONE_TEXT, TABLE_1, TABLE_4, Three
 from omnidyn.run import Run
 from omnidyn.simulation.programs import ramp, steps
 from omnidyn.simulation.simulate import simulate

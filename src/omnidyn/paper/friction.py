@@ -8,11 +8,11 @@ from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.paper.claim import ROUNDING, Claim, judge, plain, same, tiny
 from omnidyn.paper.steady import settled_twist
 from omnidyn.paper.tables import (
-    AXES,
     PAPER_AXES,
     TABLE_1,
     TABLE_2_COULOMB,

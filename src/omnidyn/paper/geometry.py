@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.frames import body_to_world, world_to_body
+from omnidyn.model.frames import AXES, body_to_world, world_to_body
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wheel_speed, wrench_from_traction
 from omnidyn.paper.claim import ROUNDING, Claim, judge, listed, plain, tiny
 from omnidyn.paper.steady import printed_speed, printed_voltage
-from omnidyn.paper.tables import AXES, EQ_3, NOISE_SENTENCE
+from omnidyn.paper.tables import EQ_3, NOISE_SENTENCE
 
 TWIST = np.array([0.4, 0.7, 2.0])  # any twist and traction will do: the balance of power is an identity
 TRACTION = np.array([1.0, -2.0, 3.0])

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from omnidyn.model.frames import AXES
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.paper.claim import TOLERANCE, Claim, ClaimVerdict, judge, listed, plain, same
 from omnidyn.paper.reconcile import FRICTION, Reconciliation, reconciliations
 from omnidyn.paper.steady import printed_force
-from omnidyn.paper.tables import AXES, MPC_SENTENCE, PAPER_AXES, SPEED_UNIT
+from omnidyn.paper.tables import MPC_SENTENCE, PAPER_AXES, SPEED_UNIT
 
 
 def mismatch_claims(robot: Robot) -> tuple[Claim, ...]:

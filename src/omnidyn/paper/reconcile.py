@@ -16,11 +16,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from omnidyn.paper.claim import listed, same
 from omnidyn.paper.steady import printed_speed, printed_voltage, rms, settled_twist
-from omnidyn.paper.tables import AXES
 
 
 @dataclass(frozen=True)

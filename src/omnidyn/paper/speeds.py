@@ -7,6 +7,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import breakaway_voltage, moves
 from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import Key
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
@@ -22,7 +23,6 @@ from omnidyn.paper.steady import (
     rms,
 )
 from omnidyn.paper.tables import (
-    AXES,
     FORCE_UNIT,
     PAPER_AXES,
     SPEED_UNIT,

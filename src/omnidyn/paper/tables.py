@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-AXES = ("x", "y", "yaw")
 PAPER_AXES = {"x": "v", "y": "v_n", "yaw": "w"}
 SPEED_UNIT = {"x": "m/s", "y": "m/s", "yaw": "rad/s"}
 FORCE_UNIT = {"x": "N", "y": "N", "yaw": "N m"}

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.model.deadzone import breakaway_voltage, moves
+from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.paper.claim import TOLERANCE, Claim, ClaimVerdict, judge, listed, plain, same
 from omnidyn.paper.steady import measured_speed, pattern_of, printed_voltage, settled_speed
-from omnidyn.paper.tables import AXES, DEAD_ZONE_TEXT, FIG_2_SPEED, FIG_2_VOLTAGE, PAPER_AXES, TABLE_4
+from omnidyn.paper.tables import DEAD_ZONE_TEXT, FIG_2_SPEED, FIG_2_VOLTAGE, PAPER_AXES, TABLE_4
 
 
 def validation_claims(robot: Robot) -> tuple[Claim, ...]:

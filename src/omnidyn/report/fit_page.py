@@ -1,4 +1,4 @@
-"""The report of `omnidyn identify` by output error: logs, numbers, free runs, residuals, doubts, what to do next."""
+"""The report of `omnidyn identify` by output error: logs, numbers, free runs, residuals, warnings, what to do next."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     travelled = _paths(fits, validations)
     unchecked = paragraph("The logs are too long to be checked on the way: see omnidyn check.")
     checked = content(verdict_table(found.verdicts)) if found.verdicts else unchecked
-    doubts, advice = list(dict.fromkeys(_doubts(fits, validations))), list(dict.fromkeys(found.advice))
+    warnings, advice = list(dict.fromkeys(_warnings(fits, validations))), list(dict.fromkeys(found.advice))
     residuals = "".join(_residuals(g, fits[g], v) for g, v in validations.items())
     numbers = _each(fits, lambda group, fit: content(number_table(fit)))
     sections = [
         section("findings", "What the data say", Points(_findings(fits, validations))),
-        section("doubts", "Doubts", Points(doubts), none="None."),
+        section("warnings", "Warnings", Points(warnings), none="None."),
         section("next", "What to measure next", Points(advice), none="Nothing: every number is well determined."),
         Section("runs", "Measured and model", _each(validations, partial(_runs, fits))),
         section("friction", "Friction against speed", friction),
@@ -170,7 +170,7 @@ def _correlations(fits: Fits) -> list[str]:
     return found
 
 
-def _doubts(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
+def _warnings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
     words = [_named(group, each, fits) for group, fit in fits.items() for each in fit.warnings]
     for each in validations.values():
         for comparison in (each.fitted, each.held_out):

@@ -26,7 +26,7 @@ def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     pictures = [] if study.windows is None else [draw_motor_lines(study.motors, study.windows)]
     sections = [
         section("findings", "What the data say", told["statements"]),
-        section("doubts", "Doubts", told["doubts"], none="None."),
+        section("warnings", "Warnings", told["warnings"], none="None."),
         *([section("figures", "Figures", *pictures)] if pictures else []),
         *([section("starts", "Where each direction starts", told["starts"])] if study.starts else []),
         section("numbers", "Numbers, with 95 % intervals", told["motors"]),

@@ -14,7 +14,7 @@ from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.friction_curve import FrictionCurve, friction_curve, sliding_force
 from omnidyn.identification.identify import Identification
 from omnidyn.logs.path import path_of
-from omnidyn.logs.steady_table import AXES
+from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 from omnidyn.report.figures.channels import draw_run

@@ -27,7 +27,7 @@ def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
     errors, *pictures = shape_pictures(study)
     sections = [
         section("findings", "What the data say", told["statements"]),
-        section("doubts", "Doubts", told.joined("warnings", "doubts"), none="None."),
+        section("warnings", "Warnings", told.joined("warnings", "warnings of fits"), none="None."),
         section("next", "What to measure next", told["next"], none="Nothing: every number is well determined."),
         section("forces", "Forces", *pictures),
         section("friction", "Friction against speed", draw_estimates(study.estimates, driven=driven([points.twist]))),

@@ -21,7 +21,8 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 
-from omnidyn.paper.tables import AXES, PAPER_AXES
+from omnidyn.model.frames import AXES
+from omnidyn.paper.tables import PAPER_AXES
 
 # Okabe & Ito 2008.
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (

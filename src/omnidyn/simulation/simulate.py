@@ -121,12 +121,12 @@ def _implicit(
 
 
 def implicit_run(robot: Robot, given: Commands, voltage: FloatArray, outcome: Outcome, tol: float) -> Run:
-    """The Run of what the implicit engine found at the samples asked for, its doubts included."""
+    """The Run of what the implicit engine found at the samples asked for, its warnings included."""
     how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
     stopped, rows = capped(outcome), len(outcome.iterations)
-    doubts = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
+    warnings = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
     twists = outcome.state[:, :N_AXES] / [1.0, 1.0, plant(robot).body[LENGTH]]
-    return as_run(robot, given, voltage, twists, outcome.pose, outcome, how, doubts)
+    return as_run(robot, given, voltage, twists, outcome.pose, outcome, how, warnings)
 
 
 def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
@@ -140,7 +140,7 @@ def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
 
 def as_run(
     robot: Robot, given: Commands, voltage: FloatArray, twists: FloatArray, poses: FloatArray,
-    outcome: Outcome | None, engine: str, doubts: tuple[str, ...], currents: FloatArray | None = None,
+    outcome: Outcome | None, engine: str, warnings: tuple[str, ...], currents: FloatArray | None = None,
 ) -> Run:  # fmt: skip
     """The Run of a simulation: what the instruments of an ideal robot would have recorded."""
     dt, n = given.dt, robot.wheels.count
@@ -168,7 +168,7 @@ def as_run(
         pose=poses,
         supply=None if given.supply is None else _with_last(given.supply),
         source=f"simulated: {robot.name}, {engine}",
-        warnings=given.warnings + doubts,
+        warnings=given.warnings + warnings,
     )
 
 

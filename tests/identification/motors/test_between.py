@@ -65,7 +65,7 @@ def test_a_bend_of_the_line_is_no_dead_band():
     fit = fit_motor(log(3, drag=lambda w: 0.15 * w * np.exp(-((w / 1.5) ** 2))))
     assert fit.value["dead_band"] > 0.01
     assert not fit.dead_band_seen
-    assert any("bends" in words for words in fit.doubts)
+    assert any("bends" in words for words in fit.warnings)
 
 
 @pytest.mark.parametrize("seed", range(4))

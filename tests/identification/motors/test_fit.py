@@ -86,8 +86,8 @@ def test_how_the_input_goes_between_rows_is_found(clean):
 def test_a_refuted_way_widens_the_intervals_and_says_so(clean):
     """The input is held. Asked for the mean of two rows, the fit must say that the logs are met better otherwise."""
     asked, right = fit_motor(run_of(clean, BAND, 1), between="mean"), fit_motor(run_of(clean, BAND, 1))
-    assert "met better where the input is held from row to row" in asked.doubts[0]
-    assert right.doubts == ()
+    assert "met better where the input is held from row to row" in asked.warnings[0]
+    assert right.warnings == ()
     for name, true in TRUE.items():
         assert asked.ci95[name][0] <= right.ci95[name][0] < right.ci95[name][1] <= asked.ci95[name][1]
         assert asked.ci95[name][0] - 2e-3 * true <= true <= asked.ci95[name][1] + 2e-3 * true
@@ -97,7 +97,7 @@ def test_a_refuted_way_widens_the_intervals_and_says_so(clean):
 def test_a_true_way_is_as_sure_as_before(clean):
     """Held inputs, asked for as held: nothing is widened, and the dead band that is there is seen."""
     fit = fit_motor(run_of(clean, BAND, 1), between="hold")
-    assert fit.doubts == ()
+    assert fit.warnings == ()
     assert fit.dead_band_seen
 
 

@@ -164,4 +164,4 @@ def test_starts_that_differ_from_time_to_time_are_spanned():
     for each in both_ways(identify_motors(runs)):
         low, high = each.ci95["start"]
         assert low <= 0.6 < 0.8 <= high
-        assert any("starts scatter" in words for words in each.doubts)
+        assert any("starts scatter" in words for words in each.warnings)

@@ -56,7 +56,7 @@ def test_a_sweep_of_a_row_a_second_tells_all(how):
         assert each.value["offset"] == pytest.approx(slide, abs=0.3)
         assert np.isnan(each.value["lag"])
     assert study.verdict == "Motor 1 starts at 21 % (+) and 27 % (-)."
-    assert any("each is a point of steady speed" in words for words in study.doubts)
+    assert any("each is a point of steady speed" in words for words in study.warnings)
 
 
 def test_whole_logs_of_a_row_a_second_have_the_same_starts():
@@ -81,7 +81,7 @@ def test_rows_of_a_table_have_no_order():
     order = np.random.default_rng(1).permutation(len(put_in))
     one, other = (identify_motors(table(put_in[rows], speed[rows])).starts for rows in (slice(None), order))
     assert [each.ci95["start"] for each in one] == [each.ci95["start"] for each in other]
-    assert any("starts scatter" in words for each in one for words in each.doubts)  # up and down are in one table
+    assert any("starts scatter" in words for each in one for words in each.warnings)  # up and down are in one table
 
 
 def test_motors_of_a_table_are_told_apart():

@@ -1,4 +1,4 @@
-"""fit_steady_state: what it takes, what it refuses, and every doubt it utters."""
+"""fit_steady_state: what it takes, what it refuses, and every warning it utters."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def test_axes_without_data_keep_their_friction_and_say_so():
     assert "axis yaw: no data, B and C stay as they were" in fit.warnings
 
 
-# ---- doubts, each in words ------------------------------------------------------------------------------
+# ---- warnings, each in words ----------------------------------------------------------------------------
 
 
 def test_two_degrees_of_freedom_or_fewer_are_told_with_the_t_factor():

@@ -14,7 +14,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.motors.estimate import BAND, LATENCY
 from omnidyn.identification.output_error.engines.exact import Weighting, march_piece, padded, used_by
-from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, Slopes
+from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, PhysicsSlopes
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
 from omnidyn.model.actuation import Driver
@@ -57,7 +57,7 @@ class MotorEngine:
             for piece, state in zip(self.problem.pieces, point.states, strict=True)
         ]
 
-    def _numbers(self, piece: Piece, values: FloatArray) -> tuple[Physics, Slopes, IntArray]:
+    def _numbers(self, piece: Piece, values: FloatArray) -> tuple[Physics, PhysicsSlopes, IntArray]:
         """Physics and slopes of the outputs of one piece; each output is a group for its latency."""
         problem, columns, count = self.problem, piece.record.columns, len(self.problem.parameters)
         width, room = len(columns), padded(used_by(piece, count))
@@ -71,7 +71,7 @@ class MotorEngine:
             law, drive, np.zeros(N_AXES), speed_map, travel_map, np.zeros(width), np.full(width, -1),
             np.array([values[k] if k >= 0 else 0.0 for k in late]), Driver(), bool(travel_map.any()),
         )  # fmt: skip
-        slopes = Slopes(
+        slopes = PhysicsSlopes(
             by_law, by_drive, np.zeros((N_AXES, room)), np.zeros((width, N_AXES, room)), np.zeros((width, PATH, room)),
             np.zeros((width, room)), True, np.zeros(width, bool), np.array(late), np.full(3, -1),
             at[:N_AXES], at[N_AXES:],

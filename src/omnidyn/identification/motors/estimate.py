@@ -29,7 +29,7 @@ class MotorEstimate:
     run" of whole logs. correlation: of slope and dead band. rmse [rad/s]: of the speed; of windows, of their mean
     speed. count: windows, or rows. at_bound, unidentifiable: names. left_out: rows that do not count, because the log
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
-    one. held_out [rad/s]: error of free runs on logs that were not fitted. doubts: in words. source: the logs.
+    one. held_out [rad/s]: error of free runs on logs that were not fitted. warnings: in words. source: the logs.
     Of windows: rest, the largest input under which the motor stayed at rest, NaN where it never rested; draws: of the
     bootstrap, by name. Of a free run: between, noise by channel, kind of the covariance, whether the fit converged.
     """
@@ -50,7 +50,7 @@ class MotorEstimate:
     left_out: int = 0
     one_way: bool = False
     held_out: float = math.nan
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     rest: float = math.nan
     draws: Mapping[str, FloatArray] = field(default_factory=dict)
     between: str = ""
@@ -136,7 +136,7 @@ class MotorEstimate:
             "motor": "all" if self.motor is None else self.motor + 1, "unit": self.unit, "from": self.way,
             "count": self.count, "parameters": parameters, "dead_band_seen": self.dead_band_seen,
             "rmse_rad_s": self.rmse, "held_out_rmse_rad_s": self.held_out, "at_bound": self.at_bound,
-            "unidentifiable": self.unidentifiable, "doubts": self.doubts, "data": self.source, **of_way,
+            "unidentifiable": self.unidentifiable, "warnings": self.warnings, "data": self.source, **of_way,
         })  # fmt: skip
 
 

@@ -112,9 +112,9 @@ def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
 def _widened(
     fit: MotorEstimate, std: dict[str, float], ci95: dict[str, tuple[float, float]], words: str
 ) -> MotorEstimate:
-    """The fit with other standard errors, intervals that hold these too, and a doubt more."""
+    """The fit with other standard errors, intervals that hold these too, and a warning more."""
     both = {name: (min(fit.ci95[name][0], low), max(fit.ci95[name][1], high)) for name, (low, high) in ci95.items()}
-    return replace(fit, std={**fit.std, **std}, ci95={**fit.ci95, **both}, doubts=(*fit.doubts, words))
+    return replace(fit, std={**fit.std, **std}, ci95={**fit.ci95, **both}, warnings=(*fit.warnings, words))
 
 
 def _answer(

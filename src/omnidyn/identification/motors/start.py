@@ -53,7 +53,7 @@ class MotorStart:
     ci95: Mapping[str, tuple[float, float]]
     starts: int = 0
     stops: int = 0
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -113,7 +113,7 @@ class MotorStart:
         numbers = {name: {"value": value, "ci95": self.ci95[name]} for name, value in self.value.items()}
         return plain({
             "motor": self.motor + 1, "direction": self.direction, "unit": self.unit, "parameters": numbers,
-            "starts": self.starts, "stops": self.stops, "doubts": self.doubts,
+            "starts": self.starts, "stops": self.stops, "warnings": self.warnings,
         })  # fmt: skip
 
 
@@ -144,16 +144,16 @@ def direction_of(
     numbers: Mapping[str, tuple[float, tuple[float, float]]],
 ) -> MotorStart:  # fmt: skip
     """One direction from its starts, its stops and its line. numbers: name -> (value, interval)."""
-    doubts = []
+    warnings = []
     known = {START: common(up), STOP: common(down)}
     for name, (_, agree) in known.items():
         if not agree:
-            doubts.append(f"its {name}s scatter by more than their intervals: the interval spans them")
+            warnings.append(f"its {name}s scatter by more than their intervals: the interval spans them")
     every = {name: (_middle(span), (span.low, span.high)) for name, (span, _) in known.items()} | dict(numbers)
     return MotorStart(
         motor, side, unit, {name: each[0] for name, each in every.items()},
         {name: each[1] for name, each in every.items()}, sum(math.isfinite(each.high) for each in up), len(down),
-        tuple(doubts),
+        tuple(warnings),
     )  # fmt: skip
 
 

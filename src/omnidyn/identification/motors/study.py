@@ -36,7 +36,7 @@ class MotorStudy:
     plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
     found. windows: that the lines go through, None of free runs. starts: each direction of each motor by itself, with
     the input at which it sets off. supply [V]: of a duty, the mean of the logs; NaN where it is not logged.
-    warnings: of the logs, in words.
+    log_warnings: of the logs, in words; `warnings` has those of each motor too.
     """
 
     method: str
@@ -48,7 +48,7 @@ class MotorStudy:
     windows: MotorWindows | None = None
     starts: tuple[MotorStart, ...] = ()
     supply: float = math.nan
-    warnings: tuple[str, ...] = ()
+    log_warnings: tuple[str, ...] = ()
 
     @property
     def statements(self) -> tuple[str, ...]:
@@ -69,15 +69,15 @@ class MotorStudy:
         return motors_verdict(self.motors, self.starts)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """Of the logs, then of each motor."""
-        words = list(self.warnings)
+        words = list(self.log_warnings)
         for each in self.motors:
-            own = [*each.doubts, *(f"{name} is at its bound" for name in each.at_bound)]
+            own = [*each.warnings, *(f"{name} is at its bound" for name in each.at_bound)]
             own += ["the intervals allow for errors that have a memory"] if each.covariance == "sandwich" else []
             own += [] if each.converged else ["the fit was cut short: the numbers are of its last step"]
             words += [f"{each.name}: {text}" for text in own]
-        return (*words, *(f"{each.name}: {text}" for each in self.starts for text in each.doubts))
+        return (*words, *(f"{each.name}: {text}" for each in self.starts for text in each.warnings))
 
     def document(self) -> Document:
         """What the study says: a row per motor, with a dead band and without, then words."""
@@ -91,9 +91,9 @@ class MotorStudy:
             f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", "",
             Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
             *([Table(STARTS_HEAD, [each.row() for each in self.starts], name="starts"), ""] if self.starts else []),
-            Points(self.statements, name="statements"), Points(self.doubts, "warning:", "doubts"),
+            Points(self.statements, name="statements"), Points(self.warnings, "warning:", "warnings"),
         ]  # fmt: skip
-        return Document(parts, self.to_dict(), self.doubts, verdict=self.verdict)
+        return Document(parts, self.to_dict(), self.warnings, verdict=self.verdict)
 
     def to_dict(self) -> dict[str, Any]:
         """The study as JSON can hold it."""
@@ -105,7 +105,7 @@ class MotorStudy:
             "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
             "starts": [each.to_dict() for each in self.starts], "statements": list(self.statements),
-            "warnings": list(self.doubts),
+            "warnings": list(self.warnings),
         }  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def _of_points(points: MotorTable, origin: str, words: Sequence[str]) -> MotorSt
     _, lines = _of_each(windows, points.source)
     return MotorStudy(
         STEADY_STATE, points.kind, points.unit, origin, lines, (), windows, starts_of_points(points),
-        warnings=(*points.notes, *words, *_of_windows(windows, lines)),
+        log_warnings=(*points.notes, *words, *_of_windows(windows, lines)),
     )  # fmt: skip
 
 

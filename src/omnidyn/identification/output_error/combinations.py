@@ -17,7 +17,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.answer import Combination
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, Trust
-from omnidyn.logs.steady_table import AXES
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import VISCOUS, Key
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Robot

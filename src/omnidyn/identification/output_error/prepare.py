@@ -29,8 +29,8 @@ from omnidyn.identification.output_error.problem.record import Record, record
 from omnidyn.identification.output_error.solve.loop import loop_keys, loop_pieces, looped
 from omnidyn.identification.output_error.trust.breakaway import KEY
 from omnidyn.identification.question import Question
-from omnidyn.logs.steady_table import AXES
 from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import (
     BOX,
     BREAKAWAY,

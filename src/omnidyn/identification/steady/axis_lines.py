@@ -12,7 +12,8 @@ from omnidyn.identification.question import STEADY_STATE, Question
 from omnidyn.identification.steady.operating_points import ForcePoints, force_points
 from omnidyn.identification.steady.points import driven_axes
 from omnidyn.identification.steady.steady_state import fit_steady_state
-from omnidyn.logs.steady_table import AXES, SteadyTable
+from omnidyn.logs.steady_table import SteadyTable
+from omnidyn.model.frames import AXES
 from omnidyn.model.friction import Friction
 from omnidyn.model.keys import DIRECTION, WHEELS, Key
 from omnidyn.model.robot import Robot

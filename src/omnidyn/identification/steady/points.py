@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import loses_in_gear
-from omnidyn.logs.steady_table import AXES, SteadyTable
+from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents, wrench_from_currents
+from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 

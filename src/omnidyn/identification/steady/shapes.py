@@ -21,7 +21,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import AXES, DIRECTION, WHEELS, Key, expand
+from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS, Key, expand
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import rim_speed, sin_cos_deg
 
@@ -141,7 +141,7 @@ def element_speeds(shape: Shape, robot: Robot, points: ForcePoints) -> FloatArra
     """
     names = {term.keys[0].rpartition(".")[0] for term in shape.terms}
     parts = [np.full((len(points), 1), np.inf)]
-    if AXES in names:
+    if BODY_AXES in names:
         seen = np.stack([points.travels, points.travels, points.turns], axis=1)
         parts.append(np.where(seen, np.abs(points.twist * [1.0, 1.0, _arm(robot)]), np.inf))
     if WHEELS in names:
@@ -169,10 +169,12 @@ def _ellipse_slope(points: ForcePoints, level: FloatArray) -> FloatArray:
 
 
 _TERMS = {
-    "box": Term((f"{AXES}.coulomb[0]", f"{AXES}.coulomb[1]"), lambda r, p: _on_axes(_axis_sides(r, p), (0, 1))),
-    "box-yaw": Term((f"{AXES}.coulomb[2]",), lambda r, p: _on_axes(_axis_sides(r, p), (2,)), yaw=True),
-    "box-viscous": Term((f"{AXES}.viscous[0]", f"{AXES}.viscous[1]"), lambda r, p: _on_axes(p.twist, (0, 1))),
-    "box-viscous-yaw": Term((f"{AXES}.viscous[2]",), lambda r, p: _on_axes(p.twist, (2,)), yaw=True),
+    "box": Term(
+        (f"{BODY_AXES}.coulomb[0]", f"{BODY_AXES}.coulomb[1]"), lambda r, p: _on_axes(_axis_sides(r, p), (0, 1))
+    ),
+    "box-yaw": Term((f"{BODY_AXES}.coulomb[2]",), lambda r, p: _on_axes(_axis_sides(r, p), (2,)), yaw=True),
+    "box-viscous": Term((f"{BODY_AXES}.viscous[0]", f"{BODY_AXES}.viscous[1]"), lambda r, p: _on_axes(p.twist, (0, 1))),
+    "box-viscous-yaw": Term((f"{BODY_AXES}.viscous[2]",), lambda r, p: _on_axes(p.twist, (2,)), yaw=True),
     "disc": Term((f"{DIRECTION}.coulomb",), lambda r, p: _columns(_unit(p))),
     "plain": Term((f"{DIRECTION}.coulomb[0]", f"{DIRECTION}.coulomb[1]"), lambda r, p: _on_axes(_unit(p), (0, 1))),
     "ellipse": Term(

@@ -18,9 +18,10 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
-from omnidyn.identification.steady.doubts import ORIGIN, about_line, about_points
 from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
-from omnidyn.logs.steady_table import AXES, SteadyTable
+from omnidyn.identification.steady.steady_state_words import ORIGIN, about_line, about_points
+from omnidyn.logs.steady_table import SteadyTable
+from omnidyn.model.frames import AXES
 from omnidyn.model.friction import AxesFriction
 from omnidyn.model.keys import unit, with_priors
 from omnidyn.model.known.told import with_correlation
@@ -33,7 +34,7 @@ ONE_SPEED = 1e-4  # speeds that differ by less than this share are one speed
 
 @dataclass
 class _Findings:
-    """What the axes gave so far: lines and bounds by axis, and doubts in words."""
+    """What the axes gave so far: lines and bounds by axis, and warnings in words."""
 
     lines: dict[int, Line] = field(default_factory=dict)
     bounds: dict[int, float] = field(default_factory=dict)
@@ -112,7 +113,7 @@ def _refuse_other_friction(robot: Robot) -> None:
 
 
 def _study(axis: int, data: SteadyTable, rest: str, limit: float, absolute_std: bool, found: _Findings) -> None:
-    """One axis: its bound from rest, its line, its doubts."""
+    """One axis: its bound from rest, its line, its warnings."""
     mine = data.axis_index == axis
     moving = mine & (np.abs(data.speed) > limit)
     resting = mine & ~moving

@@ -31,7 +31,7 @@ from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
+from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.layout import YAW
@@ -113,7 +113,7 @@ def identify_steady(
             *words.statements(choice, viscous, differences, internal, lack, MATTERS),
             scale_of_traction(robot, points.force_from == CURRENT),
         ),
-        warnings=(*points.notes, *words.doubts(points, choice, turning), *words.about_lack_of_fit(lack, choice)),
+        warnings=(*points.notes, *words.about_points(points, choice, turning), *words.about_lack_of_fit(lack, choice)),
         advice=words.lack_advice(lack) + words.advice(choice, viscous, turning, points.force_from),
     )  # fmt: skip
 
@@ -150,7 +150,7 @@ def _viscous(
             turned = np.abs(points.twist[points.turns, 2])
             level, slow, fast = float(np.abs(points.wrench[points.turns, 2]).mean()), turned.min(), turned.max()
         brake = emf.of(name)
-        value, std = float(fit.free[k]), float(np.hypot(fit.std[k], emf.doubt * brake))
+        value, std = float(fit.free[k]), float(np.hypot(fit.std[k], emf.relative_std * brake))
         half = t_quantile(fit.degrees_of_freedom) * std
         low, high = value - half, value + half
         found.append(
@@ -166,13 +166,13 @@ class _BackEmf:
     """How the back-EMF brakes: forces from a voltage show its sum with viscous friction, and never one alone.
 
     brake: -d(wrench)/d(twist), shape (3, 3). at_rim: the same of one wheel [N s/m]. guesses: the motor constants that
-    are guesses of the robot file. doubt: relative standard deviation of `brake` by these, as far as it is known.
+    are guesses of the robot file. relative_std: relative standard deviation of `brake` by these, as far as it is known.
     """
 
     brake: FloatArray
     at_rim: float
     guesses: tuple[str, ...] = ()
-    doubt: float = 0.0
+    relative_std: float = 0.0
 
     def of(self, key: Key) -> float:
         """The part of a viscous level that is back-EMF, in its unit."""
@@ -189,17 +189,17 @@ def _back_emf(robot: Robot, points: ForcePoints) -> _BackEmf:
     matrix = robot.wheels.wrench_matrix
     guesses = {key: prior for key, prior in robot.priors.items()
                if prior.origin == GUESS and Key.parse(key).name in (TORQUE, EMF)}  # fmt: skip
-    doubts = [float(prior.std / abs(np.mean(Key.parse(expand(key, robot)[0]).get(robot))))
+    shares = [float(prior.std / abs(np.mean(Key.parse(expand(key, robot)[0]).get(robot))))
               for key, prior in guesses.items() if prior.std is not None]  # fmt: skip
     # K_t and K_v are one number of a motor, and the brake has both
     return _BackEmf(
-        brake, float(np.trace(brake) / np.sum(matrix**2)), tuple(guesses), 2.0 * max(doubts, default=0.0)
+        brake, float(np.trace(brake) / np.sum(matrix**2)), tuple(guesses), 2.0 * max(shares, default=0.0)
     )  # fmt: skip
 
 
 def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool) -> Estimate:
     fit, emf = choice.fits[choice.chosen][group], _back_emf(robot, points)
-    extra = np.array([emf.doubt * emf.of(Key.parse(key)) if Key.parse(key).level == VISCOUS_LEVEL else 0.0
+    extra = np.array([emf.relative_std * emf.of(Key.parse(key)) if Key.parse(key).level == VISCOUS_LEVEL else 0.0
                       for key in fit.keys])  # fmt: skip
     fit = replace(fit, covariance=fit.covariance + np.diag(extra**2))
     value = dict(zip(fit.keys, fit.level.tolist(), strict=True))
@@ -250,7 +250,7 @@ def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: boo
     coulomb = before.axes.coulomb[2] + before.direction.yaw_coulomb
     viscous = before.axes.viscous[2] + before.direction.yaw_viscous
     on_axes = fit.shape.name.startswith("box")
-    names = (f"{AXES}.coulomb[2]", f"{AXES}.viscous[2]") if on_axes else (
+    names = (f"{BODY_AXES}.coulomb[2]", f"{BODY_AXES}.viscous[2]") if on_axes else (
         f"{DIRECTION}.yaw_coulomb", f"{DIRECTION}.yaw_viscous"
     )  # fmt: skip
     kept = {key: level for key, level in zip(names, (coulomb, viscous), strict=True) if level > 0.0}

@@ -13,9 +13,9 @@ from omnidyn.model.keys import Key
 
 
 def study_document(study: SteadyStudy) -> Document:
-    """The study: what was used, the shapes, the levels, what it says and what is doubtful."""
+    """The study: what was used, the shapes, the levels, what it says and what it warns of."""
     points = study.points
-    doubts = [
+    of_fits = [
         words if group == "all" else f"{group}: {words}"
         for group, estimate in study.estimates.items() for words in estimate.warnings
     ]  # fmt: skip
@@ -26,7 +26,7 @@ def study_document(study: SteadyStudy) -> Document:
         Points(study.statements, name="statements"),
         Points(study.warnings, "warning:", "warnings"),
         Points(study.advice, "next:", "next"),
-        Points(doubts, "warning:", "doubts"),
+        Points(of_fits, "warning:", "warnings of fits"),
     ]  # fmt: skip
     return Document(parts, _data(study), study.warnings)
 

@@ -177,7 +177,7 @@ def _about_difference(each: Difference) -> str:
     return f"{name}: {pair}: {verdict}, {span} (95 %)"
 
 
-def doubts(points: ForcePoints, choice: ShapeChoice, turning: bool) -> tuple[str, ...]:
+def about_points(points: ForcePoints, choice: ShapeChoice, turning: bool) -> tuple[str, ...]:
     """What is weak about the points or the comparison."""
     found = []
     along = points.along[np.isfinite(points.along)]

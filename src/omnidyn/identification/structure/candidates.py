@@ -17,8 +17,8 @@ from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
-from omnidyn.logs.steady_table import AXES
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import EMF, TORQUE, Key, in_words
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.robot import Robot

@@ -12,8 +12,7 @@ from omnidyn.identification.structure.candidates import CHANGE, STEP, Candidate,
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.keys import AXES as ON_AXES
-from omnidyn.model.keys import DIRECTION, WHEELS, find_key, in_words, unit
+from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Robot
@@ -84,7 +83,7 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
     axes, direction = friction.axes, friction.direction
     boxed, round_ = any(axes.coulomb), any(direction.coulomb)
     if boxed and axes.breakaway is None:
-        yield Candidate(f"{ON_AXES}.breakaway", _breakaway, as_it_is("breakaway above Coulomb friction"))
+        yield Candidate(f"{BODY_AXES}.breakaway", _breakaway, as_it_is("breakaway above Coulomb friction"))
     if boxed and not round_:
         other = DirectionFriction(
             coulomb=axes.coulomb[:2], viscous=0.5 * (axes.viscous[0] + axes.viscous[1]), yaw_coulomb=axes.coulomb[YAW],
@@ -98,7 +97,7 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
         viscous = (direction.viscous, direction.viscous, direction.yaw_viscous)
         own = AxesFriction(viscous=viscous, coulomb=(*direction.coulomb, direction.yaw_coulomb))
         yield Candidate(
-            ON_AXES, _in_place(Friction(axes=own, wheels=friction.wheels)),
+            BODY_AXES, _in_place(Friction(axes=own, wheels=friction.wheels)),
             as_it_is("Coulomb friction on each axis by itself, a box"),
         )  # fmt: skip
     if friction.wheels == WheelFriction():

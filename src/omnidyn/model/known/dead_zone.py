@@ -14,11 +14,11 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Table, Words, all_of, plain
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
+from omnidyn.model.frames import AXES
 from omnidyn.model.known.told import numbers_told, told
 from omnidyn.model.known.uncertainty import DRAWS, Interval, effects, interval_of
 from omnidyn.model.robot import GUESS, Robot
 
-AXES = ("x", "y", "yaw")
 WAYS = {"x": "forward", "y": "sideways", "yaw": "turning"}
 AROUND = np.radians(np.arange(0.0, 360.0, 5.0))  # directions of travel that are answered for
 HALVINGS = 20  # of a drawn robot: a millionth of its voltage
@@ -95,13 +95,13 @@ class DeadZone:
 
     def document(self) -> Document:
         """What it says."""
-        doubts = self._doubts()
+        warnings = self._warnings()
         head = f"{self.robot.name} at rest: it starts to move when the voltages of the wheels exceed"
-        parts: list[Part] = [head, "", *map(_line, self.rows), "", *map(Words, [*self._around(), *doubts])]
+        parts: list[Part] = [head, "", *map(_line, self.rows), "", *map(Words, [*self._around(), *warnings])]
         intervals = self.table() if self.band is not None else None
         if intervals is not None:
             parts += ["", "95 % intervals, from the std and the correlations of the file", "", intervals]
-        told = [words for words in doubts if self.guesses or self.band is None]
+        told = [words for words in warnings if self.guesses or self.band is None]
         return Document(parts, self.to_dict(), told, verdict=self.verdict)
 
     @property
@@ -126,7 +126,7 @@ class DeadZone:
 
     def statements(self) -> list[str]:
         """What must be said beside the numbers, in words."""
-        return [*self._around(), *self._doubts()]
+        return [*self._around(), *self._warnings()]
 
     def _around(self) -> list[str]:
         """The easiest and the hardest direction of travel, and what a duty is of."""
@@ -141,7 +141,7 @@ class DeadZone:
     def _band_at(self, k: int) -> str:
         return "" if self.band is None else f" [{self.band.low[k]:.3f}, {self.band.high[k]:.3f}]"
 
-    def _doubts(self) -> list[str]:
+    def _warnings(self) -> list[str]:
         """Guesses that it rests on, by name, and where there is no interval."""
         words = []
         for what, duty in (("it rests", False), ("the duty rests", True)):

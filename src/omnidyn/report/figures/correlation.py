@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.identification.estimate import Correlation
-from omnidyn.logs.steady_table import AXES
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import find_key
 from omnidyn.report.style import INK, WIDTH, Picture, look, new_figure, picture
 

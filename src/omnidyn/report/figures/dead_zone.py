@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 from matplotlib.axes import Axes
 
+from omnidyn.model.frames import AXES
 from omnidyn.paper.experiments import Ramp
-from omnidyn.paper.tables import AXES, SPEED_UNIT
+from omnidyn.paper.tables import SPEED_UNIT
 from omnidyn.report.style import (
     AXIS_COLOUR,
     INK,

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.steady.band import confidence_band
-from omnidyn.paper.tables import AXES, FORCE_UNIT, SPEED_UNIT, TABLE_1, TABLE_2_COULOMB, TABLE_2_VISCOUS
+from omnidyn.model.frames import AXES
+from omnidyn.paper.tables import FORCE_UNIT, SPEED_UNIT, TABLE_1, TABLE_2_COULOMB, TABLE_2_VISCOUS
 from omnidyn.report.style import (
     BLUE,
     INK,

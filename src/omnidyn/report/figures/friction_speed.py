@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.friction_curve import FrictionCurve
-from omnidyn.logs.steady_table import AXES
+from omnidyn.model.frames import AXES
 from omnidyn.report.style import (
     BLUE,
     GREEN,

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from omnidyn.model.frames import AXES
 from omnidyn.paper.reconcile import Reconciliation
-from omnidyn.paper.tables import AXES
 from omnidyn.report.style import BLUE, GREY, INK, PALE, WIDTH, Picture, look, new_figure, picture, thin_out
 
 NAMES = {

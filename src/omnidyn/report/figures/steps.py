@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 
+from omnidyn.model.frames import AXES
 from omnidyn.paper.experiments import StepResponse
-from omnidyn.paper.tables import AXES, SPEED_UNIT
+from omnidyn.paper.tables import SPEED_UNIT
 from omnidyn.report.style import (
     LEVEL_COLOURS,
     LEVEL_LINES,

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from omnidyn.paper.tables import AXES, SPEED_UNIT, TABLE_1
+from omnidyn.model.frames import AXES
+from omnidyn.paper.tables import SPEED_UNIT, TABLE_1
 from omnidyn.report.style import (
     INK,
     LEVEL_COLOURS,

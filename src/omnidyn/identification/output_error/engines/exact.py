@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.kernel.march import (
     WAVES,
     Loss,
     Physics,
-    Slopes,
+    PhysicsSlopes,
     Sums,
     march,
 )
@@ -171,7 +171,7 @@ class ExactEngine:
 
     def _numbers(
         self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, room: int
-    ) -> tuple[Physics, Slopes, IntArray]:
+    ) -> tuple[Physics, PhysicsSlopes, IntArray]:
         """Physics and slopes of the outputs of one piece."""
         problem, columns = self.problem, piece.record.columns
         count, robot_count, width = len(problem.parameters), problem.robot_count, len(columns)
@@ -199,7 +199,7 @@ class ExactEngine:
             if name == POSITION:
                 travel[c, N_AXES:, at[N_AXES + columns.index(HEADING)]] = turned_by(facing)[i]
         varies = np.array([bool(travel[c].any()) for c in range(width)])
-        derivatives = Slopes(
+        derivatives = PhysicsSlopes(
             wide(np.stack([by.rate, by.coulomb])), wide(by.drive), push, wide(slopes[0]), travel, wide(slopes[2]),
             not self.mapping.linear, varies, np.array(late), np.array(at_driver), at[:N_AXES], at[N_AXES:],
         )  # fmt: skip
@@ -219,7 +219,7 @@ def padded(used: IntArray) -> int:
 
 def march_piece(
     piece: Piece, state: FloatArray, every: Sequence[Column], count: int,
-    numbers: tuple[Physics, Slopes, IntArray], weighting: Weighting,
+    numbers: tuple[Physics, PhysicsSlopes, IntArray], weighting: Weighting,
 ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:  # fmt: skip
     """The sums of a piece, and its (outputs, slopes) where the weighting keeps them. every: the columns of the problem.
 

@@ -53,7 +53,7 @@ class Physics(NamedTuple):
     travels: bool  # whether Q has an entry
 
 
-class Slopes(NamedTuple):
+class PhysicsSlopes(NamedTuple):
     """Derivatives of the numbers above; the last axis is the parameter, in all P. at_...: index of one, or -1."""
 
     law: FloatArray  # (2, 3, P) of a and c

@@ -16,7 +16,7 @@ from omnidyn.identification.output_error.problem.starts import (
     measured_twist,
     window_rows,
 )
-from omnidyn.logs.steady_table import AXES
+from omnidyn.model.frames import AXES
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space

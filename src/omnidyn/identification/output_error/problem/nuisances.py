@@ -22,9 +22,9 @@ from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twist
 from omnidyn.identification.question import AUTO, REST
-from omnidyn.logs.steady_table import AXES
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.first_guess import GRAVITY
+from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 
 LATENCY, TILT = "latency", "tilt"

@@ -28,7 +28,7 @@ class Record:
     """One run. t (rows,); voltage (rows, W); outputs (rows, C), columns named by (channel, index).
 
     ticks (C,): of columns that are counts [rad], 0 for the others. pieces: (first, last) rows of what has no gap.
-    supplied: whether the voltage is a duty times a supply that was not logged. notes: what a reader should know.
+    supplied: whether the voltage is a duty times a supply that was not logged. notes: what was decided on the way.
     unused: what the log holds and a fit does not use, and why, in words.
     set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
     here then; else None.

@@ -1,1 +1,1 @@
-"""To the minimum: solver, first_point, loop (firmware loops), difference, progress."""
+"""To the minimum: solver, first_point, loop (firmware loops), tied (two numbers), progress."""

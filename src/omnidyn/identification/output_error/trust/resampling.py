@@ -10,9 +10,9 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.difference import TiedEngine
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
+from omnidyn.identification.output_error.solve.tied import TiedEngine
 from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.statistics import central_interval, t_quantile
 

@@ -1,4 +1,4 @@
-"""Doubts about steady points and the lines through them, in words that a reader can act on."""
+"""Warnings of steady points and the lines through them, in words that a reader can act on."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from scipy.special import chdtr
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.steady.line import Line
-from omnidyn.logs.steady_table import AXES, SteadyTable
+from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, wrench_from_currents
+from omnidyn.model.frames import AXES
 from omnidyn.model.keys import unit
 from omnidyn.model.motor import back_emf
 from omnidyn.model.robot import Robot
