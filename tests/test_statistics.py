@@ -240,3 +240,14 @@ def test_the_tick_of_a_log_is_found():
     assert find_tick(np.round(angle, 6)) == 0.0  # too fine to matter
     assert find_tick(np.zeros(100)) == 0.0
     assert find_tick(np.full(100, np.nan)) == 0.0
+
+
+def test_the_tick_of_a_wheel_that_never_turns_by_one_is_found():
+    """A log of few rows a second: from rest it is at once beyond one tick, and no change is the tick itself."""
+    rng, q = np.random.default_rng(3), 2.0 * np.pi / 1024
+    for least in (2, 3, 7):
+        counts = np.cumsum(rng.choice([-1, 1], 800) * rng.integers(least, 40, 800) * (rng.random(800) > 0.2))
+        assert find_tick(counts * q) == pytest.approx(q, rel=1e-9)
+        assert find_tick(np.round(counts * q, 5)) == pytest.approx(q, rel=1e-4)
+    assert find_tick(np.cumsum(rng.uniform(0.1, 0.3, 800))) == 0.0
+    assert find_tick(np.cumsum(rng.choice([0.10, 0.13], 800))) == 0.0  # two speeds have a common measure by chance

@@ -24,6 +24,9 @@ MEMORY_SHARE = 4.0  # a block of a bootstrap is so many times the memory of its 
 ENOUGH, LEAST_ROWS = 20_000, 20  # rows looked at for a tick; rows that change, without which there is none
 FINE = 1e-3  # of the usual change from row to row: a smaller tick is noise like any other
 TEXT = 0.05  # of a tick that the text of a log may round by
+# Ticks in the least change that are looked for; as many different changes, each within TEXT of a whole number, are no
+# chance: (2 TEXT)^5 for each number of ticks tried.
+MOST_IN_LEAST, LEAST_DISTINCT = 12, 6
 
 
 # ---- spread -----------------------------------------------------------------------------------------------
@@ -292,9 +295,19 @@ def find_tick(values: FloatArray) -> float:
     typical = float(np.sqrt(np.mean(change**2)))
     if moved.size < LEAST_ROWS:
         return 0.0
-    step = float(moved.min())
+    for parts in range(1, MOST_IN_LEAST + 1):  # from one row to the next even the least change may be several ticks
+        step, turns = _step(moved, float(moved.min()) / parts)
+        if step <= FINE * typical:
+            return 0.0
+        by_chance = parts > 1 and np.unique(turns).size < LEAST_DISTINCT
+        if float(np.quantile(np.abs(moved / step - turns), 0.99)) <= TEXT and not by_chance:
+            return step
+    return 0.0
+
+
+def _step(changes: FloatArray, step: float) -> tuple[float, FloatArray]:
+    """The step near `step` of which the changes are made best, and how many of them each is."""
     for _ in range(2):
-        turns = np.round(moved / step)
-        step = float((turns * moved).sum() / (turns * turns).sum())
-    off = np.abs(moved / step - np.round(moved / step))
-    return step if step > FINE * typical and float(np.quantile(off, 0.99)) <= TEXT else 0.0
+        turns = np.round(changes / step)
+        step = float((turns * changes).sum() / (turns * turns).sum())
+    return step, np.round(changes / step)

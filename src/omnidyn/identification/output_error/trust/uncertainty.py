@@ -9,7 +9,8 @@ blocks that carry the information. Which of the two is used is decided by the re
 each is one block: a floor or a battery that differs from run to run is then in the intervals too (Liang, Zeger,
 Biometrika 73 (1986); n/(n - 1) for n runs).
 
-Counts without noise are neither: no variance is less than what rounding.py finds.
+Counts without noise are neither: their covariance is what rounding.py finds, and more only where the sandwich says so
+beyond chance. No variance is below the plain one, of a number or of what several do together.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ TOLD = 0.5
 # most of it. Viscous friction beside the back-EMF of motors that are guesses keeps 0.3 to 0.7; Coulomb friction beside
 # rotors that may weigh 0.1 of the robot keeps 0.08 to 0.15, which its interval tells.
 TOLD_BY_OTHERS, MOST = 0.25, 0.5
+PRECISION = 1e-14  # of the largest eigenvalue of a matrix whose diagonal is 1: below it there is only rounding
 RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 
 
@@ -104,24 +106,29 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     normal = Normal(solver, State(solution.state.point, sums, solution.state.objective, solution.state.variance))
     relative = _relative(solver, solution)
     seen, directions, lost = _seen(normal.information, relative, normal.prior_information)
-    plain = _inverse(normal.information, lost)
+    root = _root_of_inverse(normal.information, lost)
+    plain = root @ root.T
     runs = _runs(solver, sums)
     count = len(runs) if len(runs) >= MANY_RUNS else 0
-    influence = normal.scores() @ plain  # what each block moves each parameter by
+    scores = normal.scores()
     if count:
-        influence = np.array([influence[own].sum(axis=0) for own in runs]) * np.sqrt(count / (count - 1.0))
+        scores = np.array([scores[own].sum(axis=0) for own in runs]) * np.sqrt(count / (count - 1.0))
+    influence = scores @ plain  # what each block moves each parameter by
     coloured, neighbours = _coloured(solver, sums, runs if count else None)
     if kind == "auto":  # a loss that is not the likelihood of the noise says nothing by its curvature alone
         kind = SANDWICH if coloured or solver.nu or counted else WHITE  # nor does an encoder at rest, which repeats
-    wide = influence.T @ influence + plain @ np.diag(normal.prior_information) @ plain
     guessed = seen & _guessed(plain, normal.prior_information)
     told = seen & ~guessed
-    degrees = _degrees(influence, told) if kind == SANDWICH else _rows(solver, sums) - int(seen.sum())
+    independent = _degrees(influence, told)
+    degrees = independent if kind == SANDWICH else _rows(solver, sums) - int(seen.sum())
     if len(influence) <= len(plain):
         kind, degrees = WHITE, _rows(solver, sums) - int(seen.sum())
-    least = _least(solver, solution, plain, lost)
-    covariance = _at_least(wide, least) if kind == SANDWICH else least.copy()
-    widening = float(np.sqrt(_ratio(np.maximum(np.diag(wide), np.diag(least)), np.diag(plain), told)))
+    least, scattered = _least(solver, solution, root), scores @ root
+    exact = not solver.nu and silent(solver, solution).any()  # what is more, and no chance, is an error of the model
+    beyond = (1.0 + np.sqrt(len(least) / independent)) ** 2 if exact else 1.0
+    wide = _at_least(scattered.T @ scattered + (root.T * normal.prior_information) @ root, least, float(beyond))
+    covariance, wide = (root @ each @ root.T for each in (wide if kind == SANDWICH else least, wide))
+    widening = float(np.sqrt(_ratio(np.diag(wide), np.diag(plain), told)))
     logs = np.array([p.log for p in solver.problem.parameters], bool)
     seen = seen & ~(logs & (np.sqrt(np.diag(covariance)) > UNTOLD))
     covariance[~seen, ~seen] = np.inf
@@ -241,21 +248,22 @@ def _seen(
     return seen, tuple(directions), np.array(lost).reshape(-1, len(diagonal)).T
 
 
-def _inverse(information: FloatArray, lost: FloatArray) -> FloatArray:
-    """Inverse without the directions that are lost, (P, directions), the diagonal scaled to 1; 0 where that is 0.
+def _root_of_inverse(information: FloatArray, lost: FloatArray) -> FloatArray:
+    """R, shape (P, K): R R' is the inverse without the directions that are lost, (P, directions), the diagonal scaled
+    to 1; rows are 0 where that is 0.
 
     What a lost direction does not move keeps the variance that it has beside all others, not the one that it would have
-    if these were known.
+    if these were known. Covariances are compared as C of R C R': of numbers that are guesses and of which only the
+    product shows the std of the product is a thousandth of theirs, and differences of such matrices say nothing of it.
     """
-    inverse = np.zeros_like(information)
     there = np.diag(information) > 0.0
-    if there.any():
-        chosen = np.ix_(there, there)
-        size = np.sqrt(np.diag(information)[there])
-        left = np.eye(len(size)) - lost[there] @ lost[there].T
-        part = left @ (information[chosen] / np.outer(size, size)) @ left
-        inverse[chosen] = left @ np.linalg.pinv(part, rcond=1e-14, hermitian=True) @ left / np.outer(size, size)
-    return inverse
+    size = np.sqrt(np.diag(information)[there])
+    left = np.eye(len(size)) - lost[there] @ lost[there].T
+    values, vectors = np.linalg.eigh(left @ (information[np.ix_(there, there)] / np.outer(size, size)) @ left)
+    kept = values > PRECISION * values.max(initial=0.0)
+    root = np.zeros((len(information), int(kept.sum())))
+    root[there] = left @ (vectors[:, kept] / np.sqrt(values[kept])) / size[:, None]
+    return root
 
 
 def _ratio(wide: FloatArray, plain: FloatArray, seen: BoolArray) -> float:
@@ -265,20 +273,31 @@ def _ratio(wide: FloatArray, plain: FloatArray, seen: BoolArray) -> float:
     return float((wide[seen] / np.maximum(plain[seen], 1e-300)).max())
 
 
-def _least(solver: Solver, solution: Solution, plain: FloatArray, lost: FloatArray) -> FloatArray:
-    """The least covariance: the plain one, or what rounding alone makes of counts that show no noise."""
+def _least(solver: Solver, solution: Solution, root: FloatArray) -> FloatArray:
+    """C of the least covariance R C R', (K, K): the plain one, or what rounding alone makes of counts without noise.
+
+    root: R, (P, K).
+    """
     if not silent(solver, solution).any():
-        return plain
-    information, scatter = rounding_scatter(solver, solution)
-    inverse = _inverse(information, lost)
+        return np.eye(root.shape[1])
+    information, scatter = (root.T @ each @ root for each in rounding_scatter(solver, solution))
+    inverse = np.linalg.inv(information)
     return inverse @ scatter @ inverse
 
 
-def _at_least(wide: FloatArray, plain: FloatArray) -> FloatArray:
-    """The sandwich, with no variance below the plain one: few blocks may also err to the good side."""
-    own, least = np.diag(wide), np.diag(plain)
-    stretch = np.sqrt(np.maximum(least, own) / np.where(own > 0.0, own, 1.0))
-    return wide * np.outer(stretch, stretch)
+def _at_least(wide: FloatArray, least: FloatArray, beyond: float) -> FloatArray:
+    """The sandwich, with no variance below `least`, of any sum of parameters: few blocks may also err to the good side.
+
+    With least = L L' and wide = L (V diag(l) V') L': L (V diag(max(l, 1)) V') L', where l up to `beyond` count as 1. To
+    stretch the std of each parameter alone would not do: that of a product is all in their correlation. beyond: where
+    `least` is what the noise makes, the edge of the ratios that K numbers and n blocks show by chance, which is
+    (1 + sqrt(K/n))^2 (Marchenko, Pastur, Math. USSR Sb. 1 (1967)); else 1. Shapes (K, K), see `_root_of_inverse`.
+    """
+    lower = np.linalg.cholesky(0.5 * (least + least.T))
+    back = np.linalg.inv(lower)
+    ratio, ways = np.linalg.eigh(back @ wide @ back.T)
+    more = lower @ ways * np.sqrt(np.where(ratio > beyond, ratio - 1.0, 0.0).clip(0.0))
+    return least + more @ more.T
 
 
 def _free_step(plain: FloatArray, normal: Normal) -> FloatArray:
