@@ -16,7 +16,7 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
 from omnidyn.model.robot import GUESS
 
-OFFERED = 2  # remedies that are worth a word
+NEARLY = 0.7  # of what the best remedy explains, from which another is worth a word
 WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
 LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
@@ -85,7 +85,7 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
         return
     told: set[str] = set()
     for remedy in lack.remedies:
-        if remedy.key in told or len(told) > OFFERED:
+        if remedy.key in told or remedy.chi2 < NEARLY * lack.remedies[0].chi2:
             continue
         told |= {remedy.key, *remedy.same_as}
         alike = f"; these logs cannot tell it from {all_of(list(map(named, remedy.same_as)))}" if remedy.same_as else ""

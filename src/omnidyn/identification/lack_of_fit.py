@@ -91,7 +91,7 @@ class LackOfFit:
     def table(self) -> Table:
         """The remedies, a row each."""
         rows = [
-            (r.words, r.key, f"{100.0 * r.gain:.2g} +- {100.0 * r.gain_std:.1g} %", all_of(list(map(named, r.same_as))))
+            (r.words, r.key, f"{100.0 * r.gain:.2g} +- {100.0 * r.gain_std:.2g} %", all_of([*map(named, r.same_as)]))
             for r in self.remedies
         ]  # fmt: skip
         return Table(("what may be missing", "key", "held-out error less by", "the same to this log"), rows, "<<><")

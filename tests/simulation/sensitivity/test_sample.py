@@ -67,6 +67,20 @@ def test_between_the_rows(robot):
                 assert (np.nanmax(np.abs(found - slope), axis=0) <= 2e-5 * np.max(size) + 1e-6).all(), key
 
 
+def test_a_look_beyond_the_last_row_sees_its_voltage_hold_on(robot):
+    """Of voltages that do, as of a run that has a row more; of a voltage less, there is nothing to see."""
+    voltage, t = program(60), np.arange(60) * 0.01
+    seen, _ = late_samples(robot, t, voltage, ways(robot), np.zeros(3), (-0.004, 0.0), 1e-7)
+    longer, _ = late_samples(robot, np.arange(61) * 0.01, voltage, ways(robot), np.zeros(3), (-0.004, 0.0), 1e-7)
+    for own, more in zip(seen, longer, strict=True):
+        assert np.isfinite(own.twist).all()
+        np.testing.assert_allclose(own.twist, more.twist[:60], atol=1e-6)
+        np.testing.assert_allclose(own.dtwist, more.dtwist[:60], atol=1e-5)
+        np.testing.assert_array_equal(own.voltage, more.voltage[:60])
+    shorter, _ = late_samples(robot, t, voltage[:-1], [], np.zeros(3), (-0.004,), 1e-7)
+    assert np.flatnonzero(np.isnan(shorter[0].twist[:, 0])).tolist() == [59]
+
+
 def test_a_look_between_fixed_steps_is_of_second_order(robot):
     """Half the step, a quarter of the error: where the rows are, and between them."""
     errors = []

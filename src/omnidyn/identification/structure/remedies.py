@@ -18,6 +18,7 @@ from omnidyn.identification.structure.candidates import Candidate, Trial
 from omnidyn.identification.structure.linear import SAME, Linear
 
 BLOCKS = 10  # of the log, each held out once
+RIVAL = 0.3  # of what the best explains, from which another explanation is worth a look
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
 
 
@@ -120,7 +121,7 @@ def remedies(linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], mos
         same = tuple(o.candidate.key for o in worth if o is not t and _same(blocks, known, base, noise, t, o))
         words = t.candidate.told(float(t.size[0]), t.trial.at)
         found.append(Remedy(t.candidate.key, words, gain, std, same, t.chi2, len(t.at)))
-    return tuple(r for r in found if r.gain > 0.0)[:most]
+    return tuple(r for r in found if r.gain > 0.0 and r.chi2 > RIVAL * worth[0].chi2)[:most]
 
 
 def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried, other: Tried) -> bool:

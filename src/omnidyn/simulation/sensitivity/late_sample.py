@@ -39,8 +39,8 @@ PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
 class Direction:
     """A way to change a run; derivatives are by a number that is 0 for the run itself.
 
-    up, down: robots at +EPS and -EPS, None where the robot stays. voltage (rows - 1, n), start (3,): derivatives of the
-    voltages [V] and of the twist at the start, None where they stay. name: for messages.
+    up, down: robots at +EPS and -EPS, None where the robot stays. voltage, of the shape of the voltages [V], and start
+    (3,): derivatives of them and of the twist at the start, None where they stay. name: for messages.
     """
 
     name: str
@@ -129,9 +129,10 @@ def late_samples(
 ) -> tuple[list[LateSample], int]:  # fmt: skip
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
-    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors; start: (3,) twist; tol as for `simulate`;
-    travel: what is wanted of the way, see sample.py. Also returns the number of rows in which the friction solver
-    hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
+    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors, or (rows, n): see `_held`; start: (3,)
+    twist; tol as for `simulate`; travel: what is wanted of the way, see sample.py. Also returns the number of rows in
+    which the friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which
+    is off.
     """
     numbers, plants = _plants(robot, directions)
     rates = np.zeros((len(directions), *voltage.shape))
@@ -141,7 +142,7 @@ def late_samples(
         rates[k] = 0.0 if one.voltage is None else one.voltage
         first[k, :N_AXES] = 0.0 if one.start is None else one.start * [1.0, 1.0, length]
     first[:, 2] += start[2] * stretch
-    given = Commands(np.ascontiguousarray(np.diff(t)), np.ascontiguousarray(voltage))
+    given = Commands(_held(t, len(voltage), late), np.ascontiguousarray(voltage))
     seen = _room(robot, t, late, len(directions), travel)
     outcome, _, _ = run_with_derivatives(
         numbers, directions_of(numbers, plants, rates), given, current_bounds(robot, given, len(given.dt)),
@@ -154,14 +155,14 @@ def looped_samples(
     robot: Robot, t: FloatArray, set_point: FloatArray, directions: Sequence[Direction], late: Sequence[float],
     tol: float | None, travel: int = TURN, settled: float = 0.0,
 ) -> list[LateSample]:  # fmt: skip
-    """The same through the speed loop of the robot, under set points [rad/s], (rows - 1, n), from rest.
+    """The same through the speed loop of the robot, under set points [rad/s], (rows - 1, n) or (rows, n), from rest.
 
     Before the run it has rested. Directions change the robot only. settled: see `run_loop_with_derivatives`.
     """
     refuse_rate([one.name for one in directions])
     numbers, plants = _plants(robot, directions)
     robots = [each or robot for one in directions for each in (one.up, one.down)]
-    given = Commands(np.ascontiguousarray(np.diff(t)), None, set_point=np.ascontiguousarray(set_point))
+    given = Commands(_held(t, len(set_point), late), None, set_point=np.ascontiguousarray(set_point))
     seen, count = _room(robot, t, late, len(directions), travel), len(directions)
     found = run_loop_with_derivatives(
         robot, robots, numbers, directions_of(numbers, plants, np.zeros((count, *set_point.shape))), given,
@@ -172,6 +173,16 @@ def looped_samples(
         for part in (seen.state, seen.pace, seen.way, seen.dstate, seen.dway):
             part[c, rests] = 0.0
     return _looks(robot, directions, seen, (numbers.body[LENGTH], _stretch(plants)), _in_force(found))
+
+
+def _held(t: FloatArray, commands: int, late: Sequence[float]) -> FloatArray:
+    """For how long each of the commands holds [s]. The last row may have one too, or none; t (rows,) [s].
+
+    It then holds on for as long as any channel looks ahead. Otherwise these channels would show nothing in their last
+    rows, and the likelihood would jump by those where a latency passes 0: no descent would get it across.
+    """
+    held = np.ascontiguousarray(np.diff(t))
+    return held if commands < len(t) else np.append(held, max(-min(late, default=0.0), held[-1]))
 
 
 def _in_force(found: LoopRun) -> tuple[FloatArray, FloatArray, FloatArray]:

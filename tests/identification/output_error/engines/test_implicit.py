@@ -13,6 +13,7 @@ from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
+from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
@@ -96,6 +97,23 @@ def test_the_fast_fit_ends_where_an_independent_optimiser_does(ellipse, log):
     best = least_squares(residual, own + 0.3 * std, x_scale=std, diff_step=1e-4, xtol=1e-7, ftol=1e-10)
     print("distance from the optimum, standard errors:", np.round((own - best.x) / std, 4))
     assert (np.abs(own - best.x) < 0.02 * std).all()
+
+
+def test_no_row_comes_or_goes_where_a_latency_passes_0(ellipse, log):
+    """The likelihood would jump by the density of these rows, and a descent from 0 would end there."""
+    lacks = replace(log, voltage=np.vstack([log.voltage[:-1], np.full((1, 3), np.nan)]))  # the last row needs none
+    for run in (log, lacks):
+        problem = make_problem([record(run, ellipse)], ellipse, Question(free=tuple(TRUTH), start="rest"))
+        solver, late = Solver(problem, ImplicitEngine(problem, 1e-6)), problem.names.index("latency.twist")
+        objectives, used = [], []
+        for value in (-1e-6, 0.0, 1e-6):
+            point = problem.start()
+            point.values[late] = value
+            state = solver.state(point)
+            objectives.append(state.objective)
+            used.append(np.isfinite(solver.engine.residuals(point)[0][0]).sum())
+        assert used[0] == used[1] == used[2]
+        assert np.ptp(objectives) < 0.5
 
 
 NUISANCES = {

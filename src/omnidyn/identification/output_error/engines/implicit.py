@@ -159,9 +159,9 @@ class ImplicitEngine:
     ) -> tuple[FloatArray, list[Direction], list[int], FloatArray]:
         """(voltages at the motors, directions, index of each among the slopes, what turns its derivative into that)."""
         record, count = piece.record, len(self.problem.parameters)
-        rows, (driver, where) = slice(piece.first, piece.last), driver_of(self.problem, values)
+        rows, (driver, where) = slice(piece.first, piece.last + 1), driver_of(self.problem, values)
         at, directions = list(range(self.problem.robot_count)), []
-        logged = clip_voltage(robot.motor, record.voltage[rows])
+        logged = clip_voltage(robot.motor, through_the_end(record.voltage[rows]))
         share = record.share[rows]
         voltage, by = at_motors(logged, share, driver)
         for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True):
@@ -180,6 +180,12 @@ class ImplicitEngine:
         factors = np.ones(len(at))
         factors[: self.problem.robot_count] = 1.0 / np.array(scales[: self.problem.robot_count])
         return voltage, directions, at, factors
+
+
+def through_the_end(commands: FloatArray) -> FloatArray:
+    """Commands (rows, n) of a piece, whose last row may lack its own: the one before it then holds on."""
+    last = commands[-1]
+    return commands if np.isfinite(last).all() else np.concatenate([commands[:-1], commands[-2:-1]])
 
 
 def travel_of(columns: Sequence[Column]) -> int:

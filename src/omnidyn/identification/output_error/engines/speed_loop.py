@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.exact import LATE
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, travel_of
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, through_the_end, travel_of
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -45,7 +45,7 @@ class LoopEngine(ImplicitEngine):
         robot = self.problem.robot_at(point.values)
         for piece in self.problem.pieces:
             t, set_point = _driven(piece)
-            voltage = simulate(robot, dt=np.diff(t), wheel_speed_command=set_point, tol=self.tol).voltage
+            voltage = simulate(robot, dt=np.diff(t), wheel_speed_command=set_point[:-1], tol=self.tol).voltage
             assert voltage is not None
             if (np.abs(voltage) > NEAR_LIMIT * per_wheel(robot.motor.voltage_limit, voltage.shape[1])).any():
                 return True
@@ -91,6 +91,7 @@ class LoopEngine(ImplicitEngine):
 
 
 def _driven(piece: Piece) -> tuple[FloatArray, FloatArray]:
-    """(times (rows,) [s], set points (rows - 1, n) [rad/s]) of a piece."""
+    """(times (rows,) [s], set points (rows, n) [rad/s]) of a piece."""
     assert piece.record.set_point is not None
-    return piece.record.t[piece.first : piece.last + 1], piece.record.set_point[piece.first : piece.last]
+    rows = slice(piece.first, piece.last + 1)
+    return piece.record.t[rows], through_the_end(piece.record.set_point[rows])
