@@ -106,6 +106,27 @@ def test_random_bytes_are_called_what_they_are(write):
     assert "zero" not in str(error.value)
 
 
+@pytest.mark.parametrize("size", [60, 200, 5000])
+def test_random_bytes_without_zeros_are_no_text_either(write, size):
+    """They were said to lack a separator, or a row. What the file begins with is told, in hex."""
+    content = np.random.default_rng(1).integers(1, 256, size).astype(np.uint8).tobytes()
+    with pytest.raises(InputError, match="not a text file; got bytes that are no text") as error:
+        read_table(write(content))
+    assert f"it begins with {content[:8].hex(' ')}" in str(error.value)
+    assert "export it as CSV" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "encoding, name", [("latin-1", "Geschwindigkeit Räder"), ("gbk", "速度"), ("shift-jis", "速度"), ("utf-8", "速度")]
+)
+def test_text_in_any_encoding_is_text(write, encoding, name):
+    """A control character in it (a form feed, a colour of a terminal) makes no noise of it."""
+    table = read_table(write(f"t_s,{name}\n0,1\n0.1,2\n0.2,3\n".encode(encoding)))
+    assert len(table) == 3
+    table = read_table(write(f"# \x1b[0m{name}\nt_s,x_m\n0,1\n0.1,2\n0.2,3\n".encode(encoding)))
+    assert len(table) == 3
+
+
 def test_zero_bytes_in_text_are_zero_bytes(write):
     rows = "".join(f"{k},{k}\n" for k in range(500)).encode()
     with pytest.raises(InputError, match="got zero bytes in it"):
