@@ -18,7 +18,7 @@ from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import unit_of
 from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, is_numeric, letter_of
-from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, quantity_of
+from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import NameParts, read_name
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
@@ -54,10 +54,12 @@ def guess_columns(
     """Guess the map of a table. robot: settles what a name leaves open (volts or duty, which side of the gear).
 
     assume: name of a column or letter of a component ("u", "w1", "vx") -> unit, where the file gives none. A name that
-    a units row or its own ending gives a unit needs none. taken: column -> component, where the user says it
+    a units row or its own ending gives a unit needs none. With @motor or @wheel behind the unit, "ticks/48@motor", it
+    says the side of the gear too. taken: column -> component, where the user says it
     himself: nothing is doubted of them. Raises InputError for an unknown unit in `assume`.
     """
-    assumed = {name: parse_unit(text).text for name, text in (assume or {}).items()}
+    told = {name: unit_and_side(text) for name, text in (assume or {}).items()}
+    assumed = {name: unit.text for name, (unit, _) in told.items()}
     found = Guess()
     names = [name for name in table.names if is_numeric(table.columns[name])]
     table = replace(table, units={**_units_of_letters(names, assumed, table.units), **table.units})
@@ -70,6 +72,7 @@ def guess_columns(
     if not numbers:
         _take_bench(table, names, assumed, found)
     _settle_side(table, robot, found)
+    _take_sides({name: side for name, (_, side) in told.items() if side}, found)
     found.doubts = [doubt for doubt in found.doubts if doubt.name not in (taken or {})]
     used = {column.name for column in found.columns.values()}
     unused = tuple(name for name in table.names if name not in used)
@@ -356,6 +359,14 @@ def _settle_side(table: Table, robot: Robot | None, found: Guess) -> None:
             found.notes.append(
                 f"speeds of wheels are on the {side} side: the commands are {ratio:.4g} times those of the body"
             )
+
+
+def _take_sides(sides: Mapping[str, str], found: Guess) -> None:
+    """The sides of the gear that the user says. sides: column, component or its letter -> side."""
+    for component, column in found.columns.items():
+        for name in (component.rstrip("0123456789"), component, column.name):
+            if name in sides:
+                found.columns[component] = replace(found.columns[component], side=sides[name])
 
 
 def _values(table: Table, columns: list[Column | None]) -> FloatArray:

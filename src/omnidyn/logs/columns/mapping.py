@@ -128,6 +128,17 @@ def parse_column(text: str, names: Sequence[str] = ()) -> tuple[str, Column]:
     return component, Column(name, unit.strip(), side or WHEEL_SIDE, invert)
 
 
+def unit_and_side(text: str) -> tuple[Unit, str]:
+    """UNIT[@motor|@wheel], as --assume takes it: "ticks/48@motor"; the side is "" where none is said.
+
+    Raises InputError for an unknown unit or side.
+    """
+    unit, at, side = text.partition("@")
+    if at and side.strip() not in (MOTOR_SIDE, WHEEL_SIDE):
+        raise InputError("unknown side of the gear", got=text, expected="@motor or @wheel", where="assume")
+    return parse_unit(unit), side.strip()
+
+
 def save_map(columns: ColumnMap, path: str | os.PathLike, force: bool = False) -> Path:
     """Write a map as TOML; `load_map` reads it back equal. Raises InputError as `write_atomic` does."""
     return write_atomic(path, map_to_toml(columns), force)
