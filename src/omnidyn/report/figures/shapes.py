@@ -8,7 +8,6 @@ from typing import cast
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.projections.polar import PolarAxes
-from matplotlib.ticker import MaxNLocator
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.steady.operating_points import SPEEDS, ForcePoints
@@ -27,6 +26,7 @@ from omnidyn.report.style import (
     VERMILLION,
     WIDTH,
     Picture,
+    around_robot,
     look,
     new_figure,
     picture,
@@ -96,7 +96,7 @@ def draw_polar(study: SteadyStudy) -> Picture:
                       label=f"{study.choice.chosen}" + ("" if group == "all" else f", {group}"))  # fmt: skip
             top = max(top, float(np.nanmax(own.along, initial=0.0)))
         _compared(study, axes, groups[0])
-        _dress(axes, top)
+        around_robot(axes, top)
         figure.legend(*axes.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.68, 0.5))
         figure.text(0.02, 0.95, "force along travel, N", fontsize=11.5)
         return picture("force_polar", "Force along travel, over the direction of travel", _polar_words(study), figure)
@@ -182,15 +182,3 @@ def _along(way: FloatArray, wrench: FloatArray) -> FloatArray:
 def _of(points: ForcePoints, group: str) -> ForcePoints:
     own = np.array([name == group for name in points.group])
     return points.chosen(own & points.travels if (own & points.travels).any() else own)
-
-
-def _dress(axes: PolarAxes, top: float) -> None:
-    """Forward is up, left is left, as in the picture of the robot."""
-    axes.set_theta_zero_location("N")
-    axes.set_thetagrids([0.0, 90.0, 180.0, 270.0], ["x\nforward", "y\nleft", "180°", "-90°"], fontsize=10.0)
-    axes.set_ylim(0.0, 1.15 * top)
-    ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, 1.15 * top)
-    axes.set_rgrids([each for each in ticks if 0.0 < each <= 1.15 * top], angle=-112.5, fontsize=9.5, color=INK)
-    axes.spines["polar"].set_visible(True)
-    axes.spines["polar"].set_color(GREY)
-    axes.grid(color=GREY, alpha=0.35)
