@@ -10,6 +10,7 @@ from omnidyn.statistics import (
     block_length,
     bootstrap_error,
     central_interval,
+    difference_noise,
     drawn_times,
     errors_in_variables,
     find_tick,
@@ -80,6 +81,16 @@ def test_the_error_is_the_scatter_of_repeated_means():
     series = [ar1(rng, 600, 0.8) for _ in range(200)]
     told = np.mean([standard_error(x) for x in series])
     assert told == pytest.approx(np.std([np.mean(x) for x in series]), rel=0.15)
+
+
+def test_noise_from_differences():
+    """Of normal noise on a slow signal its std; of a quantised signal half a step; never across pieces."""
+    noise = np.random.default_rng(6).standard_normal(4000)
+    slow = np.sin(np.linspace(0.0, 20.0, 4000))
+    assert difference_noise(0.3 * noise + slow) == pytest.approx(0.3, rel=0.05)
+    assert difference_noise(np.repeat([0.0, 0.5, 1.5], 50)) == 0.25
+    assert difference_noise(np.zeros(5), np.full(5, 9.0)) == 0.0
+    assert difference_noise() == 0.0
 
 
 def test_the_step_of_a_sensor():

@@ -27,6 +27,7 @@ TEXT = 0.05  # of a tick that the text of a log may round by
 # Ticks in the least change that are looked for; as many different changes, each within TEXT of a whole number, are no
 # chance: (2 TEXT)^5 for each number of ticks tried.
 MOST_IN_LEAST, LEAST_DISTINCT = 12, 6
+SAMPLE, DIFFERENCE = 1500, 0.954  # rows for a median; median difference of two normal numbers, in their std
 
 
 # ---- spread -----------------------------------------------------------------------------------------------
@@ -40,6 +41,19 @@ def robust_std(values: FloatArray, centre: FloatArray | float | None = None, axi
     """
     middle = np.median(values, axis=axis) if centre is None else centre
     return MAD_TO_STD * np.median(np.abs(values - middle), axis=axis)
+
+
+def difference_noise(*pieces: FloatArray) -> float:
+    """Standard deviation of the noise of a signal that moves slowly, from the differences of its neighbours.
+
+    pieces: of the signal, shape (n,) each, NaN where missing; no difference reaches from one to the next. The median of
+    the differences is 0.954 sigma; where most are 0, the signal is quantised, and half of its step is taken.
+    """
+    steps = np.concatenate([np.diff(each[np.isfinite(each)]) for each in pieces] or [np.zeros(0)])
+    size = np.abs(steps[:: max(len(steps) // SAMPLE, 1)])
+    size = size[np.isfinite(size)]
+    middle = float(np.median(size)) / DIFFERENCE if size.size else 0.0
+    return middle if middle > 0.0 else 0.5 * float(size[size > 0.0].min(initial=np.inf)) if size.any() else 0.0
 
 
 def sensor_step(values: FloatArray) -> float:

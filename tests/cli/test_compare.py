@@ -10,6 +10,7 @@ import omnidyn
 from omnidyn.cli import main
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
 from tests.support.compared_logs import clean_log, coulomb_times, noisy
 
 AXEBOT = load_robot("axebot")
@@ -91,6 +92,23 @@ def test_fail_if_is_exit_5_with_the_numbers_and_the_result(call):
     assert "1 of 2 rules of --fail-if hold for coulomb x 1.3: vx.rmse = 0.0" in err
     assert call("run.csv", "--robot", "axebot", "--fail-if", "vx.rmse>0.02")[0] == 0
     assert call("run.csv", "--robot", "axebot", "--robot", "wrong.toml", "--fail-if", "vx.rmse>0.02")[0] == 0
+
+
+def test_a_model_that_follows_nothing_ends_with_4_and_is_shown(call):
+    """Mirrored wheels and twist: it was exit 0. A model that follows badly is a result."""
+    run = noisy(clean_log(AXEBOT, 1), 1)
+    wrong = Run(t=run.t, voltage=run.voltage, wheel_speed=-np.asarray(run.wheel_speed), twist=-np.asarray(run.twist))
+    omnidyn.write_run(wrong, "mirrored.csv")
+    code, out, err = call("mirrored.csv", "--robot", "axebot")
+    assert code == 4
+    assert out.startswith("The model does not follow: ")
+    assert "axebot against mirrored.csv: 1 free run" in out
+    assert err.splitlines()[-1].startswith("omnidyn: The model does not follow: ")
+    code, out, _ = call("mirrored.csv", "--robot", "axebot", "--robot", "wrong.toml", "--json")
+    assert (code, json.loads(out)["ok"]) == (4, False)
+    assert call("mirrored.csv", "--robot", "axebot", "--fail-if", "vx.rmse>0.02")[0] == 5
+    code, out, _ = call("run.csv", "--robot", "wrong.toml", "--json")
+    assert (code, json.loads(out)["ok"]) == (0, True)
 
 
 @pytest.mark.parametrize(

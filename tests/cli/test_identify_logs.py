@@ -194,6 +194,17 @@ def test_motors_in_words(call, bench):
     assert "-o is not used" in err
 
 
+def test_motors_that_do_not_answer_end_with_4_and_are_shown(call, tmp_path):
+    """The speed has nothing to do with the input: it was exit 0."""
+    rng, t = np.random.default_rng(3), np.arange(3000) * 0.01
+    speed = np.repeat(rng.choice([-6.0, -3.0, 3.0, 6.0], 60), 50)[:, None]
+    volts = np.repeat(rng.choice([-4.0, -2.0, 2.0, 4.0], 60), 50)[:, None]
+    write_run(Run(t=t, voltage=volts, wheel_speed=speed), tmp_path / "loose.csv")
+    code, out, err = call(str(tmp_path / "loose.csv"), "--what", "motors", "--json")
+    assert (code, json.loads(out)["ok"]) == (4, False)
+    assert "omnidyn: No motor is seen to answer to its input" in err
+
+
 def test_motors_from_a_table_without_a_time(call, tmp_path):
     """u = 0.5 w + 0.4: at rest up to 0.6 V, and 0.8 V moves it."""
     table, report = tmp_path / "table.csv", tmp_path / "m.html"

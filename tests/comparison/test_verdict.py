@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.comparison.compare import compare
-from omnidyn.comparison.verdict import NOISE, WELL, compared_words, followed, follows
+from omnidyn.comparison.verdict import NOISE, WELL, compared_words, followed, follows, is_missed, nothing_followed
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 
@@ -94,3 +94,20 @@ def test_wheels_that_turn_the_other_way_are_not_followed(run):
         load_robot("axebot"), run.replace(wheel_speed=-run.wheel_speed, twist=None, pose=None, current=None)
     )
     assert found.verdict.startswith("The model does not follow: wheel speeds not at all (rms error ")
+    assert found.failed
+    assert found.to_dict()["ok"] is False
+    assert not compare(load_robot("axebot"), run).failed
+
+
+def test_a_model_fails_where_it_follows_nothing():
+    """One kind that is followed, or that is noise, is enough not to fail; what never changes is no failure."""
+    assert nothing_followed(followed({"w1": Score(12.0, -60.0), "vx": Score(0.4, 30.0)}))
+    assert not nothing_followed(followed({"w1": Score(12.0, -60.0), "vx": Score(0.4, 60.0)}))
+    assert not nothing_followed(followed({"w1": Score(12.0, -60.0), "vx": Score(0.4, 30.0, 0.3)}))
+    assert not nothing_followed(followed({"w1": Score(0.0, None)}))
+
+
+def test_a_signal_is_missed_where_its_errors_are_large_and_no_noise():
+    assert is_missed(0.51, 3.1, 1.0)
+    assert not is_missed(0.49, 3.1, 1.0)
+    assert not is_missed(0.51, 2.9, 1.0)

@@ -1,5 +1,6 @@
 """What an identification came to, in a sentence: a good model, a half-good one, a bad one."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from omnidyn.identification.estimate import Correlation, Estimate
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.motors.verdict import motors_verdict
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.question import Question
 from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_verdict
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot_file import load_robot
@@ -137,6 +139,20 @@ def test_no_shape_fits():
     assert steady_verdict(study(7.0)) == (
         "No shape of friction explains the forces: the best, disc, misses 7 N of 10 N in a direction that was left out."
     )
+    found = Identification(Question(), "steady-state", {"all": estimate([0.02] * 6, Estimate)}, study=study(7.0))
+    assert found.verdict.startswith("Failed: no shape of friction explains the forces: the best, disc, misses 7 N")
+    assert found.verdict.endswith("the numbers mean nothing until that is mended.")
+    assert replace(found, study=study(0.5)).failures == ()
+
+
+def test_what_the_verdict_calls_meaningless_is_a_failure():
+    """The sentence said that the numbers mean nothing, and `failures` was empty: exit 0."""
+    lost = estimate([0.02] * 6, not_followed=("wheel_speed[0]",))
+    found = Identification(Question(), "output-error", {"all": lost})
+    assert found.failures == ("the model does not follow wheel_speed[0]",)
+    scores = SimpleNamespace(scores={"fitted": BAD}, not_followed=lambda noise: {})
+    hardly = replace(found, estimates={"all": estimate([0.02] * 6)}, validations={"all": scores})
+    assert hardly.failures == ("the model does not follow: wheel speeds not at all (rms error 9 rad/s)",)
 
 
 # ---- motors -----------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from omnidyn.errors import InputError
 from omnidyn.findings.check import check
 from omnidyn.logs.read_log import LogOptions, iter_logs, load_log, read_log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
+from omnidyn.model.robot_file import load_robot
 
 VOLTS = "u1_V,u2_V,u3_V"
 
@@ -106,6 +107,27 @@ def test_random_bytes_are_called_what_they_are(write):
     assert "zero" not in str(error.value)
 
 
+@pytest.mark.parametrize("size", [60, 200, 5000])
+def test_random_bytes_without_zeros_are_no_text_either(write, size):
+    """They were said to lack a separator, or a row. What the file begins with is told, in hex."""
+    content = np.random.default_rng(1).integers(1, 256, size).astype(np.uint8).tobytes()
+    with pytest.raises(InputError, match="not a text file; got bytes that are no text") as error:
+        read_table(write(content))
+    assert f"it begins with {content[:8].hex(' ')}" in str(error.value)
+    assert "export it as CSV" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "encoding, name", [("latin-1", "Geschwindigkeit Räder"), ("gbk", "速度"), ("shift-jis", "速度"), ("utf-8", "速度")]
+)
+def test_text_in_any_encoding_is_text(write, encoding, name):
+    """A control character in it (a form feed, a colour of a terminal) makes no noise of it."""
+    table = read_table(write(f"t_s,{name}\n0,1\n0.1,2\n0.2,3\n".encode(encoding)))
+    assert len(table) == 3
+    table = read_table(write(f"# \x1b[0m{name}\nt_s,x_m\n0,1\n0.1,2\n0.2,3\n".encode(encoding)))
+    assert len(table) == 3
+
+
 def test_zero_bytes_in_text_are_zero_bytes(write):
     rows = "".join(f"{k},{k}\n" for k in range(500)).encode()
     with pytest.raises(InputError, match="got zero bytes in it"):
@@ -130,8 +152,34 @@ def test_a_column_that_is_mapped_is_no_longer_called_not_taken(write):
 
 def test_the_speed_of_a_rim_is_called_that(write):
     (words,) = load_log(write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))).columns.doubts
-    assert "m/s is the speed of its rim: divide it by the radius of the wheel" in words
+    assert "m/s is the speed of its rim: name the robot, whose radius of the wheels makes rad/s of it" in words
     assert "`assume`" not in words
+    (words,) = load_log(write(three("v1_m_s,v2_m_s,v3_m_s"))).columns.doubts
+    assert words.startswith("v1_m_s, v2_m_s, v3_m_s look like w1, w2, w3, but m/s is the speed of its rim")
+
+
+@pytest.mark.parametrize("names", ["v{}_m_s", "speed_m{} [m/s]", "wheel{}_speed_m_s", "motor{}_vel_m_s", "v{}_mm_s"])
+def test_the_speed_of_a_rim_is_that_of_the_wheel_times_its_radius(write, names):
+    """It was left out, or taken for nothing. The gear has no part in it, whatever the name says."""
+    robot = load_robot("axebot")
+    log = load_log(write(three(",".join(names.format(k) for k in (1, 2, 3)))), robot)
+    size = 1e-3 if "mm" in names else 1.0
+    assert log.channels["wheel_speed"] == pytest.approx(size * np.outer(np.arange(60), [13, 17, 7]) / 0.035)
+    assert not log.columns.doubts
+    assert sum("divided by the radius of the wheels" in note for note in log.notes) == 1
+
+
+def test_a_rim_may_be_given_by_hand(write):
+    robot, path = load_robot("axebot"), write(three("p,q,r"))
+    log = load_log(path, robot, LogOptions(overrides=("a1=p:mm", "w2=q:cm/s")))
+    assert log.channels["wheel_angle"][:, 0] == pytest.approx(1e-3 * 13 * np.arange(60) / 0.035)
+    assert log.channels["wheel_speed"][:, 1] == pytest.approx(1e-2 * 17 * np.arange(60) / 0.035)
+    with pytest.raises(InputError, match=r"w2 is that of a rim: without its radius it is no angle; got q \[cm/s\]"):
+        load_log(path, options=LogOptions(overrides=("w2=q:cm/s",)))
+    with pytest.raises(InputError, match="what is in metres is of the rim, behind the gear; got w2: q"):
+        load_log(path, robot, LogOptions(overrides=("w2=q:m/s@motor",)))
+    with pytest.raises(InputError, match="u1 cannot have this unit; got m/s"):
+        load_log(path, robot, LogOptions(overrides=("u1=p:m/s",)))
 
 
 def test_an_assumed_unit_of_nothing_is_said(write):

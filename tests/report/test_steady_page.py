@@ -76,6 +76,14 @@ def test_each_group_has_its_dead_zone(page, study):
         assert f"{x.scale_interval[0]:.3f} to {x.scale_interval[1]:.3f}" in text
 
 
+def test_forces_around_the_robot_look_as_its_paths_do(study):
+    """The numbers on the rings stand on a ground of their own, above marks and lines."""
+    polar = next(each for each in shape_pictures(study) if each.name == "force_polar").figure
+    labels = polar.axes[0].get_yticklabels()
+    assert labels
+    assert all(label.get_bbox_patch() is not None for label in labels)
+
+
 def test_names_of_groups_are_text(page):
     assert "<second>" in Reader(page).text
     assert "<second>" not in page

@@ -10,7 +10,7 @@ import typer
 from omnidyn.cli import log_options
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import progress
-from omnidyn.cli.terminal.telling import tell
+from omnidyn.cli.terminal.telling import end_failed, tell
 
 if TYPE_CHECKING:
     from omnidyn.comparison.result import Comparison
@@ -49,6 +49,7 @@ def compare(
 
     The model runs free under the logged voltages (or duties, or set speeds through the speed loop of the robot file),
     from gap to gap. First a sentence: what it follows, and what not; then how far it ends up from what was measured.
+    Exit code 4 where it follows nothing that was measured; the result is still written.
     """
     if len(robot) > MOST_ROBOTS:
         raise typer.BadParameter(f"--robot may be given once or twice, not {len(robot)} times.")
@@ -70,6 +71,8 @@ def compare(
         with progress("drawing"):
             _draw(found, picture, channels, force)
     refuse_exceeded(found, rules)
+    if found.failed:
+        end_failed(found.verdict)
 
 
 def _robots(names: Sequence[str]) -> list[Robot]:

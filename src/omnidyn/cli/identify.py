@@ -14,10 +14,11 @@ from omnidyn.cli.terminal.flags import flags
 from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say
+from omnidyn.cli.terminal.telling import end_failed
 from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.identification.question import options as fields_of_question
 
-INTERRUPTED, FAILED = 130, 4
+INTERRUPTED = 130
 
 
 def _asks(command: Callable[..., None]) -> Callable[..., None]:
@@ -142,5 +143,4 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
         told(f"interrupted: {found.interrupted}")
         raise typer.Exit(INTERRUPTED)
     if found.failures:
-        told(found.verdict)
-        raise typer.Exit(FAILED)
+        end_failed(found.verdict)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from omnidyn.cli.identify_logs import Loaded
 from omnidyn.cli.identify_show import Out, say_written
 from omnidyn.cli.terminal.streams import say
-from omnidyn.cli.terminal.telling import tell
+from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.document import apart
 from omnidyn.identification.question import Question
 
@@ -52,6 +52,8 @@ def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Ou
     tell(told, to.json, record, robot=own, output=output or None, report=report or None)
     say_written([output, report])
     to.finish()
+    if study.failed:
+        end_failed(study.verdict)
 
 
 def _page(study: MotorStudy, record: dict[str, Any]) -> str:

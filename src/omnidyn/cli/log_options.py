@@ -28,7 +28,12 @@ MAP = typer.Option(
 COLUMN = typer.Option(
     [], "--column", metavar="CH=COL:UNIT", help="One column: u1=motor_1_volts:V, w2=-m2vel:rpm@motor. Repeatable."
 )
-ASSUME = typer.Option([], "--assume", metavar="NAME=UNIT", help="Unit of a column, or of all u, w, vx, ... Repeatable.")
+ASSUME = typer.Option(
+    [],
+    "--assume",
+    metavar="NAME=UNIT",
+    help="Unit of a column, or of all u, w, vx, ...: d=%, a=ticks/48@motor. Repeatable.",
+)
 LATENCY = typer.Option(
     [], "--latency", metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.", rich_help_panel=MORE
 )

@@ -13,7 +13,7 @@ from omnidyn.comparison import text
 from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
-from omnidyn.comparison.verdict import compared_words
+from omnidyn.comparison.verdict import compared_words, followed, nothing_followed
 from omnidyn.document import Document, Part, Points, Words
 from omnidyn.logs.channels import place
 from omnidyn.model.first_guess import guess_line
@@ -108,6 +108,11 @@ class Comparison(Shown):
         better = {name: self.better(name) for name in self.difference}
         return compared_words(self.robots, [self.overall[robot] for robot in self.robots], better)
 
+    @property
+    def failed(self) -> bool:
+        """Whether no robot follows the logs: something changes, and nothing of it is followed even roughly."""
+        return all(nothing_followed(followed(self.overall[robot])) for robot in self.robots)
+
     def trace(self, robot: str, component: str, segment: Segment) -> Trace:
         """Measured and model of one component over one segment."""
         real, ours = self.measured[segment.log], self.simulated[robot][segment.log]
@@ -192,6 +197,7 @@ class Comparison(Shown):
         }
         return {
             "verdict": self.verdict,
+            "ok": not self.failed,
             "logs": [run.source for run in self.measured],
             "segments": [asdict(segment) for segment in self.segments],
             "units": {name: unit(name) for name in self.channels},

@@ -2,6 +2,9 @@
 
 The error of a component as a share of its spread is 1 - fit / 100 (metrics.py). Up to FOLLOWS of it the model follows,
 up to HALF roughly; errors that are white are the noise of the sensor, whatever their share.
+
+A model fails where it follows nothing (`nothing_followed`). A fit fails too where it misses one of the signals that it
+was fitted to (`is_missed`), for its numbers stand for that signal as well. Both rules stand here and nowhere else.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from omnidyn.document import all_of, sentence
 from omnidyn.logs.channels import place
 
 FOLLOWS, HALF, NOTHING = 0.2, 0.5, 1.0  # error over spread
+ROUGH = 3.0  # times what a signal scatters by from row to row: errors beyond are no noise
 WHITE = 0.05  # p-value from which errors are noise
 WELL, NOISE, ROUGHLY, HARDLY, NOT = range(5)  # how a component is followed, best first
 PLAIN = {
@@ -83,6 +87,20 @@ def followed(scores: Mapping[str, Scored]) -> list[Followed]:
     return sorted(found, key=lambda each: each.level)
 
 
+def nothing_followed(found: Sequence[Followed]) -> bool:
+    """Whether the model does not follow: something changes, and nothing of it is followed even roughly."""
+    return bool(found) and all(each.level >= HARDLY for each in found)
+
+
+def is_missed(share: float, error: float, scatter: float) -> bool:
+    """Whether a model misses a signal: its errors are more than half of the spread, and no noise.
+
+    share: error over spread. error: its rms. scatter: by how much the signal scatters from row to row
+    (`statistics.difference_noise`), in the same unit; a signal of mere noise is not to blame.
+    """
+    return share > HALF and error > ROUGH * scatter
+
+
 def plain_name(component: str) -> str:
     """The kind of measurement that a component belongs to, in plain words."""
     where = place(component)
@@ -109,7 +127,7 @@ def follows(who: str, found: Sequence[Followed]) -> str:
     """ "the model follows wheel speeds within 3 % and turn rate within 5 %, heading not at all (..)", no full stop."""
     if not found:
         return f"nothing that was measured changes: how well {who} follows cannot be told"
-    if found[0].level >= HARDLY:
+    if nothing_followed(found):
         return f"{who} does not follow: {', '.join(each.words() for each in found)}"
     good = [each.words() for each in found if each.level <= ROUGHLY]
     bad = [each.words() for each in found if each.level >= HARDLY]

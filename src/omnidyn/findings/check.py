@@ -15,6 +15,7 @@ import numpy as np
 from omnidyn.arguments import check_order
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
+from omnidyn.findings.filters import check_filters
 from omnidyn.findings.finding import FATAL, NOTE, Finding, Verdict, in_order, merged
 from omnidyn.findings.fitness import uses
 from omnidyn.findings.limits import check_limits
@@ -36,8 +37,8 @@ __all__ = ["check", "check_blocks", "check_log"]
 
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
-    check_values, check_limits, check_wiring, check_dead_wheels, check_slip, check_scale, check_lag, check_energy,
-    check_motion, check_oddities, check_excitation,
+    check_values, check_limits, check_wiring, check_dead_wheels, check_slip, check_scale, check_lag, check_filters,
+    check_energy, check_motion, check_oddities, check_excitation,
 )  # fmt: skip
 
 # What only a whole log can show: dropped unless every block shows it.

@@ -32,7 +32,7 @@ from omnidyn.identification.steady.study import SteadyStudy, identify_steady
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.validation import Validation, validate
-from omnidyn.identification.verdict import fits_verdict, lines_verdict, steady_verdict
+from omnidyn.identification.verdict import fit_failure, fits_verdict, lines_verdict, steady_failure, steady_verdict
 from omnidyn.identification.whole_logs import answered, fit_output_error
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
@@ -180,20 +180,18 @@ class Identification(Shown):
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Why the numbers mean nothing, in words: what of a log is not followed, by the rule of validation.py, and
+        """Why the numbers mean nothing, in words: what of a log is not followed, forces that no shape explains, and
         fatal findings of `check`; empty for a fit that stands."""
-        words = []
-        for group, validation in (self.validations or {}).items():
-            missed = validation.not_followed(self.fits[group].noise)
-            if missed:
-                names = ", ".join(f"{name} (fit {percent:.0f} %)" for name, percent in missed.items())
+        words = [steady_failure(self.study)] if self.study is not None else []
+        for group, fit in self.fits.items():
+            if missed := fit_failure(fit, (self.validations or {}).get(group)):
                 where = f"{group}: " if len(self.estimates) > 1 else ""
-                words.append(f"{where}the model does not follow {names}")
+                words.append(f"{where}{missed}")
         for verdict in self.verdicts:
             found = [finding.message for finding in verdict.findings if finding.level == FATAL]
             if found:
                 words.append(f"{verdict.source or 'the log'} is not fit for use as it stands: {'; '.join(found)}")
-        return tuple(words)
+        return tuple(each for each in words if each)
 
     @property
     def estimate(self) -> Estimate:
@@ -217,7 +215,8 @@ class Identification(Shown):
 
     def _told(self) -> Document:
         if self.study is not None:
-            return study_document(self.study)
+            told = study_document(self.study)
+            return replace(told, data={"ok": not self.failures, **told.data})
         if self.method == OUTPUT_ERROR:
             told = fit_document(self.fits, self.validations or {}, self.differences, self.verdicts, self.advice)
             return replace(told, data={"ok": not self.failures, **told.data})

@@ -52,6 +52,7 @@ def shows_options(*takers: tuple[str, str]) -> Callable[[Function], Function]:
     """
 
     def shown(function: Function) -> Function:
+        """The function, its signature completed; what it does stays as it is."""
         signature = inspect.signature(function)
         kept = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
         more = [

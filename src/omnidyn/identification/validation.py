@@ -1,9 +1,7 @@
 """Validation: the fitted robot as a free run beside the logs it was fitted to, and beside logs it never saw.
 
-The rule of a model that does not follow its log: of a signal that was fitted, the free run leaves more than half of the
-spread (a fit below FOLLOWS percent), on held-out logs where there are any, and errors more than ROUGH times what the
-signal scatters by from row to row, so that a signal of mere noise is not blamed. Headings and positions count on the
-logs they were fitted to: a free run drifts.
+A model does not follow its log where it misses a signal that was fitted, by the rule of comparison/verdict.py, on
+held-out logs where there are any. Headings and positions count on the logs they were fitted to: a free run drifts.
 """
 
 from __future__ import annotations
@@ -20,12 +18,13 @@ from omnidyn.comparison.compare import compare
 from omnidyn.comparison.replay import choose_input
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import counts_from_start, unit
+from omnidyn.comparison.verdict import is_missed
 from omnidyn.document import Document, Table, cell, chance_cell
 from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
 from omnidyn.run import Run
-from omnidyn.statistics import find_tick, robust_std
+from omnidyn.statistics import difference_noise, find_tick, robust_std
 
 STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
 FITTED, HELD_OUT = "fitted", "held out"
@@ -33,7 +32,6 @@ POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
 LASTING = 2.0  # errors over their scatter from row to row, beyond which most of them is no noise
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
-FOLLOWS, ROUGH = 50.0, 3.0  # [%]; see above
 
 
 @dataclass(frozen=True)
@@ -117,12 +115,11 @@ class Validation:
         found = {}
         for name in self.scores[FITTED]:
             score = self.scores[FITTED if name in POSE else which].get(name)
-            percent = None if score is None else score.fit_percent
-            if percent is None or percent >= FOLLOWS or output_name(name) not in fitted:
+            if score is None or score.fit_percent is None or output_name(name) not in fitted:
                 continue
             comparison = self.fitted if name in POSE or self.held_out is None else self.held_out
-            if _signal_over_scatter(comparison, name) > ROUGH:
-                found[name] = percent
+            if is_missed(1.0 - score.fit_percent / 100.0, score.rmse, _scatter(comparison, name)):
+                found[name] = score.fit_percent
         return found
 
     def _lasting(self, name: str) -> float:
@@ -154,14 +151,9 @@ class Validation:
         }  # fmt: skip
 
 
-def _signal_over_scatter(found: Comparison, name: str) -> float:
-    """Errors over what the measured signal scatters by from row to row, robustly: most rows are none of a jump."""
-    traces = [found.trace(found.robots[0], name, segment) for segment in found.segments]
-    steps = np.concatenate([np.diff(trace.measured) for trace in traces])
-    errors = np.concatenate([trace.error for trace in traces])
-    scatter = robust_std(steps[np.isfinite(steps)], 0.0) / np.sqrt(2.0)
-    size = float(np.sqrt(np.nanmean(errors**2)))
-    return size / scatter if scatter > 0.0 else np.inf
+def _scatter(found: Comparison, name: str) -> float:
+    """What the measured signal scatters by from row to row, in its unit."""
+    return difference_noise(*(found.trace(found.robots[0], name, segment).measured for segment in found.segments))
 
 
 def validate(

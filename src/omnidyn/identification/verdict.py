@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from omnidyn.comparison.verdict import HARDLY, followed, follows
+from omnidyn.comparison.verdict import followed, follows, nothing_followed
 from omnidyn.document import all_of, sentence
 from omnidyn.findings.finding import FATAL, Verdict
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.steady.choice import ShapeScore
 from omnidyn.identification.steady.study import SteadyStudy
-from omnidyn.identification.validation import FITTED, HELD_OUT, Validation
+from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name
 
 NAMED = 4  # shapes that are named
 WHERE = {FITTED: "on the fitted logs", HELD_OUT: "on logs held out"}
@@ -27,7 +28,7 @@ def fit_verdict(fit: OutputErrorEstimate, validation: Validation | None = None) 
     which = HELD_OUT if HELD_OUT in validation.scores else FITTED
     found = followed(validation.scores[which])
     words = f"{WHERE[which]} {follows('the model', found)}"
-    if fit.not_followed or (found and found[0].level >= HARDLY):
+    if fit.not_followed or nothing_followed(found):
         return sentence(f"{words}: its numbers mean nothing until it does")
     return sentence(f"{words}; {fit.numbers_known()}")
 
@@ -53,18 +54,48 @@ def _led_by_misfit(fit: OutputErrorEstimate, words: str) -> str:
     return f"{sentence(lack.words())} {words}" if lack is not None and lack.found and not fit.not_followed else words
 
 
-def steady_verdict(study: SteadyStudy) -> str:
-    """Friction from steady windows."""
+def fit_failure(fit: OutputErrorEstimate, validation: Validation | None = None) -> str:
+    """What a fit misses, in words; "" where it follows what it was fitted to."""
+    missed = {} if validation is None else validation.not_followed(fit.noise)
+    words = [f"{name} (fit {percent:.0f} %)" for name, percent in missed.items()]
+    named = {output_name(name) for name in missed}
+    words += [name for name in fit.not_followed if name not in named]
+    if words:
+        return f"the model does not follow {', '.join(words)}"
+    found = followed(_judged(validation)) if validation is not None else []
+    return follows("the model", found) if nothing_followed(found) else ""
+
+
+def _judged(validation: Validation) -> Mapping[str, Score]:
+    """The scores that say whether a model follows: those of logs held out, where there are any."""
+    return validation.scores[HELD_OUT if HELD_OUT in validation.scores else FITTED]
+
+
+def steady_failure(study: SteadyStudy) -> str:
+    """What no shape of friction explains, in words; "" where one does."""
+    score, size, share = _best_shape(study)
+    if share <= MISSES:
+        return ""
+    return (
+        f"no shape of friction explains the forces: the best, {score.name}, misses {score.loo:.2g} N of "
+        f"{size:.2g} N in a direction that was left out"
+    )
+
+
+def _best_shape(study: SteadyStudy) -> tuple[ShapeScore, float, float]:
+    """(score of the best shape, size of the forces [N], share of it that this shape misses)."""
     score, forces = study.choice.score, study.points.wrench[:, :2]
     size = float(np.sqrt(np.mean((forces**2).sum(axis=1))))
-    share = score.loo / size if size > 0.0 else math.inf
+    return score, size, score.loo / size if size > 0.0 and math.isfinite(score.loo) else math.inf
+
+
+def steady_verdict(study: SteadyStudy) -> str:
+    """Friction from steady windows."""
+    score, _, share = _best_shape(study)
     several = len(study.travel) > 1
     levels = all_of([f"{each.mean:.3g} N{f' ({name})' * several}" for name, each in study.travel.items()])
-    if not share <= MISSES:
-        return (
-            f"No shape of friction explains the forces: the best, {score.name}, misses {score.loo:.2g} N of "
-            f"{size:.2g} N in a direction that was left out."
-        )
+    if failure := steady_failure(study):
+        return sentence(failure)
     ties = [each.name for each in study.choice.scores if not each.told_apart and each.name != score.name]
     alike = f"; as good, as far as these data tell: {all_of(ties[:NAMED])}" if ties else ""
     lacks = [each for each in study.lack_of_fit.values() if each.found]

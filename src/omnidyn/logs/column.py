@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from omnidyn.errors import InputError
-from omnidyn.units import parse_unit
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel
+from omnidyn.units import LENGTH, SPEED, parse_unit
 
 WHEEL_SIDE, MOTOR_SIDE = "wheel", "motor"
 MAX_LATENCY = 10.0  # [s]
@@ -16,8 +18,8 @@ class Column:
     """One column as a component.
 
     name: of the column in the file. unit: as units.py writes it. side: "motor" for a speed or an angle before the
-    gear, "wheel" behind it. invert: the column has the opposite sign. latency: how late it was recorded [s]; a value
-    of row time t happened at t - latency.
+    gear, "wheel" behind it; a speed in m/s and a way in m are of the rim. invert: the column has the opposite sign.
+    latency: how late it was recorded [s]; a value of row time t happened at t - latency.
     Raises InputError for an unknown unit or side, or a latency beyond 10 s.
     """
 
@@ -36,8 +38,22 @@ class Column:
 
     @property
     def factor(self) -> float:
-        """SI value behind the gear of the motor side = factor * cell; the gear is not in it."""
+        """SI value = factor * cell, neither gear nor radius of the wheel in it: `divisor` has these."""
         return parse_unit(self.unit).size * (-1.0 if self.invert else 1.0)
+
+    @property
+    def of_rim(self) -> bool:
+        """Whether what it says of a wheel is about its rim: a speed in m/s, a way in m."""
+        return parse_unit(self.unit).quantity in (SPEED, LENGTH)
+
+    def divisor(self, robot: Robot, wheel: int) -> float:
+        """What a number of a wheel, counted from 0, is divided by to be that of the wheel in rad/s or rad.
+
+        The gear ratio before the gear, the radius [m] at the rim, else 1.
+        """
+        if self.side == MOTOR_SIDE:
+            return float(per_wheel(robot.motor.gear_ratio, robot.wheels.count)[wheel])
+        return float(per_wheel(robot.wheels.wheel_radius, robot.wheels.count)[wheel]) if self.of_rim else 1.0
 
     def __str__(self) -> str:
         side = f" at the {self.side}" if self.side == MOTOR_SIDE else ""

@@ -16,14 +16,14 @@ from omnidyn.logs.clock.counters import unrolled
 from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.column import MOTOR_SIDE, Column
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
-from omnidyn.logs.columns.mapping import ColumnMap, component_channel, load_map, parse_column
+from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, load_map, parse_column
 from omnidyn.logs.log import Log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.table.table import ROWS, Table
 from omnidyn.logs.table.text_file import Progress
 from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import per_wheel, wheel_speed
+from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 
 STILL = 1e-6  # [rad/s] a commanded speed below counts as none
@@ -152,8 +152,8 @@ def log_from_table(
             if period is not None:
                 notes.append(f"{column.name} starts over after {period:.6g} {_bare(column.unit)}: it is taken to go on")
         values = values * column.factor
-        if column.side == MOTOR_SIDE:
-            values = values / _gear(robot, found[1])
+        if found[0] in SIDED:
+            values = values / _divisor(column, key, robot, found[1], table.source)
         width = len(components(found[0], wheels))
         channels.setdefault(found[0], np.full((len(table), width), np.nan))[:, found[1]] = values
     if any(column.side == MOTOR_SIDE for column in columns.columns.values()) and robot is None:
@@ -172,8 +172,16 @@ def _bare(unit: str) -> str:
     return unit.partition("/")[0]
 
 
-def _gear(robot: Robot | None, wheel: int) -> float:
-    return 1.0 if robot is None else float(per_wheel(robot.motor.gear_ratio, robot.wheels.count)[wheel])
+def _divisor(column: Column, component: str, robot: Robot | None, wheel: int, where: str) -> float:
+    """`Column.divisor`, and 1 before the gear of no robot. Raises InputError for a rim without one."""
+    if robot is not None:
+        return column.divisor(robot, wheel)
+    if column.of_rim:
+        raise InputError(
+            f"{component} is that of a rim: without its radius it is no angle", got=f"{column}, and no robot",
+            expected="rad/s or rad, or a robot", remedy="name the robot, whose file has the radius", where=where,
+        )  # fmt: skip
+    return 1.0
 
 
 def _signed(log: Log, robot: Robot | None) -> Log:

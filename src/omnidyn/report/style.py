@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -154,13 +154,20 @@ def axis_title(axis: str) -> str:
     return f"{axis} ({letter})"
 
 
-def around_robot(axes: PolarAxes, top: float) -> None:
-    """Directions of travel as in the picture of the robot: forward is up, left is left. top: of what was drawn."""
+FOUR_WAYS = {0.0: "x\nforward", 90.0: "y\nleft", 180.0: "180°", 270.0: "-90°"}
+
+
+def around_robot(axes: PolarAxes, top: float, ways: Mapping[float, str] = FOUR_WAYS, room: float = 1.15) -> None:
+    """Directions of travel as in the picture of the robot: forward is up, left is left.
+
+    top: of what was drawn. ways: directions that are named [degree]. room: end of the scale, in tops. The numbers of
+    the scale stand between two directions, on a ground of their own.
+    """
     axes.set_theta_zero_location("N")
-    axes.set_thetagrids([0.0, 90.0, 180.0, 270.0], ["x\nforward", "y\nleft", "180°", "-90°"], fontsize=10.0)
-    axes.set_ylim(0.0, 1.15 * top)
-    ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, 1.15 * top)
-    axes.set_rgrids([each for each in ticks if 0.0 < each <= 1.15 * top], angle=-112.5, fontsize=9.5, color=INK)
+    axes.set_thetagrids(list(ways), list(ways.values()), fontsize=10.0)
+    axes.set_ylim(0.0, room * top)
+    ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, room * top)
+    axes.set_rgrids([each for each in ticks if 0.0 < each <= room * top], angle=-112.5, fontsize=9.5, color=INK)
     for label in axes.get_yticklabels():
         label.set(bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}, ha="center", va="center")
     axes.spines["polar"].set_visible(True)

@@ -273,6 +273,24 @@ def test_commands_tell_the_side_of_the_gear(tmp_path):
         assert columns.columns["w1_cmd"].side == side
 
 
+def test_an_assumed_unit_may_say_the_side_of_the_gear(tmp_path):
+    """It was refused as an unknown unit; only a column of its own could have a side."""
+    table = table_of(tmp_path, {"t_s": clock(0.01), "enc1": np.arange(ROWS), "enc2": np.arange(ROWS), "w1": 2.0})
+    columns = guess_columns(table, assume={"a": "ticks/48@motor", "w1": "rpm@motor"}).columns
+    assert columns["a2"] == Column("enc2", "ticks/48", "motor")
+    assert columns["w1"] == Column("w1", "rpm", "motor")
+    assert guess_columns(table, assume={"a": "ticks/48@wheel"}).columns["a1"] == Column("enc1", "ticks/48")
+    robot = load_robot("axebot")
+    run = read_log(tmp_path / "log.csv", robot, assume={"a": "ticks/48@motor"})
+    turn = 2.0 * np.pi / 48.0 / 19.0  # the gear of the AxeBot is 19
+    assert run.wheel_angle[:, 0] == pytest.approx(turn * np.arange(ROWS))
+    with pytest.raises(InputError, match="unknown side of the gear; got ticks/48@shaft; expected @motor or @wheel"):
+        guess_columns(table, assume={"a": "ticks/48@shaft"})
+    volts = table_of(tmp_path, {"t_s": clock(0.01), "u1": 2.0})
+    with pytest.raises(InputError, match="only speeds and angles of wheels have a motor side; got u1: u1"):
+        guess_columns(volts, assume={"u": "V@motor"})
+
+
 def test_wheels_may_be_counted_from_zero(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "w0_rpm": 1, "w1_rpm": 2, "w2_rpm": 3}))
     assert [columns.columns[f"w{k}"].name for k in (1, 2, 3)] == ["w0_rpm", "w1_rpm", "w2_rpm"]

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
+
+import typer
 
 from omnidyn.cli.terminal.streams import painted, say, show, show_json
 from omnidyn.document import WIDTH, Document
+
+FAILED = 4  # the result is written, and it means nothing
+
+
+def end_failed(verdict: str) -> NoReturn:
+    """End with exit code 4 a command whose result, written and shown, means nothing; `verdict` says why."""
+    say(f"omnidyn: {verdict}")
+    raise typer.Exit(FAILED)
 
 
 def as_json(document: Document, record: dict[str, Any], **written: Any) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.logs.channels import place
-from omnidyn.logs.column import MOTOR_SIDE
+from omnidyn.logs.columns.mapping import SIDED, component_channel
 from omnidyn.logs.log import MAX_MISSING
 
 CODES = frozenset((999, 9999, 99999, 999999, 32767, 32768, 65535, 2147483647, 2147483648, 4294967295))
@@ -83,9 +83,10 @@ def _changed(work: LogUnderCheck, channel: str, component: str, values: FloatArr
 
 
 def _cell_size(work: LogUnderCheck, component: str) -> float:
-    """What one of the file's units is in SI, the gear included."""
+    """What one of the file's units is in SI, gear and radius of the wheel included."""
     column = work.log.columns.columns.get(component)
     if column is None:
         return 1.0
-    gear = float(np.mean(work.robot.motor.gear_ratio)) if column.side == MOTOR_SIDE and work.robot is not None else 1.0
-    return column.factor / gear
+    if work.robot is None or component_channel(component) not in SIDED:
+        return column.factor
+    return column.factor / column.divisor(work.robot, place(component)[1])  # type: ignore[index]

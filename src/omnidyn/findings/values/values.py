@@ -13,7 +13,7 @@ from omnidyn.findings.values.codes import check_codes
 from omnidyn.findings.values.spikes import check_spikes, recorded
 from omnidyn.findings.values.stuck import check_stuck
 from omnidyn.logs.channels import place
-from omnidyn.logs.column import MOTOR_SIDE
+from omnidyn.logs.columns.mapping import SIDED, component_channel
 from omnidyn.logs.log import MAX_MISSING
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.units import known_unit
@@ -133,8 +133,8 @@ def _unit_words(work: LogUnderCheck, component: str, step: float) -> str:
     if column is None or unit is None:
         return si
     size = unit.size
-    if column.side == MOTOR_SIDE and work.robot is not None:
-        size /= float(np.mean(work.robot.motor.gear_ratio))
+    if work.robot is not None and component_channel(component) in SIDED:
+        size /= column.divisor(work.robot, place(component)[1])  # type: ignore[index]
     return si if abs(size - 1.0) < 1e-9 else f"{si} ({step / size:.4g} {unit.text} in column {column.name})"
 
 

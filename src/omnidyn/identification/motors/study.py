@@ -20,7 +20,7 @@ from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import MotorLog, motor_logs
 from omnidyn.identification.motors.start import STARTS_HEAD, MotorStart, motor_starts
 from omnidyn.identification.motors.static import is_slow, points_of_logs, starts_of_points, windows_of_points
-from omnidyn.identification.motors.verdict import motors_verdict
+from omnidyn.identification.motors.verdict import motors_verdict, none_answers
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import MOTOR_FIT, MOTOR_LINES, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
@@ -69,6 +69,11 @@ class MotorStudy:
         return motors_verdict(self.motors, self.starts)
 
     @property
+    def failed(self) -> bool:
+        """Whether no motor is seen to answer to its input: the numbers mean nothing."""
+        return none_answers(self.motors, self.starts)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Of the logs, then of each motor."""
         words = list(self.log_warnings)
@@ -101,8 +106,8 @@ class MotorStudy:
         for own, plain in zip(motors, self.plain, strict=False):
             own["without_dead_band"] = plain.to_dict()
         return {
-            "verdict": self.verdict, "method": self.method, "input": self.kind, "unit": self.unit,
-            "speed_from": self.speed_from,
+            "verdict": self.verdict, "ok": not self.failed, "method": self.method, "input": self.kind,
+            "unit": self.unit, "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
             "starts": [each.to_dict() for each in self.starts], "statements": list(self.statements),
             "warnings": list(self.warnings),

@@ -13,9 +13,8 @@ def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart]
     """Which motors answer to their input, and at which input they start: from rest where that was seen, else by the
     dead band of the line.
     """
-    each = [one for one in motors if one.motor is not None] or list(motors)
-    levels = {one.name: _levels(one, starts) for one in each}
-    blind = [one.name for one in each if not one.ci95[SLOPE][0] > 0.0 and not levels[one.name]]
+    each = _own(motors)
+    levels, blind = {one.name: _levels(one, starts) for one in each}, unanswering(motors, starts)
     if len(blind) == len(each):
         return f"No motor is seen to answer to its input: the slope of {all_of(blind)} may as well be 0."
     seen = [one for one in each if levels[one.name]]
@@ -33,6 +32,21 @@ def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart]
     if blind:
         parts.append(f"{all_of(blind)} {'is' if len(blind) == 1 else 'are'} not seen to answer to the input")
     return sentence("; ".join(parts))
+
+
+def unanswering(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> list[str]:
+    """Names of the motors that are not seen to answer to their input: their slope may be 0, and no start was seen."""
+    return [one.name for one in _own(motors) if not one.ci95[SLOPE][0] > 0.0 and not _levels(one, starts)]
+
+
+def none_answers(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> bool:
+    """Whether no motor is seen to answer to its input."""
+    return len(unanswering(motors, starts)) == len(_own(motors))
+
+
+def _own(motors: Sequence[MotorEstimate]) -> list[MotorEstimate]:
+    """The motors without the line of all together, where they have lines of their own."""
+    return [one for one in motors if one.motor is not None] or list(motors)
 
 
 def _one_way(start: MotorStart) -> str:

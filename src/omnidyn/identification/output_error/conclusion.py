@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.comparison.verdict import is_missed
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified, printable
 from omnidyn.identification.force_scale import scale_of_motion
@@ -19,7 +20,6 @@ from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT,
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
-from omnidyn.identification.output_error.problem.starts import difference_noise
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.support import too_early
@@ -27,11 +27,11 @@ from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, 
 from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
+from omnidyn.statistics import difference_noise
 
 IN_METRES = (("twist", 0), ("twist", 1), ("position", 0), ("position", 1))  # outputs that know of no wheel radius
 LEAST_SHARE = 1e-4  # of a lost direction that a number lost with it must have to be named
 LARGEST_STD = 1e9  # what a robot file takes
-HALF, ROUGH = 0.5, 3.0  # of an output's spread, and times its noise from row to row: errors beyond are no noise
 SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted to Gaussian noise of std 1
 
 
@@ -103,9 +103,9 @@ def _scale(problem: Problem) -> str:
 
 
 def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
-    """Output -> share of its spread that the model leaves, where that is most of it and far from the noise of a row.
+    """Output -> share of its spread that the model leaves, where the model misses it (`is_missed`).
 
-    An output that hardly moves may be all noise; one that moves, and not as the model does, has a wrong sign or unit.
+    It has a wrong sign or unit. Left out: what is counted, and what never changes.
     """
     found = {}
     noise = noise_of(solver, solution)
@@ -119,10 +119,9 @@ def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
         parts = [part - part.mean() if column[0] in TRAVELS else part for part in parts if part.size]
         left = noise.get(_column(column), 0.0)
         spread = float(np.std(np.concatenate(parts))) if parts else 0.0
-        if solver.tick[c] or not left > HALF * spread:
+        if solver.tick[c] or not spread:
             continue
-        rough = max((difference_noise(part) for part in parts), default=0.0)
-        if left > ROUGH * rough and spread > ROUGH * rough:
+        if is_missed(left / spread, left, difference_noise(*parts)):
             found[_column(column)] = left / spread
     return found
 

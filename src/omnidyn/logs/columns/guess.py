@@ -8,21 +8,19 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns import names as words
+from omnidyn.logs.columns.guess_side import settle_side, take_sides
 from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import unit_of
 from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, is_numeric, letter_of
-from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, quantity_of
+from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import NameParts, read_name
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import MAX_WHEELS, per_wheel, wheel_speed
+from omnidyn.model.wheels import MAX_WHEELS
 from omnidyn.units import COUNT, Unit, known_unit, parse_unit
 from omnidyn.units import CURRENT as CURRENT_UNIT
 from omnidyn.units import DUTY as DUTY_UNIT
@@ -32,7 +30,6 @@ from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
 
 Numbers = Mapping[tuple[str, int], int]  # (letter of a component, number in the file) -> number of the wheel from 1
 
-SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
 _LETTER = re.compile(r"([a-z])\d{1,3}")
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
 
@@ -40,6 +37,7 @@ _BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and wh
 _NUMBERED = (
     (words.CURRENT, "i"), (words.DUTY, "d"), (words.VOLTAGE, "u"), (words.RATE, "w"), (words.ANGLE, "a"),
 )  # fmt: skip
+_OF_A_RIM = {words.LINEAR, words.RATE, words.WHEEL, words.MOTOR, words.COMMAND, words.MEASURED}
 _BY_UNIT = {VOLTAGE_UNIT: "u", CURRENT_UNIT: "i", DUTY_UNIT: "d", TURN_RATE_UNIT: "w", "angle": "a", COUNT: "a"}
 NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPLY, words.TIME})
 _BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
@@ -54,11 +52,13 @@ def guess_columns(
     """Guess the map of a table. robot: settles what a name leaves open (volts or duty, which side of the gear).
 
     assume: name of a column or letter of a component ("u", "w1", "vx") -> unit, where the file gives none. A name that
-    a units row or its own ending gives a unit needs none. taken: column -> component, where the user says it
+    a units row or its own ending gives a unit needs none. With @motor or @wheel behind the unit, "ticks/48@motor", it
+    says the side of the gear too. taken: column -> component, where the user says it
     himself: nothing is doubted of them. Raises InputError for an unknown unit in `assume`.
     """
-    assumed = {name: parse_unit(text).text for name, text in (assume or {}).items()}
-    found = Guess()
+    told = {name: unit_and_side(text) for name, text in (assume or {}).items()}
+    assumed = {name: unit.text for name, (unit, _) in told.items()}
+    found = Guess(robot=robot)
     names = [name for name in table.names if is_numeric(table.columns[name])]
     table = replace(table, units={**_units_of_letters(names, assumed, table.units), **table.units})
     numbers = _wheel_numbers(table, names, found)
@@ -69,7 +69,8 @@ def guess_columns(
     take_time(table, assumed, found)
     if not numbers:
         _take_bench(table, names, assumed, found)
-    _settle_side(table, robot, found)
+    settle_side(table, robot, found)
+    take_sides({name: side for name, (_, side) in told.items() if side}, found)
     found.doubts = [doubt for doubt in found.doubts if doubt.name not in (taken or {})]
     used = {column.name for column in found.columns.values()}
     unused = tuple(name for name in table.names if name not in used)
@@ -141,6 +142,8 @@ def _numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
         volts = unit.quantity == VOLTAGE_UNIT and name.roles == {words.LINEAR}  # V1 [V]
         if by_word or volts or name.roles & {words.MOTOR, words.WHEEL} or not name.roles - {words.OTHER}:
             return _BY_UNIT[unit.quantity]
+    if unit is not None and unit.quantity == SPEED_UNIT and words.LINEAR in name.roles and name.roles <= _OF_A_RIM:
+        return "w"  # v1_m_s: of the rim of wheel 1
     return next((letter for role, letter in _NUMBERED if role in name.roles), None)
 
 
@@ -271,15 +274,26 @@ def _enter(name: str, component: str, unit: Unit, parts: NameParts, found: Guess
     elif unit.quantity == COUNT:
         found.doubts.append(Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
         return
-    elif unit.quantity == SPEED_UNIT and wanted == TURN_RATE_UNIT and component.startswith("w"):
-        why = f"but {unit.text} is the speed of its rim: divide it by the radius of the wheel, to log rad/s"
-        found.doubts.append(Doubt(name, component, why, ()))
+    elif unit.quantity == SPEED_UNIT and is_of_rim(component, unit):
+        _enter_rim(name, component, unit, found)
         return
     elif unit.quantity != wanted:
         found.doubts.append(Doubt(name, component, f"{unit.text} is no unit of a {wanted}"))
         return
     side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in parts.roles else WHEEL_SIDE
     found.columns[component] = Column(name, unit.text, side)
+
+
+def _enter_rim(name: str, component: str, unit: Unit, found: Guess) -> None:
+    """Take a speed of a rim, where the radius is known that makes it one of the wheel."""
+    if found.robot is None:
+        why = f"but {unit.text} is the speed of its rim: name the robot, whose radius of the wheels makes rad/s of it"
+        found.doubts.append(Doubt(name, component, why, ()))
+        return
+    found.columns[component] = Column(name, unit.text)
+    words = f"speeds of wheels in {unit.text} are those of their rims: divided by the radius of the wheels"
+    if words not in found.notes:
+        found.notes.append(words)
 
 
 def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], found: Guess) -> None:
@@ -330,36 +344,6 @@ def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, 
     unit = known_unit(text) or parts.unit or unit_of(table, name, component, None, found)
     if unit is not None:
         _enter(name, component, unit, parts._replace(number=1), found)
-
-
-def _settle_side(table: Table, robot: Robot | None, found: Guess) -> None:
-    """Commands of body and of wheels tell the side of the gear: they differ by the gear ratio on the other one."""
-    if robot is None:
-        return
-    count = robot.wheels.count
-    body = [found.columns.get(name) for name in ("vx_cmd", "vy_cmd", "omega_cmd")]
-    mine = [found.columns.get(f"w{wheel + 1}_cmd") for wheel in range(count)]
-    gear = per_wheel(robot.motor.gear_ratio, count)
-    if None in body or None in mine or np.all(np.abs(gear - 1.0) < 2.0 * SAME_SIDE):
-        return
-    twist, speed = (_values(table, columns) for columns in (body, mine))
-    expected = wheel_speed(robot.wheels, twist)
-    size = float(np.nansum(np.abs(expected)))
-    if not size > 0.0:
-        return
-    ratio = float(np.nansum(np.abs(speed))) / size
-    for side, factor in ((WHEEL_SIDE, 1.0), (MOTOR_SIDE, float(np.mean(gear)))):
-        if abs(ratio / factor - 1.0) < SAME_SIDE and mine[0].side != side:  # type: ignore[union-attr]
-            for component, column in found.columns.items():
-                if component_channel(component) in SIDED:
-                    found.columns[component] = Column(column.name, column.unit, side)
-            found.notes.append(
-                f"speeds of wheels are on the {side} side: the commands are {ratio:.4g} times those of the body"
-            )
-
-
-def _values(table: Table, columns: list[Column | None]) -> FloatArray:
-    return np.column_stack([table.numbers(c.name, missing=True) * c.factor for c in columns if c is not None])
 
 
 def refuse_doubtful(columns: ColumnMap, where: str) -> None:

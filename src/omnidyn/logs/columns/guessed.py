@@ -11,6 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.column import Column
 from omnidyn.logs.table.dialect import is_number_or_missing, looks_like_number, to_float
+from omnidyn.model.robot import Robot
 
 
 class Doubt(NamedTuple):
@@ -24,12 +25,13 @@ class Doubt(NamedTuple):
 
 @dataclass
 class Guess:
-    """What is found so far. si: columns without a unit, and the SI unit they are taken in."""
+    """What is found so far. si: columns without a unit, and the SI unit they are taken in. robot: whose log it is."""
 
     columns: dict[str, Column] = field(default_factory=dict)
     doubts: list[Doubt] = field(default_factory=list)
     si: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    robot: Robot | None = None
 
     def doubt_words(self) -> tuple[str, ...]:
         """The doubts, columns of one kind in one sentence."""

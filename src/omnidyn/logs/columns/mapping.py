@@ -24,6 +24,7 @@ _QUANTITIES = {
     "s": TIME_QUANTITY, "V": VOLTAGE, "duty": DUTY, "A": CURRENT, "rad": ANGLE, "rad_s": TURN_RATE, "m": LENGTH,
     "m_s": SPEED,
 }  # fmt: skip
+_RIM = {TURN_RATE: SPEED, ANGLE: LENGTH}  # what a wheel does -> what its rim does
 _SPEC = re.compile(r"(?P<invert>-)?(?P<name>.+?)(?::(?P<unit>[^:@]*))?(?:@(?P<side>wheel|motor))?", re.DOTALL)
 
 
@@ -46,9 +47,10 @@ class ColumnMap:
     def __post_init__(self) -> None:
         for component, column in self.columns.items():
             check_quantity(component, parse_unit(column.unit))
-            if column.side == MOTOR_SIDE and component_channel(component) not in SIDED:
+            if column.side == MOTOR_SIDE and (component_channel(component) not in SIDED or column.of_rim):
+                what = "what is in metres is of the rim, behind the gear" if column.of_rim else ""
                 raise InputError(
-                    "only speeds and angles of wheels have a motor side", got=f"{component}: {column}",
+                    what or "only speeds and angles of wheels have a motor side", got=f"{component}: {column}",
                     expected="side wheel",
                 )  # fmt: skip
 
@@ -95,14 +97,19 @@ def quantity_of(component: str) -> str:
 
 
 def check_quantity(component: str, unit: Unit) -> None:
-    """Raises InputError where a unit measures something else than the component."""
+    """Raises InputError where a unit measures something else than the component; a wheel may have that of its rim."""
     wanted = quantity_of(component)
-    if unit.quantity != wanted:
+    if unit.quantity != wanted and not is_of_rim(component, unit):
         remedy = "say how many make a turn: ticks/2000" if unit.quantity == "count" else ""
         raise InputError(
             f"{component} cannot have this unit", got=f"{unit.text} ({unit.quantity})", expected=f"a {wanted}",
             remedy=remedy,
         )  # fmt: skip
+
+
+def is_of_rim(component: str, unit: Unit) -> bool:
+    """Whether a speed of a wheel is given in m/s, or its angle in m: that of its rim."""
+    return component_channel(component) in SIDED and _RIM.get(quantity_of(component)) == unit.quantity
 
 
 def parse_column(text: str, names: Sequence[str] = ()) -> tuple[str, Column]:
@@ -126,6 +133,17 @@ def parse_column(text: str, names: Sequence[str] = ()) -> tuple[str, Column]:
     if unit is None or not unit.strip():
         unit = next(suffix for suffix, each in _QUANTITIES.items() if each == quantity).replace("_", "/")
     return component, Column(name, unit.strip(), side or WHEEL_SIDE, invert)
+
+
+def unit_and_side(text: str) -> tuple[Unit, str]:
+    """UNIT[@motor|@wheel], as --assume takes it: "ticks/48@motor"; the side is "" where none is said.
+
+    Raises InputError for an unknown unit or side.
+    """
+    unit, at, side = text.partition("@")
+    if at and side.strip() not in (MOTOR_SIDE, WHEEL_SIDE):
+        raise InputError("unknown side of the gear", got=text, expected="@motor or @wheel", where="assume")
+    return parse_unit(unit), side.strip()
 
 
 def save_map(columns: ColumnMap, path: str | os.PathLike, force: bool = False) -> Path:

@@ -15,9 +15,11 @@ from omnidyn.errors import InputError
 from omnidyn.files import file_format, open_regular, text_format, too_large
 
 BLOCK_BYTES = 2**20
+SHOWN_BYTES = 8  # of a file that is no text
 START_BYTES = 256  # enough to tell a format and an encoding
 MAX_LINE_BYTES = 4 * 2**20
 MOST_CONTROLS = 0.01  # of the bytes of a file that is damaged text
+MOST_ODD = 0.3  # of the bytes of a text in an encoding of its own; three in five of mere noise are odd
 _NO_CONTROLS = bytes([0, 9, 10, 12, 13, *range(32, 127), *range(128, 256)])  # zero is judged by itself
 TOO_LARGE_REMEDY = "cut it, allow more with `max_bytes`, or read it in pieces with iter_tables"
 
@@ -43,6 +45,7 @@ class TextFile:
         self.notes: list[str] = []
         self._progress, self._max_bytes, self._hash = progress, max_bytes, hashlib.sha256()
         self._latin_line = 0
+        self._start = b""  # what the file begins with
         self.last = 0  # number of the last line, once it was given out
         self.ends_open = False  # whether that one lacks its line end
 
@@ -91,6 +94,7 @@ class TextFile:
             while block := stream.read(BLOCK_BYTES if done else max(BLOCK_BYTES, START_BYTES)):
                 if not done:
                     self._refuse_format(block)
+                    self._start = block[:SHOWN_BYTES]
                 self._hash.update(block)
                 done += len(block)
                 yield block
@@ -123,9 +127,11 @@ class TextFile:
             if decoder is not None:
                 block = self._from_utf16(decoder, block)
             text = block.rstrip(b"\0")
-            if b"\0" in text and _is_binary(text):
+            if (b"\0" in text and _is_binary(text)) or (k == 0 and decoder is None and _is_noise(text)):
+                begins = f" (it begins with {self._start.hex(' ')})"
                 raise InputError(
-                    "this is not a text file", got="bytes that are no text", expected="text with a row for each moment",
+                    "this is not a text file", got=f"bytes that are no text{begins}",
+                    expected="text with a row for each moment, such as CSV, or Parquet",
                     remedy="give the file that the logger wrote, or export it as CSV", where=self.source,
                 )  # fmt: skip
             if b"\0" in text or (zeros and text):
@@ -182,6 +188,22 @@ def _is_binary(block: bytes) -> bool:
     """Whether a part of a file with zero bytes holds much else that stands in no text: other control characters."""
     controls = block[:BLOCK_BYTES].translate(None, _NO_CONTROLS)
     return len(controls) > MOST_CONTROLS * len(block[:BLOCK_BYTES])
+
+
+def _is_noise(block: bytes) -> bool:
+    """Whether a block without zero bytes is no text in any encoding: control characters, and much that is not UTF-8.
+
+    Text in an encoding of its own (Shift JIS, GBK) may hold as many bytes that are not UTF-8, and has no controls.
+    """
+    controls = len(block.translate(None, _NO_CONTROLS))
+    if not controls:
+        return False
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(block)  # the block may end within a character
+    except UnicodeDecodeError:
+        high = len(block) - len(block.translate(None, bytes(range(128, 256))))
+        return controls + high > MOST_ODD * len(block)
+    return controls > MOST_ODD * len(block)
 
 
 def _begin(block: bytes) -> tuple[bytes, str]:

@@ -8,7 +8,6 @@ from typing import cast
 
 import numpy as np
 from matplotlib.projections.polar import PolarAxes
-from matplotlib.ticker import MaxNLocator
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import dead_zone_force, dead_zone_map
@@ -17,12 +16,11 @@ from omnidyn.model.robot import Robot
 from omnidyn.report.style import (
     BLUE,
     GREEN,
-    GREY,
-    INK,
     PURPLE,
     VERMILLION,
     WIDTH,
     Picture,
+    around_robot,
     look,
     new_figure,
     picture,
@@ -55,7 +53,8 @@ def draw_dead_zone_map(robots: Mapping[str, Robot], found: Mapping[str, DeadZone
             if name in found:
                 _band(left, found[name], colour)
         for axes, words in ((left, "voltage of the most loaded motor, V"), (right, "push of the motors, N")):
-            _dress(axes)
+            axes.tick_params(axis="x", pad=4)
+            around_robot(axes, axes.get_ylim()[1], AROUND, 1.06)
             figure.text(axes.get_position().x0 - 0.05, 0.94, words, fontsize=11.5)
         handles, names = left.get_legend_handles_labels()
         figure.legend(handles, names, loc="lower center", ncols=len(names), bbox_to_anchor=(0.5, 0.0))
@@ -81,22 +80,6 @@ def _band(axes: PolarAxes, found: DeadZone, colour: str) -> None:
     axes.fill_between(
         around, low, high, where=np.isfinite(high).tolist(), color=colour, alpha=0.28, linewidth=0, label="95 %"
     )
-
-
-def _dress(axes: PolarAxes) -> None:
-    """Forward is up, left is left, as in the picture of the robot; the scale stands between two directions."""
-    axes.set_theta_zero_location("N")
-    axes.set_thetagrids(list(AROUND), list(AROUND.values()), fontsize=10.0)
-    axes.tick_params(axis="x", pad=4)
-    ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, axes.get_ylim()[1])
-    top = 1.06 * axes.get_ylim()[1]
-    axes.set_ylim(0.0, top)
-    axes.set_rgrids([each for each in ticks if 0.0 < each <= top], angle=-112.5, fontsize=9.5, color=INK)
-    for label in axes.get_yticklabels():
-        label.set(bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}, ha="center", va="center")
-    axes.spines["polar"].set_visible(True)
-    axes.spines["polar"].set_color(GREY)
-    axes.grid(color=GREY, alpha=0.35)
 
 
 def _caption(robots: Mapping[str, Robot], found: Mapping[str, DeadZone]) -> str:

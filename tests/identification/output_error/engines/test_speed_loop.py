@@ -11,17 +11,18 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.loop import retimed
+from omnidyn.identification.output_error.solve.loop import FEW, loop_start, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.keys import Key, friction_keys, gain_keys
+from omnidyn.model.keys import EMF, TORQUE, Key, friction_keys, gain_keys
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
 KP, KI = "drive.kp_V_s_rad", "drive.ki_V_rad"
+RESISTANCE = "motor.resistance_ohm"
 NOISE, CURRENT_NOISE = np.array([0.02, 0.02, 0.1]), 0.05
 
 
@@ -248,3 +249,14 @@ def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(lo
     values[astray] = 0.15
     found = retimed(Solver(problem, LoopEngine(problem)), Point(values, point.states), Progress())
     assert abs(found.values[astray]) <= 0.01
+
+
+def test_motors_that_are_wrong_guesses_come_before_latencies(looped):
+    """Torque twice too large, a resistance that is a guess: with all at once the latencies end in another valley."""
+    start = wrong(looped, **{KP: 1.0, RESISTANCE: 0.3, TORQUE: 2.0, EMF: 2.0})
+    asked = Question(nuisances=("latency",), free=(RESISTANCE, *friction_keys(looped)))
+    problem = make_problem(read_records([log(looped, 3, 300)], start, asked), start, asked)
+    solver, watch = Solver(problem, LoopEngine(problem)), Progress()
+    all_at_once = solver.minimise(loop_start(problem, 0.0, watch), FEW)
+    all_at_once = solver.minimise(retimed(solver, all_at_once.state.point, watch))
+    assert solve_loop(problem, 0.0, watch).state.objective < all_at_once.state.objective - 100.0

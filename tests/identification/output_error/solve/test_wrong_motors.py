@@ -44,6 +44,20 @@ def test_currents_find_their_latency_beside_a_motor_that_is_a_wrong_guess(true, 
     assert abs(fit.value[RESISTANCE] - true.motor.resistance) < 4.0 * fit.std[RESISTANCE]
 
 
+def test_a_path_finds_its_latency_beside_a_motor_that_is_a_wrong_guess(true, run):
+    """Motors first: half the force a row earlier looks like all of it. It ended at -41 ms and 0.4 of the friction."""
+    log = run.replace(twist=None, wheel_speed=None, current=None, pose=noisy(run.pose, 0.002))
+    start = Key.parse(RESISTANCE).set(true, 4.0 * true.motor.resistance)
+    for key in (TORQUE, EMF):
+        start = Key.parse(key).set(start, 0.5 * true.motor.torque_constant)
+    fit = fit_output_error(log, start, start="rest")
+    assert abs(fit.nuisances["latency.position"].value) < 0.1 * STEP
+    assert all(std < 0.0023 for std in fit.noise.values())
+    for k in (0, 1):
+        key = f"friction.direction.coulomb[{k}]"
+        assert abs(fit.value[key] - Key.parse(key).get(true)) < 4.0 * fit.std[key]
+
+
 def test_a_speed_long_before_its_voltage_is_no_automatic_latency(true, run):
     """Speeds 120 ms early; rows are 40 ms apart."""
     early = np.vstack([run.twist[3:], np.repeat(run.twist[-1:], 3, axis=0)])

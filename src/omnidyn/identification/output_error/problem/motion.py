@@ -11,7 +11,6 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import (
     count_far,
-    difference_noise,
     measured_rows,
     measured_twist,
     window_rows,
@@ -20,6 +19,7 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
+from omnidyn.statistics import difference_noise
 
 CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any log
 

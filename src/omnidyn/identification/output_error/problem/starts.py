@@ -21,6 +21,7 @@ from omnidyn.model.frames import world_to_body
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.statistics import difference_noise
 
 WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
@@ -133,18 +134,6 @@ def window_rows(t: FloatArray) -> int:
 def measured_rows(v: FloatArray, rows: int) -> float:
     """How many of so many rows hold a measurement, on average, and at least one: missing ones do not average noise."""
     return max(rows * float(np.isfinite(v).mean()), 1.0)
-
-
-def difference_noise(v: FloatArray) -> float:
-    """Standard deviation of the noise of a signal that moves slowly, from the differences of its neighbours.
-
-    Their median is 0.954 sigma; where most are 0, the signal is quantised, and half of its step is taken.
-    """
-    steps = np.diff(v[np.isfinite(v)])
-    size = np.abs(steps[:: max(len(steps) // SAMPLE, 1)])
-    size = size[np.isfinite(size)]
-    middle = float(np.median(size)) / 0.954 if size.size else 0.0
-    return middle if middle > 0.0 else 0.5 * float(size[size > 0.0].min(initial=np.inf)) if size.any() else 0.0
 
 
 @maker

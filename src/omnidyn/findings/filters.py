@@ -1,0 +1,170 @@
+"""Speeds that the recorder made of positions: differences over one row or several, centred ones, low-passed ones.
+
+Such a speed is no measurement of its own row: it is late, or knows the row after. It is told by the noise: a speed that
+was made of the positions of the same log has their noise too, tick by tick, and nothing that was measured does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.document import all_of
+from omnidyn.findings.finding import NOTE, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.model.frames import unwrapped, world_to_body
+from omnidyn.statistics import robust_std
+
+ENOUGH = 60_000  # rows that tell a filter
+ALIKE = 0.2  # of the noise of the differences: a speed that comes nearer has that very noise
+FOURTH = np.sqrt(70.0)  # spread of fourth differences of white noise; a smooth motion has next to none
+MOST = 0.9  # of the rows must be alike
+LONGEST = 8  # rows of a mean
+STRONGEST, PLAIN = 0.02, 0.95  # share of the new value in a low-pass: below it nothing is told, above it there is none
+LATE_STEP = 1.5  # steps of time beyond which two rows are no neighbours
+
+
+class Speed(NamedTuple):
+    """A speed, shape (rows,), and what it may be made of. rates (rows, n): of the positions, over one row back, over
+    one back and one on, over two back, and so on to LONGEST. noise: of the first of these, by their positions.
+    """
+
+    component: str
+    origin: str
+    values: FloatArray
+    back: FloatArray
+    centred: FloatArray
+    over: tuple[FloatArray, ...]
+    noise: float
+
+
+class Filter(NamedTuple):
+    """What a speed is of its positions: how it was made, by how much it is late [rows], and what to do about it."""
+
+    kind: str
+    words: str
+    late: float
+    remedy: str
+
+
+def check_filters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """Notes on speeds that are differences of positions in the same log; nothing is masked."""
+    if len(work) < 3 * MIN_ROWS or work.step <= 0.0:
+        return [], work
+    alike: dict[Filter, list[Speed]] = {}
+    for speed in _speeds(work):
+        found = _filter_of(speed, work.step)
+        if found is not None:
+            alike.setdefault(found, []).append(speed)
+    return [_finding(each, speeds, work.step) for each, speeds in alike.items()], work
+
+
+def _finding(each: Filter, speeds: list[Speed], step: float) -> Finding:
+    names = all_of([speed.component for speed in speeds])
+    of = all_of(list(dict.fromkeys(speed.origin for speed in speeds)))
+    are = "is" if len(speeds) == 1 else "are"
+    return Finding(
+        "filtered", NOTE, " ".join(speed.component for speed in speeds), f"{names} {are} {each.words} of {of}",
+        each.remedy, (), 0, {"rows_late": each.late, "seconds_late": each.late * step},
+    )  # fmt: skip
+
+
+def _filter_of(speed: Speed, step: float) -> Filter | None:
+    """How a speed was made; None where it has no noise of the positions, as one that was measured."""
+    if not speed.noise > 0.0:
+        return None
+    if _off(speed.values - speed.centred, speed.back) < ALIKE * 0.5 * speed.noise:
+        return Filter(
+            "centred", "centred differences, from the row before to the row after,", 0.0,
+            "they show a motion a row before it begins: where that matters, fit to the positions, without the speeds",
+        )  # fmt: skip
+    for rows, rate in enumerate(speed.over, 1):
+        if _off(speed.values - rate, speed.back) < ALIKE * speed.noise / rows:
+            ms = 0.5 * rows * step * 1e3
+            how = "differences to the row before" if rows == 1 else f"differences over {rows} rows back"
+            return Filter("backward", how, 0.5 * rows, f"they are {ms:.3g} ms late: latency in the mapping")
+    return _low_pass(speed, step)
+
+
+def _low_pass(speed: Speed, step: float) -> Filter | None:
+    """y_k = y_(k-1) + a (d_k - y_(k-1)), d the differences to the row before; late by about its time constant."""
+    change, ahead = np.diff(speed.values), speed.back[1:] - speed.values[:-1]
+    good = np.isfinite(change) & np.isfinite(ahead)
+    power = float((ahead[good] ** 2).sum())
+    share = float((change[good] * ahead[good]).sum()) / power if power > 0.0 else 0.0
+    if not STRONGEST < share < PLAIN or not _off(change - share * ahead, ahead) < ALIKE * share * speed.noise:
+        return None
+    constant = (1.0 - share) / share
+    return Filter(
+        "low-pass", f"low-passed differences (time constant {constant * step * 1e3:.2g} ms)", 0.5 + round(constant, 1),
+        "they lag and hide what is fast: log the speed without the filter, or fit to the positions, without the speeds",
+    )  # fmt: skip
+
+
+def _off(errors: FloatArray, rate: FloatArray) -> float:
+    """What nine errors in ten stay below where it moves; inf where that is too little.
+
+    A speed that is made of positions is so in every row; the middle error would be that of rest.
+    """
+    good = np.isfinite(errors) & np.isfinite(rate) & (rate != 0.0)
+    return float(np.quantile(np.abs(errors[good]), MOST)) if good.sum() >= MIN_ROWS else np.inf
+
+
+def _speeds(work: LogUnderCheck) -> Iterator[Speed]:
+    """Speeds that were recorded beside the positions that they could be made of."""
+    t = work.t[:ENOUGH]
+    angle, pose = work.get("wheel_angle"), work.get("pose")
+    if angle is not None and "wheel_speed" in work.log.channels:
+        of = {component: angle[:ENOUGH, k : k + 1] for k, component in enumerate(_names(angle, "w"))}
+        for component, values in work.columns("wheel_speed"):
+            yield from _made(component, "a" + component[1:], values[:ENOUGH], of[component], t, work.step, None)
+    if pose is None or work.get("twist") is None:
+        return
+    place, heading = pose[:ENOUGH, :2], unwrapped(pose[:ENOUGH, 2])
+    for component, values in work.columns("twist"):
+        own = values[:ENOUGH]
+        if component == "omega":
+            yield from _made(component, "heading", own, heading[:, None], t, work.step, None)
+        else:
+            row = world_to_body(heading)[:, ["vx", "vy"].index(component), :2]
+            yield from _made(component, "x and y", own, place, t, work.step, row)
+
+
+def _names(values: FloatArray, letter: str) -> list[str]:
+    return [f"{letter}{k + 1}" for k in range(values.shape[1])]
+
+
+def _made(
+    component: str, origin: str, values: FloatArray, place: FloatArray, t: FloatArray, step: float,
+    row: FloatArray | None,
+) -> Iterator[Speed]:  # fmt: skip
+    """The speed beside the rates of its positions, shape (rows, n); row (rows, n): which part of them it is."""
+    part = np.ones_like(place) if row is None else row
+    near = np.concatenate([[False], np.diff(t) < LATE_STEP * step])
+
+    def rate(back: int, on: int) -> FloatArray:
+        """From `back` rows before to `on` rows after each row."""
+        own = np.full(len(t), np.nan)
+        inside = slice(back, len(t) - on)
+        change = place[back + on :] - place[: len(t) - back - on]
+        own[inside] = (part[inside] * change).sum(axis=1) / (t[back + on :] - t[: len(t) - back - on])
+        own[inside][~_together(near, back + on)] = np.nan
+        return own
+
+    over = tuple(rate(rows, 0) for rows in range(1, LONGEST + 1))
+    moving = np.isfinite(over[0]) & (over[0] != 0.0)
+    if moving.sum() < MIN_ROWS:
+        return
+    rough = (part[2:-2] * np.diff(place, 4, axis=0)).sum(axis=1)[moving[2:-2] & _together(near, 4)]
+    rough = rough[np.isfinite(rough)]
+    noise = float(robust_std(rough, 0.0)) / FOURTH if rough.size >= MIN_ROWS else 0.0
+    yield Speed(component, origin, values, over[0], rate(1, 1), over, noise * np.sqrt(2.0) / step)
+
+
+def _together(near: BoolArray, count: int) -> BoolArray:
+    """Whether `count` + 1 rows from each row on follow one another without a gap. Shape (rows - count,)."""
+    far = np.concatenate([[0], np.cumsum(~near)])
+    return far[count + 1 :] == far[1 : len(near) - count + 1]

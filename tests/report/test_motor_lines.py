@@ -1,0 +1,45 @@
+"""The picture of the motors: its panels, and what is drawn in them."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from omnidyn.report.figures.motor_lines import draw_motor_lines
+
+SPEED = np.linspace(-5.0, 5.0, 40)
+
+
+def study(count, width=0.01) -> Any:
+    """So many motors, u = 0.5 w + 0.4 sgn w, whose dead bands are known within `width`."""
+    lines = [
+        SimpleNamespace(
+            motor=k, name=f"motor {k + 1}", value={"slope": 0.5, "dead_band": 0.4, "inertia": 0.0},
+            ci95={"dead_band": (0.4 - width, 0.4 + width)},
+        )
+        for k in range(count)
+    ]  # fmt: skip
+    side = np.sign(SPEED)
+    parts = (0.5 * SPEED + 0.4 * side, SPEED, 0.01 + 0.0 * SPEED, side, 0.0 * SPEED, side)
+    windows = SimpleNamespace(kind="voltage", unit="V", speed_from="wheel_angle", of=lambda motor: parts)
+    return lines, windows
+
+
+@pytest.mark.parametrize(("count", "shape"), [(1, (1, 1)), (2, (1, 2)), (3, (1, 3)), (4, (2, 2)), (6, (2, 3))])
+def test_panels_fill_their_rows_and_each_row_has_its_unit(count, shape):
+    """Four motors stood as three and one, the first of each row named by its number and not by its place."""
+    axes = draw_motor_lines(*study(count)).figure.axes
+    assert axes[0].get_gridspec().get_geometry() == shape
+    assert all(panel.axison for panel in axes)
+    labels = [panel.get_ylabel() for panel in axes]
+    assert labels == ["voltage, V" if k % shape[1] == 0 else "" for k in range(count)]
+
+
+def test_a_dead_band_that_is_well_known_is_seen():
+    """An interval of 20 mV on an axis of 3 V was less than a pixel high, below the line."""
+    (panel,) = draw_motor_lines(*study(1)).figure.axes
+    (band,) = [line for line in panel.get_lines() if line.get_label() == "dead band, 95 %"]
+    assert band.get_ydata() == pytest.approx([-0.39, -0.41])
+    assert band.get_marker() == "_"
+    assert band.get_zorder() > max(line.get_zorder() for line in panel.get_lines() if line.get_label() == "line")
