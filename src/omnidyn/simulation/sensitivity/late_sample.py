@@ -125,13 +125,14 @@ class LateSample:
 
 def late_samples(
     robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
-    late: Sequence[float], tol: float | None, travel: int = TURN,
+    late: Sequence[float], tol: float | None, travel: int = TURN, rows: int | None = None,
 ) -> tuple[list[LateSample], int]:  # fmt: skip
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
     t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors; start: (3,) twist; tol as for `simulate`;
-    travel: what is wanted of the way, see sample.py. Also returns the number of rows in which the friction solver
-    hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
+    travel: what is wanted of the way, see sample.py; rows: only so many of t are sampled, the others go on for channels
+    that are early. Also returns the number of rows in which the friction solver hit its cap. Raises InputError for a
+    direction that changes friction or a gear loss which is off.
     """
     numbers, plants = _plants(robot, directions)
     rates = np.zeros((len(directions), *voltage.shape))
@@ -142,17 +143,17 @@ def late_samples(
         first[k, :N_AXES] = 0.0 if one.start is None else one.start * [1.0, 1.0, length]
     first[:, 2] += start[2] * stretch
     given = Commands(np.ascontiguousarray(np.diff(t)), np.ascontiguousarray(voltage))
-    seen = _room(robot, t, late, len(directions), travel)
+    seen = _room(robot, t[:rows], late, len(directions), travel)
     outcome, _, _ = run_with_derivatives(
         numbers, directions_of(numbers, plants, rates), given, current_bounds(robot, given, len(given.dt)),
         (np.asarray(start, dtype=float), np.zeros(3)), first, as_tolerance(tol), seen,
     )  # fmt: skip
-    return _looks(robot, directions, seen, (length, stretch), (seen.t, voltage, rates)), capped(outcome)
+    return _looks(robot, directions, seen, (length, stretch), (t - t[0], voltage, rates)), capped(outcome)
 
 
 def looped_samples(
     robot: Robot, t: FloatArray, set_point: FloatArray, directions: Sequence[Direction], late: Sequence[float],
-    tol: float | None, travel: int = TURN, settled: float = 0.0,
+    tol: float | None, travel: int = TURN, settled: float = 0.0, rows: int | None = None,
 ) -> list[LateSample]:  # fmt: skip
     """The same through the speed loop of the robot, under set points [rad/s], (rows - 1, n), from rest.
 
@@ -162,7 +163,7 @@ def looped_samples(
     numbers, plants = _plants(robot, directions)
     robots = [each or robot for one in directions for each in (one.up, one.down)]
     given = Commands(np.ascontiguousarray(np.diff(t)), None, set_point=np.ascontiguousarray(set_point))
-    seen, count = _room(robot, t, late, len(directions), travel), len(directions)
+    seen, count = _room(robot, t[:rows], late, len(directions), travel), len(directions)
     found = run_loop_with_derivatives(
         robot, robots, numbers, directions_of(numbers, plants, np.zeros((count, *set_point.shape))), given,
         (np.zeros(3), np.zeros(3)), np.zeros((count, N_AXES + numbers.wheels)), as_tolerance(tol), settled, seen,

@@ -9,7 +9,7 @@ from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.identify import identify
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
-from omnidyn.identification.output_error.fit import fit_output_error, identify_groups
+from omnidyn.identification.output_error.fit import Fit, fit_output_error, identify_groups
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.loop import retimed
@@ -144,9 +144,7 @@ def test_outputs_and_slopes(ellipse, late):
     for c, (name, i) in enumerate(piece.record.columns):
         pose = {"heading": fine.pose[:, 2:], "position": fine.pose, "wheel_angle": angle}
         model = (pose[name] if name in pose else getattr(fine, name))[:, i]
-        last = -1 if name == "current" and not late else None  # the loop has not answered there yet
-        np.testing.assert_allclose(outputs[late_enough, c][:last], model[seen][late_enough][:last], atol=2e-6)
-        assert np.isnan(outputs[-1, c]) == (last is not None)
+        np.testing.assert_allclose(outputs[late_enough, c], model[seen][late_enough], atol=2e-6)
     for j, p in enumerate(problem.parameters):
         if p.name.startswith("latency") and not late:
             continue  # rows stand on ticks, where a twist has a kink
@@ -249,3 +247,34 @@ def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(lo
     values[astray] = 0.15
     found = retimed(Solver(problem, LoopEngine(problem)), Point(values, point.states), Progress())
     assert abs(found.values[astray]) <= 0.01
+
+
+@pytest.mark.parametrize("channel", ["twist", "current"])
+def test_a_channel_that_is_early_shows_as_many_rows(ellipse, channel):
+    """Else the likelihood of those that are left would jump at a latency of 0, and no descent would cross it."""
+    given = Question(nuisances=("latency",))
+    problem = make_problem(read_records([log(ellipse, 5, 150)], ellipse, given), ellipse, given)
+    solver, point = Solver(problem, LoopEngine(problem, 1e-6)), problem.start()
+    found = []
+    for late in (0.0, -1e-6, -0.012):
+        values = point.values.copy()
+        values[problem.where(f"latency.{channel}")] = late
+        found.append(solver.state(Point(values, point.states)))
+    for state in found:
+        assert state.sums[0].number.tolist() == found[0].sums[0].number.tolist() == [150.0] * 6
+    assert abs(found[1].objective - found[0].objective) < 0.1  # 9 of a row of wheel speeds, before
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_fit_is_at_least_as_good_as_one_from_the_truth(ellipse, seed):
+    """Where rows stand on ticks, F has a valley with a sharp floor at a latency of 0, and for currents a jump."""
+    robot = ellipse.replace(drive=ellipse.drive.replace(ki=4.0))
+    start = wrong(robot, **{KP: 1.0, "friction.direction.coulomb[1]": 0.7, "friction.direction.viscous": 1.5})
+    fit = Fit.of(log(robot, seed, 400), start, Question(fixed=(KP, KI)))
+    found = fit.solve()
+    solver = found.solver
+    values = found.state.point.values.copy()
+    for j, p in enumerate(solver.problem.parameters):
+        values[j] = 0.0 if p.part == "latency" else Key.parse(p.name).get(robot)
+    best = solver.minimise(Point(values, found.state.point.states))
+    assert found.state.objective < best.state.objective + 0.5

@@ -182,6 +182,18 @@ class ImplicitEngine:
         return voltage, directions, at, factors
 
 
+def beyond(problem: Problem, piece: Piece) -> FloatArray:
+    """Times [s] of the rows of a piece, then on, a row each, until no latency within its bounds looks any further.
+
+    A run that ended with the log would show an early channel fewer rows than a late one: the likelihood of what is left
+    would jump at a latency of 0, and no descent would cross it.
+    """
+    t = piece.record.t[piece.first : piece.last + 1]
+    reach = -min((p.low for p in problem.parameters if p.name.startswith(LATE)), default=0.0)
+    row = float(np.median(np.diff(t)))
+    return np.concatenate([t, t[-1] + row * np.arange(1, int(np.ceil(max(reach, 0.0) / row)) + 1)])
+
+
 def travel_of(columns: Sequence[Column]) -> int:
     """What these outputs take of the way of a run, see simulation/sensitivity/sample.py."""
     names = {name for name, _ in columns}

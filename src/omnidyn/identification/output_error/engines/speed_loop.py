@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.exact import LATE
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, travel_of
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, beyond, travel_of
 from omnidyn.identification.output_error.engines.sums import Parts
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC
@@ -45,7 +45,7 @@ class LoopEngine(ImplicitEngine):
         """Whether a run comes near the voltage limit, where the integral of the loop stands still, at any row."""
         robot = self.problem.robot_at(point.values)
         for piece in self.problem.pieces:
-            t, set_point = _driven(piece)
+            t, set_point = self._driven(piece)
             voltage = simulate(robot, dt=np.diff(t), wheel_speed_command=set_point, tol=self.tol).voltage
             assert voltage is not None
             if (np.abs(voltage) > NEAR_LIMIT * per_wheel(robot.motor.voltage_limit, voltage.shape[1])).any():
@@ -64,15 +64,16 @@ class LoopEngine(ImplicitEngine):
         values: FloatArray, late: list[float],
     ) -> tuple[list[LateSample], list[int], FloatArray]:  # fmt: skip
         """As of any run; where currents jump from tick to tick, a look a period after theirs is the last one."""
-        count, (t, set_point) = self.problem.robot_count, _driven(piece)
+        count, (t, set_point) = self.problem.robot_count, self._driven(piece)
         directions = [
             Direction(p.name, up, down) for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True)
         ]
         own = self.problem.where(f"{LATE}current")
         more = [float(values[own]) - self._period] if own >= 0 and self._jumps(t) else []
         seen = looped_samples(
-            robot, t, set_point, directions, [*late, *more], self.tol, travel_of(piece.record.columns), SETTLED
-        )
+            robot, t, set_point, directions, [*late, *more], self.tol, travel_of(piece.record.columns), SETTLED,
+            piece.last - piece.first + 1,
+        )  # fmt: skip
         return seen, list(range(count)), 1.0 / np.array(scales[:count])
 
     def _shown(self, seen: list[LateSample], number: int, name: str, facing: float) -> Shown:
@@ -90,8 +91,10 @@ class LoopEngine(ImplicitEngine):
         """Whether a log whose rows are at t does not see what a current does between two ticks."""
         return self._period < SLOW_LOOP * float(np.median(np.diff(t))) or self.problem.robot.motor.electrical == DYNAMIC
 
-
-def _driven(piece: Piece) -> tuple[FloatArray, FloatArray]:
-    """(times (rows,) [s], set points (rows - 1, n) [rad/s]) of a piece."""
-    assert piece.record.set_point is not None
-    return piece.record.t[piece.first : piece.last + 1], piece.record.set_point[piece.first : piece.last]
+    def _driven(self, piece: Piece) -> tuple[FloatArray, FloatArray]:
+        """(times [s], set points [rad/s]) of a piece, and of what channels that are early see after its last row."""
+        set_point = piece.record.set_point
+        assert set_point is not None
+        t, last = beyond(self.problem, piece), piece.last - int(not np.isfinite(set_point[piece.last]).all())
+        more = np.repeat(set_point[last : last + 1], len(t) - 1 - (piece.last - piece.first), axis=0)
+        return t, np.concatenate([set_point[piece.first : piece.last], more])
