@@ -39,6 +39,7 @@ BEST = 2  # of the starts from which the fit is carried on
 FAR = (1.0, -1.0, 3.0, -3.0, 6.0, -6.0)  # standard errors by which a gain is moved
 LESS, ROUNDS = 1.0, 10  # of -log likelihood that counts as another branch; how often
 FEW = 8  # iterations of each before the better one is taken
+SHARES = (0.25, 0.5)  # of the longest log, from its start on, that are fitted before all of it
 
 
 def looped(records: Sequence[Record]) -> bool:
@@ -233,9 +234,9 @@ def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
     """The solution, or a better one behind a jump of the likelihood, which no descent crosses.
 
     An integral that stands still at the voltage limit jumps by a whole tick where a number of the robot decides on
-    which side of the limit a tick is. So the gains are moved by some standard errors, the others following: where F
-    rises by less than the parabola says, there is another branch to descend into. A run away from the limit has
-    no such branch.
+    which side of the limit a tick is. So the logs are fitted once more from their start on; and the gains are moved by
+    some standard errors, the others following: where F rises by less than the parabola says, there is another branch to
+    descend into. A run away from the limit has no such branch.
     """
     solver, seen = solution.solver, watch.below(solution.state.objective)
     watch.doing("looking for a better branch, beyond jumps of the likelihood")
@@ -243,6 +244,8 @@ def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
         isinstance(solver.engine, LoopEngine) and not solver.engine.meets_limit(solution.state.point)
     ):
         return solution
+    grown = solver.minimise(_grown(solver, solution.state.point), FEW, seen)
+    solution = min(solution, grown, key=lambda each: each.state.objective)
     gains = [j for j, p in enumerate(solver.problem.parameters) if p.part == DRIVE]
     for _ in range(ROUNDS):
         better = next(_branches(solver, solution, gains, watch), None)
@@ -251,6 +254,20 @@ def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
             break
         solution = found
     return solver.minimise(solution.state.point, watch=seen)
+
+
+def _grown(solver: Solver, point: Point) -> Point:
+    """The point from which all rows are fitted, found on ever more of them.
+
+    What jumps late in a log cannot pull a fit of what comes before; and once that has brought the numbers close to
+    where they belong, each later tick is on the side of the limit on which it was.
+    """
+    longest = max(p.last - p.first for p in solver.problem.pieces)
+    for share in SHARES:
+        short = shortened(solver.problem, max(int(share * longest), SETTING_OFF))
+        found = Solver(short, solver.engine.on(short), solver.nu, solver.close).minimise(point, FEW)
+        point = Point(found.state.point.values, point.states)
+    return point
 
 
 def _branches(solver: Solver, solution: Solution, gains: Sequence[int], watch: Progress) -> Iterator[State]:

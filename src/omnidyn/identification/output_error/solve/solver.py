@@ -15,7 +15,7 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.exact import LATE, Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.problem.problem import Fitted, Parts, PieceSums, Point, per_column
 
@@ -24,7 +24,8 @@ CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which
 ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
 DAMPING, LEAST_DAMPING = 1e-4, 1e-10
-FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked by a jump
+FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked at an edge
+CURRENT = f"{LATE}current"
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
 UNSEEN = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
@@ -96,8 +97,10 @@ class Solver(Generic[P]):
         self.creep = CREEP * close if close > CLOSE else 0.0  # a speed loop may creep for long, and yet find its way
         self.tick = problem.tick if counted else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
-        # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross.
-        self._jumps = np.array([p.name.partition("@")[0] == "latency.current" for p in problem.parameters], bool)
+        # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross. What
+        # follows the current meets a kink there, the floor of a valley where the log has no latency.
+        late = [p.name.partition("@")[0] for p in problem.parameters]
+        self._edges = [np.array([each.startswith(own) for each in late], bool) for own in (CURRENT, LATE)]
         self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
         self._high = np.array([p.inner(p.high) for p in problem.parameters])
 
@@ -148,8 +151,9 @@ class Solver(Generic[P]):
             ):
                 trial = self.state(normal.moved(damping, still), now.variance if self.scaled.any() else None)
                 better = trial.objective < now.objective
-                if not better and not (still | self._jumps == still).all():
-                    blocked = self._jumps  # once more, and from here on, without what may have jumped
+                edge = None if better else next((e for e in self._edges if (e & ~still).any()), None)
+                if edge is not None:  # once more, and from here on, without what may stand at a jump or a kink
+                    blocked = blocked | edge
                     still = still | blocked
                     continue
                 damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
@@ -161,7 +165,7 @@ class Solver(Generic[P]):
                 watch(now)
             if creeping >= STEPS and change < SCALE_CHANGE:
                 return Solution(now, held, iteration + 1, True, self)
-            if not better and blocked.any() and not released:  # a shorter step may stay this side of the jump
+            if not better and blocked.any() and not released:  # a shorter step may stay this side of the edge
                 blocked, released, damping = np.zeros_like(blocked), True, SHORT
             elif not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
                 return Solution(now, held, iteration + 1, True, self)
