@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from omnidyn.identification.output_error import fit as whole
+from omnidyn.identification import whole_logs as whole
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot

@@ -44,14 +44,15 @@ def test_a_drive_that_the_file_states_stays(duties):
     assert as_driven(told, [duties]).drive.supply == 7.0
 
 
-@pytest.mark.parametrize("white", [True, False])
-def test_a_longer_log_is_asked_for_against_noise_only(monkeypatch, white):
-    fit = SimpleNamespace(value={"body.mass_kg": 2.0}, std={"body.mass_kg": 0.6}, at_bound=(), unidentifiable=())
-    validation = SimpleNamespace(scores={advice.FITTED: {}})
-    monkeypatch.setattr(advice, "coloured", lambda scores: {} if white else {"w1": 0.0})
-    (words,) = advice._wide(fit, validation)
-    assert ("times as long" in words) is white
-    assert ("no longer log mends that" in words) is not white
+@pytest.mark.parametrize("right", [True, False])
+def test_a_longer_log_is_asked_for_against_noise_only(right):
+    fit = SimpleNamespace(
+        value={"body.mass_kg": 2.0}, std={"body.mass_kg": 0.6}, at_bound=(), unidentifiable=(),
+        lack_of_fit=SimpleNamespace(found=not right),
+    )  # fmt: skip
+    (words,) = advice._wide(fit)
+    assert ("times as long" in words) is right
+    assert ("no longer log mends that" in words) is not right
 
 
 def test_a_fit_to_200_logs_without_noise_that_overlap_ends():

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error import fit as whole
+from omnidyn.identification import whole_logs as whole
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.output_error import fit as whole
+from omnidyn.identification import whole_logs as whole
 from omnidyn.identification.output_error.solve.solver import of_states
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Prior

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.output_error import fit as whole
+from omnidyn.identification import whole_logs as whole
 from omnidyn.identification.whole_logs import identify_groups
 from omnidyn.model.keys import BOX
 from omnidyn.simulation.simulate import simulate

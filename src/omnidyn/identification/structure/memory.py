@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
-from scipy.signal import lfilter
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.statistics import stretches
@@ -28,11 +27,12 @@ class Memory:
         p, found = len(self.coefficients), []
         if not p:
             return values[there] / self.std
-        taps = np.concatenate([[1.0], -self.coefficients])
         lower = np.linalg.cholesky(toeplitz(self.covariance))
         for first, after in stretches(there):
             own = values[first:after]
-            out = np.asarray(lfilter(taps, [1.0], own, axis=0)) / self.std
+            out = own / self.std
+            for k, a in enumerate(self.coefficients / self.std, 1):
+                out[k:] -= a * own[:-k]
             n = min(p, len(own))
             out[:n] = np.linalg.solve(lower[:n, :n], own[:n])
             found.append(out)

@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
+from omnidyn.identification import whole_logs as whole
 from omnidyn.identification.as_fitted import as_fitted
-from omnidyn.identification.output_error import fit as whole
 from omnidyn.identification.validation import validate
 from omnidyn.logs.read_log import read_log
 from omnidyn.logs.run_file import write_run

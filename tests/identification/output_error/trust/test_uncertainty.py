@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.output_error import fit as whole
+from omnidyn.identification import whole_logs as whole
 from omnidyn.model.keys import BOX, Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
