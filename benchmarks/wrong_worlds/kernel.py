@@ -19,6 +19,9 @@ SHORTEST = 1e-6  # [s] within which an event is found
 CREEP = 3e-5  # [m/s] below it the plane rests where it can be held: an ellipse turns ever faster as it stops
 HEAT = 9  # where the heat of the windings begins in a state: twist, path, pose, heat
 
+# What kernels call: no way in from Python, which would take as long to compile as all the rest.
+part = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore[reportCallIssue]
+
 
 class Physics(NamedTuple):
     """Numbers that the kernels read; SI. Two entries: before and after the change. n wheels, k elements."""
@@ -65,7 +68,7 @@ class Physics(NamedTuple):
     duration: float  # [s]
 
 
-@numba.njit(cache=True)
+@part
 def _rho(p, y, i):
     """Radius of a wheel over its nominal one, where it has turned to."""
     if p.eccentric[i] == 0.0:
@@ -74,7 +77,7 @@ def _rho(p, y, i):
     return 1.0 + p.eccentric[i] * np.cos(p.bumps * turned + i)
 
 
-@numba.njit(cache=True)
+@part
 def _supply(p, y, u, t):
     """What is left of the voltages: of a battery that sags under all its currents, of a gain, of one that fades."""
     share = p.gain[1 if t >= p.change else 0] * (1.0 - p.fade * t / p.duration)
@@ -89,7 +92,7 @@ def _supply(p, y, u, t):
     return share * min((1.0 + p.battery * back / p.full) / (1.0 + p.battery * load), 1.0)
 
 
-@numba.njit(cache=True)
+@part
 def _current(p, y, u, left, i, rim):
     """Current of a motor whose rim moves at `rim` [m/s]."""
     size = max(abs(u[i]) - p.dead, 0.0)
@@ -98,7 +101,7 @@ def _current(p, y, u, left, i, rim):
     return min(max(driving / (p.R[i] * (1.0 + p.heating * y[HEAT + i])), -p.limit), p.limit)
 
 
-@numba.njit(cache=True)
+@part
 def _push(p, y, u, left, i, gap):
     """(force at the rim, speed of the rim as the wheel turns, current) of a wheel."""
     rho = _rho(p, y, i)
@@ -118,7 +121,7 @@ def _push(p, y, u, left, i, gap):
     return f / rho, seen, amps
 
 
-@numba.njit(cache=True)
+@part
 def _applied(p, y, u, t, gap, out):
     """All forces but dry friction into out (3,); currents of the motors are heat into out[HEAT:]."""
     after, n = (1 if t >= p.change else 0), u.size
@@ -140,14 +143,14 @@ def _applied(p, y, u, t, gap, out):
             out[a] -= p.d[k, a] * f
 
 
-@numba.njit(cache=True)
+@part
 def _level(p, k, side, speed, t):
     """What a line element resists with while it slides to a side."""
     level = p.level[1 if t >= p.change else 0, k] * (1.0 + p.aside * side)
     return level * (1.0 + p.stribeck * np.exp(-((speed / p.stribeck_speed[k]) ** 2)))
 
 
-@numba.njit(cache=True)
+@part
 def _slope(p, y, u, t, gap, stuck, sign, out, held):
     """Derivative of a state into out; what holds the stuck elements into held (k + 2,), the plane last."""
     after, count = (1 if t >= p.change else 0), len(p.d)
@@ -175,7 +178,7 @@ def _slope(p, y, u, t, gap, stuck, sign, out, held):
     out[6], out[7], out[8] = c * y[0] - s * y[1], s * y[0] + c * y[1], y[2]
 
 
-@numba.njit(cache=True)
+@part
 def _accelerate(p, after, stuck, out, held):
     """Acceleration from the forces in out[:3], in place, what is stuck held."""
     count, size = len(p.d), 3
@@ -200,7 +203,7 @@ def _accelerate(p, after, stuck, out, held):
         held[owner[j]] = right[j]
 
 
-@numba.njit(cache=True)
+@part
 def _solve(rows, right, size):
     """The first `size` rows of rows x = right, in place, by elimination with pivots: faster than LAPACK where small."""
     for j in range(size):
@@ -224,7 +227,7 @@ def _solve(rows, right, size):
         right[j] /= rows[j, j]
 
 
-@numba.njit(cache=True)
+@part
 def _overload(p, held, stuck, t):
     """(by how much the most loaded of what is stuck is beyond its level, as a share; which): it lets go above 0."""
     after, count = (1 if t >= p.change else 0), len(p.d)
@@ -242,7 +245,7 @@ def _overload(p, held, stuck, t):
     return most, which
 
 
-@numba.njit(cache=True)
+@part
 def _release(p, y, u, t, gap, stuck, sign, out, held):
     """Let go of what is loaded beyond its level, one after another; hold what then would go against its own way."""
     count = len(p.d)
@@ -265,7 +268,7 @@ def _release(p, y, u, t, gap, stuck, sign, out, held):
         stuck[back] = True
 
 
-@numba.njit(cache=True)
+@part
 def _rk4(p, y, u, t, h, gap, stuck, sign, held):
     n = y.size
     k1, k2, k3, k4 = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -276,7 +279,7 @@ def _rk4(p, y, u, t, h, gap, stuck, sign, held):
     return y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
-@numba.njit(cache=True)
+@part
 def _stops(p, y0, y1, stuck, sign, t, stop):
     """Which elements come to rest between two states, into stop (k + 1,); whether any does."""
     count, some = len(p.d), False
@@ -290,7 +293,7 @@ def _stops(p, y0, y1, stuck, sign, t, stop):
     return some or stop[count]
 
 
-@numba.njit(cache=True)
+@part
 def _settles(p, y, u, t, gap, stuck, sign, out, held):
     """Whether the plane creeps, and rests if it is held."""
     count = len(p.d)
@@ -303,7 +306,7 @@ def _settles(p, y, u, t, gap, stuck, sign, out, held):
     return _overload(p, held, kept, t)[0] < 0.0
 
 
-@numba.njit(cache=True)
+@part
 def _rest(p, y, stuck, stop):
     """Stop what stops: its speed becomes 0 by the least change of the twist, weighed by mass."""
     count = len(p.d)
@@ -325,7 +328,7 @@ def _rest(p, y, stuck, stop):
     y[:3] -= weighed @ np.linalg.solve(c @ weighed, c @ y[:3].copy())
 
 
-@numba.njit(cache=True)
+@part
 def _turn_gap(p, y, u, t, h, gap):
     """The motors cross the play of their gears for a time h."""
     left = _supply(p, y, u, t)
@@ -336,7 +339,7 @@ def _turn_gap(p, y, u, t, h, gap):
             gap[i] = min(max(gap[i] + h * amps * p.R[i] / p.ke[i], -p.gap), p.gap)
 
 
-@numba.njit(cache=True)
+@part
 def _advance(p, y, u, now, span, step, gap, stuck, sign):
     """Over a span of constant voltage."""
     count = len(p.d)

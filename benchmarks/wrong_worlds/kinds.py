@@ -165,7 +165,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("turning frame", "left out", _turning, "body.rotating_frame"),
     Kind("tilt", "of the floor [rad], the heading kept", _tilted, "tilt", most=0.15),
     Kind("payload", "dropped on the way", lambda case, size: case.world_but(
-        change=WHEN, mass=case.told.mass * (1.0 + size), after_mass=1.0 / (1.0 + size)), CHANGE, ("body.mass_kg",)),
+        change=WHEN, after_mass=1.0 / (1.0 + size)), CHANGE, ("body.mass_kg",), most=3.0),
     Kind("floor", "another one on the way", _changed(after_friction=1.0), CHANGE),
     Kind("battery swap", "a full battery on the way", _changed(after_gain=1.0), CHANGE, ("gain", "fade"), most=0.5),
     Kind("breakaway", "above sliding friction", _world("breakaway", 1.0), f"{AXES}.breakaway", most=3.0),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -24,8 +25,9 @@ class Setup:
     """How a log is made. rate [Hz]. sensor: what is logged, and its noise; memory: correlation of it, row to row.
 
     mix: share of the second direction in moves along two; apart: whether the robot stops between moves; turns: whether
-    it turns only to and fro; forward: whether moves along two are along x first. latency [s]. jitter: of when a row was measured, a share of a row. smoothing [s] of a
-    first-order filter. missed: share of rows. period [s] of a driver that takes its command so often only.
+    it turns only to and fro, where false; forward: whether moves along two are along x first. latency [s]. jitter: of
+    when a row was measured, a share of a row. smoothing [s] of a first-order filter. missed: share of rows. period [s]
+    of a driver that takes its command so often only.
     """
 
     rate: float = 100.0
@@ -107,9 +109,7 @@ def friction_of(told: World, factor: float = 1.0) -> str:
         return f"[friction.axes]\nviscous = {b}\ncoulomb = {c}\n"
     if told.shape == WHEELS:
         return f"[friction.wheels]\ncoulomb = {factor * told.rim[0]}\nviscous = {factor * told.rim[1]}\n"
-    return (
-        f"[friction.direction]\ncoulomb = {c[:2]}\nviscous = {b[0]}\nyaw_coulomb = {c[2]}\nyaw_viscous = {b[2]}\n"
-    )
+    return f"[friction.direction]\ncoulomb = {c[:2]}\nviscous = {b[0]}\nyaw_coulomb = {c[2]}\nyaw_viscous = {b[2]}\n"
 
 
 def truths(world: World, shape: str) -> dict[str, float]:
@@ -173,6 +173,7 @@ def logged(case: Case, seed: int, noisy: bool = True) -> Run:
     since = t if setup.period == 0.0 else np.maximum.accumulate(np.ceil(t / setup.period - 1e-9) * setup.period)
     speed, path = _sampled(case, since, asked, measured)
     radii = np.array(case.told.wheel_radius)
+    channels: dict[str, Any]
     if setup.sensor == TWIST:
         sensed = speed * radii @ np.linalg.pinv(case.told.G)
         own = NOISE * radii[0] * np.array([1.0, 1.0, 1.0 / case.told.robot_radius])

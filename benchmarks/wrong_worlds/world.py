@@ -18,8 +18,8 @@ class World:
     """The truth. Wheels in tuples; coulomb, viscous (3,) along x, y and about yaw, rim (c, b) at the wheels.
 
     Below `rim` everything is neutral. after_*: factors from `change` [s] on. load [A]: at which windings have grown by
-    `heating`. pull: constant force in the world [N]. cogging [N] at the rim, `teeth` a turn. gap: play of a gear, either
-    way [m at the rim]. traction: most force of a wheel [N].
+    `heating`. pull: constant force in the world [N]. cogging [N] at the rim, `teeth` a turn. gap: play of a gear,
+    either way [m at the rim]. traction: most force of a wheel [N].
     """
 
     azimuth: tuple[float, ...] = (60.0, 180.0, 300.0)
