@@ -386,7 +386,7 @@ def march(p, since, command, wanted, step, states, seen):
                 u[:] = command[row]
                 row += 1
             until = wanted[k] if row >= len(since) else min(wanted[k], since[row])
-            if now < p.change < until - 1e-12:
+            if now + 1e-12 < p.change < until - 1e-12:
                 until = p.change
             if until - now > 1e-12:
                 _advance(p, y, u, now, until - now, step, gap, stuck, sign)

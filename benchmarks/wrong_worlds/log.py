@@ -76,7 +76,7 @@ def right_case(seed: int) -> Case:
         coulomb=(near(3.9), near(3.9), near(0.2)), viscous=(near(1.2), near(1.2), near(0.012)), frame=seed % 3 == 2,
     )  # fmt: skip
     sensor = (SPEEDS, SPEEDS, TWIST, AR, COUNTS)[seed % 5]
-    return Case(world, world, Setup(100.0 if seed % 2 else 50.0, sensor, 0.8 if sensor == AR else 0.0))
+    return Case(world, world, Setup(100.0 if seed // 2 % 2 else 50.0, sensor, 0.8 if sensor == AR else 0.0))
 
 
 def robot_of(told: World) -> Robot:

@@ -8,13 +8,12 @@ Where they are missing nothing is found.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from benchmarks.wrong_worlds.kinds import KINDS, Kind
+from benchmarks.wrong_worlds.kinds import KINDS, Kind, by_name
 from benchmarks.wrong_worlds.log import Case, logged, right_case, robot_of, truths
 from benchmarks.wrong_worlds.remedies import FRICTION, NUISANCES, held
 from benchmarks.wrong_worlds.sizes import SIZES
@@ -61,17 +60,14 @@ class Seen:
 def drawn(kind: Kind, number: int) -> tuple[Case, int, bool]:
     """(wrong case, seed, whether it is a large one) of a log of a kind."""
     seed = FIRST_SEED + SEEDS_EACH * KINDS.index(kind) + number
-    large = number // 2 % 2 == 1
+    large = number % 2 == 1
     factor = np.exp(np.random.default_rng([seed, 4]).uniform(-SPREAD, SPREAD))
     return kind.make(right_case(seed), min(SIZES[kind.name][large] * float(factor), kind.most)), seed, large
 
 
-def score(kind: Kind, numbers: Iterable[int]) -> list[Seen]:
-    """Each log of a kind by itself, asked as a user does: its friction, all else by default."""
-    return [_seen(kind, number) for number in numbers]
-
-
-def _seen(kind: Kind, number: int) -> Seen:
+def score(name: str, number: int) -> Seen:
+    """A log of a kind by itself, asked as a user does: its friction, all else by default."""
+    kind = by_name(name)
     case, seed, large = drawn(kind, number)
     run, out = logged(case, seed), Seen(large)
     began = time.process_time()
