@@ -85,6 +85,9 @@ def _add_totals(table: Table, every: Sequence[tuple[Kind, Seen]]) -> None:
               **{"found of visible": _share(log.found for log in logs if log.visible)})  # fmt: skip
     table.add(f"1st or 2nd >= {NAMED}", _at_least(early, NAMED), world="all that a candidate describes",
               logs=len(told), **{"1st or 2nd": early})  # fmt: skip
+    seen = [log for log in told if log.visible]
+    early_seen: dict[str, Any] = {"1st or 2nd": _share(log.early for log in seen)}
+    table.add(world="those of them that are visible", logs=len(seen), **early_seen)
     table.add(f"sure <= {1.0 - CALM:.2g}", _at_most(sure, 1.0 - CALM), world="all others", logs=len(other), sure=sure)
     table.add(f"held >= {HELD}", _at_least(held, HELD), world="after the true remedy", logs=len(told), held=held)
 

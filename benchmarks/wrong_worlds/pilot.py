@@ -9,14 +9,13 @@ than 3 %, which is what the benchmark minds.
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from benchmarks.wrong_worlds.kinds import KINDS, Kind, by_name
-from benchmarks.wrong_worlds.log import Case, logged, right_case, robot_of
+from benchmarks.wrong_worlds.log import Case, clean, logged, right_case, robot_of
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import identify
@@ -35,7 +34,7 @@ def fit(case: Case, seed: int, kind: Kind) -> Estimate:
 
 @lru_cache(maxsize=64)
 def _right(case: Case, seed: int, kind: Kind) -> Estimate:
-    return fit(replace(case, world=case.told), seed, kind)
+    return fit(case, seed, kind)
 
 
 def bias(kind: Kind, size: float) -> float:
@@ -43,8 +42,7 @@ def bias(kind: Kind, size: float) -> float:
     found = []
     for seed in SEEDS:
         case = kind.make(right_case(seed), size)
-        clean = replace(case.setup, latency=0.0, jitter=0.0, smoothing=0.0, missed=0.0, period=0.0)
-        right = _right(Case(case.told, case.told, clean, case.step), seed, kind)
+        right = _right(clean(case), seed, kind)
         try:
             wrong = fit(case, seed, kind)
         except OmnidynError:

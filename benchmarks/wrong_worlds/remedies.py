@@ -19,7 +19,7 @@ from omnidyn.run import CHANNELS, Run
 NUISANCES = ("gain", "fade", "tilt", "latency", "dead_band")
 USUAL = ("latency", "dead_band")  # what a default fit has
 SHAPES = {f"friction.{shape}": shape for shape in (BOX, ELLIPSE, WHEELS)}
-FRAME, FRICTION = "body.rotating_frame", ("friction",)
+FRAME, LIMIT, FRICTION = "body.rotating_frame", "motor.current_limit_A", ("friction",)
 # Where a number begins that is off in the file.
 STARTS = {"motor.voltage_drop_V": 0.3, "motor.gear_efficiency": 0.95}
 
@@ -44,8 +44,9 @@ def refitted(key: str, case: Case, run: Run) -> Any:
 
 
 def _with_number(key: str, case: Case, run: Run, robot: Robot) -> Any:
-    true = true_value(key, case.world)
-    start = STARTS.get(key, 1.05 * true if true and key in ("motor.current_limit_A",) else None)
+    true, start = true_value(key, case.world), STARTS.get(key)
+    if key == LIMIT:  # a key that the file does not have yet; the search begins where it is active
+        robot = robot.replace(motor=robot.motor.replace(current_limit=1.05 * true))
     if key == "motor.rotor_inertia_kg_m2":
         told = case.told
         start = 0.05 * told.mass * told.wheel_radius[0] ** 2 / (1.5 * told.gear_ratio**2)
@@ -59,11 +60,11 @@ def _with_number(key: str, case: Case, run: Run, robot: Robot) -> Any:
         return identify(run, Key.parse(key).set(robot, true), free=FRICTION)
 
 
-def true_value(key: str, world: World) -> float | None:
+def true_value(key: str, world: World) -> Any:
     """What a number of the robot file is in a world; None where that is not known here."""
     name, _, index = key.partition("[")
     field = {
-        "motor.current_limit_A": world.limit, "motor.voltage_drop_V": world.drop, "body.mass_kg": world.mass,
+        LIMIT: world.limit, "motor.voltage_drop_V": world.drop, "body.mass_kg": world.mass,
         "motor.gear_efficiency": world.efficiency, "motor.rotor_inertia_kg_m2": world.rotor_inertia,
         "motor.torque_constant_Nm_A": world.torque_constant, "motor.resistance_ohm": world.resistance,
         "wheels.wheel_radius_m": world.wheel_radius, "wheels.robot_radius_m": world.robot_radius,

@@ -8,13 +8,13 @@ Where they are missing nothing is found.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from benchmarks.wrong_worlds.kinds import KINDS, Kind, by_name
-from benchmarks.wrong_worlds.log import Case, logged, right_case, robot_of, truths
+from benchmarks.wrong_worlds.log import Case, clean, logged, right_case, robot_of, truths
 from benchmarks.wrong_worlds.remedies import FRICTION, NUISANCES, held
 from benchmarks.wrong_worlds.sizes import SIZES
 from omnidyn.errors import OmnidynError
@@ -82,6 +82,8 @@ def score(name: str, number: int) -> Seen:
     out.worst, out.off = worst(estimate, rests, truths(case.told, case.told.shape))
     out.visible = _visible(case, seed, estimate)
     same = _remedies(out, kind, lack)
+    if any(is_same(name, kind.key) for name in getattr(estimate, "nuisances", ())):  # fitted without being asked for
+        out.named = out.early = True
     if kind.key:
         out.held = held(kind.key, same, case, run)
     return out
@@ -105,8 +107,7 @@ def worst(estimate: Any, rests: Any, true: dict[str, float]) -> tuple[str, bool]
 
 def _visible(case: Case, seed: int, wrong: Any) -> bool:
     """Whether a test that knows the truth sees it: by how much the same noise fits worse than in the right world."""
-    clean = replace(case.setup, latency=0.0, jitter=0.0, smoothing=0.0, missed=0.0, period=0.0)
-    right_log = logged(replace(case, world=case.told, setup=clean), seed)
+    right_log = logged(clean(case), seed)
     right = identify(right_log, robot_of(case.told), free=FRICTION)
     gain = 0.0
     for name in set(right.noise) & set(wrong.noise):  # type: ignore[attr-defined]

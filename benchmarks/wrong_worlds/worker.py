@@ -8,7 +8,7 @@ from collections.abc import Callable
 from multiprocessing.pool import Pool
 from typing import Any
 
-LONGEST = 180.0  # [s] of the wall clock
+LONGEST = 120.0  # [s] of the wall clock
 
 
 class Worker:

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.wrong_worlds import log as making
 from benchmarks.wrong_worlds.kinds import KINDS, by_name
-from benchmarks.wrong_worlds.log import SPEEDS, friction_of, logged, right_case, robot_of, truths, voltages
+from benchmarks.wrong_worlds.log import SPEEDS, clean, friction_of, logged, right_case, robot_of, truths, voltages
 from benchmarks.wrong_worlds.remedies import true_value
 from benchmarks.wrong_worlds.score import drawn, is_same, is_sure, worst
 from benchmarks.wrong_worlds.sizes import SIZES
@@ -16,13 +16,13 @@ from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World, drive
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from omnidyn.simulation.simulate import simulate
 
-SEED = 7  # of no log of the benchmark, nor of its pilot
+SEED = 12  # of no log of the benchmark, nor of its pilot
 
 
 @pytest.fixture
 def short(monkeypatch):
-    """Logs of 4 s."""
-    monkeypatch.setattr(making, "SECONDS", 4.0)
+    """Logs of 8 s."""
+    monkeypatch.setattr(making, "SECONDS", 8.0)
 
 
 def plain(seed, **changed):
@@ -60,11 +60,11 @@ def test_one_axis_against_its_closed_form():
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_a_wrong_world_of_size_0_is_right_and_a_large_one_is_not(short, monkeypatch, kind):
     monkeypatch.setattr("benchmarks.wrong_worlds.kinds.WHEN", 2.0)
-    none, large = (kind.make(right_case(SEED), size) for size in (0.0, 0.5 * kind.most))
+    none, large = (kind.make(plain(SEED), size) for size in (0.0, 0.9 * kind.most))
     right = replace(none, world=none.told)
     channel = lambda case: logged(case, SEED, noisy=False)  # noqa: E731
     assert channel(none).wheel_speed == pytest.approx(channel(right).wheel_speed, abs=1e-6)
-    wrong, meant = channel(large), channel(replace(large, world=large.told, setup=none.setup))
+    wrong, meant = channel(large), channel(clean(large))
     assert np.array_equal(wrong.t, meant.t)
     assert np.abs(wrong.wheel_speed - meant.wheel_speed).max() > 0.05
 
