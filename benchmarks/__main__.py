@@ -28,6 +28,7 @@ NAMES = {
     "identify_ellipse": "the same by the implicit engine: an ellipse of friction in a turning frame (four minutes)",
     "identify_loop": "output error through a firmware's speed loop, simulated logs: coverage (a few minutes)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
+    "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"
 OF_ANSWERS = "no benchmark: 360 commands and calls, recorded, and compared with a recording to the last digit"

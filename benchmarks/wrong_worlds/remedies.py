@@ -1,0 +1,96 @@
+"""The true remedy of a wrong world, applied as a user would: a key set free, a nuisance, another table, half a log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.wrong_worlds.kinds import CHANGE, WHEN
+from benchmarks.wrong_worlds.log import Case, robot_of, truths
+from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World
+from omnidyn.errors import OmnidynError
+from omnidyn.identification.identify import identify
+from omnidyn.model.keys import Key
+from omnidyn.model.robot import Robot
+from omnidyn.run import CHANNELS, Run
+
+NUISANCES = ("gain", "fade", "tilt", "latency", "dead_band")
+USUAL = ("latency", "dead_band")  # what a default fit has
+SHAPES = {f"friction.{shape}": shape for shape in (BOX, ELLIPSE, WHEELS)}
+FRAME, LIMIT, FRICTION = "body.rotating_frame", "motor.current_limit_A", ("friction",)
+# Where a number begins that is off in the file.
+STARTS = {"motor.voltage_drop_V": 0.3, "motor.gear_efficiency": 0.95}
+
+
+def refitted(key: str, case: Case, run: Run) -> Any:
+    """The Estimate of the friction with a remedy applied; None where it cannot be. A number that omnidyn cannot set
+    free is given as it is."""
+    robot = robot_of(case.told)
+    try:
+        if key == CHANGE:
+            return identify(before(run, WHEN), robot, free=FRICTION)
+        if key in SHAPES:
+            return identify(run, robot_of(replace(case.told, shape=SHAPES[key])), free=FRICTION)
+        if key == FRAME:
+            body = robot.body.replace(rotating_frame=True)
+            return identify(run, robot.replace(body=body), free=FRICTION)
+        if key.partition(".")[0] in NUISANCES:
+            return identify(run, robot, free=FRICTION, nuisances=tuple(dict.fromkeys((*USUAL, key))))
+        return _with_number(key, case, run, robot)
+    except OmnidynError:
+        return None
+
+
+def _with_number(key: str, case: Case, run: Run, robot: Robot) -> Any:
+    true, start = true_value(key, case.world), STARTS.get(key)
+    if key == LIMIT:  # a key that the file does not have yet; the search begins where it is active
+        robot = robot.replace(motor=robot.motor.replace(current_limit=1.05 * true))
+    if key == "motor.rotor_inertia_kg_m2":
+        told = case.told
+        start = 0.05 * told.mass * told.wheel_radius[0] ** 2 / (1.5 * told.gear_ratio**2)
+    if start is not None:
+        robot = Key.parse(key).set(robot, start)
+    try:
+        return identify(run, robot, free=(*FRICTION, key))
+    except OmnidynError:
+        if true is None:
+            raise
+        return identify(run, Key.parse(key).set(robot, true), free=FRICTION)
+
+
+def true_value(key: str, world: World) -> Any:
+    """What a number of the robot file is in a world; None where that is not known here."""
+    name, _, index = key.partition("[")
+    field = {
+        LIMIT: world.limit, "motor.voltage_drop_V": world.drop, "body.mass_kg": world.mass,
+        "motor.gear_efficiency": world.efficiency, "motor.rotor_inertia_kg_m2": world.rotor_inertia,
+        "motor.torque_constant_Nm_A": world.torque_constant, "motor.resistance_ohm": world.resistance,
+        "wheels.wheel_radius_m": world.wheel_radius, "wheels.robot_radius_m": world.robot_radius,
+        "body.inertia_kg_m2": world.inertia,
+    }.get(name)  # fmt: skip
+    if isinstance(field, tuple):
+        return field[int(index[:-1]) if index else 0]
+    return field
+
+
+def before(run: Run, t: float) -> Run:
+    """The rows of a log before a time [s]."""
+    kept = run.t < t
+    own = {name: getattr(run, name) for name in CHANNELS}
+    return Run(run.t[kept], **{name: values[kept] for name, values in own.items() if values is not None})
+
+
+def held(key: str, same: tuple[str, ...], case: Case, run: Run) -> list[bool]:
+    """Whether each friction interval holds the truth after a remedy, over those of the group it cannot be told from."""
+    shape = SHAPES.get(key, case.told.shape)
+    true = truths(case.told if shape == case.told.shape else case.world, shape)
+    estimates = [found for each in (key, *same) if (found := refitted(each, case, run)) is not None]
+    estimates = [each for each in estimates if set(true) <= set(each.value)]
+    out = []
+    for name, value in true.items() if estimates else ():
+        bounds = np.array([each.ci95[name] for each in estimates if name not in each.unidentifiable])
+        if bounds.size:
+            out.append(bool(bounds[:, 0].min() <= value <= bounds[:, 1].max()))
+    return out
