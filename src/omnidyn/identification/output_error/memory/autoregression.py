@@ -9,6 +9,7 @@ over all of them. The order has the least BIC: G. Schwarz, Ann. Stat. 6, 461 (19
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -90,23 +91,17 @@ def autoregression(stretches: Sequence[FloatArray], most: int | None = None) -> 
     variance = sum(float((each**2).sum()) for each in stretches) / max(rows, 1)
     ahead, behind = list(stretches), list(stretches)
     partial: list[float] = []
-    best, least = (0, variance), _bic(variance, rows, 0)
-    for order in range(1, limit + 1):
+    best, cost, least = (0, variance), 0.0, 0.0
+    for _ in range(limit):
         pairs = [(f[1:], b[:-1]) for f, b in zip(ahead, behind, strict=True) if len(f) > 1]
         power = sum(float((f**2).sum() + (b**2).sum()) for f, b in pairs)
-        if power <= 0.0:
+        k = 2.0 * sum(float((f * b).sum()) for f, b in pairs) / power if power > 0.0 else 1.0
+        if abs(k) >= 1.0:
             break
-        k = 2.0 * sum(float((f * b).sum()) for f, b in pairs) / power
         ahead, behind = [f - k * b for f, b in pairs], [b - k * f for f, b in pairs]
         partial.append(k)
         variance *= 1.0 - k * k
-        if variance <= 0.0:
-            partial.pop()
-            break
-        if (cost := _bic(variance, rows, order)) < least:
-            best, least = (order, variance), cost
+        cost += sum(len(f) for f, _ in pairs) * math.log1p(-k * k) + math.log(rows)  # rows that reach so far back
+        if cost < least:
+            best, least = (len(partial), variance), cost
     return AutoRegression(np.array(partial[: best[0]]), best[1], rows)
-
-
-def _bic(variance: float, rows: int, order: int) -> float:
-    return rows * float(np.log(max(variance, 1e-300))) + order * float(np.log(max(rows, 2)))

@@ -9,9 +9,14 @@ so that the sums from which the memory is found are those of r and of the column
 where the restricted likelihood is largest: its memory is not too short because the fit has swallowed slow errors
 (D. A. Harville, J. Am. Stat. Assoc. 72, 320 (1977)).
 
-The covariance is (J~' J~ / s^2)^-1, ~ the filtered rows. How well it is known follows from how well the memory is: by
-the derivatives of a variance V with respect to phi and s, whose own covariance is that of maximum likelihood, Student's
-t has 2 V^2/var V degrees of freedom (Satterthwaite's, as in M. G. Kenward, J. H. Roger, Biometrics 53, 983 (1997)).
+The covariance is (J~' J~ / s^2)^-1, ~ the filtered rows, and as much wider or narrower as the change of the score
+between the ends of the intervals says: of slow errors only what is fast counts, and there a robot that stops or sets
+off a row earlier bends the likelihood. Observed information is the better one: B. Efron, D. V. Hinkley, Biometrika 65,
+457 (1978).
+
+How well a variance V is known follows from how well the memory is: by the derivatives of V with respect to phi and s,
+whose own covariance is that of maximum likelihood, Student's t has 2 V^2/var V degrees of freedom (Satterthwaite's, as
+in M. G. Kenward, J. H. Roger, Biometrics 53, 983 (1997)).
 """
 
 from __future__ import annotations
@@ -25,7 +30,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.whitened import WhitenedEngine, known_rows, spacing, without_gaps
-from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Problem
+from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
 from omnidyn.statistics import t_quantile
@@ -35,6 +40,7 @@ SETTLED = 0.03  # standard errors: a round that moves no number further is the l
 LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the sandwich
 ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
 UNEVEN = 0.05  # share of rows off an even grid that is worth a word
+BENT = 0.25  # of the information expected: less, or four times as much, is a bend that no parabola tells
 FEW = 10.0  # memories in a log, below which the memory itself is hardly known
 
 
@@ -95,7 +101,7 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
         return None
     known = _trusted(found, before, models)
     plain = replace(found, state=solver.state(found.state.point), solver=solver)
-    return Weighed(found, plain, known, models, tuple(_words(found, models)))
+    return Weighed(found, plain, known, models, tuple(_words(found, models, known)))
 
 
 def below(solver: Solver[Problem]) -> RowEngine[Problem]:
@@ -167,6 +173,7 @@ def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegress
     """The trust in a fit by filtered rows. before: in the one by residuals as they are."""
     solver = found.solver
     known = trust(solver, found, WHITE)
+    known = replace(known, covariance=_observed(found, known))
     degrees = _degrees(found, known, models)
     told = ~known.open & ~before.open
     plain = np.sqrt(np.diag(before.plain))
@@ -175,6 +182,37 @@ def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegress
         known, kind=AUTOREGRESSIVE, degrees=int(degrees), quantile=t_quantile(degrees), neighbours=before.neighbours,
         widening=float(ratio.max(initial=0.0)) or 1.0,
     )  # fmt: skip
+
+
+def _observed(found: Solution, known: Trust) -> FloatArray:
+    """The covariance by the information that is observed: how much the score changes between the ends of intervals.
+
+    Shape (P, P); infinite variances and what stands at a bound stay as they are.
+    """
+    solver, point = found.solver, found.state.point
+    chosen = np.flatnonzero(~known.blind & ~known.held & (known.std > 0.0))
+    if not chosen.size:
+        return known.covariance
+    own = known.covariance[np.ix_(chosen, chosen)]
+    axes = _root(own / np.outer(known.std[chosen], known.std[chosen])) * known.std[chosen][:, None]
+    inner, curved = solver.inner(point.values), np.zeros((axes.shape[1], axes.shape[1]))
+    for k, way in enumerate(axes.T):
+        ends, scores = [], []
+        for side in (1.0, -1.0):
+            moved = inner.copy()
+            moved[chosen] += side * known.quantile * way
+            ends.append(solver.clipped(moved))
+            scores.append(Normal(solver, solver.state(Point(solver.outer(ends[-1]), point.states))).gradient[chosen])
+        apart = float(np.linalg.norm((ends[0] - ends[1])[chosen]) / np.linalg.norm(way))
+        curved[k] = axes.T @ (scores[1] - scores[0]) / apart
+    values, vectors = np.linalg.eigh(0.5 * (curved + curved.T))
+    turned = axes @ vectors
+    stretched = turned / np.sqrt(np.clip(values, BENT, 1.0 / BENT))
+    covariance, rest = known.covariance.copy(), np.setdiff1d(np.arange(len(inner)), chosen)
+    covariance[np.ix_(chosen, chosen)] = stretched @ stretched.T
+    cross = stretched @ np.linalg.pinv(turned) @ covariance[np.ix_(chosen, rest)]
+    covariance[np.ix_(chosen, rest)], covariance[np.ix_(rest, chosen)] = cross, cross.T
+    return covariance
 
 
 def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegression]) -> float:
@@ -222,18 +260,23 @@ def _scatter(model: AutoRegression, reach: FloatArray) -> FloatArray:
     return total + (by_phi * np.linalg.solve(model.covariance, by_phi)).sum(axis=0) / model.rows
 
 
-def _words(found: Solution, models: Mapping[Column, AutoRegression]) -> Iterator[str]:
-    """What a reader should know of the memory: logs too short for it, stamps that are not even."""
+def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trust) -> Iterator[str]:
+    """What a reader should know of the memory: what it is, logs too short for it, stamps that are not even."""
     pieces = found.solver.problem.pieces
-    longest = max(models, key=lambda column: models[column].memory / max(models[column].rows, 1))
-    model = models[longest]
-    count = model.rows / model.memory
-    if count < FEW:
-        step = spacing(pieces, longest)[0]
+    least, most = (way(model.order for model in models.values()) for way in (min, max))
+    order = f"{least} to {most}" if most > least else f"{most}"
+    longest = max(models, key=lambda column: models[column].memory)
+    model, lasts = models[longest], models[longest].memory * spacing(pieces, longest)[0]
+    yield (
+        f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
+        f"errors of each output are fitted as an autoregression of order {order}, with a memory of up to "
+        f"{lasts:.2g} s; the intervals are up to {known.widening:.2g} times as wide as for white noise"
+    )
+    if model.rows < FEW * model.memory:
         yield (
-            f"the errors of {longest[0]}[{longest[1]}] remember {model.memory * step:.3g} s, and the logs last "
-            f"{count:.1f} times that: how long they remember is hardly known, nor how sure the numbers are; a log of "
-            f"{FEW * model.memory * step:.3g} s or longer tells"
+            f"the errors of {longest[0]}[{longest[1]}] remember {lasts:.2g} s, and the logs last "
+            f"{model.rows / model.memory:.1f} times that: how long they remember is hardly known, nor how sure the "
+            f"numbers are; logs of {FEW * lasts:.2g} s or longer tell"
         )
     uneven = max(spacing(pieces, column)[2] for column in models)
     if uneven > UNEVEN:
