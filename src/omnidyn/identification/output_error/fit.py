@@ -169,13 +169,15 @@ class Fit:
         Raises UnsupportedError where an autoregression is asked for and cannot be had.
         """
         kind, solver = self.question.covariance, solution.solver
-        known = trust(solver, solution, AUTO if kind == AUTOREGRESSIVE else kind)
-        asked, why = kind == AUTOREGRESSIVE, why_not(solver) if kind in (AUTO, AUTOREGRESSIVE) else ""
+        asked = kind == AUTOREGRESSIVE
+        known = trust(solver, solution, AUTO if asked else kind)
+        as_it_is = Weighed(solution, solution, known)
+        if not asked and (kind != AUTO or known.kind != SANDWICH or known.runs):
+            return as_it_is
+        why = why_not(solver)
         if asked and why:
             raise UnsupportedError(why, got=kind, expected="auto, white or sandwich", where="covariance")
-        if not asked and (why or kind != AUTO or known.kind != SANDWICH or known.runs):
-            return Weighed(solution, solution, known)
-        return whitened(solution, known, (progress or Progress()).doing) or Weighed(solution, solution, known)
+        return as_it_is if why else whitened(solution, known, (progress or Progress()).doing) or as_it_is
 
     def _settled(self, group: Group, progress: Progress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
