@@ -133,7 +133,7 @@ class Fit:
         warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution, done)]
         solution, levels = self._levels(solution) if done else (solution, [])
         progress.doing("finding how sure the numbers are")
-        sure = self.weighed(solution, progress)
+        sure = self.weighed(solution, progress, anew=done)
         known, by, warnings = sure.known, sure.solution, [*warnings, *sure.warnings]
         strata = {id(record): group.name for group in self.groups for record in group.records}
         profile, draws = (self.question.profile, self.question.bootstrap) if done else ((), 0)
@@ -163,8 +163,10 @@ class Fit:
         shared = tuple(name for name in solver.problem.names if AT not in name)
         return Answer(estimates, own, shared, differences(by, known, again, own, [*estimates], profile, strata))
 
-    def weighed(self, solution: Solution, progress: Progress | None = None) -> Weighed:
+    def weighed(self, solution: Solution, progress: Progress | None = None, anew: bool = True) -> Weighed:
         """The trust in a solution; where its errors remember, that in the fit made anew for it, and its point.
+
+        anew: whether there is time for that; after an interrupt there is none.
 
         Raises UnsupportedError where an autoregression is asked for and cannot be had.
         """
@@ -172,7 +174,7 @@ class Fit:
         asked = kind == AUTOREGRESSIVE
         known = trust(solver, solution, AUTO if asked else kind)
         as_it_is = Weighed(solution, solution, known)
-        if not asked and (kind != AUTO or known.kind != SANDWICH or known.runs):
+        if not anew or not asked and (kind != AUTO or known.kind != SANDWICH or known.runs):
             return as_it_is
         why = why_not(solver)
         if asked and why:

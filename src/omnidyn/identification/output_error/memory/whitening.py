@@ -187,32 +187,22 @@ def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegress
 def _observed(found: Solution, known: Trust) -> FloatArray:
     """The covariance by the information that is observed: how much the score changes between the ends of intervals.
 
-    Shape (P, P); infinite variances and what stands at a bound stay as they are.
+    Shape (P, P). Where a number is not told or stands at a bound, nothing leads to the ends: it stays as expected.
     """
     solver, point = found.solver, found.state.point
-    chosen = np.flatnonzero(~known.blind & ~known.held & (known.std > 0.0))
-    if not chosen.size:
+    if (known.open | known.held | ~(known.std > 0.0)).any():
         return known.covariance
-    own = known.covariance[np.ix_(chosen, chosen)]
-    axes = _root(own / np.outer(known.std[chosen], known.std[chosen])) * known.std[chosen][:, None]
+    axes = _root(known.covariance / np.outer(known.std, known.std)) * known.std[:, None]
     inner, curved = solver.inner(point.values), np.zeros((axes.shape[1], axes.shape[1]))
     for k, way in enumerate(axes.T):
-        ends, scores = [], []
-        for side in (1.0, -1.0):
-            moved = inner.copy()
-            moved[chosen] += side * known.quantile * way
-            ends.append(solver.clipped(moved))
-            scores.append(Normal(solver, solver.state(Point(solver.outer(ends[-1]), point.states))).gradient[chosen])
-        apart = float(np.linalg.norm((ends[0] - ends[1])[chosen]) / np.linalg.norm(way))
-        curved[k] = axes.T @ (scores[1] - scores[0]) / apart
+        ends = [solver.clipped(inner + side * known.quantile * way) for side in (1.0, -1.0)]
+        states = (solver.state(Point(solver.outer(end), point.states)) for end in ends)
+        high, low = (Normal(solver, state).gradient for state in states)
+        apart = float(np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(way))
+        curved[k] = axes.T @ (low - high) / apart
     values, vectors = np.linalg.eigh(0.5 * (curved + curved.T))
-    turned = axes @ vectors
-    stretched = turned / np.sqrt(np.clip(values, BENT, 1.0 / BENT))
-    covariance, rest = known.covariance.copy(), np.setdiff1d(np.arange(len(inner)), chosen)
-    covariance[np.ix_(chosen, chosen)] = stretched @ stretched.T
-    cross = stretched @ np.linalg.pinv(turned) @ covariance[np.ix_(chosen, rest)]
-    covariance[np.ix_(chosen, rest)], covariance[np.ix_(rest, chosen)] = cross, cross.T
-    return covariance
+    stretched = (axes @ vectors) / np.sqrt(np.clip(values, BENT, 1.0 / BENT))
+    return stretched @ stretched.T
 
 
 def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegression]) -> float:
