@@ -174,7 +174,7 @@ class Fit:
         asked = kind == AUTOREGRESSIVE
         known = trust(solver, solution, AUTO if asked else kind)
         as_it_is = Weighed(solution, solution, known)
-        if not anew or not asked and (kind != AUTO or known.kind != SANDWICH or known.runs):
+        if not anew or (not asked and (kind != AUTO or known.kind != SANDWICH or known.runs)):
             return as_it_is
         why = why_not(solver)
         if asked and why:
