@@ -27,6 +27,7 @@ NAMES = {
     "identify": "output error on simulated logs: coverage, starts, nuisances, time beside peers (ten minutes)",
     "identify_ellipse": "the same by the implicit engine: an ellipse of friction in a turning frame (four minutes)",
     "identify_loop": "output error through a firmware's speed loop, simulated logs: coverage (a few minutes)",
+    "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }

@@ -11,6 +11,7 @@ GLOSSARY = {
     "chi2": "mean square of the error over that of the noise: 1 where the model leaves nothing but noise.",
     "std error": "how far the value would scatter if the same were recorded again.",
     "sandwich": "intervals that hold for errors with a memory too: from their own products, not from white noise.",
+    "autoregression": "errors of which each is a share of the last ones and something new: how they remember.",
     "nuisance": "a number of the log, not of the robot: a latency, a dead band of the driver.",
     "jackknife": "standard errors from fits that leave out one direction, or run, at a time.",
     "bootstrap": "standard errors from fits to stretches drawn again at random.",

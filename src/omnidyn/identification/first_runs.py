@@ -32,6 +32,7 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("simulation, friction of the axes", partial(_run, paper)),
         ("fit of speeds", partial(_fit, paper, "twist")),
         ("fit of speeds alone", partial(_fit, paper, "twist", nuisances=(), start="rest")),
+        ("fit of speeds whose errors remember", partial(_fit, paper, "twist", covariance="autoregressive")),
         ("fit of speeds, currents and poses", partial(_fit, paper, "twist", "current", "pose")),
         ("fit of counted angles", partial(_fit, paper, "wheel_angle")),
         ("simulation, any friction", partial(_run, other)),

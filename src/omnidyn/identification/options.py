@@ -40,7 +40,7 @@ class Options(TypedDict, total=False):
     group: Names
     rest: Literal["bound", "line", "ignore"]
     outputs: Names | None
-    covariance: Literal["auto", "white", "sandwich"]
+    covariance: Literal["auto", "white", "autoregressive", "sandwich"]
     tick_rad: float | None
     robust: bool
 

@@ -147,8 +147,10 @@ class Question:
         of=(FIT,), flag=None,
     )  # fmt: skip
     covariance: str = _option(
-        AUTO, "white, sandwich, or auto: the sandwich where residuals are not white.", of=(FIT,),
-        choices=(AUTO, "white", "sandwich"), flag=None,
+        AUTO, "white, autoregressive, sandwich, or auto: autoregressive where residuals are not white.",
+        "An autoregression of the errors sets estimate and intervals. The sandwich stays where there is none: for "
+        "Student's t, for counts, from 20 runs on, and where none makes the residuals white.",
+        of=(FIT,), choices=(AUTO, "white", "autoregressive", "sandwich"), flag=None,
     )  # fmt: skip
     tick_rad: float | None = _option(
         None, "Of the encoders behind wheel angles [rad].",

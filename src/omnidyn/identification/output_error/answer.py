@@ -45,9 +45,9 @@ class OutputErrorEstimate(Estimate):
     unidentifiable: names of what the data do not determine. Where the std of the robot file is a prior, the value is
     the one that goes best with all others, std and interval are those of the posterior, hardly more than what the file
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
-    together. blind: directions that the data do not show, in words. covariance: "white" or "sandwich".
-    unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the minimisation.
-    not_followed: outputs that the model does not follow. study: makes the diagnosis, on first access to it.
+    together. blind: directions that the data do not show, in words. covariance: "white", "autoregressive" or
+    "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the
+    minimisation. not_followed: outputs that the model does not follow. study: makes the diagnosis, on first access.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)

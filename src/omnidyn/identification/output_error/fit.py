@@ -16,6 +16,7 @@ from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.conclusion import conclude
 from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
+from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
 from omnidyn.identification.output_error.prepare import (
     EXACT,
     FINE,
@@ -42,8 +43,8 @@ from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, 
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early, wanted
-from omnidyn.identification.output_error.trust.uncertainty import trust
-from omnidyn.identification.question import GAUSS, STUDENT, Question
+from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, trust
+from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
 from omnidyn.identification.recordings import count_once
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
@@ -128,12 +129,14 @@ class Fit:
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
         warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution, done)]
         solution, levels = self._levels(solution) if done else (solution, [])
-        solver = solution.solver
         progress.doing("finding how sure the numbers are")
-        known = trust(solver, solution, self.question.covariance)
+        sure = self.weighed(solution, progress, anew=done)
+        known, by, warnings = sure.known, sure.solution, [*warnings, *sure.warnings]
         strata = {id(record): group.name for group in self.groups for record in group.records}
         profile, draws = (self.question.profile, self.question.bootstrap) if done else ((), 0)
-        again = resampled(solver, solution, known, _in_each_group(profile, solver.problem), draws, strata, progress)
+        names = _in_each_group(profile, by.solver.problem)
+        again = resampled(by.solver, by, known, names, draws, strata, progress)
+        solution, solver = sure.plain, solution.solver
         loss = loss_words(self.question.loss)
         if len(self.groups) == 1:
             group = self.groups[0]
@@ -156,8 +159,26 @@ class Fit:
             estimates[member.name] = replace(estimate, method=f"{estimate.method}; fitted together with {others}")
         own = own_names(self.question.per_free, [member.problem for member in engine.members])
         shared = tuple(name for name in solver.problem.names if AT not in name)
-        between = differences(solution, known, again, own, [*estimates], profile, strata)
+        between = differences(by, known, again, own, [*estimates], profile, strata)
         return Answer(estimates, own, shared, between, tuple(alones))
+
+    def weighed(self, solution: Solution, progress: Progress | None = None, anew: bool = True) -> Weighed:
+        """The trust in a solution; where its errors remember, that in the fit made anew for it, and its point.
+
+        anew: whether there is time for that; after an interrupt there is none.
+
+        Raises UnsupportedError where an autoregression is asked for and cannot be had.
+        """
+        kind, solver = self.question.covariance, solution.solver
+        asked = kind == AUTOREGRESSIVE
+        known = trust(solver, solution, AUTO if asked else kind)
+        as_it_is = Weighed(solution, solution, known)
+        if not anew or (not asked and (kind != AUTO or known.kind != SANDWICH or known.runs)):
+            return as_it_is
+        why = why_not(solver)
+        if asked and why:
+            raise UnsupportedError(why, got=kind, expected="auto, white or sandwich", where="covariance")
+        return as_it_is if why else whitened(solution, known, (progress or Progress()).doing) or as_it_is
 
     def _settled(self, group: Group, progress: Progress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
@@ -271,7 +292,9 @@ class Fit:
                 "breakaway is profiled with the exact engine only", got=group.robot.name,
                 expected="friction on the body axes", where="free",
             )  # fmt: skip
-        return find_breakaway(solution, axes, trust(solution.solver, solution, self.question.covariance))
+        kind = self.question.covariance
+        known = trust(solution.solver, solution, SANDWICH if kind == AUTOREGRESSIVE else kind)
+        return find_breakaway(solution, axes, known)
 
 
 def degrees(loss: str) -> float:

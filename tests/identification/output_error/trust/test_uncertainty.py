@@ -33,14 +33,15 @@ def coloured(run, seed, memory=0.9):
 
 
 def test_coloured_noise_is_seen_and_the_intervals_follow(axebot, clean):
-    """25 logs, 150 intervals: with white intervals fewer than 85 % would hold the truth, the sandwich's do."""
+    """25 logs, 150 intervals: with white intervals fewer than 85 % would hold the truth; those that know of it do."""
     held = {"auto": 0, "white": 0}
     for seed in range(25):
         log = coloured(clean, seed)
         for kind in held:
             fit = fit_output_error(log, axebot, start="rest", covariance=kind)
             held[kind] += sum(fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in TRUTH.items())
-        assert fit_output_error(log, axebot, start="rest").covariance == "sandwich"
+        assert fit_output_error(log, axebot, start="rest").covariance == "autoregressive"
+        assert fit_output_error(log, axebot, start="rest", covariance="sandwich").covariance == "sandwich"
     assert held["white"] < 0.85 * 150
     assert held["auto"] >= 0.90 * 150
 

@@ -36,7 +36,7 @@ BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below w
 UNTOLD = 3.0  # std of a logarithm beyond which a number is not told: 95 % of it lie between 1/360 and 360 times
 WEAK = 1e-4  # below it, is hardly seen
 SHARE = 0.05  # of a blind direction that a parameter must have to be named
-WHITE, SANDWICH = "white", "sandwich"
+WHITE, SANDWICH, AUTOREGRESSIVE = "white", "sandwich", "autoregressive"
 # Std over that of the prior from which on the logs say too little of a number. Of two guesses of which only the product
 # shows each keeps 0.71 of its own, of three 0.82, however long the log.
 TOLD = 0.5
@@ -55,11 +55,12 @@ class Trust:
     covariance (P, P): infinite variances where the data are blind. held: at a bound. blind: not determined by the data,
     alone or only together with others, and no prior holds it; unseen: not even together, prior or none. guessed: what a
     prior holds more than the data do, see TOLD; its covariance is the posterior's. free_step (P,): from a bound to
-    where the fit would go without it. kind: white or sandwich. widening: largest ratio of the sandwich's std to the
-    plain one. quantile: standard errors in half a 95 % interval. degrees: of freedom behind it. neighbours (columns,):
-    correlation of successive residuals. directions: blind or weak ones no prior holds: (eigenvalue, relative change
-    of each parameter). runs: that were the blocks, 0 where these were shorter than a run. plain (P, P): inverse of the
-    information, which is what the likelihood itself curves by; the covariance where the noise is white.
+    where the fit would go without it. kind: white, sandwich or autoregressive (memory/whitening.py). widening: largest
+    ratio of the std to that for white residuals. quantile: standard errors in half a 95 % interval. degrees: of freedom
+    behind it. neighbours (columns,): correlation of successive residuals. directions: blind or weak ones no prior
+    holds: (eigenvalue, relative change of each parameter). runs: that were the blocks, 0 where these were shorter than
+    a run. plain (P, P): inverse of the information, which is what the likelihood itself curves by; the covariance where
+    the noise is white.
     """
 
     covariance: FloatArray

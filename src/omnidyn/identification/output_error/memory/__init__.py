@@ -1,0 +1,2 @@
+"""Errors with a memory: autoregression (of a series), innovations (what is new in each row, compiled), whitened (the
+engine whose rows have forgotten), whitening (a fit made anew with it, and how sure it is)."""

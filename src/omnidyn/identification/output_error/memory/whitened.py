@@ -1,0 +1,108 @@
+"""The engine of a fit whose errors have a memory: any other one, its rows filtered until they are white.
+
+Residuals and slopes go through the same filter, so that their sums are those of the exact likelihood of autoregressive
+errors, and the solver, the priors and the covariance are as they are for white ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.sums import added
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.memory.innovations import innovations
+from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
+from omnidyn.identification.output_error.solve.solver import RowEngine
+from omnidyn.statistics import stretches
+
+FORGOTTEN = 1000  # rows missing in a row after which a stretch begins anew
+Rows = tuple[NDArray[np.intp], IntArray]  # which rows of a piece are known, rows since the one before (0: at a start)
+
+
+class WhitenedEngine:
+    """engine: which simulates. models: the memory of each column; one that is not named has none.
+
+    Memory is counted in rows of the column's own, and a column keeps its rate: a channel that only every fifth row
+    has is not missing four. What is missing beside that costs what it would have told, no more.
+    """
+
+    def __init__(self, engine: RowEngine[Problem], models: Mapping[Column, AutoRegression]):
+        self.engine, self.models = engine, dict(models)
+        self._filters = {
+            column: (model.coefficients, model.covariance) for column, model in self.models.items() if model.order
+        }
+
+    @property
+    def problem(self) -> Problem:
+        """Of the engine that simulates."""
+        return self.engine.problem
+
+    def on(self, problem: Problem) -> WhitenedEngine:
+        """The same engine on other pieces of the same logs, with the same parameters."""
+        return WhitenedEngine(self.engine.on(problem), self.models)
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the filtered rows of every piece add up to."""
+        columns, count = self.problem.columns, len(self.problem.parameters)
+        return [
+            added(piece, columns, parts, weighting, count)
+            for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True)
+        ]
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """Filtered residuals and slopes of every piece, see engines/sums.py."""
+        parts = zip(self.problem.pieces, self.engine.residuals(point), strict=True)
+        return [self._filtered(piece, own) for piece, own in parts]
+
+    def _filtered(self, piece: Piece, parts: Parts) -> Parts:
+        residual, slopes, at = parts
+        residual, slopes = residual.copy(), slopes.copy()
+        for c, column in enumerate(piece.record.columns):
+            if column not in self._filters:
+                continue
+            rows, steps = known_rows(piece, residual[c], slopes[c])
+            left = np.setdiff1d(np.arange(residual.shape[1]), rows)
+            residual[c, left], slopes[c, left] = np.nan, 0.0
+            series = np.column_stack([residual[c, rows], slopes[c, rows]])
+            new = innovations(series, steps, *self._filters[column])
+            residual[c, rows], slopes[c, rows] = new[:, 0], new[:, 1:]
+        return residual, slopes, at
+
+
+def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:
+    """Which rows of one column of a piece are known. residual (rows,), slopes (rows, U)."""
+    rows = np.flatnonzero(np.isfinite(residual) & np.isfinite(slopes).all(axis=1))
+    if not rows.size:
+        return rows, rows
+    apart = np.diff(piece.record.t[piece.first : piece.last + 1][rows])
+    usual = float(np.median(apart)) if apart.size else 1.0
+    steps = np.concatenate([[0], np.maximum(np.round(apart / usual), 1.0)]).astype(np.intp)
+    steps[steps > FORGOTTEN] = 0
+    return rows, steps
+
+
+def without_gaps(series: FloatArray, steps: IntArray) -> list[FloatArray]:
+    """The stretches of a series (n, K) in which no row is missing."""
+    joined = stretches(np.append(steps[1:] == 1, False)) if len(steps) > 1 else np.zeros((0, 2), int)
+    return [series[first : last + 1] for first, last in joined.tolist()]
+
+
+def spacing(pieces: Sequence[Piece], column: Column) -> tuple[float, float, float]:
+    """(least, greatest, share of uneven ones) of the usual times between known rows of a column in every piece [s]."""
+    usual, uneven, count = [], 0, 0
+    for piece in pieces:
+        if column not in piece.record.columns:
+            continue
+        values = piece.record.outputs[piece.first : piece.last + 1, piece.record.columns.index(column)]
+        apart = np.diff(piece.record.t[piece.first : piece.last + 1][np.isfinite(values)])
+        if not apart.size:
+            continue
+        usual.append(float(np.median(apart)))
+        steps = apart / usual[-1]
+        uneven, count = uneven + int((np.abs(steps - np.round(steps)) > 0.25).sum()), count + len(steps)
+    return min(usual, default=1.0), max(usual, default=1.0), uneven / max(count, 1)

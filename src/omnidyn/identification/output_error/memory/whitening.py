@@ -1,0 +1,276 @@
+"""A fit made anew for errors with a memory: its point, and how far it can be trusted.
+
+The errors of each output are an autoregression (autoregression.py), fitted to the residuals in turn with the numbers of
+the robot. With e = y - f the errors and J C J' what a fit with covariance C has taken out of the residuals r,
+
+    E[e e' | r] = r r' + J C J'
+
+so that the sums from which the memory is found are those of r and of the columns of J C^1/2 together. That settles
+where the restricted likelihood is largest: its memory is not too short because the fit has swallowed slow errors
+(D. A. Harville, J. Am. Stat. Assoc. 72, 320 (1977)).
+
+The covariance is (J~' J~ / s^2)^-1, ~ the filtered rows, and as much wider or narrower as the change of the score
+between the ends of the intervals says: of slow errors only what is fast counts, and there a robot that stops or sets
+off a row earlier bends the likelihood. Observed information is the better one: B. Efron, D. V. Hinkley, Biometrika 65,
+457 (1978).
+
+How well a variance V is known follows from how well the memory is: by the derivatives of V with respect to phi and s,
+whose own covariance is that of maximum likelihood, Student's t has 2 V^2/var V degrees of freedom (Satterthwaite's, as
+in M. G. Kenward, J. H. Roger, Biometrics 53, 983 (1997)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
+from omnidyn.identification.output_error.memory.whitened import WhitenedEngine, known_rows, spacing, without_gaps
+from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
+from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
+from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
+from omnidyn.statistics import t_quantile
+
+ROUNDS = 6  # of memory and numbers in turn
+SETTLED = 0.03  # standard errors: a round that moves no number further is the last one
+LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the sandwich
+ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
+UNEVEN = 0.05  # share of rows off an even grid that is worth a word
+BENT = 0.25  # of the information expected: less, or four times as much, is a bend that no parabola tells
+FEW = 10.0  # memories in a log, below which the memory itself is hardly known
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A point and how far it can be trusted. solution: by filtered rows where errors remember, its solver has a
+    WhitenedEngine then. plain: the same point with residuals as they are. known: the trust in `solution`. models: the
+    memory of each column, none where rows are not filtered. warnings: in words."""
+
+    solution: Solution
+    plain: Solution
+    known: Trust
+    models: Mapping[Column, AutoRegression] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def why_not(solver: Solver) -> str:
+    """Why errors with a memory cannot be modelled here, in words; "" where they can."""
+    problem = solver.problem
+    if solver.nu:
+        return "Student's t has no autoregression here"
+    if solver.tick.any():
+        return "counts whose rounding is the noise have no autoregression here"
+    slopes = sum(
+        (p.last - p.first + 1) * len(p.record.columns) * (len(problem.parameters) + len(p.free)) for p in problem.pieces
+    )
+    if slopes > LARGEST:
+        return "the logs are too long for an autoregression"
+    for column in problem.columns:
+        least, greatest, _ = spacing(problem.pieces, column)
+        if greatest > ONE_RATE * least:
+            return f"the logs have {column[0]} at several rates"
+    return ""
+
+
+def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] = lambda words: None) -> Weighed | None:
+    """The fit anew with errors that remember; None where they do not, or where no memory makes them white.
+
+    solution, before: the fit by residuals as they are, and the trust in it.
+    """
+    solver, models = solution.solver, _memory(solution, None)
+    if not any(model.order for model in models.values()):
+        return None
+    now = solution.state.point
+    for each in range(ROUNDS):
+        doing(f"errors with a memory, round {each + 1}")
+        filtered = Solver(solver.problem, WhitenedEngine(below(solver), models), 0.0, solver.close)
+        found = filtered.minimise(now)
+        covariance = _inverse(Normal(filtered, found.state).information)
+        moved = filtered.inner(found.state.point.values) - filtered.inner(now.values)
+        now = found.state.point
+        models = _memory(found, covariance)
+        if each and (np.abs(moved) <= SETTLED * np.sqrt(np.diag(covariance))).all():
+            break
+    filtered = Solver(solver.problem, WhitenedEngine(below(solver), models), 0.0, solver.close)
+    found = replace(filtered.minimise(now), notes=solution.notes)
+    if trust(filtered, found).kind == SANDWICH:
+        return None
+    known = _trusted(found, before, models)
+    plain = replace(found, state=solver.state(found.state.point), solver=solver)
+    return Weighed(found, plain, known, models, tuple(_words(found, models, known)))
+
+
+def below(solver: Solver[Problem]) -> RowEngine[Problem]:
+    """The engine that simulates, whose rows are as they are."""
+    engine = solver.engine
+    if isinstance(engine, WhitenedEngine):
+        return engine.engine
+    assert hasattr(engine, "residuals")
+    return cast(RowEngine[Problem], engine)
+
+
+def _memory(solution: Solution, covariance: FloatArray | None) -> dict[Column, AutoRegression]:
+    """The memory of the residuals of each column, and of what the fit has taken out of them.
+
+    covariance (P, P): of the parameters; None for a fit whose residuals are taken as they are.
+    """
+    solver = solution.solver
+    series: dict[Column, list[FloatArray]] = {column: [] for column in solver.problem.columns}
+    taken = None if covariance is None else [_root(own) for own in _of_pieces(solution, covariance)]
+    for k, parts in enumerate(below(solver).residuals(solution.state.point)):
+        for column, residual, slopes, steps in _columns(solver.problem.pieces[k], parts):
+            more = [] if taken is None else [slopes @ taken[k][parts[2]]]
+            series[column] += without_gaps(np.column_stack([residual, *more]), steps)
+    return {column: autoregression(own) for column, own in series.items() if own}
+
+
+def _columns(piece: Piece, parts: Parts) -> Iterator[tuple[Column, FloatArray, FloatArray, IntArray]]:
+    """(column, residuals (n,), slopes (n, U), steps (n,)) of the known rows of every column of a piece."""
+    residual, slopes, _ = parts
+    for c, column in enumerate(piece.record.columns):
+        rows, steps = known_rows(piece, residual[c], slopes[c])
+        if rows.size:
+            yield column, residual[c, rows], slopes[c, rows], steps
+
+
+def _of_pieces(solution: Solution, covariance: FloatArray) -> list[FloatArray]:
+    """Covariance of the parameters and the states of every piece, in the units of its slopes. (P + S, P + S) each."""
+    normal, count, found = Normal(solution.solver, solution.state), len(covariance), []
+    for sums, (_, info) in zip(solution.state.sums, normal.pieces, strict=True):
+        full = np.zeros((sums.grad.shape[1], sums.grad.shape[1]))
+        full[:count, :count] = covariance
+        if len(info) > count:
+            lift = -of_states(info[count:, count:], info[count:, :count])
+            full[count:, :count] = lift @ covariance
+            full[:count, count:] = full[count:, :count].T
+            full[count:, count:] = (
+                of_states(info[count:, count:], np.eye(len(info) - count)) + lift @ covariance @ lift.T
+            )
+        size = np.concatenate([normal.scale, np.ones(len(full) - count)])
+        found.append(full * np.outer(size, size))
+    return found
+
+
+def _inverse(information: FloatArray) -> FloatArray:
+    """Inverse in balanced units, 0 for what is not seen. Shape (P, P)."""
+    size = np.sqrt(np.maximum(information.diagonal(), 0.0))
+    size[size == 0.0] = 1.0
+    return np.linalg.pinv(information / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """R with R R' the covariance, without what is not open."""
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > 1e-14 * max(float(values.max(initial=0.0)), 1e-300)
+    return vectors[:, kept] * np.sqrt(values[kept])
+
+
+def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegression]) -> Trust:
+    """The trust in a fit by filtered rows. before: in the one by residuals as they are."""
+    solver = found.solver
+    known = trust(solver, found, WHITE)
+    known = replace(known, covariance=_observed(found, known))
+    degrees = _degrees(found, known, models)
+    told = ~known.open & ~before.open
+    plain = np.sqrt(np.diag(before.plain))
+    ratio = known.std[told] / np.where(plain[told] > 0.0, plain[told], 1.0)
+    return replace(
+        known, kind=AUTOREGRESSIVE, degrees=int(degrees), quantile=t_quantile(degrees), neighbours=before.neighbours,
+        widening=float(ratio.max(initial=0.0)) or 1.0,
+    )  # fmt: skip
+
+
+def _observed(found: Solution, known: Trust) -> FloatArray:
+    """The covariance by the information that is observed: how much the score changes between the ends of intervals.
+
+    Shape (P, P). Where a number is not told or stands at a bound, nothing leads to the ends: it stays as expected.
+    """
+    solver, point = found.solver, found.state.point
+    if (known.open | known.held | ~(known.std > 0.0)).any():
+        return known.covariance
+    axes = _root(known.covariance / np.outer(known.std, known.std)) * known.std[:, None]
+    inner, curved = solver.inner(point.values), np.zeros((axes.shape[1], axes.shape[1]))
+    for k, way in enumerate(axes.T):
+        ends = [solver.clipped(inner + side * known.quantile * way) for side in (1.0, -1.0)]
+        states = (solver.state(Point(solver.outer(end), point.states)) for end in ends)
+        high, low = (Normal(solver, state).gradient for state in states)
+        apart = float(np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(way))
+        curved[k] = axes.T @ (low - high) / apart
+    values, vectors = np.linalg.eigh(0.5 * (curved + curved.T))
+    stretched = (axes @ vectors) / np.sqrt(np.clip(values, BENT, 1.0 / BENT))
+    return stretched @ stretched.T
+
+
+def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegression]) -> float:
+    """Degrees of freedom of the least known variance among those that the logs tell."""
+    told = ~known.open
+    if not told.any():
+        return float(max(known.degrees, 1))
+    solver = found.solver
+    reach = {column: np.zeros((model.order + 1, int(told.sum()))) for column, model in models.items()}
+    of_pieces = _of_pieces(found, known.plain)
+    scale = Normal(solver, found.state).scale[told]
+    pieces = zip(solver.problem.pieces, below(solver).residuals(found.state.point), of_pieces, strict=True)
+    for piece, parts, covariance in pieces:
+        ways = covariance[:, : len(told)][:, told] / scale
+        for column, _, slopes, _ in _columns(piece, parts):
+            if column not in reach:
+                continue
+            pulls = slopes @ ways[parts[2]]
+            for k in range(min(len(reach[column]), len(pulls))):
+                reach[column][k] += (1.0 if k == 0 else 2.0) * (pulls[k:] * pulls[: len(pulls) - k]).sum(axis=0)
+    variance, scatter = np.diag(known.plain)[told], np.zeros(int(told.sum()))
+    for column, model in models.items():
+        scatter += _scatter(model, reach[column] / found.state.variance[solver.problem.columns.index(column)])
+    degrees = 2.0 * variance**2 / np.maximum(scatter, 1e-300)
+    return float(np.clip(degrees.min(), 3.0, max(known.degrees, 3)))
+
+
+def _scatter(model: AutoRegression, reach: FloatArray) -> FloatArray:
+    """Variance that a model's own uncertainty gives each of the variances V = (J~' J~/s^2)^-1. Shape (P,).
+
+    J~' J~ = sum over k of w_k J' J(k rows on), w_k = sum of a_i a_(i+k), a = (1, -phi), so that with g = J V
+    dV = -dw_k g' g(k rows on)/s^2; reach (p + 1, P): these products, both ways for k > 0.
+    """
+    p, a = model.order, np.concatenate([[1.0], -model.coefficients])
+    wide = np.concatenate([np.zeros(p + 1), a, np.zeros(p + 1)])
+    weights = np.array([a[: p + 1 - k] @ a[k:] for k in range(p + 1)])
+    total = 2.0 / model.rows * (weights @ reach) ** 2
+    if not p:
+        return total
+    at = np.arange(1, p + 1)[:, None] + p + 1
+    lag = np.arange(p + 1)
+    slope = -(wide[at + lag] + wide[at - lag])  # of w_k by phi_i
+    slope[:, 0] = -2.0 * a[1:]
+    by_phi = slope @ reach
+    return total + (by_phi * np.linalg.solve(model.covariance, by_phi)).sum(axis=0) / model.rows
+
+
+def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trust) -> Iterator[str]:
+    """What a reader should know of the memory: what it is, logs too short for it, stamps that are not even."""
+    pieces = found.solver.problem.pieces
+    least, most = (way(model.order for model in models.values()) for way in (min, max))
+    order = f"{least} to {most}" if most > least else f"{most}"
+    longest = max(models, key=lambda column: models[column].memory)
+    model, lasts = models[longest], models[longest].memory * spacing(pieces, longest)[0]
+    yield (
+        f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
+        f"errors of each output are fitted as an autoregression of order {order}, with a memory of up to "
+        f"{lasts:.2g} s; the intervals are up to {known.widening:.2g} times as wide as for white noise"
+    )
+    if model.rows < FEW * model.memory:
+        yield (
+            f"the errors of {longest[0]}[{longest[1]}] remember {lasts:.2g} s, and the logs last "
+            f"{model.rows / model.memory:.1f} times that: how long they remember is hardly known, nor how sure the "
+            f"numbers are; logs of {FEW * lasts:.2g} s or longer tell"
+        )
+    uneven = max(spacing(pieces, column)[2] for column in models)
+    if uneven > UNEVEN:
+        yield (
+            f"{100.0 * uneven:.0f} % of the rows do not come at even times: the errors are taken to forget as much "
+            "from each row to the next"
+        )

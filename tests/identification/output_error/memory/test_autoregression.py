@@ -1,0 +1,74 @@
+"""Autoregressions: their covariance, what is new in a row against the dense likelihood, and their fit."""
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
+from omnidyn.identification.output_error.memory.innovations import innovations
+
+THREE = AutoRegression(np.array([0.8, -0.4, 0.3]), 1.0, 1000)
+
+
+def series(model, rows, seed, columns=1):
+    fresh = np.random.default_rng(seed).normal(size=(rows + 5000, columns))
+    return lfilter([1.0], np.concatenate([[1.0], -model.coefficients]), fresh, axis=0)[5000:]
+
+
+def test_the_autocovariance_is_that_of_its_response_to_an_impulse():
+    response = lfilter([1.0], np.concatenate([[1.0], -THREE.coefficients]), np.eye(1, 4000)[0])
+    expected = [response[: 4000 - k] @ response[k:] for k in range(10)]
+    np.testing.assert_allclose(THREE.autocovariance(10), expected, rtol=1e-10)
+    np.testing.assert_allclose(THREE.covariance, toeplitz(expected[:3]), rtol=1e-10)
+    np.testing.assert_allclose(AutoRegression(np.zeros(0), 1.0, 10).autocovariance(3), [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("missing", [[], [1], [20, 21, 22, 40], [0, 5, 7, 9, 58]])
+def test_what_is_new_makes_the_exact_likelihood_rows_missing_or_not(missing):
+    """Products of filtered columns are those with the inverse of the dense covariance, at the start and past gaps."""
+    values = np.random.default_rng(1).normal(size=(60, 3))
+    left = np.setdiff1d(np.arange(60), missing)
+    steps = np.concatenate([[0], np.diff(left)])
+    new = innovations(values[left], steps, THREE.coefficients, THREE.covariance)
+    dense = toeplitz(THREE.autocovariance(60))[np.ix_(left, left)]
+    np.testing.assert_allclose(new.T @ new, values[left].T @ np.linalg.solve(dense, values[left]), rtol=1e-10)
+
+
+def test_stretches_know_nothing_of_each_other():
+    values = np.random.default_rng(2).normal(size=(40, 2))
+    steps = np.ones(40, int)
+    steps[[0, 17]] = 0
+    both = innovations(values, steps, THREE.coefficients, THREE.covariance)
+    alone = [innovations(part, np.minimum(np.arange(len(part)), 1), THREE.coefficients, THREE.covariance)
+             for part in (values[:17], values[17:])]  # fmt: skip
+    np.testing.assert_allclose(both, np.concatenate(alone))
+
+
+def test_order_and_numbers_come_back():
+    """Coefficients of 20 series of 3000 rows scatter as 1/sqrt(rows): their means within 4 standard errors."""
+    found = [autoregression([series(THREE, 3000, seed)]) for seed in range(20)]
+    assert np.mean([model.order == 3 for model in found]) >= 0.9
+    own = np.mean([autoregression([series(THREE, 3000, seed)], 3).coefficients for seed in range(20)], axis=0)
+    np.testing.assert_allclose(own, THREE.coefficients, atol=4.0 / np.sqrt(20 * 3000))
+    assert np.mean([model.variance for model in found]) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 60_000))
+
+
+def test_white_noise_has_no_memory():
+    white = [autoregression([np.random.default_rng(seed).normal(size=(2000, 1))]) for seed in range(40)]
+    assert sum(model.order == 0 for model in white) >= 38
+    assert AutoRegression(np.zeros(0), 1.0, 10).memory == 1.0
+
+
+def test_memory_is_that_of_a_mean():
+    """The variance of the mean of AR(1) is (1 + z)/(1 - z) times that of as many independent rows."""
+    assert AutoRegression(np.array([0.98]), 1.0, 10).memory == pytest.approx(99.0)
+
+
+def test_stretches_are_fitted_together():
+    whole = series(AutoRegression(np.array([0.9]), 1.0, 1), 4000, 3)
+    model = autoregression([whole[k : k + 40] for k in range(0, 4000, 40)])
+    assert model.order == 1
+    uneven = np.cumsum(np.random.default_rng(4).geometric(0.1, 400))  # few stretches reach far back
+    assert autoregression(np.split(whole, uneven[uneven < 4000])).order == 1
+    assert model.partial[0] == pytest.approx(0.9, abs=4.0 * np.sqrt((1.0 - 0.81) / 4000))
