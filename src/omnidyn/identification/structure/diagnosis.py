@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import fdtrc
 
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.output_error.prepare import engine_kind
@@ -30,7 +30,8 @@ def diagnose(solution: Solution) -> Diagnosis:
     bench = Workbench(problem, point, engine_kind(solver.engine), moved)
     tried = [(one, one.tried(bench)) for one in candidates(bench)]
     ranked = remedies(seen.linear, [each for each in tried if each[1]])
-    strong = [r for r in ranked if chdtrc(r.numbers, r.chi2) * len(tried) < FALSE]
+    degrees = min(seen.linear.degrees, float(sum(there.sum() for there in rows.there)))
+    strong = [r for r in ranked if fdtrc(r.numbers, degrees, r.chi2 / r.numbers) * len(tried) < FALSE]
     found = bool(seen.found or strong)
     told = ranked if found else ()
     names = [f"{name}[{i}]" for name, i in problem.columns]

@@ -15,9 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.memory.innovations import innovations
+from omnidyn.identification.output_error.memory.whitened import known_rows
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
-from omnidyn.identification.structure.memory import Memory
 
+TINY = 1e-300
 SAME = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
 Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 
@@ -26,7 +29,8 @@ Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 class Rows:
     """The rows of a fit as they are: of each piece residuals (C, rows), and slopes (C, rows, P), (C, rows, S) of it.
 
-    there: of each piece (C, rows), which rows count. column: of each piece (C,), which column of the problem it is.
+    there: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
+    column: of each piece (C,), which column of the problem it is.
     """
 
     problem: Problem
@@ -35,6 +39,7 @@ class Rows:
     slopes: list[FloatArray]
     own: list[FloatArray]
     there: list[BoolArray]
+    steps: list[list[IntArray]]
     column: list[list[int]]
 
     @classmethod
@@ -42,7 +47,7 @@ class Rows:
         """The rows that an engine shows at a point, by the numbers that the solver sees."""
         count, every = len(problem.parameters), problem.columns
         scale = [p.slope(float(v)) for p, v in zip(problem.parameters, point.values, strict=True)]
-        rows = cls(problem, point, [], [], [], [], [])
+        rows = cls(problem, point, [], [], [], [], [], [])
         for piece, (residual, slopes, at) in zip(problem.pieces, parts, strict=True):
             wide = np.zeros((*residual.shape, count))
             mine = at < count
@@ -50,7 +55,9 @@ class Rows:
             rows.residual.append(residual)
             rows.slopes.append(wide * scale)
             rows.own.append(slopes[:, :, ~mine])
-            rows.there.append(np.isfinite(residual) & np.isfinite(slopes).all(axis=2))
+            known = [known_rows(piece, own, by) for own, by in zip(residual, slopes, strict=True)]
+            rows.there.append(np.array([np.isin(np.arange(residual.shape[1]), at_rows) for at_rows, _ in known]))
+            rows.steps.append([steps for _, steps in known])
             rows.column.append([every.index(column) for column in piece.record.columns])
         return rows
 
@@ -64,7 +71,12 @@ class Linear:
     """Rows made white. memory: of each column of the problem."""
 
     rows: Rows
-    memory: Sequence[Memory]
+    memory: Sequence[AutoRegression]
+
+    @property
+    def degrees(self) -> float:
+        """Degrees of freedom with which the noise is known where it is known least, at slow changes."""
+        return min((memory.degrees for memory in self.memory), default=np.inf)
 
     def white(self, shown: Shown) -> FloatArray:
         """What is shown in the rows, as the fit sees it: (N, K), starts projected out, a row of 0 for each prior."""
@@ -88,7 +100,10 @@ class Linear:
 
     def of_piece(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, its start still in them."""
-        parts = [self.memory[c].whitened(values[j], self.rows.there[k][j]) for j, c in enumerate(self.rows.column[k])]
+        rows = self.rows
+        parts = [
+            _new(self.memory[c], values[j], rows.there[k][j], rows.steps[k][j]) for j, c in enumerate(rows.column[k])
+        ]
         return np.concatenate(parts) if parts else np.zeros((0, values.shape[2]))
 
     def whole(self) -> tuple[FloatArray, FloatArray]:
@@ -149,6 +164,13 @@ class Gram:
         return float(((vectors[:, kept].T @ self.matrix[by, 0]) ** 2 / values[kept]).sum()), int(kept.sum())
 
 
+def _new(memory: AutoRegression, values: FloatArray, there: BoolArray, steps: IntArray) -> FloatArray:
+    """What is new in each row that counts, over its standard deviation. values (rows, K) -> (rows that count, K)."""
+    own = np.ascontiguousarray(values[there])
+    new = innovations(own, steps, memory.coefficients, memory.covariance) if memory.order else own
+    return new / np.sqrt(max(memory.variance, TINY))
+
+
 def solved(columns: FloatArray, right: FloatArray) -> FloatArray:
     """The least squares solution of columns (N, K) for right (N,); directions that are one get the shortest."""
     size = np.linalg.norm(columns, axis=0)
@@ -157,3 +179,13 @@ def solved(columns: FloatArray, right: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(columns.T @ columns)
     kept = values > SAME * max(float(values.max(initial=0.0)), 1e-300)
     return (vectors[:, kept] @ ((vectors[:, kept].T @ (columns.T @ right)) / values[kept])) / size
+
+
+def root_of_covariance(columns: FloatArray) -> FloatArray:
+    """R (K, K') with R R' the covariance of what columns (N, K) are fitted by; what is not told has none."""
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    columns = columns / size
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    kept = values > SAME * max(float(values.max(initial=0.0)), TINY)
+    return vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]

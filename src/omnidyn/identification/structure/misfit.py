@@ -15,13 +15,14 @@ from scipy.special import fdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Found
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
+from omnidyn.identification.output_error.memory.whitened import without_gaps
 from omnidyn.identification.structure.disturbances import THEMES, Theme, shown_by_themes
-from omnidyn.identification.structure.linear import Gram, Linear, Rows, solved
-from omnidyn.identification.structure.memory import Memory, memory_of
+from omnidyn.identification.structure.linear import Gram, Linear, Rows, root_of_covariance, solved
 from omnidyn.identification.structure.motion import Motion
-from omnidyn.statistics import stretches
 
 FALSE = 0.02  # of right models for which something is found, all tests together
+ROUNDS = 2  # of memory and fit in turn
 NEW = 1e-4  # share of a direction that no parameter explains, from which it is one to test
 
 
@@ -55,7 +56,8 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
         offset = 1 + gram.count
         rest, _ = gram.left(np.concatenate([gram.fitted, offset + taken]))
         names = {each.theme for each in found}
-        scores = {name: _score(rest, offset + own) for name, own in at.items() if name not in names}
+        degrees = min(linear.degrees, float(max(rest.rows, 1)))
+        scores = {name: _score(rest, offset + own, degrees) for name, own in at.items() if name not in names}
         first = first or {name: p for name, (_, p, _) in scores.items()}
         best = min(scores, key=lambda name: scores[name][1], default="")
         if not best or scores[best][1] > FALSE / len(themes):
@@ -64,56 +66,61 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
         taken = np.concatenate([taken, at[best]])
 
 
-def _score(rest: Gram, at: IntArray) -> tuple[float, float, int]:
-    """(F, p, directions) of what columns explain of what is left."""
+def _score(rest: Gram, at: IntArray, degrees: float) -> tuple[float, float, int]:
+    """(F, p, directions) of what columns explain of what is left. degrees: with which its noise is known."""
     explained, k = rest.explained(at, NEW)
     if not k:
         return 0.0, 1.0, 0
     noise = max(float(rest.matrix[0, 0]) - explained, 1e-300) / max(rest.rows - k, 1)
     f = explained / k / noise
-    return f, float(fdtrc(k, max(rest.rows - k, 1), f)), k
+    return f, float(fdtrc(k, max(min(degrees, rest.rows - k), 1.0), f)), k
 
 
 def _whitened(rows: Rows, kept: Sequence[FloatArray]) -> tuple[Linear, list[FloatArray]]:
-    """(the fit with the memory of what it and `kept` leave, what they leave (C, rows) of each piece)."""
-    memory: list[Memory] = []
-    left = rows.residual
-    for turn in range(3):
-        if turn == 0:
-            memory = _memories(rows, left, 0)
-        else:
-            linear = Linear(rows, memory)
-            left = _left(rows, linear, kept)
-            memory = _memories(rows, left)
-    return Linear(rows, memory), left
+    """(the fit with the memory of what it and `kept` leave, what they leave (C, rows) of each piece).
+
+    What they have taken out of the residuals belongs to the noise, too: see output_error/memory/whitening.py.
+    """
+    linear, left = Linear(rows, _memories(rows, rows.residual, None)), list(rows.residual)
+    for _ in range(ROUNDS):
+        left, taken = _left(rows, linear, kept)
+        linear = Linear(rows, _memories(rows, left, taken))
+    return linear, left
 
 
-def _memories(rows: Rows, left: Sequence[FloatArray], most: int = 12) -> list[Memory]:
+def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray] | None) -> list[AutoRegression]:
+    """The memory of each column. taken: of each piece (C, rows, K), what a fit has taken out, as likely as it is."""
     found = []
     for c in range(len(rows.problem.columns)):
-        series = [
-            left[k][j][a:b] for k, own in enumerate(rows.column) for j, column in enumerate(own) if column == c
-            for a, b in stretches(rows.there[k][j])
-        ]  # fmt: skip
-        found.append(memory_of(series, most))
+        series: list[FloatArray] = []
+        for k, own in enumerate(rows.column):
+            for j, column in enumerate(own):
+                if column == c:
+                    there = rows.there[k][j]
+                    more = [] if taken is None else [taken[k][j][there]]
+                    series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
+        found.append(autoregression(series))
     return found
 
 
-def _left(rows: Rows, linear: Linear, kept: Sequence[FloatArray]) -> list[FloatArray]:
-    """The residuals without what parameters, `kept` and the start of each piece explain of them."""
+def _left(rows: Rows, linear: Linear, kept: Sequence[FloatArray]) -> tuple[list[FloatArray], list[FloatArray]]:
+    """(residuals without what parameters, `kept` and the start of each piece explain, what that may be off by)."""
     e, j = linear.whole()
     z = np.hstack([j, linear.white(kept)]) if kept[0].shape[2] else j
-    by = solved(z, e)
-    count, found = j.shape[1], []
+    by, root = solved(z, e), root_of_covariance(z)
+    found, taken = [], []
     for k in range(len(rows.pieces)):
-        explained = rows.slopes[k] @ by[:count] + kept[k] @ by[count:]
-        own = rows.own[k]
+        shown = np.concatenate([rows.slopes[k], kept[k]], axis=2)
+        rest, off, own = rows.residual[k] - shown @ by, shown @ root, rows.own[k]
         if own.shape[2]:
-            rest = (rows.residual[k] - explained)[:, :, None]
-            white_own, white_rest = linear.of_piece(k, own), linear.of_piece(k, rest)
-            explained = explained + own @ solved(white_own, white_rest[:, 0])
-        found.append(rows.residual[k] - explained)
-    return found
+            white_own = linear.of_piece(k, own)
+            both = linear.of_piece(k, np.concatenate([rest[:, :, None], off], axis=2))
+            lift = np.column_stack([solved(white_own, each) for each in both.T])
+            rest, off = rest - own @ lift[:, 0], off - own @ lift[:, 1:]
+            off = np.concatenate([off, own @ root_of_covariance(white_own)], axis=2)
+        found.append(rest)
+        taken.append(off)
+    return found, taken
 
 
 def _shares(rows: Rows, left: Sequence[FloatArray], found: bool) -> tuple[FloatArray, list[FloatArray]]:

@@ -61,6 +61,17 @@ class AutoRegression:
         return np.array(known[:count])
 
     @property
+    def degrees(self) -> float:
+        """Degrees of freedom behind the power of the slowest errors, s^2/(1 - sum phi)^2; inf for white ones.
+
+        (sum phi) has the variance 1' covariance^-1 1/rows; a variance with d degrees is known within sqrt(2/d).
+        """
+        if not self.order:
+            return math.inf
+        spread = float(np.linalg.solve(self.covariance, np.ones(self.order)).sum()) / max(self.rows, 1)
+        return 0.5 * (1.0 - float(self.coefficients.sum())) ** 2 / max(spread, 1e-300)
+
+    @property
     def memory(self) -> float:
         """Rows that say as much as one that is independent of others: (1 + z)/(1 - z), z the slowest decay of a row.
 
