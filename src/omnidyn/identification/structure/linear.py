@@ -48,7 +48,8 @@ class Rows:
         count, every = len(problem.parameters), problem.columns
         scale = [p.slope(float(v)) for p, v in zip(problem.parameters, point.values, strict=True)]
         rows = cls(problem, point, [], [], [], [], [], [])
-        for piece, (residual, slopes, at) in zip(problem.pieces, parts, strict=True):
+        for piece, (every_residual, slopes, at) in zip(problem.pieces, parts, strict=True):
+            residual = _anew(piece, every_residual)
             wide = np.zeros((*residual.shape, count))
             mine = at < count
             wide[:, :, at[mine]] = slopes[:, :, mine]
@@ -162,6 +163,21 @@ class Gram:
         values, vectors = np.linalg.eigh(self.matrix[np.ix_(by, by)])
         kept = values > least
         return float(((vectors[:, kept].T @ self.matrix[by, 0]) ** 2 / values[kept]).sum()), int(kept.sum())
+
+
+def _anew(piece: Piece, residual: FloatArray) -> FloatArray:
+    """Residuals (C, rows) without rows in which an encoder shows what it showed before, within a tick of the model.
+
+    What is left of rounding is spread evenly over a tick, and one such row knows nothing of the next.
+    """
+    out = residual.copy()
+    for c, tick in enumerate(piece.record.ticks):
+        if tick <= 0.0:
+            continue
+        model = piece.record.outputs[piece.first : piece.last + 1, c] - residual[c]
+        turned = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.nan_to_num(model))))]) // tick
+        out[c, 1:][turned[1:] == turned[:-1]] = np.nan
+    return out
 
 
 def _new(memory: AutoRegression, values: FloatArray, there: BoolArray, steps: IntArray) -> FloatArray:
