@@ -28,6 +28,7 @@ class Found:
 class Remedy:
     """key: of the robot file, a nuisance or "change". words: what it is, with its value. gain: share of the squared
     held-out error that it takes away, with its standard error. same_as: keys that the log cannot tell from it.
+    share: of all that residuals hold beside noise, that it explains.
     chi2: by how much it lowers the sum of squares, in those of the noise; numbers: how many it fits."""
 
     key: str
@@ -35,6 +36,7 @@ class Remedy:
     gain: float
     gain_std: float
     same_as: tuple[str, ...] = ()
+    share: float = 1.0
     chi2: float = field(default=0.0, repr=False)
     numbers: int = 1
 

@@ -29,7 +29,7 @@ def diagnose(solution: Solution) -> Diagnosis:
     seen = misfit(rows, moved)
     bench = Workbench(problem, point, engine_kind(solver.engine), moved)
     tried = [(one, one.tried(bench)) for one in candidates(bench)]
-    ranked = remedies(seen.linear, [each for each in tried if each[1]])
+    ranked = remedies(seen.linear, [each for each in tried if each[1]], seen.shown)
     degrees = min(seen.linear.degrees, float(sum(there.sum() for there in rows.there)))
     strong = [r for r in ranked if fdtrc(r.numbers, degrees, r.chi2 / r.numbers) * len(tried) < FALSE]
     found = bool(seen.found or strong)

@@ -30,13 +30,15 @@ NEW = 1e-4  # share of a direction that no parameter explains, from which it is 
 class Misfit:
     """What the residuals follow. found: themes, first the one that explains most. tested: every theme, p of each.
 
-    linear: the fit with the memory of what is left. shares: of each column of the problem, of the variance of its
+    linear: the fit with the memory of what is left. shown: of each piece (C, rows, K), the directions of what was found.
+    shares: of each column of the problem, of the variance of its
     residuals that is no noise. explained: of each piece (C, rows), what the themes make of the residuals.
     """
 
     found: tuple[Found, ...]
     tested: dict[str, float]
     linear: Linear
+    shown: list[FloatArray]
     shares: FloatArray
     explained: list[FloatArray]
 
@@ -61,7 +63,8 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
         first = first or {name: p for name, (_, p, _) in scores.items()}
         best = min(scores, key=lambda name: scores[name][1], default="")
         if not best or scores[best][1] > FALSE / len(themes):
-            return Misfit(tuple(found), first, linear, *_shares(rows, left, bool(found)))
+            kept = [each[:, :, taken] for each in shown]
+            return Misfit(tuple(found), first, linear, kept, *_shares(rows, left, bool(found)))
         found.append(Found(best, *scores[best]))
         taken = np.concatenate([taken, at[best]])
 

@@ -89,13 +89,16 @@ class Blocks:
         return np.array(found)
 
 
-def remedies(linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], most: int = 8) -> tuple[Remedy, ...]:
-    """The candidates that explain something, best first."""
+def remedies(
+    linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], found: Sequence[FloatArray], most: int = 8
+) -> tuple[Remedy, ...]:
+    """The candidates that explain something, best first. found: of each piece (C, rows, K), what residuals follow."""
     flat = [(one, trial) for one, trials in tried for trial in trials]
     if not flat:
         return ()
     shown = [np.concatenate([trial.shown[k] for _, trial in flat], axis=2) for k in range(len(linear.rows.residual))]
-    blocks = Blocks(linear, shown)
+    blocks = Blocks(linear, [np.concatenate(both, axis=2) for both in zip(shown, found, strict=True)])
+    themes = np.arange(1 + blocks.count + shown[0].shape[2], len(blocks.size))
     known = np.arange(1, 1 + blocks.count)
     base, first, best = blocks.left(known), 1 + blocks.count, {}
     before = blocks.held_out(known)
@@ -113,15 +116,17 @@ def remedies(linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], mos
     penalty = np.log(max(blocks.rows, 2))
     ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * len(t.at), reverse=True)
     worth = [t for t in ranked if t.chi2 > penalty * len(t.at) + 2.0 * np.log(max(len(best), 1))][: 2 * most]
-    found = []
+    ranking = []
     for t in worth:
         after = blocks.held_out(np.concatenate([known, t.at]))
         change = (before - after) / max(float(before.sum()), 1e-300)
         gain, std = float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
         same = tuple(o.candidate.key for o in worth if o is not t and _same(blocks, known, base, noise, t, o))
         words = t.candidate.told(float(t.size[0]), t.trial.at)
-        found.append(Remedy(t.candidate.key, words, gain, std, same, t.chi2, len(t.at)))
-    return tuple(r for r in found if r.gain > 0.0 and r.chi2 > RIVAL * worth[0].chi2)[:most]
+        every = (base - blocks.left(np.concatenate([known, t.at, themes]))) / noise
+        share = (t.chi2 - len(t.at)) / max(every - len(t.at) - len(themes), t.chi2 - len(t.at), 1e-300)
+        ranking.append(Remedy(t.candidate.key, words, gain, std, same, share, t.chi2, len(t.at)))
+    return tuple(r for r in ranking if r.gain > 0.0 and r.chi2 > RIVAL * worth[0].chi2)[:most]
 
 
 def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried, other: Tried) -> bool:
