@@ -115,13 +115,12 @@ def _on_time(problem: Problem) -> Problem:
 
 
 def _by_rates(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
-    """The point that fits best what outputs gain from row to row, where any of them adds up; latencies at their start.
+    """The point that fits best what outputs gain from row to row, latencies at their start: one more place to begin.
 
     The path itself has minima far from the best one: an axis that creeps where it should rest makes up for a turn that
-    went too far before, and no descent gets across the level at which it would rest.
+    went too far before, and no descent gets across the level at which it would rest. Rates of few, noisy rows say less
+    than their path, so that the better one of both is taken.
     """
-    if not any(name in TRAVELS for name, _ in problem.columns):
-        return point
     held = _on_time(problem)
     solver = Solver(held, RateEngine(held), nu, NEAR, counted=False)
     found = solver.minimise(point, watch=watch.aside("rates before paths")).state.point
@@ -131,11 +130,14 @@ def _by_rates(problem: Problem, point: Point, nu: float, watch: Progress) -> Poi
 def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
     """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes.
 
-    With the latencies that go with it.
+    With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
     """
     own, short = problem.start(), problem.shortened(FEW)
     solver = Solver(short, ImplicitEngine(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
     best = min(points, key=lambda point: solver.state(point).objective)
-    return _timed(short, _by_rates(short, best, nu, watch), nu, watch)
+    begun = [best]
+    if any(name in TRAVELS for name, _ in short.columns):
+        begun.append(_by_rates(short, best, nu, watch))
+    return min((_timed(short, one, nu, watch) for one in begun), key=lambda point: solver.state(point).objective)
