@@ -85,7 +85,7 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
         return
     told: set[str] = set()
     for remedy in lack.remedies:
-        if remedy.key in told or remedy.chi2 < NEARLY * lack.remedies[0].chi2:
+        if remedy.key in told or not remedy.confident or remedy.chi2 < NEARLY * lack.remedies[0].chi2:
             continue
         told |= {remedy.key, *remedy.same_as}
         alike = f"; these logs cannot tell it from {all_of(list(map(named, remedy.same_as)))}" if remedy.same_as else ""

@@ -10,6 +10,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import Part, Table, all_of, plain
 from omnidyn.model.keys import find_key, in_words
 
+MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
 WORTH = 0.01  # share of the variance of a residual that is worth a line
 MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
@@ -39,6 +40,11 @@ class Remedy:
     share: float = 1.0
     chi2: float = field(default=0.0, repr=False)
     numbers: int = 1
+
+    @property
+    def confident(self) -> bool:
+        """Whether it explains most of what is to be explained; else it may stand for what nobody offers."""
+        return self.share >= MOST
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +92,12 @@ class LackOfFit:
         )  # fmt: skip
         if not self.remedies:
             return f"{words}; no cause that is known here explains it"
+        if not self.remedies[0].confident:
+            near = self.remedies[0]
+            return (
+                f"{words}; no cause that is known here explains it: the nearest, {near.words}, explains "
+                f"{100.0 * near.share:.0f} % of it"
+            )
         best = self.remedies[0]
         same = f", or what this log cannot tell from it ({', '.join(map(named, best.same_as))})" if best.same_as else ""
         return f"{words}; most likely {best.words}{same}"

@@ -16,11 +16,11 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
 from omnidyn.identification.structure.motion import Motion
-from omnidyn.identification.structure.workbench import Workbench
+from omnidyn.identification.structure.workbench import Workbench, scaled
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
-from omnidyn.model.frames import AXES
-from omnidyn.model.keys import EMF, TORQUE, Key, in_words
-from omnidyn.model.layout import N_AXES, YAW
+from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.keys import EMF, TORQUE, in_words
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 
 STEP = 0.02  # relative change that a smooth number is tried with
@@ -72,30 +72,17 @@ def numbers(bench: Workbench) -> Iterator[Candidate]:
 
 
 def _number(robot: Robot, key: str, beside: str = "") -> Iterator[Candidate]:
-    """A number, and another one that follows it. A list has no number of its own, only its entries have."""
-    changed = times(robot, key, 1.0 + STEP)
+    """A number, of all wheels where the key is that of a list, and another one that follows it."""
+    changed = scaled(robot, key, 1.0 + STEP)
     if changed is None:
         return
     if beside:
-        changed = times(changed, beside, 1.0 + STEP) or changed
+        changed = scaled(changed, beside, 1.0 + STEP) or changed
 
     def trials(bench: Workbench) -> list[Trial]:
         return [Trial([own / STEP for own in bench.change(changed)])]
 
     yield Candidate(key, trials, lambda change, _: f"{in_words(key)} {100.0 * change:+.2g} %")
-
-
-def times(robot: Robot, name: str, factor: float) -> Robot | None:
-    """The robot with a number, or every entry of a list of the same on all wheels, times a factor; None without it."""
-    key = Key.parse(name)
-    try:
-        if key.index is None:
-            return key.set(robot, key.get(robot) * factor, checked=False)
-        now = Key(key.name, key.index)
-        value = now.get(robot)
-        return now.set(robot, value * factor, checked=False)
-    except (OmnidynError, TypeError):
-        return None
 
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
@@ -108,17 +95,16 @@ def of_the_log(bench: Workbench) -> Iterator[Candidate]:
         yield Candidate(
             DEAD_BAND, _driver(DEAD_BAND, Driver(dead_band=0.1), 0.1), lambda by, _: f"dead band {by:.2g} V", True
         )
-    for axis, name in enumerate(AXES):
-        words, unit = (f"a constant force along {name}", "N") if axis < YAW else ("a constant torque", "N m")
-        yield Candidate(
-            f"{TILT}.{name}", _tilt(axis), lambda by, _, words=words, unit=unit: f"{words} of {by:.2g} {unit}"
-        )
+    yield Candidate(TILT, _tilt, as_it_is("a constant force, as of a floor that is not level"))
     for channel in dict.fromkeys(name for name, _ in bench.problem.columns):
         words = channel.replace("_", " ")
         yield Candidate(
             f"{LATENCY}.{channel}", _late(channel), lambda by, _, words=words: f"{words} late by {1e3 * by:.3g} ms"
         )
-    yield Candidate(CHANGE, _changes, lambda _, at: f"friction that changes {100.0 * at:.0f} % into the log")
+    for words, force in (("friction", _friction), ("mass", _inertia), ("supply", _drive)):
+        yield Candidate(
+            CHANGE, _later(force), lambda _, at, words=words: f"{words} that changes {100.0 * at:.0f} % into the log"
+        )
 
 
 def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], list[Trial]]:
@@ -126,11 +112,8 @@ def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], lis
     return lambda bench: [Trial([own / size for own in bench.change(driver=driver)])]
 
 
-def _tilt(axis: int) -> Callable[[Workbench], list[Trial]]:
-    def force(motion: Motion) -> FloatArray:
-        return np.tile(np.eye(N_AXES)[axis], (len(motion.t), 1, 1))
-
-    return lambda bench: [Trial(bench.by_force(force))]
+def _tilt(bench: Workbench) -> list[Trial]:
+    return [Trial(bench.by_force(lambda motion: np.tile(np.eye(N_AXES), (len(motion.t), 1, 1))))]
 
 
 def _late(channel: str) -> Callable[[Workbench], list[Trial]]:
@@ -147,10 +130,32 @@ def _late(channel: str) -> Callable[[Workbench], list[Trial]]:
     return trials
 
 
-def _changes(bench: Workbench) -> list[Trial]:
-    def force(motion: Motion, when: float) -> FloatArray:
-        later = (motion.share >= when).astype(float)[:, None, None]
-        each = np.eye(N_AXES) * np.sign(motion.twist)[:, None, :]
-        return -later * np.concatenate([each, np.eye(N_AXES) * motion.twist[:, None, :]], axis=1)
+def _later(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[Trial]]:
+    """Forces that begin at some time of the log, at several times."""
 
-    return [Trial(bench.by_force(lambda motion, when=when: force(motion, when)), when) for when in WHEN.tolist()]
+    def trials(bench: Workbench) -> list[Trial]:
+        return [
+            Trial(bench.by_force(lambda m, when=when: force(m) * (m.share >= when)[:, None, None]), when)
+            for when in WHEN.tolist()
+        ]
+
+    return trials
+
+
+def _friction(motion: Motion) -> FloatArray:
+    speed = motion.twist[:, None, :]
+    return -np.concatenate([np.eye(N_AXES) * np.sign(speed), np.eye(N_AXES) * speed], axis=1)
+
+
+def _inertia(motion: Motion) -> FloatArray:
+    """Of a mass that is added to the body, and of its inertia."""
+    pace = np.zeros_like(motion.twist)
+    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
+    flat, turn = pace * [1.0, 1.0, 0.0], pace * [0.0, 0.0, 1.0]
+    return -np.stack([flat, turn], axis=1)
+
+
+def _drive(motion: Motion) -> FloatArray:
+    """Of voltages that are all larger by a share: what the motors push with, without the back-EMF."""
+    at_rest = drive_wrench(motion.robot, np.zeros_like(motion.twist), motion.voltage)
+    return at_rest[:, None, :]

@@ -128,6 +128,6 @@ def _at_wheels(bench: Workbench) -> list[Trial]:
 
     def force(motion: Motion) -> FloatArray:
         rim = motion.twist @ g
-        return -np.concatenate([np.sign(rim), rim], axis=1)[:, :, None] * np.concatenate([g, g], axis=1).T
+        return -np.stack([np.sign(rim) @ g.T, rim @ g.T], axis=1)
 
     return [Trial(bench.by_force(force))]

@@ -30,7 +30,7 @@ NEW = 1e-4  # share of a direction that no parameter explains, from which it is 
 class Misfit:
     """What the residuals follow. found: themes, first the one that explains most. tested: every theme, p of each.
 
-    linear: the fit with the memory of what is left. shown: of each piece (C, rows, K), the directions of what was found.
+    linear: the fit with the memory of what is left. shown: of each piece (C, rows, K), the directions that were found.
     shares: of each column of the problem, of the variance of its
     residuals that is no noise. explained: of each piece (C, rows), what the themes make of the residuals.
     """

@@ -17,6 +17,7 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.structure.candidates import Candidate, Trial
 from omnidyn.identification.structure.linear import SAME, Linear
 
+CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
 BLOCKS = 10  # of the log, each held out once
 RIVAL = 0.3  # of what the best explains, from which another explanation is worth a look
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
@@ -31,10 +32,6 @@ class Tried:
     at: IntArray
     chi2: float
     size: FloatArray
-
-    @property
-    def bic(self) -> float:
-        return self.chi2
 
 
 class Blocks:
@@ -102,6 +99,7 @@ def remedies(
     known = np.arange(1, 1 + blocks.count)
     base, first, best = blocks.left(known), 1 + blocks.count, {}
     before = blocks.held_out(known)
+    penalty = np.log(max(blocks.rows, 2))
     noise = base / max(blocks.rows - blocks.count, 1)
     for one, trial in flat:
         k = trial.shown[0].shape[2]
@@ -111,9 +109,8 @@ def remedies(
         size = blocks.fitted(blocks.total, np.concatenate([known, at]))[len(known) :] / blocks.size[at]
         if one.one_sided and k == 1 and size[0] < 0.0:
             continue
-        if one.key not in best or chi2 > best[one.key].chi2:
+        if one.key not in best or chi2 - penalty * k > best[one.key].chi2 - penalty * len(best[one.key].at):
             best[one.key] = Tried(one, trial, at, float(chi2), size)
-    penalty = np.log(max(blocks.rows, 2))
     ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * len(t.at), reverse=True)
     worth = [t for t in ranked if t.chi2 > penalty * len(t.at) + 2.0 * np.log(max(len(best), 1))][: 2 * most]
     ranking = []
@@ -126,7 +123,7 @@ def remedies(
         every = (base - blocks.left(np.concatenate([known, t.at, themes]))) / noise
         share = (t.chi2 - len(t.at)) / max(every - len(t.at) - len(themes), t.chi2 - len(t.at), 1e-300)
         ranking.append(Remedy(t.candidate.key, words, gain, std, same, share, t.chi2, len(t.at)))
-    return tuple(r for r in ranking if r.gain > 0.0 and r.chi2 > RIVAL * worth[0].chi2)[:most]
+    return tuple(r for r in ranking if r.gain > -CLEAR * r.gain_std and r.chi2 > RIVAL * worth[0].chi2)[:most]
 
 
 def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried, other: Tried) -> bool:

@@ -6,9 +6,8 @@ import numpy as np
 
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.structure.linear import Linear, solved
-from omnidyn.identification.structure.workbench import Workbench
-from omnidyn.model.keys import EMF, TORQUE, Key, expand
-from omnidyn.model.robot import Robot
+from omnidyn.identification.structure.workbench import Workbench, scaled
+from omnidyn.model.keys import EMF, TORQUE, Key
 
 PERCENT = 0.01
 TRIED = 0.01  # relative change of a fixed number, either way is alike
@@ -44,17 +43,3 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
     return {
         name: dict(sorted(by.items(), key=lambda item: -abs(item[1]))) for name, by in found.items()
     }  # fmt: skip
-
-
-def scaled(robot: Robot, name: str, factor: float) -> Robot | None:
-    """The robot with a number, on all wheels, times a factor; None where it has none or 0."""
-    try:
-        keys = [Key.parse(each) for each in expand(name, robot)]
-        values = [float(key.get(robot)) for key in keys]
-    except OmnidynError:
-        return None
-    if not any(values):
-        return None
-    for key, value in zip(keys, values, strict=True):
-        robot = key.set(robot, value * factor, checked=False)
-    return robot

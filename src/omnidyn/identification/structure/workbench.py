@@ -8,12 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.prepare import EXACT, IMPLICIT, make_engine
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.model.actuation import Driver, at_motors
+from omnidyn.model.keys import Key, expand
 from omnidyn.model.robot import Robot
 
 IDEAL = Driver()
@@ -67,3 +69,17 @@ def _driven(piece: Piece, driver: Driver, records: dict[int, Record]) -> Record:
     if id(own) not in records:
         records[id(own)] = replace(own, voltage=at_motors(own.voltage, own.share, driver)[0])
     return records[id(own)]
+
+
+def scaled(robot: Robot, name: str, factor: float) -> Robot | None:
+    """The robot with a number, on all wheels, times a factor; None where it has none or 0."""
+    try:
+        keys = [Key.parse(each) for each in expand(name, robot)]
+        values = [float(key.get(robot)) for key in keys]
+    except OmnidynError:
+        return None
+    if not any(values):
+        return None
+    for key, value in zip(keys, values, strict=True):
+        robot = key.set(robot, value * factor, checked=False)
+    return robot

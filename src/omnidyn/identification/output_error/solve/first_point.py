@@ -9,7 +9,8 @@ import numpy as np
 
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.problem.nuisances import LATENCY
+from omnidyn.identification.output_error.engines.rates import RateEngine
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, TRAVELS
 from omnidyn.identification.output_error.problem.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
@@ -102,19 +103,41 @@ def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
     parts = {p.part for p in problem.parameters}
     if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
         return point
-    still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
-    held = replace(problem, parameters=tuple(still))
+    held = _on_time(problem)
     first = Solver(held, ImplicitEngine(held), nu, NEAR).minimise(point, watch=watch.aside("motors first"))
     return _with_latencies(Solver(problem, ImplicitEngine(problem), nu), first.state).point
+
+
+def _on_time(problem: Problem) -> Problem:
+    """The problem with every latency held at its start."""
+    still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
+    return replace(problem, parameters=tuple(still))
+
+
+def _by_rates(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
+    """The point that fits best what outputs gain from row to row, latencies at their start: one more place to begin.
+
+    The path itself has minima far from the best one: an axis that creeps where it should rest makes up for a turn that
+    went too far before, and no descent gets across the level at which it would rest. Rates of few, noisy rows say less
+    than their path, so that the better one of both is taken.
+    """
+    held = _on_time(problem)
+    solver = Solver(held, RateEngine(held), nu, NEAR, counted=False)
+    found = solver.minimise(point, watch=watch.aside("rates before paths")).state.point
+    return Point(found.values, point.states)
 
 
 def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
     """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes.
 
-    With the latencies that go with it.
+    With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
     """
     own, short = problem.start(), problem.shortened(FEW)
     solver = Solver(short, ImplicitEngine(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
-    return _timed(short, min(points, key=lambda point: solver.state(point).objective), nu, watch)
+    best = min(points, key=lambda point: solver.state(point).objective)
+    begun = [best]
+    if any(name in TRAVELS for name, _ in short.columns):
+        begun.append(_by_rates(short, best, nu, watch))
+    return min((_timed(short, one, nu, watch) for one in begun), key=lambda point: solver.state(point).objective)
