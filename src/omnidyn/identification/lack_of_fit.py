@@ -11,6 +11,18 @@ from omnidyn.document import Part, Table, all_of, plain
 from omnidyn.model.keys import find_key, in_words
 
 MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
+# What robots do that no law holds yet: key -> words.
+UNOFFERED = {
+    "friction one way": "friction that is another one backward than forward",
+    "friction over speed": "friction that falls with the speed",
+    "drag": "drag that grows with the square of the speed",
+    "force in the room": "a force that stays in the room, as of a cable or a slope",
+    "turns of the wheels": "something that comes back with the turns of the wheels",
+    "sag": "a supply that sags under load",
+    "heat": "motors that weaken as they warm up",
+    "centre of mass": "a centre of mass off the middle of the wheels",
+    "filter": "speeds that went through a filter",
+}
 WORTH = 0.01  # share of the variance of a residual that is worth a line
 MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
@@ -29,7 +41,7 @@ class Found:
 class Remedy:
     """key: of the robot file, a nuisance or "change". words: what it is, with its value. gain: share of the squared
     held-out error that it takes away, with its standard error. same_as: keys that the log cannot tell from it.
-    share: of all that residuals hold beside noise, that it explains.
+    share: of all that residuals hold beside noise, that it explains. offered: whether a robot file or a fit holds such.
     chi2: by how much it lowers the sum of squares, in those of the noise; numbers: how many it fits."""
 
     key: str
@@ -38,13 +50,19 @@ class Remedy:
     gain_std: float
     same_as: tuple[str, ...] = ()
     share: float = 1.0
+    offered: bool = True
     chi2: float = field(default=0.0, repr=False)
     numbers: int = 1
 
     @property
     def confident(self) -> bool:
-        """Whether it explains most of what is to be explained; else it may stand for what nobody offers."""
-        return self.share >= MOST
+        """Whether it explains most of what is to be explained, and nothing that nobody offers explains the same."""
+        return self.offered and self.share >= MOST and not self.rivals
+
+    @property
+    def rivals(self) -> tuple[str, ...]:
+        """Those of `same_as` that no robot file holds."""
+        return tuple(key for key in self.same_as if key in UNOFFERED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +112,10 @@ class LackOfFit:
             return f"{words}; no cause that is known here explains it"
         if not self.remedies[0].confident:
             near = self.remedies[0]
+            if not near.offered:
+                return f"{words}; it looks like {near.words}, which no law that is known here holds"
+            if near.rivals:
+                return f"{words}; it may be {near.words}, or {' or '.join(UNOFFERED[key] for key in near.rivals)}"
             return (
                 f"{words}; no cause that is known here explains it: the nearest, {near.words}, explains "
                 f"{100.0 * near.share:.0f} % of it"
@@ -152,4 +174,4 @@ class Diagnosis:
 
 def named(key: str) -> str:
     """A remedy's key as people call it."""
-    return in_words(key) if find_key(key) else key
+    return in_words(key) if find_key(key) else UNOFFERED.get(key, key)

@@ -40,12 +40,13 @@ class Trial:
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """key: of the robot file, a nuisance, or CHANGE. trials: one or more. told: its fitted change and where it was
-    tried, in words. one_sided: a change below 0 makes no sense."""
+    tried, in words. one_sided: a change below 0 makes no sense. offered: whether a robot file or a fit can hold it."""
 
     key: str
     trials: Callable[[Workbench], list[Trial]]
     told: Callable[[float, float], str]
     one_sided: bool = False
+    offered: bool = True
 
     def tried(self, bench: Workbench) -> list[Trial]:
         """Its trials; none where the engine cannot simulate them."""

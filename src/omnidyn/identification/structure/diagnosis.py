@@ -15,6 +15,7 @@ from omnidyn.identification.structure.misfit import FALSE, Misfit, misfit
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.remedies import remedies
 from omnidyn.identification.structure.rests_on import rests_on
+from omnidyn.identification.structure.unoffered import unoffered
 from omnidyn.identification.structure.workbench import Workbench
 
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
@@ -28,7 +29,7 @@ def diagnose(solution: Solution) -> Diagnosis:
     rows, moved = Rows.of(problem, point, engine.residuals(point)), motions(problem, point)
     seen = misfit(rows, moved)
     bench = Workbench(problem, point, engine_kind(solver.engine), moved)
-    tried = [(one, one.tried(bench)) for one in candidates(bench)]
+    tried = [(one, one.tried(bench)) for one in (*candidates(bench), *unoffered(bench))]
     ranked = remedies(seen.linear, [each for each in tried if each[1]], seen.shown)
     degrees = min(seen.linear.degrees, float(sum(there.sum() for there in rows.there)))
     strong = [r for r in ranked if fdtrc(r.numbers, degrees, r.chi2 / r.numbers) * len(tried) < FALSE]

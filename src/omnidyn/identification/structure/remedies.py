@@ -122,7 +122,7 @@ def remedies(
         words = t.candidate.told(float(t.size[0]), t.trial.at)
         every = (base - blocks.left(np.concatenate([known, t.at, themes]))) / noise
         share = (t.chi2 - len(t.at)) / max(every - len(t.at) - len(themes), t.chi2 - len(t.at), 1e-300)
-        ranking.append(Remedy(t.candidate.key, words, gain, std, same, share, t.chi2, len(t.at)))
+        ranking.append(Remedy(t.candidate.key, words, gain, std, same, share, t.candidate.offered, t.chi2, len(t.at)))
     return tuple(r for r in ranking if r.gain > -CLEAR * r.gain_std and r.chi2 > RIVAL * worth[0].chi2)[:most]
 
 

@@ -1,0 +1,106 @@
+"""What robots do that no law of a robot file holds yet: rivals of the candidates, so that none stands in for them.
+
+Where one of these explains more than all that is offered, the answer says what it looks like, and offers no remedy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.identification.lack_of_fit import UNOFFERED
+from omnidyn.identification.structure.candidates import Candidate, Trial, as_it_is
+from omnidyn.identification.structure.motion import Motion
+from omnidyn.identification.structure.workbench import Workbench
+from omnidyn.model.layout import N_AXES
+
+Force = Callable[[Motion, float], FloatArray]
+WIDTHS = (0.03, 0.1, 0.3)  # of the fastest speed, over which friction may fall
+WAVES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0, 12.0, 24.0)  # a turn of a wheel
+
+
+def unoffered(bench: Workbench) -> Iterator[Candidate]:
+    """All of them."""
+    for key, force, sizes in (
+        ("friction one way", _one_way, (0.0,)),
+        ("friction over speed", _falling, WIDTHS),
+        ("drag", _drag, (0.0,)),
+        ("force in the room", _in_the_room, (0.0,)),
+        ("turns of the wheels", _waves, WAVES),
+        ("sag", _sag, (0.0,)),
+        ("heat", _heat, (0.0,)),
+        ("centre of mass", _off_centre, (0.0,)),
+    ):
+        yield Candidate(key, _tried(force, sizes), as_it_is(UNOFFERED[key]), offered=False)
+    yield Candidate("filter", _filtered, as_it_is(UNOFFERED["filter"]), offered=False)
+
+
+def _tried(force: Force, sizes: tuple[float, ...]) -> Callable[[Workbench], list[Trial]]:
+    return lambda bench: [Trial(bench.by_force(lambda m, size=size: force(m, size)), size) for size in sizes]
+
+
+def _along_axes(values: FloatArray) -> FloatArray:
+    """A force of its own on each axis, from sizes (n, 3)."""
+    return np.eye(N_AXES) * values[:, None, :]
+
+
+def _one_way(motion: Motion, _: float) -> FloatArray:
+    return _along_axes((motion.twist != 0.0).astype(float))
+
+
+def _falling(motion: Motion, width: float) -> FloatArray:
+    top = np.maximum(np.abs(motion.twist).max(axis=0), 1e-9)
+    return _along_axes(-np.sign(motion.twist) * np.exp(-np.abs(motion.twist) / (width * top)))
+
+
+def _drag(motion: Motion, _: float) -> FloatArray:
+    return _along_axes(-motion.twist * np.abs(motion.twist))
+
+
+def _in_the_room(motion: Motion, _: float) -> FloatArray:
+    c, s = np.cos(motion.pose[:, 2]), np.sin(motion.pose[:, 2])
+    zero = np.zeros_like(c)
+    return np.stack([np.stack([c, -s, zero], axis=1), np.stack([s, c, zero], axis=1)], axis=1)
+
+
+def _waves(motion: Motion, count: float) -> FloatArray:
+    g, step = motion.robot.wheels.wrench_matrix, np.diff(motion.t)[:, None]
+    middle = 0.5 * (motion.twist[1:] + motion.twist[:-1]) * step
+    turned = np.concatenate([np.zeros((1, g.shape[1])), np.cumsum(middle @ g, axis=0)]) / motion.robot.wheels.radii
+    moving = (motion.twist @ g != 0.0).astype(float)
+    waves = np.concatenate([np.cos(count * turned) * moving, np.sin(count * turned) * moving], axis=1)
+    return waves[:, :, None] * np.concatenate([g, g], axis=1).T
+
+
+def _sag(motion: Motion, _: float) -> FloatArray:
+    draw = np.abs(motion.current).sum(axis=1, keepdims=True)
+    return -((motion.voltage * draw) @ motion.robot.wheels.wrench_matrix.T)[:, None, :]
+
+
+def _heat(motion: Motion, _: float) -> FloatArray:
+    step = np.append(np.diff(motion.t), 0.0)[:, None]
+    heat = np.cumsum(motion.current**2 * step, axis=0)
+    return -((motion.current * heat) @ motion.robot.wheels.wrench_matrix.T)[:, None, :]
+
+
+def _off_centre(motion: Motion, _: float) -> FloatArray:
+    """M (c x dw/dt + w^2 c) and its torque, for c along x and along y."""
+    x, y, w = motion.twist.T
+    pace = np.zeros_like(motion.twist)
+    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
+    ahead = np.stack([w * w, -pace[:, 2], -(pace[:, 1] + w * x)], axis=1)
+    aside = np.stack([pace[:, 2], w * w, pace[:, 0] - w * y], axis=1)
+    return np.stack([ahead, aside], axis=1)
+
+
+def _filtered(bench: Workbench) -> list[Trial]:
+    """What a filter takes out beside the delay: the bend of every speed."""
+    shown = []
+    for motion in bench.motions:
+        level = motion.shown(motion.twist[:, None, :])
+        bend = np.gradient(np.gradient(level, motion.t, axis=1), motion.t, axis=1)
+        speed = np.array([name in ("twist", "wheel_speed") for name, _ in motion.piece.record.columns])
+        shown.append(np.where(speed[:, None, None], bend, 0.0))
+    return [Trial(shown)]
