@@ -296,7 +296,6 @@ def solve(body, element, x, s):
             stale = known = False
         if not known:
             residual(body, element, x, s)
-        newton_direction(s, rank)
         if is_solved(s, rank):
             found = worst_direction(body, element, s, rank) if rank > 0 else 0.0
             if found < -_close_along_worst(s):
@@ -306,5 +305,6 @@ def solve(body, element, x, s):
                 return iteration
             stale = True
         else:
+            newton_direction(s, rank)
             stale, known = _walk(body, element, x, s)
     return CAP
