@@ -6,7 +6,7 @@ an ellipse a bounded least-squares problem (lsq_linear). Where breakaway is Coul
 minimising the convex potential must give it too.
 """
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -248,3 +248,28 @@ def test_the_first_guess_does_not_matter(seed):
         np.testing.assert_allclose(y, x, rtol=1e-10, atol=1e-13)
         np.testing.assert_array_equal(y == 0.0, x == 0.0)
         np.testing.assert_array_equal(q.element[:, SIGN], p.element[:, SIGN])
+
+
+def test_what_rounds_along_one_axis_blurs_no_friction_along_another(axebot):
+    """A stage so short that M v/tau of the drive rounds to more than the friction in yaw, which holds all the same.
+
+    By hand: yaw starts with less than tau c/M, c its friction, so that it stops; nothing drives it, so that it stays.
+    """
+    small = axebot.replace(
+        friction=axebot.friction.replace(axes=axebot.friction.axes.replace(coulomb=(2.2, 1.5, 1e-7)))
+    )
+    for sign, tau in product([1.0, -1.0], [1e-6, 1e-7, 1e-8, 1e-9]):
+        p = plant(small)
+        p.body[TAU] = tau
+        p.element[N_AXES:, VOLTAGE] = [-1.0, -4.0, 5.0]
+        p.element[N_AXES:, BOUND] = np.inf
+        x = start_state(p, np.array([0.6, 0.5, 0.0]), np.zeros(3))[:3]
+        x[2] = sign * 0.5 * tau * p.element[2, SLIDE] / p.body[MASS]
+        p.body[GOAL : GOAL + 3] = x
+        p.element[:N_AXES, SIGN] = np.sign(x)
+        p.element[2, SIGN] = -sign  # the first guess slides the wrong way
+        x[2] = -x[2]
+        assert solve(p.body, p.element, x, workspace()) < CAP
+        assert p.element[2, SIGN] == 0.0
+        assert x[2] == 0.0
+        assert abs(x[0] - 0.6) < 100.0 * tau

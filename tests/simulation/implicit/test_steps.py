@@ -39,3 +39,30 @@ def test_a_robot_too_fast_to_be_followed_is_refused(monkeypatch):
         simulate(LIMITED, voltage, 1e-3)
     assert simulate(LIMITED, voltage, 1e-3, tol=None).twist.shape == (51, 3)
     simulate(AXEBOT.replace(body=LIMITED.body), np.full((50, 3), 3.0), 1e-3)  # one that is not
+
+
+@pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
+def test_a_friction_far_below_the_forces_at_work_still_stops_what_it_stops(electrical):
+    """A millionth of the axebot's friction in yaw, as a fit has it at its lower bound, while the robot drives on.
+
+    In steps of 0.1 us, M v/tau of the drive rounds to more than such a friction. Held against that, a stage could not
+    tell sliding from sticking: yaw went to and fro at 1e-14 m/s, an event in each of thousands of steps a row, or in a
+    fit of half a million.
+    """
+    friction = AXEBOT.friction
+    robot = AXEBOT.replace(
+        body=AXEBOT.body.replace(rotating_frame=True),
+        motor=AXEBOT.motor.replace(electrical=electrical),
+        friction=friction.replace(axes=friction.axes.replace(coulomb=(2.2, 1.5, 0.099e-6))),
+    )
+    voltage = np.repeat([[3.0, 3.0, 3.0], [-1.0, -4.0, 5.0]], [10, 140], axis=0)
+    numbers = plant(robot)
+    outcome = implicit.run_implicit(
+        numbers, voltage, np.full((150, 3), np.inf), np.full(150, 0.02), new_state(numbers), np.zeros(3), no_loop(3),
+        1e-5,
+    )  # fmt: skip
+    turns = outcome.state[1:, 2]
+    assert outcome.steps.max() < 1000
+    assert turns[9] > 0.1
+    assert (turns[140:] == 0.0).all()
+    assert (np.abs(outcome.state[141:, :2]) > 0.1).all()

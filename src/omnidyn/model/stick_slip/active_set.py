@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import ELLIPSE, GX, GY, GZ, SIGN
-from omnidyn.model.stick_slip.workspace import BASIS, JACOBIAN, MATRIX, NEWTON, PIVOT, RESIDUAL, ROW, SPARE
+from omnidyn.model.stick_slip.workspace import BASIS, CLOSE, JACOBIAN, MATRIX, NEWTON, PIVOT, RESIDUAL, ROW, SPARE
 
 FLAT = 1e-10  # a relative size that is rounding: an element does not move along a direction
 
@@ -111,8 +111,8 @@ def onto_active_set(x, s, rank):
 
 @part
 def newton_direction(s, rank):
-    """d = B z with (B' J B) z = -B' r: Newton's step within the active set. Returns the largest |B' r|."""
-    k, largest = 3 - rank, 0.0
+    """d = B z with (B' J B) z = -B' r: Newton's step within the active set."""
+    k = 3 - rank
     for i in range(k):
         for j in range(k):
             s[MATRIX + i, j] = 0.0
@@ -124,7 +124,6 @@ def newton_direction(s, rank):
                 for j in range(k):
                     for b in range(3):
                         s[MATRIX + i, j] += weight * s[JACOBIAN + a, b] * s[BASIS + j, b]
-        largest = max(largest, abs(s[MATRIX + i, 3]))
     for i in range(k):  # elimination without pivoting: the symmetric part is positive definite
         for j in range(i + 1, k):
             factor = s[MATRIX + j, i] / s[MATRIX + i, i]
@@ -140,4 +139,16 @@ def newton_direction(s, rank):
         s[MATRIX + i, 3] = z
         for a in range(3):
             s[NEWTON, a] += z * s[BASIS + i, a]
-    return largest
+
+
+@part
+def is_solved(s, rank):
+    """Whether B' r is 0 within rounding, which is s[CLOSE] along the axes."""
+    for i in range(3 - rank):
+        total, close = 0.0, 0.0
+        for a in range(3):
+            total += s[BASIS + i, a] * s[RESIDUAL, a]
+            close += abs(s[BASIS + i, a]) * s[CLOSE, a]
+        if not abs(total) <= close:
+            return False
+    return True

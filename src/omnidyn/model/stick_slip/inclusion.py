@@ -45,17 +45,18 @@ from omnidyn.model.stick_slip.active_set import (
     FLAT,
     absorb,
     find_active_set,
+    is_solved,
     moves_along,
     newton_direction,
     onto_active_set,
 )
 from omnidyn.model.stick_slip.can_hold import worst_direction
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses
-from omnidyn.model.stick_slip.workspace import JACOBIAN, NEWTON, RESIDUAL, TRIAL, WORST
+from omnidyn.model.stick_slip.workspace import CLOSE, JACOBIAN, NEWTON, RESIDUAL, TRIAL, WORST
 
 AFRESH = 40  # after so many, begin again from rest: the problem has one solution, whatever the first guess
 CAP = 80  # Newton steps, kinks and releases of one solve; a solve that hits it is reported
-TIGHT = 1e-13  # residual that counts as 0, relative to the forces at work
+TIGHT = 1e-13  # residual that counts as 0, relative to what it is the sum of
 TIE = 1e-12  # kinks as near as this are met together
 
 
@@ -254,15 +255,34 @@ def _release(body, element, x, s, slope):
 
 
 @part
+def _set_close(body, element, s):
+    """Into s[CLOSE], per axis: the residual that is rounding. Its inertia M x*/tau rounds along its own axis alone.
+
+    A robot that drives fast and hardly turns may have a friction in yaw far below the rounding of its other axes.
+    """
+    often, forces = 1.0 / body[TAU], forces_at_work(body, element)
+    x, y, z = often * abs(body[GOAL]), often * abs(body[GOAL + 1]), often * abs(body[GOAL + 2])
+    xx, yy, zz = body[MASS] + body[SPIN], body[MASS] + body[SPIN + 1], body[MASS] + body[SPIN + 2]
+    xy, xz, yz = abs(body[SPIN + 3]), abs(body[SPIN + 4]), abs(body[SPIN + 5])
+    s[CLOSE, 0] = TIGHT * (xx * x + xy * y + xz * z + forces)
+    s[CLOSE, 1] = TIGHT * (xy * x + yy * y + yz * z + forces)
+    s[CLOSE, 2] = TIGHT * (xz * x + yz * y + zz * z + forces)
+
+
+@part
+def _close_along_worst(s):
+    """What of phi along s[WORST] is rounding."""
+    return abs(s[WORST, 0]) * s[CLOSE, 0] + abs(s[WORST, 1]) * s[CLOSE, 1] + abs(s[WORST, 2]) * s[CLOSE, 2]
+
+
+@part
 def solve(body, element, x, s):
     """Solve the inclusion in place, from a first guess x that has the signs. Returns the number of iterations.
 
     The currents at the solution stand in CURRENT. A return of CAP means that the last digits are not there: say so.
     """
     set_losses(body, element)
-    heaviest = body[MASS] + max(body[SPIN], body[SPIN + 1], body[SPIN + 2])
-    inertia = heaviest / body[TAU] * max(abs(body[GOAL]), abs(body[GOAL + 1]), abs(body[GOAL + 2]))
-    tight = TIGHT * (inertia + forces_at_work(body, element))
+    _set_close(body, element, s)
     stale, known, rank = True, False, 0
     for iteration in range(CAP):
         if iteration == AFRESH:
@@ -276,14 +296,15 @@ def solve(body, element, x, s):
             stale = known = False
         if not known:
             residual(body, element, x, s)
-        if newton_direction(s, rank) <= tight:
+        if is_solved(s, rank):
             found = worst_direction(body, element, s, rank) if rank > 0 else 0.0
-            if found < -tight:
+            if found < -_close_along_worst(s):
                 _release(body, element, x, s, found)
             elif not _stop_contradictions(element, x):
                 onto_active_set(x, s, rank)
                 return iteration
             stale = True
         else:
+            newton_direction(s, rank)
             stale, known = _walk(body, element, x, s)
     return CAP

@@ -9,7 +9,7 @@ from omnidyn.compiled.kernel import part
 
 RESIDUAL, NEWTON, TRIAL, WORST, SPARE, LINE = 0, 1, 2, 3, 4, 5
 BASIS, ROW, JACOBIAN, MATRIX = 6, 9, 12, 15  # three rows each
-PIVOT, ROWS = 18, 19
+PIVOT, CLOSE, ROWS = 18, 19, 20
 
 
 def workspace() -> FloatArray:
