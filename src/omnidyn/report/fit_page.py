@@ -105,7 +105,7 @@ def _misfit(group: str, fit: OutputErrorEstimate) -> str:
     lack = fit.lack_of_fit
     if lack is None:
         return paragraph("Not looked for: the fit was cut short.")
-    drawn = [draw_misfit(lack.pictures, _anchor(f"misfit{group}"))] if lack.pictures else []
+    drawn = [draw_misfit(lack.pictures, _anchor(f"misfit-in-bins{group}"))] if lack.pictures else []
     return content(Points(lack.statements()), *drawn, *([lack.table()] if lack.found and lack.remedies else []))
 
 
