@@ -7,7 +7,7 @@ import re
 GLOSSARY = {
     "fit %": "100 (1 - rms error / spread of what was measured): 100 is perfect, 0 no better than its mean.",
     "VAF %": "variance accounted for: 100 (1 - var error / var measured); it forgives a constant offset.",
-    "white p": "the chance that errors without a memory look so unlike noise; below 0.05 they last, for whatever reason.",
+    "white p": "the chance that errors without a memory look so unlike noise; below 0.05 they have a memory.",
     "chi2": "mean square of the error over that of the noise: 1 where the model leaves nothing but noise.",
     "std error": "how far the value would scatter if the same were recorded again.",
     "sandwich": "intervals that hold for errors with a memory too: from their own products, not from white noise.",
