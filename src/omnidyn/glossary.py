@@ -7,7 +7,7 @@ import re
 GLOSSARY = {
     "fit %": "100 (1 - rms error / spread of what was measured): 100 is perfect, 0 no better than its mean.",
     "VAF %": "variance accounted for: 100 (1 - var error / var measured); it forgives a constant offset.",
-    "white p": "the chance that errors without a memory look so unlike noise; below 0.05 the model misses something.",
+    "white p": "the chance that errors without a memory look so unlike noise; below 0.05 they have a memory.",
     "chi2": "mean square of the error over that of the noise: 1 where the model leaves nothing but noise.",
     "std error": "how far the value would scatter if the same were recorded again.",
     "sandwich": "intervals that hold for errors with a memory too: from their own products, not from white noise.",
@@ -16,6 +16,8 @@ GLOSSARY = {
     "jackknife": "standard errors from fits that leave out one direction, or run, at a time.",
     "bootstrap": "standard errors from fits to stretches drawn again at random.",
     "left-out error": "rms error of the force in a direction that was not fitted.",
+    "no noise": "follows speeds, voltages, the time or the like by more than chance; a memory alone is not counted.",
+    "held-out error": "squared error on blocks of the log that were not fitted to.",
     "free run": "the model gets the inputs only, never what was measured after the start.",
 }  # fmt: skip
 

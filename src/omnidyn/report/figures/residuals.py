@@ -53,8 +53,8 @@ def draw_residuals(comparison: Comparison, noise: dict[str, float], name: str = 
         sizes = ", ".join(f"{key} {noise[key]:.3g} {unit(key)}" for key in shown if key in noise)
         caption = (
             f"Errors of the free run{of}. Left: their histogram (blue) and the normal curve that the intervals assume "
-            "(dashed); wider shoulders mean outliers. Right: bars beyond the grey band mean that errors last, so that "
-            f"the model misses something. Noise of the fit: {sizes or 'not known'}."
+            "(dashed); wider shoulders mean outliers. Right: bars beyond the grey band mean that errors last: "
+            f"noise with a memory, or what the model misses. Noise of the fit: {sizes or 'not known'}."
         )
         return picture(name, f"What the model leaves{of}", caption, figure)
 
