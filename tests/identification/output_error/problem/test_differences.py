@@ -33,7 +33,8 @@ def clean(make):
     return np.mean([make(seed).wheel_speed for seed in range(60)], axis=0)
 
 
-def with_speed(log, speed, rows=slice(None)):
+def with_speed(log, speed, rows=None):
+    rows = slice(None) if rows is None else rows
     return Run(log.t[rows], voltage=log.voltage[rows], wheel_speed=speed[rows])
 
 
@@ -67,7 +68,9 @@ def test_speeds_over_uneven_rows_of_their_own_stamps(log):
 def test_a_wheel_that_never_turned_has_the_tick_of_the_others(log):
     speed = log.wheel_speed.copy()
     speed[:, 1] = 0.0
-    assert differences([with_speed(log, speed)]).ticks == pytest.approx(TICK)
+    found = differences([with_speed(log, speed)])
+    assert found is not None
+    assert found.ticks == pytest.approx(TICK)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 2.0, 5.0])
@@ -122,24 +125,26 @@ def test_too_many_missing_rows_leave_them_as_they_are(axebot, log):
 
 def test_the_fit_to_them_is_as_sharp_as_counts_are(axebot, make):
     """Speeds as of a moment had a latency of half a row, and intervals four to eight times as wide."""
-    miss = []
-    for seed in range(4):
-        log = make(seed)
-        fit = fit_output_error(log, axebot)
+    miss, logs = [], [make(seed) for seed in range(4)]
+    fits = [fit_output_error(log, axebot) for log in logs]
+    for fit in fits:
         assert "wheel speeds are differences of encoder counts (tick 0.00517 rad)" in " ".join(fit.warnings)
         assert set(fit.noise) == {f"wheel_angle[{i}]" for i in range(3)}
         assert abs(fit.nuisances["latency.wheel_angle"].value) < 1e-4 if fit.nuisances else True
         miss += [(fit.value[key] - true) / fit.std[key] for key, true in TRUTH.items()]
-    plain = fit_output_error(log, axebot, tick_rad=0.0)
+    plain = fit_output_error(logs[0], axebot, tick_rad=0.0)
     assert set(plain.noise) == {f"wheel_speed[{i}]" for i in range(3)}
-    assert all(4.0 * fit.std[key] < plain.std[key] for key in TRUTH)
+    assert all(4.0 * fits[0].std[key] < plain.std[key] for key in TRUTH)
     assert np.sqrt(np.mean(np.square(miss))) < 1.6
     assert np.abs(miss).max() < 4.5
 
 
 def test_no_misfit_is_found_where_there_is_none(axebot, make):
     """The mean over a row is half a row late; taken as the speed of a moment it was a misfit in every log."""
-    assert not any(fit_output_error(make(seed), axebot).lack_of_fit.found for seed in (11, 12))
+    for seed in (11, 12):
+        lack = fit_output_error(make(seed), axebot).lack_of_fit
+        assert lack is not None
+        assert not lack.found
 
 
 def test_a_latency_of_the_speeds_is_that_of_the_angles(axebot, log):

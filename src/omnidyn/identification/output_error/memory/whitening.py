@@ -41,7 +41,7 @@ LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the 
 ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
 UNEVEN = 0.05  # share of rows off an even grid that is worth a word
 BENT = 0.25  # of the information expected: less, or four times as much, is a bend that no parabola tells
-COARSE = 0.3  # of a tick, from which on the errors of a counted angle are no rounding: a twelfth of their square is
+COARSE = 0.3  # of a tick: errors of a counted angle that pass what rounding has, 1/sqrt(12), spread it evenly
 FEW = 10.0  # memories in a log, below which the memory itself is hardly known
 
 

@@ -120,7 +120,7 @@ def _turned(run: Run, found: Differences) -> tuple[FloatArray, BoolArray]:
     turned = np.round(share)
     turned[np.abs(share - turned) > 2.0 * TEXT] = np.nan
     measured = np.isfinite(share).any(axis=0)
-    lost = np.isnan(turned[:, measured]).any(axis=1)
+    lost = np.asarray(np.isnan(turned[:, measured]).any(axis=1))
     lost[1:] |= np.diff(run.t) > LOST * _row(run)
     return turned, lost
 
