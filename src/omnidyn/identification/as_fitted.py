@@ -28,42 +28,63 @@ def as_fitted(run: Run, fit: OutputErrorEstimate) -> Run:
     Without nuisances it is the run itself. With a latency the clock is that of the first late channel, whose samples
     are left as they are; a voltage that changes within a row is the mean over it, and other channels are interpolated
     by what they differ. At 100 Hz the mean is off by less than 1 % of what one row changes. A tilt becomes the volts
-    that push as hard; currents do not follow it.
+    that push as hard; currents do not follow it. Speeds that were fitted as the angles that they add up to are means
+    over the row before, which are half a row late.
     """
     values = {name: nuisance.value for name, nuisance in fit.nuisances.items()}
-    if not values:
+    late = _late(run, fit, values)
+    if not values and not late:
         return run
     read = record(run, fit.robot, loop=any(Key.parse(key).name in GAINS for key in fit.value))
     if read.set_point is not None:
-        return _set_points_as_fitted(run, read.set_point, values)
+        return _set_points_as_fitted(run, read.set_point, late, fit)
     driver = Driver(**{name: values[name] for name in Driver._fields if name in values})
     voltage = at_motors(read.voltage, read.share, driver)[0] + pushing(fit.robot, values)
-    late = {name: values.get(f"{LATENCY}.{name}", 0.0) for name in LATE}
     if not any(late.values()):
         return run.replace(voltage=voltage, duty=None, supply=None)
-    main = next(late[name] for name in LATE if f"{LATENCY}.{name}" in values)
+    main = _main(late)
     parts = segments(run.t)
     moved = np.concatenate([mean_before(run.t[rows], voltage[rows], main) for rows in parts])
     return run.replace(
         t=run.t - main, voltage=moved, duty=None, supply=None, **_moved(run, late, main, parts),
-        warnings=(*run.warnings, _note(main)),
+        warnings=(*run.warnings, _note(main, run, fit)),
     )  # fmt: skip
+
+
+def _late(run: Run, fit: OutputErrorEstimate, values: Mapping[str, float]) -> dict[str, float]:
+    """Channel -> by how much it is late [s], as far as the fit tells."""
+    late = {name: values[f"{LATENCY}.{name}"] for name in LATE if f"{LATENCY}.{name}" in values}
+    if _added_up(run, fit):
+        late["wheel_speed"] = late.get("wheel_angle", 0.0) + 0.5 * float(np.median(np.diff(run.t)))
+    return late
+
+
+def _added_up(run: Run, fit: OutputErrorEstimate) -> bool:
+    """Whether the wheel speeds of such a run were fitted as the angles that they add up to."""
+    as_angles = any(name.startswith("wheel_angle") for name in fit.noise)
+    return as_angles and run.wheel_angle is None and run.wheel_speed is not None and len(run) > 1
+
+
+def _main(late: Mapping[str, float]) -> float:
+    """What the clock is late by."""
+    return next(late[name] for name in LATE if name in late)
 
 
 def _moved(run: Run, late: Mapping[str, float], main: float, parts: list[slice]) -> dict[str, FloatArray]:
     """The channels moved back by their latency, to rows that are `main` late."""
     found = {
-        name: _shifted(run.t, own, late[name] - main, parts)
+        name: _shifted(run.t, own, late.get(name, 0.0) - main, parts)
         for name in LATE if name not in POSE and (own := getattr(run, name)) is not None
     }  # fmt: skip
     if run.pose is not None:
-        by = [late["position"] - main, late["position"] - main, late["heading"] - main]
+        by = [late.get(name, 0.0) - main for name in ("position", "position", "heading")]
         found["pose"] = np.hstack([_shifted(run.t, run.pose[:, [k]], each, parts) for k, each in enumerate(by)])
     return found
 
 
-def _note(main: float) -> str:
-    return f"channels were moved back by the fitted latency of {main:.4g} s"
+def _note(main: float, run: Run, fit: OutputErrorEstimate) -> str:
+    words = f"channels were moved back by the fitted latency of {main:.4g} s"
+    return f"{words}, which has half a row of speeds that are differences of counts" if _added_up(run, fit) else words
 
 
 def pushing(robot: Robot, values: Mapping[str, float]) -> FloatArray:
@@ -74,15 +95,14 @@ def pushing(robot: Robot, values: Mapping[str, float]) -> FloatArray:
     return np.asarray(np.linalg.lstsq(now.drive, now.per_force * force, rcond=None)[0], dtype=float)
 
 
-def _set_points_as_fitted(run: Run, set_point: FloatArray, values: Mapping[str, float]) -> Run:
+def _set_points_as_fitted(run: Run, set_point: FloatArray, late: Mapping[str, float], fit: OutputErrorEstimate) -> Run:
     """The same where a speed loop makes the voltage: before the first row it had nothing to follow."""
-    late = {name: values.get(f"{LATENCY}.{name}", 0.0) for name in LATE}
-    main = next(late[name] for name in LATE if f"{LATENCY}.{name}" in values)
+    main = _main(late) if late else 0.0
     parts = segments(run.t)
     moved = np.concatenate([mean_before(run.t[rows], set_point[rows], main, 0.0) for rows in parts])
     return run.replace(
         t=run.t - main, voltage=None, duty=None, supply=None, twist_command=None, wheel_speed_command=moved,
-        **_moved(run, late, main, parts), warnings=(*run.warnings, _note(main)),
+        **_moved(run, late, main, parts), warnings=(*run.warnings, _note(main, run, fit)),
     )  # fmt: skip
 
 

@@ -154,7 +154,8 @@ class Question:
     )  # fmt: skip
     tick_rad: float | None = _option(
         None, "Of the encoders behind wheel angles [rad].",
-        "None: found in the log. Their likelihood is that of counts; 0 takes them like any other output.",
+        "None: found in the log. Their likelihood is that of counts; 0 takes them like any other output, and wheel "
+        "speeds that are differences of counts as they are.",
         of=(FIT,), flag=None,
     )  # fmt: skip
     robust: bool = _option(True, "Points far from the shape pull less.", of=(STEADY,), flag=None)

@@ -178,7 +178,8 @@ def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[
         return found
     inputs = dict.fromkeys(choose_input(fit.robot, run).replace("_", " ") for run in measured)
     more = dict.fromkeys(name.partition(".")[0].replace("_", " ") for name in fit.nuisances)
-    words = f"the logged {' or '.join(inputs)} as the motors had it, with the fitted {', '.join(more)}"
+    words = f"the logged {' or '.join(inputs)} as the motors had it"
+    words += f", with the fitted {', '.join(more)}" if more else ""
     return replace(found, applied=dict.fromkeys(found.robots, words))
 
 

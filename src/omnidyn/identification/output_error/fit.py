@@ -136,7 +136,7 @@ class Fit:
         profile, draws = (self.question.profile, self.question.bootstrap) if done else ((), 0)
         names = _in_each_group(profile, by.solver.problem)
         again = resampled(by.solver, by, known, names, draws, strata, progress)
-        solution, solver = sure.plain, solution.solver
+        solution, solver = sure.plain, sure.plain.solver
         loss = loss_words(self.question.loss)
         if len(self.groups) == 1:
             group = self.groups[0]
@@ -169,13 +169,13 @@ class Fit:
 
         Raises UnsupportedError where an autoregression is asked for and cannot be had.
         """
-        kind, solver = self.question.covariance, solution.solver
+        kind = self.question.covariance
         asked = kind == AUTOREGRESSIVE
-        known = trust(solver, solution, AUTO if asked else kind)
+        known = trust(solution.solver, solution, AUTO if asked else kind)
         as_it_is = Weighed(solution, solution, known)
         if not anew or (not asked and (kind != AUTO or known.kind != SANDWICH or known.runs)):
             return as_it_is
-        why = why_not(solver)
+        why = why_not(solution)
         if asked and why:
             raise UnsupportedError(why, got=kind, expected="auto, white or sandwich", where="covariance")
         return as_it_is if why else whitened(solution, known, (progress or Progress()).doing) or as_it_is

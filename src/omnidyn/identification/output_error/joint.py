@@ -93,7 +93,7 @@ class JointEngine:
         state = State(
             member.point(now.point), [now.sums[k] for k in member.places], now.objective, now.variance[columns]
         )
-        solver = Solver(member.problem, member.engine, solution.solver.nu)
+        solver = Solver(member.problem, member.engine, solution.solver.nu, counted=solution.solver.counted)
         own = replace(
             known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
             unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],

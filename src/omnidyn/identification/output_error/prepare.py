@@ -14,6 +14,7 @@ from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
+from omnidyn.identification.output_error.problem.differences import differences
 from omnidyn.identification.output_error.problem.motion import Motion, motion
 from omnidyn.identification.output_error.problem.nuisances import (
     LATENCY,
@@ -144,7 +145,8 @@ def read_records(runs: Sequence[Run], robot: Robot, question: Question) -> list[
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
     gains = any(Key.parse(key).name in GAINS for key in question.free or ())
-    found = [record(run, robot, question.outputs, gains, question.tick_rad) for run in runs]
+    counted = None if question.tick_rad == 0.0 else differences(runs)
+    found = [record(run, robot, question.outputs, gains, question.tick_rad, counted) for run in runs]
     if len({each.set_point is None for each in found}) > 1:
         raise InputError(
             "some logs have voltages, others set speeds only", got=", ".join(each.source for each in found[:2]),

@@ -8,7 +8,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error import fit as whole
+from omnidyn.identification import whole_logs as whole
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitened import WhitenedEngine

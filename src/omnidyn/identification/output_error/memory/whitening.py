@@ -41,6 +41,7 @@ LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the 
 ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
 UNEVEN = 0.05  # share of rows off an even grid that is worth a word
 BENT = 0.25  # of the information expected: less, or four times as much, is a bend that no parabola tells
+COARSE = 0.3  # of a tick: errors of a counted angle that pass what rounding has, 1/sqrt(12), spread it evenly
 FEW = 10.0  # memories in a log, below which the memory itself is hardly known
 
 
@@ -57,12 +58,12 @@ class Weighed:
     warnings: tuple[str, ...] = ()
 
 
-def why_not(solver: Solver) -> str:
+def why_not(solution: Solution) -> str:
     """Why errors with a memory cannot be modelled here, in words; "" where they can."""
-    problem = solver.problem
+    solver, problem = solution.solver, solution.solver.problem
     if solver.nu:
         return "Student's t has no autoregression here"
-    if solver.tick.any():
+    if (solution.state.variance < (COARSE * solver.tick) ** 2).any():
         return "counts whose rounding is the noise have no autoregression here"
     slopes = sum(
         (p.last - p.first + 1) * len(p.record.columns) * (len(problem.parameters) + len(p.free)) for p in problem.pieces
@@ -81,13 +82,15 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
 
     solution, before: the fit by residuals as they are, and the trust in it.
     """
+    if solution.solver.tick.any():
+        solution = _as_readings(solution)
     solver, models = solution.solver, _memory(solution, None)
     if not any(model.order for model in models.values()):
         return None
     now = solution.state.point
     for each in range(ROUNDS):
         doing(f"errors with a memory, round {each + 1}")
-        filtered = Solver(solver.problem, WhitenedEngine(below(solver), models), 0.0, solver.close)
+        filtered = Solver(solver.problem, WhitenedEngine(below(solver), models), 0.0, solver.close, solver.counted)
         found = filtered.minimise(now)
         covariance = _inverse(Normal(filtered, found.state).information)
         moved = filtered.inner(found.state.point.values) - filtered.inner(now.values)
@@ -95,13 +98,23 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
         models = _memory(found, covariance)
         if each and (np.abs(moved) <= SETTLED * np.sqrt(np.diag(covariance))).all():
             break
-    filtered = Solver(solver.problem, WhitenedEngine(below(solver), models), 0.0, solver.close)
+    filtered = Solver(solver.problem, WhitenedEngine(below(solver), models), 0.0, solver.close, solver.counted)
     found = replace(filtered.minimise(now), notes=solution.notes)
-    if trust(filtered, found).kind == SANDWICH:
+    left = trust(filtered, found)
+    if left.kind == SANDWICH and solver.counted:
         return None
-    known = _trusted(found, before, models)
+    # Rounding of a slow wheel is never white, so counts may end here. Without a memory their errors, which are sums of
+    # all that came before, would have intervals many times too narrow.
+    known = left if left.kind == SANDWICH else _trusted(found, before, models)
     plain = replace(found, state=solver.state(found.state.point), solver=solver)
     return Weighed(found, plain, known, models, tuple(_words(found, models, known)))
+
+
+def _as_readings(solution: Solution) -> Solution:
+    """The same point, its counts like any other output: rounding is a small part of errors that remember."""
+    solver = solution.solver
+    solver = Solver(solver.problem, below(solver), 0.0, solver.close, counted=False)
+    return replace(solution, state=solver.state(solution.state.point), solver=solver)
 
 
 def below(solver: Solver[Problem]) -> RowEngine[Problem]:

@@ -71,9 +71,10 @@ def nuisance_parameters(
         if name == LATENCY:
             found += [Parameter(f"{LATENCY}.{channel}", 0.0, from_, LATEST) for channel in channels]
         elif name.startswith(f"{LATENCY}."):
-            if name.partition(".")[2] not in channels:
+            channel = _as_fitted(name.partition(".")[2], channels)
+            if channel not in channels:
                 raise InputError("no such channel", got=name, expected=", ".join(channels), where="nuisances")
-            found.append(Parameter(name, 0.0, EARLIEST, LATEST))
+            found.append(Parameter(f"{LATENCY}.{channel}", 0.0, EARLIEST, LATEST))
         elif name == GAIN:
             prior = (1.0, SUPPLY_STD) if any(record.supplied for record in records) else None
             found.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
@@ -85,6 +86,12 @@ def nuisance_parameters(
         else:
             found.append(Parameter(FADE, 0.0, -MOST_FADE, MOST_FADE))
     return list({p.name: p for p in found}.values())
+
+
+def _as_fitted(channel: str, channels: Sequence[str]) -> str:
+    """Under which name a channel is fitted: speeds of wheels that are differences of counts are, as angles."""
+    added_up = channel == "wheel_speed" and channel not in channels and "wheel_angle" in channels
+    return "wheel_angle" if added_up else channel
 
 
 def measured_channels(records: Sequence[Record]) -> list[str]:

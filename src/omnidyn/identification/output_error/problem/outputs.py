@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
+from omnidyn.identification.output_error.problem.differences import Differences, added_up
 from omnidyn.identification.output_error.problem.redundant import redundant
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -23,7 +24,8 @@ TRAVEL = ("heading", "position", "wheel_angle")
 class Outputs:
     """columns: (channel, index) each; values (rows, C); ticks (C,): of counts [rad], 0 for others; notes in words.
 
-    unused: what was measured and is not fitted, and why, in words.
+    unused: what was measured and is not fitted, and why, in words. lost (rows,): rows before which a wheel may have
+    turned by any angle, None where nothing was added up.
     """
 
     columns: tuple[tuple[str, int], ...]
@@ -31,12 +33,16 @@ class Outputs:
     ticks: tuple[float, ...]
     notes: tuple[str, ...]
     unused: tuple[str, ...]
+    lost: BoolArray | None = None
 
 
-def outputs_of(run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: float | None) -> Outputs:
+def outputs_of(
+    run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: float | None, counted: Differences | None = None
+) -> Outputs:
     """wanted: names of OUTPUTS, "pose" for two of them; None for all that the log has and that do not say it twice.
 
     tick_rad: of the angles of the wheels; None: found in the log; 0: they are taken like any other output.
+    counted: what the wheel speeds are differences of: they are fitted as angles.
     Raises InputError for an unknown name and for a log without any of them.
     """
     wanted = wanted if wanted is None else [each for name in wanted for each in (PARTS if name == POSE else (name,))]
@@ -53,13 +59,17 @@ def outputs_of(run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: f
             expected=", ".join(wanted or OUTPUTS), where=run.source,
         )  # fmt: skip
     found, notes = _without_doubles(run, robot, found, wanted is not None)
+    found, given, lost = _counted(run, found, counted, notes)
     if "position" in found and "heading" not in found:  # where the robot faces at the start is fitted all the same
         found["heading"] = np.full((len(run), 1), np.nan)
     found = {name: found[name] for name in OUTPUTS if name in found}
     columns = tuple((name, i) for name, value in found.items() for i in range(value.shape[1]))
-    ticks = tuple(_tick(found[name][:, i], tick_rad) if name == "wheel_angle" else 0.0 for name, i in columns)
+    ticks = tuple(
+        0.0 if name != "wheel_angle" else float(given[i]) if given is not None else _tick(found[name][:, i], tick_rad)
+        for name, i in columns
+    )  # fmt: skip
     values = next(iter(found.values())) if len(found) == 1 else np.hstack(list(found.values()))
-    return Outputs(columns, np.ascontiguousarray(values), ticks, tuple(notes), tuple(unused))
+    return Outputs(columns, np.ascontiguousarray(values), ticks, tuple(notes), tuple(unused), lost)
 
 
 def _measured(run: Run, name: str) -> FloatArray | None:
@@ -91,6 +101,25 @@ def _without_doubles(
             found = {key: value for key, value in found.items() if key != name}
             notes.append(f"{same}: the {name.replace('_', ' ')} says nothing new and is not fitted")
     return found, notes
+
+
+def _counted(
+    run: Run, found: dict[str, FloatArray], counted: Differences | None, notes: list[str]
+) -> tuple[dict[str, FloatArray], FloatArray | None, BoolArray | None]:
+    """(the outputs, speeds that are differences of counts as angles; ticks of these, rows before which one is lost)."""
+    if counted is None or "wheel_speed" not in found or "wheel_angle" in found:
+        return found, None, None
+    tick = f"tick {float(np.median(counted.ticks)):.3g} rad"
+    if counted.why:
+        notes.append(f"wheel speeds are differences of encoder counts ({tick}), fitted as they are: {counted.why}")
+        return found, None, None
+    angle, lost = added_up(run, counted)
+    notes.append(f"wheel speeds are differences of encoder counts ({tick}): fitted as the angles that they add up to")
+    return (
+        {name: value for name, value in found.items() if name != "wheel_speed"} | {"wheel_angle": angle},
+        counted.ticks,
+        lost,
+    )
 
 
 def _tick(values: FloatArray, given: float | None) -> float:

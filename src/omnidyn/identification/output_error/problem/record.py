@@ -11,6 +11,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.findings.needs import LOOP_REMEDY, has_set_speeds
+from omnidyn.identification.output_error.problem.differences import Differences
 from omnidyn.identification.output_error.problem.outputs import outputs_of
 from omnidyn.logs.segments import segments
 from omnidyn.model.actuation import asked_voltage, clip_voltage
@@ -57,12 +58,13 @@ class Record:
 
 
 def record(
-    run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: bool = False, tick_rad: float | None = None
-) -> Record:
+    run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: bool = False, tick_rad: float | None = None,
+    counted: Differences | None = None,
+) -> Record:  # fmt: skip
     """Raises InputError for a run without inputs or outputs, InsufficientDataError where no piece is long enough.
 
-    loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad: as in
-    outputs.py.
+    loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad,
+    counted: as in outputs.py.
     """
     made_up = [name.replace("_", " ") for name, mask in run.interpolated.items() if mask.any()]
     run = run.as_measured()
@@ -77,13 +79,13 @@ def record(
         voltage = clipped
     if made_up:
         notes.append(f"{', '.join(made_up)}: only what was measured is fitted, not what was interpolated in between")
-    found = outputs_of(run, robot, outputs, tick_rad)
+    found = outputs_of(run, robot, outputs, tick_rad, counted)
     inputs = voltage if set_point is None else set_point
     finite = np.isfinite(inputs)
     _refuse_wheels_without_input(run, robot, finite)
     known = np.full(len(run), True) if finite.all() else np.asarray(finite.all(axis=1))
     parts = segments(run.t)
-    pieces = [piece for s in parts for piece in _whole(known, s.start, s.stop)]
+    pieces = [piece for s in _cut(parts, found.lost) for piece in _whole(known, s.start, s.stop)]
     if len(parts) > 1:
         lost = [float(run.t[b.start] - run.t[a.stop - 1]) for a, b in pairwise(parts)]
         many = "a gap" if len(lost) == 1 else f"{len(lost)} gaps, the longest"
@@ -95,6 +97,8 @@ def record(
         )  # fmt: skip
     if not known.all():
         notes.append(f"{int((~known).sum())} rows lack an input: the log is split there")
+    if found.lost is not None and (many := int(found.lost[1:].sum())):
+        notes.append(f"{many} rows lack counts of an encoder, or follow on missing rows: the log is split there")
     return Record(
         run.t, np.ascontiguousarray(voltage), found.values, found.columns, found.ticks, tuple(pieces), run.source,
         supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused),
@@ -163,6 +167,14 @@ def _set_point(run: Run, robot: Robot, loop: bool) -> FloatArray | None:
     if run.wheel_speed_command is not None:
         return np.ascontiguousarray(run.wheel_speed_command)
     return None if run.twist_command is None else wheel_speed(robot.wheels, run.twist_command)
+
+
+def _cut(parts: Sequence[slice], lost: BoolArray | None) -> list[slice]:
+    """Parts of a log, cut before the rows of `lost`, where an angle begins anew."""
+    if lost is None:
+        return list(parts)
+    at = [[s.start, *(s.start + 1 + np.flatnonzero(lost[s.start + 1 : s.stop])).tolist(), s.stop] for s in parts]
+    return [slice(a, b) for edges in at for a, b in pairwise(edges)]
 
 
 def _whole(known: BoolArray, start: int, stop: int) -> list[tuple[int, int]]:

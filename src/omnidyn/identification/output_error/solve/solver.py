@@ -93,7 +93,7 @@ class Solver(Generic[P]):
     """
 
     def __init__(self, problem: P, engine: Engine[P], nu: float = 0.0, close: float = CLOSE, counted: bool = True):
-        self.problem, self.engine, self.nu, self.close = problem, engine, nu, close
+        self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, close, counted
         self.creep = CREEP * close if close > CLOSE else 0.0  # a speed loop may creep for long, and yet find its way
         self.tick = problem.tick if counted else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)

@@ -117,7 +117,7 @@ def difference_interval(
 
     def rise(change: float, point: Point) -> tuple[float, Point]:
         engine = TiedEngine(solver.engine, first, second, change)
-        found = Solver(engine.problem, engine, solver.nu).minimise(point)
+        found = Solver(engine.problem, engine, solver.nu, counted=solver.counted).minimise(point)
         return 2.0 * (found.state.objective - solution.state.objective), found.state.point
 
     best, point = float(values[second] - values[first]), Point(np.delete(values, second), states)
@@ -162,7 +162,8 @@ def _rise(solver: Solver, solution: Solution, index: int, inner: float, point: P
     parameters[index] = replace(parameters[index], value=value, low=value, high=value)
     values = point.values.copy()
     values[index] = value
-    held = Solver(replace(solver.problem, parameters=tuple(parameters)), solver.engine, solver.nu)
+    problem = replace(solver.problem, parameters=tuple(parameters))
+    held = Solver(problem, solver.engine, solver.nu, counted=solver.counted)
     found = held.minimise(Point(values, point.states))
     return 2.0 * (found.state.objective - solution.state.objective), found.state.point
 
@@ -185,7 +186,7 @@ def bootstrap(
         drawn = [runs[k] for runs in of_group.values() for k in rng.integers(len(runs), size=len(runs))]
         chosen = [k for run in drawn for k, piece in enumerate(pieces) if id(piece.record) == run]
         problem = replace(solver.problem, pieces=tuple(pieces[k] for k in chosen))
-        again = Solver(problem, solver.engine.on(problem), solver.nu)
+        again = Solver(problem, solver.engine.on(problem), solver.nu, counted=solver.counted)
         point = Point(solution.state.point.values, tuple(states[k] for k in chosen))
         found.append(again.minimise(point).state.point.values)
     return np.array(found)

@@ -1,0 +1,196 @@
+"""Wheel speeds that a firmware made of two counts of an encoder: recognised, and added up to the angles they are of.
+
+    speed_k = (count_k - count_(k-1)) tick / dt        a whole number of ticks over each row
+
+Such a speed is the mean over the row before, and what one row rounds off the next row has back: a sum of rows is off by
+one tick at the most, however long it is. A speed that was rounded itself, for a text or by a coarse sensor, or that is
+of a shorter time than a row, is off anew in every row, and its sum wanders. Differences of order p of the angle show
+which: slow motion has next to none of them, and over m rows at a time the spread that is left
+
+    of counts   is C(2p, p) tick^2 / 12, whatever m is
+    of readings each with an error of its own, s, is C(2p - 2, p - 1) m s^2, which grows as m does
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.run import Run
+from omnidyn.statistics import MAD_TO_STD, TEXT, find_tick, stretches
+
+ORDER = 5  # of the differences: an acceleration that dies away within ten rows is gone from them
+FEW, MANY = 1, 4  # rows at a time: where the two kinds are alike, and where they are 4 times apart
+APART = 2.0  # the middle between 1 and 4
+LEAST, MOST = (
+    0.7,
+    10.0,
+)  # of the spread of rounding: less is no difference of counts, more is not coarse beside its noise
+ENOUGH = 100  # differences over moving rows, without which nothing is told
+JUMP = 0.05  # of the range of an input: after a greater change the acceleration jumps
+LOST = 1.5  # rows of time between two rows, from which on a row is missing and its counts with it
+UNEVEN = 0.25  # of a row that stamps may be off
+NEARLY = 0.95  # of the rows are such
+SHORT = 100  # rows between two losses, on average: shorter stretches tell less than they lose by starts of their own
+WANDER = 0.618034  # a share that no small number of rows brings back to where it was
+
+
+@dataclass(frozen=True, eq=False)
+class Differences:
+    """ticks (W,) of the wheels [rad]. stamped: whether each speed is over the time between its own stamps.
+
+    why: what keeps differences from being added up, in words; "" for nothing.
+    """
+
+    ticks: FloatArray
+    stamped: bool
+    why: str = ""
+
+
+def differences(runs: Sequence[Run]) -> Differences | None:
+    """What the wheel speeds of logs that go together are differences of; None where they are not, or it does not show.
+
+    All logs are looked at together: what is too short or too slow to tell goes with the others.
+    """
+    logs = [run.as_measured() for run in runs if _known(run.wheel_speed)]
+    if not logs or len({run.wheels for run in logs}) > 1 or any(_known(run.wheel_angle) for run in logs):
+        return None
+    for stamped in (False, True):
+        ticks = _ticks(logs, stamped)
+        if ticks is None:
+            continue
+        found = Differences(ticks, stamped)
+        if _adds_up(logs, found):
+            return Differences(ticks, stamped, _hindrance(logs, found))
+    return None
+
+
+def added_up(run: Run, found: Differences) -> tuple[FloatArray, BoolArray]:
+    """(angles of the wheels (rows, W) [rad], whether what was turned in the row before is lost (rows,)).
+
+    The angle goes on over a loss as if nothing was turned there: what follows has a start of its own.
+    """
+    turned, lost = _turned(run, found)
+    angle = np.cumsum(np.nan_to_num(turned), axis=0) * found.ticks
+    assert run.wheel_speed is not None
+    angle[:, ~np.isfinite(run.wheel_speed).any(axis=0)] = np.nan
+    return angle, lost
+
+
+def _known(values: FloatArray | None) -> bool:
+    return values is not None and bool(np.isfinite(values).any())
+
+
+def _row(run: Run) -> float:
+    """The mean time of a row that lacks none [s]: stamps of a coarse clock are right on average only."""
+    steps = np.diff(run.t)
+    return float(steps[steps < LOST * np.median(steps)].mean()) if len(steps) else 0.0
+
+
+def _way(run: Run, stamped: bool) -> FloatArray:
+    """What each row adds to the angles [rad]. Shape (rows, W)."""
+    assert run.wheel_speed is not None
+    row = _row(run)
+    return run.wheel_speed * (np.diff(run.t, prepend=run.t[0] - row)[:, None] if stamped else row)
+
+
+def _ticks(logs: Sequence[Run], stamped: bool) -> FloatArray | None:
+    """The tick of each wheel, None where one moved in no steps. Shape (W,); of a wheel that never moved as the others'.
+
+    A tick is looked for in what changes from row to row: the way is that of its own sum.
+    """
+    ways = np.concatenate([_way(run, stamped) for run in logs])
+    ticks = np.full(ways.shape[1], np.nan)
+    for w, way in enumerate(ways.T):
+        known = way[np.isfinite(way)]
+        if known.any():
+            ticks[w] = find_tick(np.cumsum(known)) or np.inf
+    if np.isnan(ticks).all() or np.isinf(ticks).any():
+        return None
+    return np.where(np.isnan(ticks), np.nanmedian(ticks), ticks)
+
+
+def _turned(run: Run, found: Differences) -> tuple[FloatArray, BoolArray]:
+    """(ticks of each row (rows, W), NaN where missing; whether a row lacks a wheel, or a row before it, (rows,))."""
+    share = _way(run, found.stamped) / found.ticks
+    turned = np.round(share)
+    turned[np.abs(share - turned) > 2.0 * TEXT] = np.nan
+    measured = np.isfinite(share).any(axis=0)
+    lost = np.asarray(np.isnan(turned[:, measured]).any(axis=1))
+    lost[1:] |= np.diff(run.t) > LOST * _row(run)
+    return turned, lost
+
+
+def _adds_up(logs: Sequence[Run], found: Differences) -> bool:
+    """Whether the sum of the speeds wanders no more than rounded counts do; False where nothing tells."""
+    inputs = [_inputs(run) for run in logs]
+    for which in range(3):
+        few, many = (
+            np.concatenate([np.zeros(0), *(d for run, own in zip(logs, inputs, strict=True)
+                                           for d in _high(run, found, own[which], rows))])
+            for rows in (FEW, MANY)
+        )  # fmt: skip
+        if min(len(few), len(many)) >= ENOUGH:
+            return LEAST <= _level(few) <= MOST and _level(many) <= APART * _level(few)
+    return False
+
+
+def _inputs(run: Run) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Rows (rows,) at which what drives the robot has jumped: voltages, set speeds; nothing."""
+    drives = [run.duty if run.voltage is None else run.voltage]
+    asked = [run.twist_command if run.wheel_speed_command is None else run.wheel_speed_command]
+    return _jumps(drives, len(run)), _jumps(asked, len(run)), np.zeros(len(run), dtype=bool)
+
+
+def _jumps(inputs: Sequence[FloatArray | None], rows: int) -> BoolArray:
+    jumped = np.zeros(rows, dtype=bool)
+    for values in inputs:
+        if values is None:
+            continue
+        known = np.nan_to_num(values)
+        jumped[1:] |= (np.abs(np.diff(known, axis=0)) > JUMP * np.ptp(known, axis=0).max(initial=0.0)).any(axis=1)
+    return jumped
+
+
+def _high(run: Run, found: Differences, jumped: BoolArray, rows: int) -> Iterator[FloatArray]:
+    """Differences of the angle of each wheel, of so many rows at a time [ticks], where it moves and nothing jumps."""
+    turned, lost = _turned(run, found)
+    reach = ORDER * rows
+    for first, last in stretches(~lost):
+        if last - first <= reach:
+            continue
+        jumps = np.cumsum(jumped[first:last])
+        quiet = jumps[reach:] == jumps[:-reach]
+        for own in turned[first:last].T:
+            angle = np.cumsum(own)
+            moved = np.abs(angle[reach:] - angle[:-reach]) >= ORDER
+            high = angle
+            for _ in range(ORDER):
+                high = high[rows:] - high[:-rows]
+            yield high[moved & quiet]
+
+
+def _level(high: FloatArray) -> float:
+    """Variance of such differences over that of rounded counts; by the median, which the rest of a jump leaves alone.
+
+    They are whole numbers: their median is told to a share of one by what is spread evenly over it.
+    """
+    spread = np.abs(high + (np.arange(len(high)) * WANDER) % 1.0 - 0.5)
+    return float((MAD_TO_STD * np.median(spread)) ** 2 / (comb(2 * ORDER, ORDER) / 12.0))
+
+
+def _hindrance(logs: Sequence[Run], found: Differences) -> str:
+    """Why such differences cannot be added up, in words; "" where they can."""
+    steps = [np.diff(run.t) / _row(run) for run in logs if len(run) > 1]
+    whole = np.concatenate([each[each < LOST] for each in steps])
+    if not found.stamped and np.mean(np.abs(whole - 1.0) <= UNEVEN) < NEARLY:
+        return "the stamps of the rows are uneven"
+    lost = sum(int(_turned(run, found)[1][1:].sum()) for run in logs)
+    rows = sum(map(len, logs))
+    if lost * SHORT > rows:
+        return f"{lost} of {rows} rows are missing, and what was turned there with them"
+    return ""
