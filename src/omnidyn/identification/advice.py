@@ -16,6 +16,7 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
 from omnidyn.model.robot import GUESS
 
+LIMIT = "motor.current_limit_A"
 NEARLY = 0.7  # of what the best remedy explains, from which another is worth a word
 WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
 LONGEST = 100.0  # times as long as now: nobody records more
@@ -81,7 +82,7 @@ def _axis(name: str) -> str:
 def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
     """What would mend a model that leaves something out: the best remedies, and how to ask for them."""
     lack = fit.lack_of_fit
-    if lack is None or not lack.found:
+    if lack is None or not lack.found or fit.not_followed:
         return
     told: set[str] = set()
     for remedy in lack.remedies:
@@ -101,6 +102,8 @@ def how_to(remedy: Remedy) -> str:
     if remedy.key == CHANGE:
         return "look what happened there; fit the parts as logs of their own"
     key = find_key(remedy.key)
+    if remedy.key == LIMIT:
+        return f"put about that value into the robot file, and let the fit find it (`free` friction {LIMIT})"
     if key is not None and key.part in ("body", "wheels") and key.field != "rotating_frame":
         return "measure it and put it into the robot file"
     return f"put {remedy.key} into the robot file, and fit again"

@@ -29,7 +29,7 @@ def fit_document(
         told = [fit.document(), *beside]
         found = fit.diagnosis
         blocks += [[f"group {group}"] if len(fits) > 1 else [], *(each.parts for each in told)]
-        blocks += _found(found) if found else []
+        blocks += _found(found) if found and not fit.not_followed else []
         groups[group] = {
             **fit.to_dict(), "validation": beside[0].data if beside else None,
             "lack_of_fit": found.lack_of_fit.to_dict() if found else None, "rests_on": fit.rests_on,

@@ -103,8 +103,8 @@ def _runs(fits: Fits, group: str, validation: Validation) -> str:
 def _misfit(group: str, fit: OutputErrorEstimate) -> str:
     """Whether residuals hold more than noise, with a picture of it, and what would explain it."""
     lack = fit.lack_of_fit
-    if lack is None:
-        return paragraph("Not looked for: the fit was cut short.")
+    if lack is None or fit.not_followed:
+        return paragraph("Not looked for: the fit was cut short, or the model does not follow the logs at all.")
     drawn = [draw_misfit(lack.pictures, _anchor(f"misfit-in-bins{group}"))] if lack.pictures else []
     return content(Points(lack.statements()), *drawn, *([lack.table()] if lack.found and lack.remedies else []))
 
