@@ -18,6 +18,8 @@ def count_once(runs: Sequence[Run], groups: Sequence[str]) -> tuple[list[int], t
     Runs are the same where all their channels are, and their times since the first row, whatever they are called. The
     first of a group is used. One that two groups have stays in both, with a word: their difference is no evidence then.
     """
+    if len(runs) == 1:
+        return [0], ()
     seen: dict[str, int] = {}
     kept, words = [], []
     for place, run in enumerate(runs):

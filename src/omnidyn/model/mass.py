@@ -27,9 +27,9 @@ def mass_matrix(robot: Robot) -> FloatArray:
 
 def added_mass(robot: Robot) -> FloatArray:
     """What rotors and wheels add by their spin: G diag(`mass_at_rim`) G^T [kg, kg m, kg m^2]. Shape (3, 3)."""
-    wrench, each = robot.wheels.wrench_matrix, mass_at_rim(robot.motor, robot.wheels)
-    if not each.any():
+    if robot.motor.rotor_inertia == 0.0 and robot.wheels.wheel_inertia == 0.0:  # asked for often, and mostly so
         return np.zeros((3, 3))
+    wrench, each = robot.wheels.wrench_matrix, mass_at_rim(robot.motor, robot.wheels)
     added = (wrench * each) @ wrench.T
     added = 0.5 * (added + added.T)  # symmetric to the last bit
     along = np.sqrt(np.abs(np.diag(added)))

@@ -75,7 +75,7 @@ class Mapping:
         self.linear = all(p.name in BOX for p in parameters)
         self._start = np.array([Key.parse(p.name).get(robot) for p in parameters])
         motors = motor_wrench(robot)
-        self._base = primitives(robot, motors)
+        self._base, self._masses = primitives(robot, motors), axis_masses(robot)
         self._probe = self._friction_slopes(robot, self._base, motors)
 
     def robot_at(self, values: FloatArray) -> Robot:
@@ -87,7 +87,7 @@ class Mapping:
         if self.linear:  # in rate and coulomb; nothing else depends on the friction of the axes
             moved, base, probe = values - self._start, self._base, self._probe
             rate, coulomb = base.rate + probe.rate @ moved, base.coulomb + probe.coulomb @ moved
-            return self._held(base, self.robot, rate, coulomb), probe
+            return self._held(base, self._masses, rate, coulomb), probe
         robot = self.robot_at(values)
         motors = motor_wrench(robot)
         now = primitives(robot, motors)
@@ -102,11 +102,11 @@ class Mapping:
             up, down = (primitives(p.on(robot, float(value) + side * step)) for side in (1.0, -1.0))
             for slope, a, b in zip(slopes, up.parts, down.parts, strict=True):
                 slope[..., j] = (a - b) / (2.0 * step)
-        return self._held(now, robot, now.rate, now.coulomb), Primitives(*slopes)
+        return self._held(now, axis_masses(robot), now.rate, now.coulomb), Primitives(*slopes)
 
-    def _held(self, now: Primitives, robot: Robot, rate: FloatArray, coulomb: FloatArray) -> Primitives:
+    def _held(self, now: Primitives, masses: FloatArray, rate: FloatArray, coulomb: FloatArray) -> Primitives:
         """At this rate and coulomb, with the breakaway of this mapping; never below coulomb."""
-        hold = np.fmax(coulomb, self.breakaway / axis_masses(robot))
+        hold = np.fmax(coulomb, self.breakaway / masses)
         return replace(now, rate=rate, coulomb=coulomb, hold=hold)
 
     def _friction_slopes(self, robot: Robot, base: Primitives, motors: MotorWrench) -> Primitives:
