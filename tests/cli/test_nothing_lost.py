@@ -100,6 +100,16 @@ def test_a_full_stream_costs_no_result(here, redirect):
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+@pytest.mark.parametrize("redirect", ["2>/dev/full", "2>/dev/full >/dev/full"])
+def test_talk_to_a_full_stream_keeps_the_exit_code(here, redirect):
+    """What could not be said waits in a buffer, and Python ends with 120 where that cannot be written."""
+    command = [sys.executable, "-m", "omnidyn", "simulate", "r.toml", "no.csv"]
+    result = subprocess.run(["sh", "-c", f'exec "$@" {redirect}', "sh", *command], cwd=here, env=environment(),
+                            timeout=120, check=False)  # fmt: skip
+    assert result.returncode == 3
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

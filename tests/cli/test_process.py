@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 SOURCES = Path(__file__).resolve().parents[2] / "src"
-DROPPED = ("LC_", "LANG", "NO_COLOR", "COLUMNS")
+DROPPED = ("PYTHONUNBUFFERED", "LC_", "LANG", "NO_COLOR", "COLUMNS")
 CLEAN = {name: value for name, value in os.environ.items() if not name.startswith(DROPPED)}
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and pipes of POSIX")
 VOLTAGES = "t_s,u1_V,u2_V,u3_V\n" + "".join(f"{k / 1000},0,3,-3\n" for k in range(5000))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import os
 import signal
 import sys
 import traceback
@@ -14,7 +13,7 @@ import typer
 
 from omnidyn.cli.terminal import session
 from omnidyn.cli.terminal.flags import of_place
-from omnidyn.cli.terminal.streams import prepare, say, say_trace
+from omnidyn.cli.terminal.streams import prepare, say, say_trace, silence
 from omnidyn.errors import OmnidynError, printable
 
 BUG, USAGE, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
@@ -63,7 +62,7 @@ def _code_of(error: BaseException, debug: bool) -> int:
         say("omnidyn: terminated")
         return TERMINATED
     if _is_closed_pipe(error):
-        _silence()
+        silence(sys.__stdout__)
         return 0
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else BUG
@@ -82,7 +81,7 @@ def _unforeseen(error: BaseException, debug: bool) -> int:
     if isinstance(error, OSError):
         place = f"{str(error.filename)[:80]}: " if error.filename else ""
         say(f"omnidyn: error: {place}the system refuses; got {error.strerror or error}")
-        _silence()
+        silence(sys.__stdout__)
         return BAD_INPUT
     say(f"omnidyn: bug: {type(error).__name__}: {' '.join(str(error).split())}")
     if not debug:
@@ -109,12 +108,6 @@ def _is_closed_pipe(error: BaseException) -> bool:
     """typer turns a closed pipe into an exit; what it saw hangs on it."""
     seen = error.__context__ if isinstance(error, SystemExit) else error
     return isinstance(seen, OSError) and seen.errno == errno.EPIPE
-
-
-def _silence() -> None:
-    """Nothing more can be said: keep the interpreter from trying at its end."""
-    with contextlib.suppress(OSError, ValueError, AttributeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno())  # type: ignore[union-attr]
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import OUTPUT_ERROR, identify
 from omnidyn.model.drive import SPEED
@@ -21,6 +22,7 @@ from omnidyn.simulation.simulate import simulate
 ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds
 NOISE = {"twist": 0.005, "current": 0.05, "pose": 0.002}  # [m/s, rad/s], [A], [m, rad]
 TWIST, VOLTAGE = (0.4, 0.4, 2.0), 10.0  # the largest commands [m/s, m/s, rad/s], [V]
+MEMORY: FloatArray = 0.9 ** np.arange(40.0)  # of errors that remember: what is left of one in the rows after it
 TICK = 2.0 * np.pi / 200.0  # of a counted angle [rad]
 
 
@@ -32,7 +34,7 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("simulation, friction of the axes", partial(_run, paper)),
         ("fit of speeds", partial(_fit, paper, "twist")),
         ("fit of speeds alone", partial(_fit, paper, "twist", nuisances=(), start="rest")),
-        ("fit of speeds whose errors remember", partial(_fit, paper, "twist", covariance="autoregressive")),
+        ("fit of speeds whose errors remember", partial(_fit, paper, "twist", memory=MEMORY)),
         ("fit of speeds, currents and poses", partial(_fit, paper, "twist", "current", "pose")),
         ("fit of counted angles", partial(_fit, paper, "wheel_angle")),
         ("simulation, any friction", partial(_run, other)),
@@ -53,12 +55,17 @@ def _run(robot: Robot) -> Run:
     return simulate(robot, dt=DT, twist_command=given * TWIST) if looped else simulate(robot, given * VOLTAGE, DT)
 
 
-def _fit(robot: Robot, *sensors: str, **options: Any) -> Estimate:
-    """A fit to what these sensors show of that run."""
+def _fit(robot: Robot, *sensors: str, memory: FloatArray = MEMORY[:1], **options: Any) -> Estimate:
+    """A fit to what these sensors show of that run, with errors of that memory."""
     random, run = np.random.default_rng(1), _run(robot)
-    seen = {name: value + NOISE[name] * random.standard_normal(value.shape) for name, value in run.channels.items()
-            if name in NOISE}  # fmt: skip
+    seen = {name: value + NOISE[name] * _remembered(random.standard_normal(value.shape), memory)
+            for name, value in run.channels.items() if name in NOISE}  # fmt: skip
     seen["wheel_angle"] = np.round(np.cumsum(run.channels["wheel_speed"], axis=0) * DT / TICK) * TICK
     given = Run(t=run.t, voltage=None if robot.drive.kind == SPEED else run.voltage, twist_command=run.twist_command)
     log = given.replace(**{name: seen[name] for name in sensors})
     return identify(log, robot, method=OUTPUT_ERROR, **options)
+
+
+def _remembered(errors: FloatArray, memory: FloatArray) -> FloatArray:
+    """Errors (rows, columns) that stay for some rows."""
+    return np.column_stack([np.convolve(column, memory)[: len(column)] for column in errors.T])

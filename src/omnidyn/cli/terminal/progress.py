@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -40,12 +39,10 @@ def _tell(steps: list[str], done: threading.Event, compiling: Compiling, hint: s
         if _now(steps, compiling) == said and done.wait(BEAT_S - NEW_S):
             return
         said, wait = _now(steps, compiling), NEW_S
-        with contextlib.suppress(OSError, ValueError):
-            if hint and compiling.under_way:
-                say(hint)
-                hint = ""
-            say(f"omnidyn: {said} ... {time.monotonic() - started:.0f} s")
-            sys.stderr.flush()
+        if hint and compiling.under_way:
+            say(hint)
+            hint = ""
+        say(f"omnidyn: {said} ... {time.monotonic() - started:.0f} s")
 
 
 def _now(steps: list[str], compiling: Compiling) -> str:

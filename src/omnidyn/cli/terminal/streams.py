@@ -9,7 +9,7 @@ import os
 import re
 import shutil
 import sys
-from typing import Any
+from typing import Any, TextIO
 
 import typer
 
@@ -62,9 +62,16 @@ def say(words: str) -> None:
     """Talk, to stderr. A stderr that nobody reads, that is full or that is not there is no reason to stop."""
     if sys.stderr is None:
         return
-    # Not typer.echo: it overrides the encoding of an ASCII stream.
-    with contextlib.suppress(OSError, ValueError):
+    try:  # not typer.echo: it overrides the encoding of an ASCII stream
         print(printable(with_flags(words)), file=sys.stderr, flush=True)
+    except (OSError, ValueError):
+        silence(sys.stderr)
+
+
+def silence(stream: TextIO | None) -> None:
+    """Nothing more can be said there: what waits to be written is dropped, or Python ends with 120 for it."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # type: ignore[union-attr]
 
 
 def say_trace(lines: str) -> None:
