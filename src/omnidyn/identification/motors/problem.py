@@ -50,7 +50,7 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> Record
         t, u, values = refined(t, u, values, pieces)
         pieces = [(SUB * first, SUB * last) for first, last in pieces]
     return Record(
-        t, np.ascontiguousarray(np.nan_to_num(u)[:, None]), values, tuple(outputs), (0.0,) * len(outputs),
+        t, np.nan_to_num(u)[:, None], values, tuple(outputs), (0.0,) * len(outputs),
         tuple(pieces), log.run.source, False, (),
     )  # fmt: skip
 

@@ -33,6 +33,8 @@ class Record:
     unused: what the log holds and a fit does not use, and why, in words.
     set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
     here then; else None.
+
+    Its arrays are read-only and in C order, whoever made them: a kernel for others would be compiled beside.
     """
 
     t: FloatArray
@@ -47,6 +49,12 @@ class Record:
     set_point: FloatArray | None = None
     unused: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        for name in ("t", "voltage", "outputs", "set_point"):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, _read_only(given))
+
     @property
     def span(self) -> float:
         return float(self.t[-1] - self.t[0]) or 1.0
@@ -55,6 +63,12 @@ class Record:
     def share(self) -> FloatArray:
         """How much of the run has gone by, 0 to 1. Shape (rows,)."""
         return (self.t - self.t[0]) / self.span
+
+
+def _read_only(values: FloatArray) -> FloatArray:
+    own = np.ascontiguousarray(values).view()
+    own.flags.writeable = False
+    return own
 
 
 def record(
@@ -100,7 +114,7 @@ def record(
     if found.lost is not None and (many := int(found.lost[1:].sum())):
         notes.append(f"{many} rows lack counts of an encoder, or follow on missing rows: the log is split there")
     return Record(
-        run.t, np.ascontiguousarray(voltage), found.values, found.columns, found.ticks, tuple(pieces), run.source,
+        run.t, voltage, found.values, found.columns, found.ticks, tuple(pieces), run.source,
         supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused),
     )  # fmt: skip
 
