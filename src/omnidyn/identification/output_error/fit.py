@@ -50,6 +50,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
+HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
 WHOLE = "all"  # the name of the group where there are none
 INTERRUPTED = "the fit was interrupted: the numbers are the best so far, their intervals are those of that point"
@@ -208,8 +209,10 @@ class Fit:
             progress.doing("looking for a start")
             solver = Solver(problem, engine, self.nu)
             return solver.minimise(first_point(solver, group.records), watch=progress)
-        solver = Solver(problem, engine, self.nu, CLOSE)
-        return solver.minimise(coarse_point(problem, self.nu, progress), watch=progress)
+        start = coarse_point(problem, self.nu, progress)
+        halfway = Solver(problem, make_engine(group.engine, problem, HALFWAY), self.nu, CLOSE)
+        nearer = halfway.minimise(start, watch=progress).state.point
+        return Solver(problem, engine, self.nu, CLOSE).minimise(nearer, watch=progress)
 
     def _settled_alone(self, progress: Progress) -> tuple[str, ...] | None:
         """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""

@@ -19,6 +19,7 @@ from omnidyn.arrays import FloatArray
 
 ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tried
 SHARE = 0.1  # of the rows that may be coefficients
+PATIENCE = 15  # orders without a better one, after which none is looked for
 FOLLOWED = 20_000  # rows after which a memory is as good as endless
 
 
@@ -99,14 +100,14 @@ def autoregression(stretches: Sequence[FloatArray], most: int | None = None) -> 
     """
     rows = sum(len(each) for each in stretches)
     limit = int(min(ORDERS * np.log10(max(rows, 1)), SHARE * rows)) if most is None else most
-    variance = sum(float((each**2).sum()) for each in stretches) / max(rows, 1)
-    ahead, behind = list(stretches), list(stretches)
+    ahead = behind = [np.ascontiguousarray(each) for each in stretches]
+    variance = sum(float(np.vdot(each, each)) for each in ahead) / max(rows, 1)
     partial: list[float] = []
     best, cost, least = (0, variance), 0.0, 0.0
     for _ in range(limit):
         pairs = [(f[1:], b[:-1]) for f, b in zip(ahead, behind, strict=True) if len(f) > 1]
-        power = sum(float((f**2).sum() + (b**2).sum()) for f, b in pairs)
-        k = 2.0 * sum(float((f * b).sum()) for f, b in pairs) / power if power > 0.0 else 1.0
+        power = sum(float(np.vdot(f, f) + np.vdot(b, b)) for f, b in pairs)
+        k = 2.0 * sum(float(np.vdot(f, b)) for f, b in pairs) / power if power > 0.0 else 1.0
         if abs(k) >= 1.0:
             break
         ahead, behind = [f - k * b for f, b in pairs], [b - k * f for f, b in pairs]
@@ -115,4 +116,6 @@ def autoregression(stretches: Sequence[FloatArray], most: int | None = None) -> 
         cost += sum(len(f) for f, _ in pairs) * math.log1p(-k * k) + math.log(rows)  # rows that reach so far back
         if cost < least:
             best, least = (len(partial), variance), cost
+        elif len(partial) >= best[0] + PATIENCE:
+            break
     return AutoRegression(np.array(partial[: best[0]]), best[1], rows)

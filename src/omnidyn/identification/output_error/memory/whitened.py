@@ -24,7 +24,25 @@ FORGOTTEN = 1000  # rows missing in a row after which a stretch begins anew
 Rows = tuple[NDArray[np.intp], IntArray]  # which rows of a piece are known, rows since the one before (0: at a start)
 
 
-class WhitenedEngine:
+class OfRows:
+    """What the engines of this file share: sums over rows that are held."""
+
+    problem: Problem
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """Residuals and slopes of every piece, see engines/sums.py."""
+        raise NotImplementedError
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the rows of every piece add up to."""
+        columns, count = self.problem.columns, len(self.problem.parameters)
+        return [
+            added(piece, columns, parts, weighting, count)
+            for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True)
+        ]
+
+
+class WhitenedEngine(OfRows):
     """engine: which simulates. models: the memory of each column; one that is not named has none.
 
     Memory is counted in rows of the column's own, and a column keeps its rate: a channel that only every fifth row
@@ -32,27 +50,14 @@ class WhitenedEngine:
     """
 
     def __init__(self, engine: RowEngine[Problem], models: Mapping[Column, AutoRegression]):
-        self.engine, self.models = engine, dict(models)
+        self.engine, self.models, self.problem = engine, dict(models), engine.problem
         self._filters = {
             column: (model.coefficients, model.covariance) for column, model in self.models.items() if model.order
         }
 
-    @property
-    def problem(self) -> Problem:
-        """Of the engine that simulates."""
-        return self.engine.problem
-
     def on(self, problem: Problem) -> WhitenedEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         return WhitenedEngine(self.engine.on(problem), self.models)
-
-    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
-        """What the filtered rows of every piece add up to."""
-        columns, count = self.problem.columns, len(self.problem.parameters)
-        return [
-            added(piece, columns, parts, weighting, count)
-            for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True)
-        ]
 
     def residuals(self, point: Point) -> list[Parts]:
         """Filtered residuals and slopes of every piece, see engines/sums.py."""
@@ -72,6 +77,24 @@ class WhitenedEngine:
             new = innovations(series, steps, *self._filters[column])
             residual[c, rows], slopes[c, rows] = new[:, 0], new[:, 1:]
         return residual, slopes, at
+
+
+class TangentEngine(OfRows):
+    """Shows what another engine would show near a point if its rows were straight there: nothing is simulated."""
+
+    def __init__(self, engine: RowEngine[Problem], point: Point):
+        self.problem, self.point, self._parts = engine.problem, point, engine.residuals(point)
+
+    def on(self, problem: Problem) -> TangentEngine:
+        """Raises NotImplementedError: it knows its own pieces only."""
+        raise NotImplementedError
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """Residuals and slopes of every piece, see engines/sums.py."""
+        found, moved = [], point.values - self.point.values
+        for (residual, slopes, at), now, before in zip(self._parts, point.states, self.point.states, strict=True):
+            found.append((residual - slopes @ np.concatenate([moved, now - before])[at], slopes, at))
+        return found
 
 
 def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:

@@ -29,14 +29,22 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
-from omnidyn.identification.output_error.memory.whitened import WhitenedEngine, known_rows, spacing, without_gaps
+from omnidyn.identification.output_error.memory.whitened import (
+    TangentEngine,
+    WhitenedEngine,
+    known_rows,
+    spacing,
+    without_gaps,
+)
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
 from omnidyn.statistics import t_quantile
 
-ROUNDS = 6  # of memory and numbers in turn
-SETTLED = 0.03  # standard errors: a round that moves no number further is the last one
+ROUNDS, TURNS = 6, 20  # of simulations; of memory and numbers in turn between them
+FEW_STEPS = 4  # of one: what the next memory moves is near
+SWALLOWED = 4.0  # times the variance: a fit that leaves as much no longer follows the log, its memory does
+SETTLED = 0.1  # standard errors: a round that moves no number further is the last one
 LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the sandwich
 ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
 UNEVEN = 0.05  # share of rows off an even grid that is worth a word
@@ -90,15 +98,13 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
     now = solution.state.point
     for each in range(ROUNDS):
         doing(f"errors with a memory, round {each + 1}")
-        filtered = Solver(solver.problem, WhitenedEngine(below(solver), models), 0.0, solver.close, solver.counted)
-        found = filtered.minimise(now)
-        covariance = _inverse(Normal(filtered, found.state).information)
-        moved = filtered.inner(found.state.point.values) - filtered.inner(now.values)
-        now = found.state.point
-        models = _memory(found, covariance)
-        if each and (np.abs(moved) <= SETTLED * np.sqrt(np.diag(covariance))).all():
+        models = _straight(solver, now, models)
+        found = _filtered(solver, below(solver), models).minimise(now, FEW_STEPS)
+        moved, now = _moved(found, now), found.state.point
+        models = _memory(found, _inverse(Normal(found.solver, found.state).information))
+        if each and moved <= SETTLED:
             break
-    filtered = Solver(solver.problem, WhitenedEngine(below(solver), models), 0.0, solver.close, solver.counted)
+    filtered = _filtered(solver, below(solver), models)
     found = replace(filtered.minimise(now), notes=solution.notes)
     left = trust(filtered, found)
     if left.kind == SANDWICH and solver.counted:
@@ -107,7 +113,37 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
     # all that came before, would have intervals many times too narrow.
     known = left if left.kind == SANDWICH else _trusted(found, before, models)
     plain = replace(found, state=solver.state(found.state.point), solver=solver)
+    if (plain.state.variance > SWALLOWED * solution.state.variance).any():
+        return None
     return Weighed(found, plain, known, models, tuple(_words(found, models, known)))
+
+
+def _straight(
+    solver: Solver[Problem], start: Point, models: Mapping[Column, AutoRegression]
+) -> Mapping[Column, AutoRegression]:
+    """The memory that rows straight near a point settle at, memory and numbers in turn: nothing is simulated for it."""
+    tangent, now = TangentEngine(below(solver), start), start
+    for _ in range(TURNS):
+        found = _filtered(solver, tangent, models).minimise(now, FEW_STEPS)
+        models = _memory(found, _inverse(Normal(found.solver, found.state).information))
+        moved, now = _moved(found, now), found.state.point
+        if moved <= SETTLED:
+            break
+    return models
+
+
+def _filtered(
+    solver: Solver[Problem], engine: RowEngine[Problem], models: Mapping[Column, AutoRegression]
+) -> Solver[Problem]:
+    """The solver for errors of these memories."""
+    return Solver(solver.problem, WhitenedEngine(engine, models), 0.0, solver.close, solver.counted)
+
+
+def _moved(found: Solution, before: Point) -> float:
+    """How far a fit has moved the number that it has moved furthest, in standard errors."""
+    std = np.sqrt(np.diag(_inverse(Normal(found.solver, found.state).information)))
+    moved = np.abs(found.solver.inner(found.state.point.values) - found.solver.inner(before.values))
+    return float((moved[std > 0.0] / std[std > 0.0]).max(initial=0.0))
 
 
 def _as_readings(solution: Solution) -> Solution:
