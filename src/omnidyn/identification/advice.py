@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from omnidyn.document import all_of
-from omnidyn.findings.finding import FATAL, Verdict
 from omnidyn.identification.lack_of_fit import Remedy, named
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
@@ -31,20 +30,6 @@ def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]
     words = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
     words += _from_validation(validation)
     return list(dict.fromkeys(words))
-
-
-def verdict_advice(verdicts: Sequence[Verdict]) -> list[str]:
-    """What to mend in logs of which `check` says that they give wrong results as they stand."""
-    alike: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for each in verdicts:
-        for finding in each.findings:
-            if finding.level == FATAL:
-                remedy = finding.remedy or "see omnidyn check"
-                alike.setdefault((finding.code, remedy), []).append((each.source, finding.message))
-    return [
-        f"{found[0][0]}{f' and {len(found) - 1} more' if len(found) > 1 else ''}: {found[0][1]}: {remedy}"
-        for (_, remedy), found in alike.items()
-    ]
 
 
 def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:

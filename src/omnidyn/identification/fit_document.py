@@ -8,6 +8,7 @@ from omnidyn.document import Document, Part, Points, Table, apart, interval_cell
 from omnidyn.findings.finding import FATAL, WARN, Verdict
 from omnidyn.identification.estimate import NOT_DETERMINED
 from omnidyn.identification.lack_of_fit import Diagnosis
+from omnidyn.identification.log_verdicts import checked
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_parts import Difference
@@ -39,7 +40,7 @@ def fit_document(
     data = {
         "method": OUTPUT_ERROR, **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
         "differences": [{**vars(each), "differs": each.differs} for each in differences], "next": advice,
-        "check": [{"source": each.source, "fatal": each.fatal, "counts": each.counts} for each in verdicts],
+        "check": checked(verdicts),
     }  # fmt: skip
     return Document(apart(*blocks), data, [words for fit in fits.values() for words in fit.warnings], ascii=True)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from omnidyn.identification.fit_document import verdict_table
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.html import page, section
@@ -31,5 +32,7 @@ def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
         *([section("starts", "Where each direction starts", told["starts"])] if study.starts else []),
         section("numbers", "Numbers, with 95 % intervals", told["motors"]),
     ]
+    if study.verdicts:
+        sections += [section("logs", "What check says of the logs", verdict_table(study.verdicts))]
     how = WINDOWS if study.windows is not None else FREE_RUNS
     return page("Motors from logs", how, sections, provenance, verdict=study.verdict)
