@@ -24,11 +24,12 @@ FREE_RUNS = (
 def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     """The page of the motors, as HTML."""
     told = study.document()
-    pictures = [] if study.windows is None else [draw_motor_lines(study.motors, study.windows)]
+    pictures = [] if study.windows is None else [draw_motor_lines(study.motors, study.windows, study.starts)]
     sections = [
+        *([section("figures", "What each motor needs", *pictures)] if pictures else []),
         section("findings", "What the data say", told["statements"]),
         section("warnings", "Warnings", told["warnings"], none="None."),
-        *([section("figures", "Figures", *pictures)] if pictures else []),
+        *([section("next", "What to mend", told["next"])] if study.advice else []),
         *([section("starts", "Where each direction starts", told["starts"])] if study.starts else []),
         section("numbers", "Numbers, with 95 % intervals", told["motors"]),
     ]

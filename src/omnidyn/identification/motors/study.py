@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -30,10 +30,14 @@ from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
+from omnidyn.shown import FIGURE, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, eq=False)
-class MotorStudy:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotorStudy(Shown):
     """motors: an estimate each, the last for all together where there are several in windows.
 
     plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
@@ -53,6 +57,16 @@ class MotorStudy:
     supply: float = math.nan
     log_warnings: tuple[str, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<MotorStudy {self.kind} [{self.unit}], {self.verdict}>"
+
+    def plot(self) -> Figure:
+        """Input against speed, with the lines and where each motor starts, as a matplotlib Figure.
+
+        Raises InputError for free runs, which have no windows to draw.
+        """
+        return make(FIGURE, self)
 
     @property
     def statements(self) -> tuple[str, ...]:
