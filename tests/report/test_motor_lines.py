@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import omnidyn
 from omnidyn.report.figures.motor_lines import BAND, LINE, STARTS, draw_motor_lines
+from omnidyn.report.motors_page import render_motors
+from tests.support.bench_motor import BenchMotor, ramps
 from tests.support.figures import shown_texts
 
 SPEED = np.linspace(-5.0, 5.0, 40)
@@ -72,3 +75,14 @@ def test_a_start_that_was_seen_stands_where_the_line_does_not_cross():
     assert "and not where the line crosses" in drawn.caption
     for words, box in shown_texts(drawn.figure):
         assert drawn.figure.bbox.x0 <= box.x0 <= box.x1 <= drawn.figure.bbox.x1, words
+
+
+def test_free_runs_have_a_picture_too():
+    t, put_in = ramps([3.0, -3.0], 0.8, 0.01)
+    speed, *_ = BenchMotor().turn(t, put_in)
+    study = omnidyn.identify_motors(
+        omnidyn.Run(t=t, voltage=put_in[:, None], wheel_speed=speed[:, None] + 1e-3), method="output-error"
+    )
+    (panel,) = study.plot().axes
+    assert len(labelled(panel, STARTS)) == 2
+    assert "<figure" in render_motors(study, {"omnidyn": "0.1.0", "command": "", "inputs": []})

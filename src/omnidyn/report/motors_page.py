@@ -24,12 +24,13 @@ FREE_RUNS = (
 def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     """The page of the motors, as HTML."""
     told = study.document()
-    pictures = [] if study.windows is None else [draw_motor_lines(study.motors, study.windows, study.starts)]
+    windows = study.windows or study.drawn
+    pictures = [] if windows is None else [draw_motor_lines(study.motors, windows, study.starts)]
     sections = [
-        *([section("figures", "What each motor needs", *pictures)] if pictures else []),
-        section("findings", "What the data say", told["statements"]),
         section("warnings", "Warnings", told["warnings"], none="None."),
         *([section("next", "What to mend", told["next"])] if study.advice else []),
+        *([section("figures", "What each motor needs", *pictures)] if pictures else []),
+        section("findings", "What the data say", told["statements"]),
         *([section("starts", "Where each direction starts", told["starts"])] if study.starts else []),
         section("numbers", "Numbers, with 95 % intervals", told["motors"]),
     ]

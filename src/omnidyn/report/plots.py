@@ -71,11 +71,10 @@ def _verdict(verdict: Verdict) -> Picture:
 
 
 def _motors(study: MotorStudy) -> Picture:
-    if study.windows is None:
-        raise InputError(
-            "free runs have no windows to draw", got=study.method, expected="motors by the method steady-state"
-        )
-    return draw_motor_lines(study.motors, study.windows, study.starts)
+    windows = study.windows or study.drawn
+    if windows is None:
+        raise InputError("the logs have no windows to draw", expected="motors that turn, at more than 10 rows a second")
+    return draw_motor_lines(study.motors, windows, study.starts)
 
 
 def _of_file(robot: Robot) -> list[FrictionCurve]:

@@ -31,11 +31,11 @@ def render_study(
     )
     errors, *pictures = shape_pictures(study)
     sections = [
-        section("findings", "What the data say", told["statements"]),
         section("warnings", "Warnings", told.joined("warnings", "warnings of fits"), none="None."),
         section("next", "What to measure next", told["next"], none="Nothing: every number is well determined."),
         section("forces", "Forces", *pictures),
         section("friction", "Friction against speed", draw_estimates(study.estimates, driven=driven([points.twist]))),
+        section("findings", "What the data say", told["statements"]),
         section("shapes", "Which shape", errors, told["shapes"]),
         section("levels", "Friction, with 95 % intervals", told["levels"]),
         dead_zone_section({group: each.robot for group, each in study.estimates.items()}),

@@ -41,9 +41,10 @@ class MotorStudy(Shown):
     """motors: an estimate each, the last for all together where there are several in windows.
 
     plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
-    found. windows: that the lines go through, None of free runs. starts: each direction of each motor by itself, with
-    the input at which it sets off. supply [V]: of a duty, the mean of the logs; NaN where it is not logged.
-    log_warnings: of the logs, in words; `warnings` has those of each motor too. verdicts: of `check` on each log.
+    found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts: each
+    direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the logs;
+    NaN where it is not logged. log_warnings: of the logs, in words; `warnings` has those of each motor too. verdicts:
+    of `check` on each log.
     """
 
     method: str
@@ -57,6 +58,7 @@ class MotorStudy(Shown):
     supply: float = math.nan
     log_warnings: tuple[str, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
+    drawn: MotorWindows | None = None
 
     def __repr__(self) -> str:
         return f"<MotorStudy {self.kind} [{self.unit}], {self.verdict}>"
@@ -64,7 +66,7 @@ class MotorStudy(Shown):
     def plot(self) -> Figure:
         """Input against speed, with the lines and where each motor starts, as a matplotlib Figure.
 
-        Raises InputError for free runs, which have no windows to draw.
+        Raises InputError where the logs have no windows to draw.
         """
         return make(FIGURE, self)
 
@@ -219,9 +221,12 @@ def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object
         pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
-    starts = starts_of_points(points_of_logs(logs)) if is_slow(logs) else motor_starts(logs, _windows_of(logs), motors)
+    slow = is_slow(logs)
+    seen = None if slow else _windows_of(logs)
+    starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
     return MotorStudy(
-        OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs)
+        OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs),
+        drawn=seen,
     )  # fmt: skip
 
 
