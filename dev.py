@@ -288,6 +288,9 @@ def ensure(level, env):
     """Afterwards .venv holds this level. Costs nothing if it already does."""
     if ready(level):
         return
+    if os.path.islink(VENV):  # setting up empties the folder: it may be that of another checkout
+        words = "dev.py: {} is a link to {}, which would be emptied; remove the link, then call again"
+        sys.exit(words.format(VENV, os.path.realpath(VENV)))
     if os.path.lexists(VENV) and not VENV.is_dir():
         sys.exit("dev.py: {} is no folder; remove it, then call again".format(VENV))
     with alone():

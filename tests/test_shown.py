@@ -34,10 +34,11 @@ def results(run):
         "comparison": omnidyn.compare(ROBOT, run, coulomb_times(ROBOT, 1.3)),
         "estimate": fit,
         "identification": omnidyn.Identification.of([run], ROBOT, nuisances="none"),
+        "motors": omnidyn.identify_motors([run]),
     }
 
 
-NAMES = ["run", "robot", "verdict", "comparison", "estimate", "identification"]
+NAMES = ["run", "robot", "verdict", "comparison", "estimate", "identification", "motors"]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.cli import main
-from omnidyn.logs.run_file import write_run
+from omnidyn.logs.run_file import read_run, write_run
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -110,8 +110,6 @@ def test_the_paper_s_line_on_each_axis(call, tmp_path):
 
 def test_unsigned_currents_get_their_sign_when_told(call, floors, tmp_path):
     for k in range(12):
-        from omnidyn.logs.run_file import read_run
-
         run = read_run(floors / "smooth" / f"run{k}.csv")
         write_run(run.replace(current=np.abs(run.current)), tmp_path / f"run{k}.csv")
     code, _, err = call(str(tmp_path), "--robot", "axebot")
@@ -162,6 +160,30 @@ def test_data_that_cannot_answer_are_exit_4(call):
     assert "drive in more directions" in err
 
 
+@pytest.mark.parametrize("shape", [(), ("--shape", "line")])
+def test_logs_with_a_fatal_fault_are_fitted_and_end_with_4(call, floors, tmp_path, shape):
+    """The second encoder is wired the other way round; the commanded speeds hide it. It was exit 0."""
+    for k in range(12):
+        run = read_run(floors / "smooth" / f"run{k}.csv")
+        write_run(run.replace(wheel_speed=run.wheel_speed * [1.0, -1.0, 1.0]), tmp_path / f"run{k}.csv")
+    result, report = tmp_path / "fit.toml", tmp_path / "r.html"
+    more = () if shape else ("--report", str(report))
+    code, out, err = call(
+        str(tmp_path), "--robot", "axebot", "--speed", "set", "--json", "-o", str(result), *more, *shape
+    )
+    told = strict(out)
+    assert (code, told["ok"]) == (4, False)
+    assert told["verdict"].startswith("Failed: ")
+    assert "run0.csv and " in told["verdict"]
+    assert "are not fit for use as they stand: " in told["verdict"]
+    assert sum(each["fatal"] for each in told["check"]) > 6
+    assert err.count("omnidyn: warning: ") < 5  # twelve logs with one fault are one warning
+    assert "omnidyn: Failed: " in err
+    assert load_robot(result).priors
+    if report:
+        assert shape or "inverted" in report.read_text("utf-8").partition("What check says of the logs")[2]
+
+
 # ---- motors ---------------------------------------------------------------------------------------------
 
 
@@ -203,6 +225,23 @@ def test_motors_that_do_not_answer_end_with_4_and_are_shown(call, tmp_path):
     code, out, err = call(str(tmp_path / "loose.csv"), "--what", "motors", "--json")
     assert (code, json.loads(out)["ok"]) == (4, False)
     assert "omnidyn: No motor is seen to answer to its input" in err
+
+
+def test_motors_of_a_log_with_a_fatal_fault_end_with_4_and_are_shown(call, bench, tmp_path):
+    """Currents without a sign: whatever the lines say, they go through the wrong points. It was exit 0."""
+    run = read_run(bench)
+    log, result, report = tmp_path / "log.csv", tmp_path / "fit.toml", tmp_path / "m.html"
+    write_run(run.replace(current=np.abs(run.voltage)), log)
+    arguments = (str(log), "--what", "motors", "--input", "current", "--robot", "robotino", "-o", str(result))
+    code, out, err = call(*arguments, "--report", str(report), "--json")
+    told = strict(out)
+    assert (code, told["ok"]) == (4, False)
+    assert "log.csv is not fit for use as it stands: the currents are never negative" in told["verdict"]
+    assert "omnidyn: Failed: " in err
+    assert any("--current-unsigned" in words for words in told["next"])
+    assert report.exists()
+    code, out, _ = call(*arguments, "--current-unsigned", "--force", "--json")
+    assert (code, strict(out)["ok"]) == (0, True)
 
 
 def test_motors_from_a_table_without_a_time(call, tmp_path):

@@ -121,13 +121,23 @@ def test_a_venv_from_which_a_package_was_deleted_is_made_anew(installers):
     assert "--clear" in installers[0][0]
 
 
-@pytest.mark.parametrize("make", ["file", "link to nothing"])
-def test_a_venv_that_is_no_folder_is_told_in_one_line(checkout, make):
+@pytest.mark.parametrize("target", ["another", "nowhere"])
+def test_a_venv_that_is_a_link_is_left_alone(installers, tmp_path, target):
+    """A work tree often shares the .venv of another checkout: to set it up would empty that."""
+    another = tmp_path / "another"
+    another.mkdir()
+    (another / "complete").write_text(f"everything {dev.fingerprint('everything')} of another folder\n")
     shutil.rmtree(dev.VENV)
-    if make == "file":
-        dev.VENV.write_text("")
-    else:
-        dev.VENV.symlink_to("nowhere")
+    dev.VENV.symlink_to(tmp_path / target)
+    with pytest.raises(SystemExit, match=rf"^dev\.py: .*\.venv is a link to .*{target}, which would be emptied"):
+        dev.ensure("core", {})
+    assert installers[0] == []
+    assert (another / "complete").exists()
+
+
+def test_a_venv_that_is_no_folder_is_told_in_one_line(checkout):
+    shutil.rmtree(dev.VENV)
+    dev.VENV.write_text("")
     with pytest.raises(SystemExit, match=r"^dev\.py: .*\.venv is no folder; remove it, then call again$"):
         dev.ensure("core", {})
 

@@ -18,7 +18,7 @@ COLUMNS = ["u1_V", "u2_V", "u3_V", "supply_V"]
 
 def test_without_pandas_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(MissingExtraError, match="needs pandas; pip install pandas") as caught:
+    with pytest.raises(MissingExtraError, match=r'needs pandas; pip install "omnidyn\[arrays\]"') as caught:
         RUN.to_dataframe()
     assert caught.value.exit_code == 6
 
@@ -47,3 +47,15 @@ def test_a_real_frame():
     assert frame.index.name == "t_s"
     assert frame["u3_V"].tolist() == [2.0, 5.0, 8.0]
     assert frame["supply_V"].isna().tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("name", ["frame.csv", "frame.parquet"])
+def test_what_pandas_writes_is_a_run_file(tmp_path, name):
+    pytest.importorskip("pandas")
+    path = tmp_path / name
+    run = omnidyn.simulate(omnidyn.load_robot("axebot"), np.tile([0.0, 2.0, -2.0], (20, 1)), 0.02)
+    write = {"frame.csv": "to_csv", "frame.parquet": "to_parquet"}[name]
+    getattr(run.to_dataframe(), write)(path)
+    again = omnidyn.read_log(str(path))
+    np.testing.assert_array_equal(again.twist, run.twist)
+    np.testing.assert_array_equal(again.voltage, run.voltage)

@@ -1,12 +1,18 @@
 """The page of a fit: verdict, pictures, tables; duty is called duty; measured lines lie above the model's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.identification.fit_document import number_table, verdict_table
 from omnidyn.logs.log import Log
 from omnidyn.report.figures.correlation import draw_correlation
-from omnidyn.report.fit_page import render_fit
+from omnidyn.report.figures.residuals import draw_residuals
+from omnidyn.report.fit_page import _noise, render_fit
+from tests.support.axebot_logs import excitation
 from tests.support.compared_logs import clean_log, noisy
 from tests.support.figures import shown_texts
 from tests.support.outputs import Reader
@@ -33,7 +39,7 @@ def page(found):
 
 
 def test_verdict_then_pictures_then_tables(page):
-    keys = ["findings", "warnings", "next", "runs", "friction", "path", "residuals", "correlation", "numbers", "scores"]
+    keys = ["warnings", "next", "runs", "friction", "path", "findings", "residuals", "correlation", "numbers", "scores"]
     places = [page.index(f'<section id="{key}">') for key in keys]
     assert places == sorted(places)
     first_table = page.index("<table")
@@ -55,7 +61,7 @@ def test_a_logged_duty_is_called_duty(page, found):
 
 
 def test_the_first_words_are_the_verdict_and_the_log_s_own_numbers_are_in_the_table_only(page, found):
-    findings = page[page.index('<section id="findings">') : page.index('<section id="warnings">')]
+    findings = page[page.index('<section id="findings">') : page.index('<section id="dead-zone">')]
     said = next(iter(found.validations.values())).statements()
     assert next(iter(said)) in Reader(findings).text
     assert "latency" not in findings
@@ -76,3 +82,43 @@ def test_the_measured_line_lies_above_and_is_thinner(found):
     assert measured.get_zorder() > model.get_zorder()
     assert measured.get_linewidth() < 0.5 * model.get_linewidth()
     assert model.get_alpha() < 1.0
+
+
+@pytest.fixture(scope="module")
+def counted():
+    """A fit to counts of 2048 a turn, without other noise."""
+    run = omnidyn.simulate(ROBOT, excitation(20.0, seed=5), 0.01)
+    tick = 2.0 * np.pi / 2048
+    angle = np.cumsum(np.vstack([np.zeros(3), 0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]) * 0.01]), axis=0)
+    kept = omnidyn.Run(t=run.t, voltage=run.voltage, wheel_angle=np.floor(angle / tick) * tick, source="counts.csv")
+    return omnidyn.Identification.of([kept], ROBOT, nuisances="none")
+
+
+def test_labels_of_residuals_are_whole_and_rounding_is_part_of_the_noise_of_counts(counted):
+    """The names of the rows were cut, and errors of a tick were drawn as outliers of the noise before rounding."""
+    validation = next(iter(counted.validations.values()))
+    (fit,) = counted.fits.values()
+    noise = _noise(fit, validation.scores["fitted"], validation.fitted)
+    rounding = 2.0 * np.pi / 2048 / np.sqrt(12.0)
+    assert all(0.9 * rounding < noise[key] < 2.0 * rounding for key in ("a1", "a2", "a3"))
+    figure = draw_residuals(validation.fitted, noise).figure
+    for words, box in shown_texts(figure):
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, words
+        assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1, words
+
+
+def test_numbers_have_their_plain_names_beside_their_keys(found):
+    rows = {row[1]: row[0] for row in number_table(found.estimate).rows}
+    assert rows["friction.axes.coulomb[0]"] == "Coulomb friction forward"
+
+
+def test_of_many_logs_the_table_shows_the_gravest(found):
+    """250 logs were 250 rows."""
+    first, fatal = found.verdicts[0], Finding("dead", FATAL, "w1", "w1 is 0 in every row")
+    many = [replace(first, source=f"{k}.csv", findings=(fatal,) if k == 40 else ()) for k in range(50)]
+    table = verdict_table(many)
+    assert len(table.rows) == 20
+    assert table.rows[0][0] == "40.csv"
+    assert table.rows[-1][0] == "and 31 more"
+    assert table.rows[-1][-1].endswith("of all 50 logs, 49 have nothing to heed")
+    assert len(verdict_table(many[:20]).rows) == 20

@@ -6,7 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from omnidyn.report.figures.motor_lines import draw_motor_lines
+import omnidyn
+from omnidyn.report.figures.motor_lines import BAND, LINE, STARTS, draw_motor_lines
+from omnidyn.report.motors_page import render_motors
+from tests.support.bench_motor import BenchMotor, ramps
+from tests.support.figures import shown_texts
 
 SPEED = np.linspace(-5.0, 5.0, 40)
 
@@ -39,7 +43,46 @@ def test_panels_fill_their_rows_and_each_row_has_its_unit(count, shape):
 def test_a_dead_band_that_is_well_known_is_seen():
     """An interval of 20 mV on an axis of 3 V was less than a pixel high, below the line."""
     (panel,) = draw_motor_lines(*study(1)).figure.axes
-    (band,) = [line for line in panel.get_lines() if line.get_label() == "dead band, 95 %"]
+    back, ahead = labelled(panel, BAND)
+    assert back.get_ydata() == pytest.approx([-0.39, -0.41])
+    assert ahead.get_ydata() == pytest.approx([0.39, 0.41])
+    assert ahead.get_marker() == "_"
+    assert ahead.get_zorder() > max(line.get_zorder() for line in labelled(panel, LINE))
+
+
+def labelled(panel, label):
+    return [line for line in panel.get_lines() if line.get_label() == label]
+
+
+def test_a_start_that_was_seen_stands_where_the_line_does_not_cross():
+    """Forward it sets off at 0.6 V, and the line of that direction crosses at 0.3: the bar shows the start."""
+    nothing = (float("nan"), float("nan"))
+    starts: Any = [
+        SimpleNamespace(motor=0, side=side, value=value, ci95={"start": span})
+        for side, value, span in (
+            (1.0, {"start": 0.6, "offset": 0.3, "slope": 0.52}, (0.58, 0.62)),
+            (-1.0, {"start": 0.6, "offset": float("nan")}, nothing),
+        )
+    ]
+    drawn = draw_motor_lines(*study(1), starts)
+    (panel,) = drawn.figure.axes
+    (start,), (band,) = labelled(panel, STARTS), labelled(panel, BAND)
+    assert start.get_ydata() == pytest.approx([0.58, 0.62])
     assert band.get_ydata() == pytest.approx([-0.39, -0.41])
-    assert band.get_marker() == "_"
-    assert band.get_zorder() > max(line.get_zorder() for line in panel.get_lines() if line.get_label() == "line")
+    back, ahead = (np.asarray(line.get_ydata()) for line in labelled(panel, LINE))
+    assert (back[0], back[-1]) == pytest.approx((-0.4, -2.9))
+    assert (ahead[0], ahead[-1]) == pytest.approx((0.3, 2.9))
+    assert "and not where the line crosses" in drawn.caption
+    for words, box in shown_texts(drawn.figure):
+        assert drawn.figure.bbox.x0 <= box.x0 <= box.x1 <= drawn.figure.bbox.x1, words
+
+
+def test_free_runs_have_a_picture_too():
+    t, put_in = ramps([3.0, -3.0], 0.8, 0.01)
+    speed, *_ = BenchMotor().turn(t, put_in)
+    study = omnidyn.identify_motors(
+        omnidyn.Run(t=t, voltage=put_in[:, None], wheel_speed=speed[:, None] + 1e-3), method="output-error"
+    )
+    (panel,) = study.plot().axes
+    assert len(labelled(panel, STARTS)) == 2
+    assert "<figure" in render_motors(study, {"omnidyn": "0.1.0", "command": "", "inputs": []})

@@ -15,7 +15,7 @@ from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed
-from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.identification.question import MOTORS, STEADY_STATE, Question
 from omnidyn.identification.question import options as fields_of_question
 
 INTERRUPTED = 130
@@ -134,8 +134,6 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
             question = replace(question, group=loaded.folders)
         elif loaded.folders:
             told("all folders are fitted together; `per` NAME=GLOB makes groups of them")
-        if question.method != OUTPUT_ERROR:
-            logs = logs.clear() or []
         found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
         now("writing")
         tell(found, record, to)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from omnidyn.cli.log_options import Maps, load_logs, log_files
 from omnidyn.cli.terminal.streams import say
-from omnidyn.identification.question import FRICTION, Question
+from omnidyn.identification.question import Question
 
 if TYPE_CHECKING:
     from omnidyn.logs.log import Log
@@ -70,10 +70,7 @@ def _first_names(path: str) -> set[str]:
 
 
 def load_runs(arguments: Sequence[str], question: Question, robot: Robot | None, reading: Reading, now: Any) -> Loaded:
-    """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once.
-
-    The logs are kept for friction alone.
-    """
+    """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once."""
     files = log_files(arguments)
     folders = () if question.per or question.group else _folders(arguments)
     used = _of_groups(files, question.per or question.group or folders, "per" if question.per else "group")
@@ -84,8 +81,7 @@ def load_runs(arguments: Sequence[str], question: Question, robot: Robot | None,
         for words in run.warnings:
             said.setdefault(words, []).append(path)
         found.runs.append(run)
-        if question.what == FRICTION:
-            found.logs.append(log)
+        found.logs.append(log)
         found.inputs.append({"role": "log", "name": path, "sha256": log.sha256})
     _say_notes(said, len(used))
     return found

@@ -24,7 +24,10 @@ def run_motors(
     """Fit; write robot file and report; show the result."""
     from omnidyn.identification.motors.study import identify_motors
 
-    study = identify_motors(loaded.runs, robot, question=question, now=now)
+    def told(words: str) -> None:
+        say(f"omnidyn: {words}")
+
+    study = identify_motors(loaded.runs, robot, question=question, logs=loaded.logs, now=now, tell=told)
     now("writing")
     _tell(study, robot, record, to)
 

@@ -73,7 +73,7 @@ def _page(found: Identification, record: dict[str, Any]) -> str:
     if found.study is not None:
         from omnidyn.report.steady_page import render_study
 
-        return render_study(found.study, record)
+        return render_study(found.study, record, verdict=found.verdict, verdicts=found.verdicts)
     from omnidyn.report.fit_page import render_fit
 
     return render_fit(found, record)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from omnidyn.document import all_of
-from omnidyn.findings.finding import FATAL, Verdict
 from omnidyn.identification.lack_of_fit import Remedy, named
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
@@ -17,7 +16,7 @@ from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
 from omnidyn.model.robot import GUESS
 
 LIMIT = "motor.current_limit_A"
-NEARLY = 0.7  # of what the best remedy explains, from which another is worth a word
+NEARLY = 0.7  # of what the first remedy explains, from which one behind it is worth a word
 WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
 LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
@@ -31,20 +30,6 @@ def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]
     words = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
     words += _from_validation(validation)
     return list(dict.fromkeys(words))
-
-
-def verdict_advice(verdicts: Sequence[Verdict]) -> list[str]:
-    """What to mend in logs of which `check` says that they give wrong results as they stand."""
-    alike: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for each in verdicts:
-        for finding in each.findings:
-            if finding.level == FATAL:
-                remedy = finding.remedy or "see omnidyn check"
-                alike.setdefault((finding.code, remedy), []).append((each.source, finding.message))
-    return [
-        f"{found[0][0]}{f' and {len(found) - 1} more' if len(found) > 1 else ''}: {found[0][1]}: {remedy}"
-        for (_, remedy), found in alike.items()
-    ]
 
 
 def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
@@ -80,15 +65,17 @@ def _axis(name: str) -> str:
 
 
 def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
-    """What would mend a model that leaves something out: the best remedies, and how to ask for them."""
+    """What would mend a model that leaves something out: the best remedy, and how to ask for it.
+
+    One, with those that the logs cannot tell from it: a confident remedy explains most of what is missing, so another
+    one explains the same in another way, and both together would be one too many.
+    """
     lack = fit.lack_of_fit
     if lack is None or not lack.found or fit.not_followed:
         return
-    told: set[str] = set()
-    for remedy in lack.remedies:
-        if remedy.key in told or not remedy.confident or remedy.chi2 < NEARLY * lack.remedies[0].chi2:
-            continue
-        told |= {remedy.key, *remedy.same_as}
+    near = (each for each in lack.remedies if each.confident and each.chi2 >= NEARLY * lack.remedies[0].chi2)
+    remedy = next(near, None)
+    if remedy is not None:
         alike = f"; these logs cannot tell it from {all_of(list(map(named, remedy.same_as)))}" if remedy.same_as else ""
         yield f"{remedy.words} would explain what the model leaves out{alike}: {how_to(remedy)}"
 

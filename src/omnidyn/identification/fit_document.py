@@ -8,6 +8,7 @@ from omnidyn.document import Document, Part, Points, Table, apart, interval_cell
 from omnidyn.findings.finding import FATAL, WARN, Verdict
 from omnidyn.identification.estimate import NOT_DETERMINED
 from omnidyn.identification.lack_of_fit import Diagnosis
+from omnidyn.identification.log_verdicts import checked
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_parts import Difference
@@ -15,6 +16,7 @@ from omnidyn.identification.validation import Validation
 from omnidyn.model.keys import in_words, unit
 
 SHOWN = 6  # findings of a log that are named
+MOST_LOGS = 20  # that are shown, one by one
 
 
 def fit_document(
@@ -39,7 +41,7 @@ def fit_document(
     data = {
         "method": OUTPUT_ERROR, **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
         "differences": [{**vars(each), "differs": each.differs} for each in differences], "next": advice,
-        "check": [{"source": each.source, "fatal": each.fatal, "counts": each.counts} for each in verdicts],
+        "check": checked(verdicts),
     }  # fmt: skip
     return Document(apart(*blocks), data, [words for fit in fits.values() for words in fit.warnings], ascii=True)
 
@@ -51,24 +53,28 @@ def _found(diagnosis: Diagnosis) -> list[Sequence[Part]]:
 
 
 def number_table(fit: OutputErrorEstimate) -> Table:
-    """Every fitted number, those of the log too."""
+    """Every fitted number, those of the log too, by its plain name and by its key."""
     rows = []
     for name, value in fit.value.items():
+        words = in_words(name) if in_words(name) != name else ""
         if name in fit.unidentifiable:
-            rows.append((name, f"{value:.5g}", "", "", unit(name), NOT_DETERMINED))
+            rows.append((words, name, f"{value:.5g}", "", "", unit(name), NOT_DETERMINED))
             continue
         mark = "at bound" if name in fit.at_bound else ""
-        rows.append((name, f"{value:.5g}", f"{fit.std[name]:.2g}", interval_cell(fit.ci95[name]), unit(name), mark))
+        std, interval = f"{fit.std[name]:.2g}", interval_cell(fit.ci95[name])
+        rows.append((words, name, f"{value:.5g}", std, interval, unit(name), mark))
     for name, own in fit.nuisances.items():
         if name in fit.unidentifiable:
-            rows.append((name, f"{own.value:.4g}", "", "", own.unit, NOT_DETERMINED))
+            rows.append(("", name, f"{own.value:.4g}", "", "", own.unit, NOT_DETERMINED))
         else:
-            rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, "of the log"))
+            rows.append(
+                ("", name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, "of the log")
+            )
     rows += [
-        (one.name, f"{one.value:.5g}", f"{one.std:.2g}", interval_cell(one.ci95), one.unit, one.words)
+        (one.words, one.name, f"{one.value:.5g}", f"{one.std:.2g}", interval_cell(one.ci95), one.unit, "together")
         for one in fit.combinations
     ]
-    return Table(("number", "value", "std error", "95 % interval", "unit", ""), rows)
+    return Table(("number", "key", "value", "std error", "95 % interval", "unit", ""), rows, "<<>>><<")
 
 
 def difference_table(differences: Sequence[Difference]) -> Table:
@@ -84,11 +90,18 @@ def difference_table(differences: Sequence[Difference]) -> Table:
 
 
 def verdict_table(verdicts: Sequence[Verdict]) -> Table:
-    """What `check` says of each log."""
-    rows = []
-    for each in verdicts:
+    """What `check` says of each log; of many logs the gravest, then a line for the rest."""
+    rows, shown = [], list(verdicts)
+    if len(shown) > MOST_LOGS:
+        shown = sorted(shown, key=lambda each: (-each.counts[FATAL], -each.counts[WARN]))[: MOST_LOGS - 1]
+    for each in shown:
         what = [f"{f.code} {f.where}".rstrip() for f in each.findings if f.level in (FATAL, WARN)]
         words = ", ".join(what[:SHOWN]) + (", ..." if len(what) > SHOWN else "")
         rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[FATAL]),
                      str(each.counts[WARN]), words or "fit for use"))  # fmt: skip
+    rest = len(verdicts) - len(shown)
+    if rest:
+        fit = len(verdicts) - sum(each.counts[FATAL] + each.counts[WARN] > 0 for each in verdicts)
+        told = f"no worse than these; of all {len(verdicts)} logs, {fit} have nothing to heed"
+        rows.append((f"and {rest} more", "", "", "", "", "", told))
     return Table(("log", "rows", "length s", "rate Hz", "fatal", "to heed", "what"), rows)

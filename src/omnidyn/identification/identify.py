@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.document import Document, apart, sentence
+from omnidyn.document import Document, Points, apart, sentence
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.findings.check import check_log
-from omnidyn.findings.finding import FATAL, Verdict
+from omnidyn.findings.finding import Verdict
 from omnidyn.findings.needs import why_no_inputs
-from omnidyn.identification.advice import advice, verdict_advice
+from omnidyn.identification.advice import advice
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
+from omnidyn.identification.log_verdicts import checked, log_verdicts, unfit, verdict_advice
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit
@@ -46,7 +46,6 @@ if TYPE_CHECKING:
 Tell = Callable[[str], object]
 
 LINE = "line"  # a shape: the paper's line on each axis
-CHECKED = 1_000_000  # rows that are checked on the way
 CUT_SHORT = "the numbers are the best so far, not the best there are"
 NOT_COMPARED = "the numbers are those of the whole fit, but nothing was compared with them"
 
@@ -165,7 +164,7 @@ class Identification(Shown):
             raise UnsupportedError("motors have functions of their own", got=MOTORS, where="what")
         asked = settle_method(every, robot, asked, heard.tell)
         if asked.method == STEADY_STATE:
-            return _steady(every, robot, asked)
+            return _steady(every, robot, asked, log_verdicts(logs, robot, heard.now, heard.tell))
         why = why_not_output_error(every, robot) if robot.drive.kind == SPEED else ""
         if why:
             heard.tell(f"{why}; `method` {STEADY_STATE} (`group` instead of `per`) answers in seconds")
@@ -187,11 +186,7 @@ class Identification(Shown):
             if missed := fit_failure(fit, (self.validations or {}).get(group)):
                 where = f"{group}: " if len(self.estimates) > 1 else ""
                 words.append(f"{where}{missed}")
-        for verdict in self.verdicts:
-            found = [finding.message for finding in verdict.findings if finding.level == FATAL]
-            if found:
-                words.append(f"{verdict.source or 'the log'} is not fit for use as it stands: {'; '.join(found)}")
-        return tuple(each for each in words if each)
+        return tuple(each for each in (*words, *unfit(self.verdicts)) if each)
 
     @property
     def estimate(self) -> Estimate:
@@ -216,13 +211,17 @@ class Identification(Shown):
     def _told(self) -> Document:
         if self.study is not None:
             told = study_document(self.study)
-            return replace(told, data={"ok": not self.failures, **told.data})
+            return replace(told, data={"ok": not self.failures, **told.data, "check": checked(self.verdicts)})
         if self.method == OUTPUT_ERROR:
             told = fit_document(self.fits, self.validations or {}, self.differences, self.verdicts, self.advice)
             return replace(told, data={"ok": not self.failures, **told.data})
         lines = {group: estimate.document() for group, estimate in self.estimates.items()}
-        data = {"shape": self.question.shape, "groups": {group: each.data for group, each in lines.items()}}
-        return Document(apart(*(each.parts for each in lines.values())), data, ascii=True)
+        data = {
+            "ok": not self.failures, "shape": self.question.shape,
+            "groups": {group: each.data for group, each in lines.items()}, "check": checked(self.verdicts),
+        }  # fmt: skip
+        mend = [Points(self.advice, "next:", "next")] if self.advice else []
+        return Document(apart(*(each.parts for each in lines.values()), mend), data, ascii=True)
 
     @property
     def fits(self) -> dict[str, OutputErrorEstimate]:
@@ -243,15 +242,20 @@ def _silent(words: str) -> None:
     """Nobody hears."""
 
 
-def _steady(runs: Sequence[Run], robot: Robot, asked: Question) -> Identification:
+def _steady(runs: Sequence[Run], robot: Robot, asked: Question, verdicts: tuple[Verdict, ...] = ()) -> Identification:
     names = group_names([run.source for run in runs], asked.group, "group") if asked.group else None
     used = runs if names is None else [run for run, name in zip(runs, names, strict=True) if name]
     groups = None if names is None else [name for name in names if name]
     plain = replace(asked, group=())
+    mend = tuple(verdict_advice(verdicts))
     if asked.shape == LINE:
-        return Identification(asked, STEADY_STATE, identify_lines(used, robot, groups=groups, question=plain))
+        lines = identify_lines(used, robot, groups=groups, question=plain)
+        return Identification(asked, STEADY_STATE, lines, verdicts=verdicts, advice=mend)
     study = identify_steady(used, robot, groups=groups, question=plain)
-    return Identification(asked, STEADY_STATE, study.estimates, study.differences, study=study, advice=study.advice)
+    study = replace(study, advice=(*mend, *study.advice))
+    return Identification(
+        asked, STEADY_STATE, study.estimates, study.differences, study=study, verdicts=verdicts, advice=study.advice
+    )
 
 
 def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[Log], heard: _Heard) -> Identification:
@@ -262,7 +266,7 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
     names = list(dict.fromkeys(group for _, group in fitted))
     if asked.per and len(names) == 1:
         raise InputError("the logs have only one group", got=names[0], expected="two or more", where="per")
-    verdicts = _verdicts(logs, robot, heard)
+    verdicts = log_verdicts(logs, robot, heard.now, heard.tell)
     heard.now("fitting: loading")
     plain = replace(asked, per=(), hold_out=())
     answer, cut = _answered(
@@ -285,7 +289,7 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
         own = advice(fit, validations.get(group))
         words += own if len(answer.estimates) == 1 else [f"{group}: {each}" for each in own]
     return Identification(
-        asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, tuple(verdicts), tuple(words), cut
+        asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, verdicts, tuple(words), cut
     )
 
 
@@ -297,21 +301,6 @@ def _not_independent(runs: Sequence[Run], held: Sequence[bool]) -> list[str]:
         f"{run.source} is held out, and the same recording as {fitted[mark]}, which is fitted: hold out another"
         for mark, run, out in zip(marks, runs, held, strict=False) if out and mark in fitted
     ]  # fmt: skip
-
-
-def _verdicts(logs: Sequence[Log], robot: Robot, heard: _Heard) -> list[Verdict]:
-    """What check says of the logs, where they are not too long; fatal findings are told at once."""
-    if sum(len(log) for log in logs) > CHECKED:
-        heard.tell("the logs are long: not checked on the way (omnidyn check does)")
-        return []
-    found = []
-    for k, log in enumerate(logs):
-        heard.now(f"checking {k + 1} of {len(logs)}")
-        found.append(check_log(log, robot))
-        for finding in found[-1].findings:
-            if finding.level == FATAL:
-                heard.tell(f"warning: {log.source}: {finding.message}: {finding.remedy}")
-    return found
 
 
 def _answered(

@@ -20,7 +20,7 @@ def to_dataframe(run: Run) -> DataFrame:
     try:
         import pandas  # pyright: ignore[reportMissingImports]
     except ImportError:
-        raise MissingExtraError("a data frame needs pandas", remedy="pip install pandas") from None
+        raise MissingExtraError("a data frame needs pandas", remedy='pip install "omnidyn[arrays]"') from None
     columns = run_columns(run)
     index = pandas.Index(columns.pop("t_s"), name="t_s")
     frame = pandas.DataFrame(columns, index=index)

@@ -188,7 +188,7 @@ def _signed(log: Log, robot: Robot | None) -> Log:
     """Currents of a sensor without sign, with the sign of the commanded speed, else of the voltage or duty."""
     if "current" not in log.channels:
         return log
-    sign, origin = _direction(log, robot)
+    sign, origin = driven_way(log, robot)
     if sign is None or sign.shape != log.channels["current"].shape:
         raise InputError(
             "cannot give unsigned currents a sign", got=", ".join(log.channels),
@@ -200,8 +200,8 @@ def _signed(log: Log, robot: Robot | None) -> Log:
     return replace(log, channels=channels, current_unsigned=True, notes=(*log.notes, note))
 
 
-def _direction(log: Log, robot: Robot | None) -> tuple[FloatArray | None, str]:
-    """Which way each motor is driven, -1, 0 or 1. Shape (rows, wheels)."""
+def driven_way(log: Log, robot: Robot | None) -> tuple[FloatArray | None, str]:
+    """(which way each motor is driven, -1, 0 or 1, shape (rows, wheels); what says so); (None, "") if nothing does."""
     speed = log.channels.get("wheel_speed_command")
     if speed is None and robot is not None and "twist_command" in log.channels:
         twist = log.channels["twist_command"]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
+
+import numpy as np
 
 from omnidyn.comparison.bands import FEW, with_bands
 from omnidyn.comparison.result import Comparison
@@ -13,9 +16,9 @@ from omnidyn.document import Points
 from omnidyn.identification.fit_document import difference_table, number_table, verdict_table
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.validation import Validation, output_name
+from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name
+from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.path import Path, body_twist, driven, path_of
-from omnidyn.model.keys import in_words
 from omnidyn.model.known.uncertainty import DRAWS
 from omnidyn.model.robot import Robot
 from omnidyn.report.dead_zone_section import dead_zone_section
@@ -23,7 +26,7 @@ from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.misfit import draw_misfit
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
-from omnidyn.report.figures.residuals import draw_residuals
+from omnidyn.report.figures.residuals import draw_residuals, residuals_of
 from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, section
 from omnidyn.report.plots import draw_estimates
 from omnidyn.report.style import Picture
@@ -51,14 +54,14 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     residuals = "".join(_residuals(g, fits[g], v) for g, v in validations.items())
     numbers = _each(fits, lambda group, fit: content(number_table(fit)))
     sections = [
-        section("findings", "What the data say", Points(_findings(fits, validations))),
         section("warnings", "Warnings", Points(warnings), none="None."),
         section("next", "What to measure next", Points(advice), none="Nothing: every number is well determined."),
         Section("runs", "Measured and model", _each(validations, partial(_runs, fits))),
         Section("misfit", "What the model leaves out", _each(fits, _misfit)),
         section("friction", "Friction against speed", friction),
-        dead_zone_section({group: fit.robot for group, fit in fits.items()}),
         *([section("path", "Where the logs went", draw_path(travelled))] if travelled else []),
+        section("findings", "What the data say", Points(_findings(fits, validations))),
+        dead_zone_section({group: fit.robot for group, fit in fits.items()}),
         Section("rests", "What the numbers rest on", _each(fits, _rests)),
         Section("residuals", "Residuals", residuals),
         Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
@@ -77,10 +80,10 @@ def _named(group: str, words: str, fits: Mapping[str, Any]) -> str:
 def _findings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
     found = [_named(group, words, fits) for group, each in validations.items() for words in each.statements()]
     for group, fit in fits.items():
-        for name, value, _, interval, unit, mark in number_table(fit).rows:
+        for words, name, value, _, interval, unit, mark in number_table(fit).rows:
             if name in fit.nuisances:
                 continue  # of the log, not of the robot: they stand in the table
-            plain = f"{in_words(name)}, " if in_words(name) != name else ""
+            plain = f"{words}, " if words else ""
             known = f" = {value} {unit}".rstrip() + f", 95 % {interval}" if interval else ""
             found.append(_named(group, f"{plain}{name}{known}{f' ({mark})' if mark else ''}", fits))
     return found
@@ -154,9 +157,26 @@ def _residuals(group: str, fit: OutputErrorEstimate, validation: Validation) -> 
         logs.append(("held-out", validation.held_out, ", logs held out"))
     found = []
     for which, comparison, words in logs:
-        noise = {key: fit.noise[name] for key in comparison.channels if (name := output_name(key)) in fit.noise}
+        noise = _noise(fit, validation.scores[FITTED if which == "fitted" else HELD_OUT], comparison)
         found.append(figure(draw_residuals(comparison, noise, _anchor(f"residuals-{which}{group}"), words)))
     return "".join(found)
+
+
+def _noise(fit: OutputErrorEstimate, scores: Mapping[str, Score], comparison: Comparison) -> dict[str, float]:
+    """Component -> std of its errors where the model leaves nothing but noise, in SI.
+
+    Of a counted angle the noise of the fit is that before its encoder rounds: rounding adds to it, and chi2 of the
+    score, which allows for both, says how much.
+    """
+    found = {}
+    for key in comparison.channels:
+        name, score = output_name(key), scores.get(key)
+        if name not in fit.noise:
+            continue
+        found[key] = fit.noise[name]
+        if score is not None and score.chi2 and component_channel(key) == "wheel_angle":
+            found[key] = math.sqrt(float(np.mean(residuals_of(comparison, key) ** 2)) / score.chi2)
+    return found
 
 
 def _correlations(fits: Fits) -> list[str]:

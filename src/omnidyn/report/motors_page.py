@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from omnidyn.identification.fit_document import verdict_table
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.html import page, section
@@ -23,13 +24,17 @@ FREE_RUNS = (
 def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     """The page of the motors, as HTML."""
     told = study.document()
-    pictures = [] if study.windows is None else [draw_motor_lines(study.motors, study.windows)]
+    windows = study.windows or study.drawn
+    pictures = [] if windows is None else [draw_motor_lines(study.motors, windows, study.starts)]
     sections = [
-        section("findings", "What the data say", told["statements"]),
         section("warnings", "Warnings", told["warnings"], none="None."),
-        *([section("figures", "Figures", *pictures)] if pictures else []),
+        *([section("next", "What to mend", told["next"])] if study.advice else []),
+        *([section("figures", "What each motor needs", *pictures)] if pictures else []),
+        section("findings", "What the data say", told["statements"]),
         *([section("starts", "Where each direction starts", told["starts"])] if study.starts else []),
         section("numbers", "Numbers, with 95 % intervals", told["motors"]),
     ]
+    if study.verdicts:
+        sections += [section("logs", "What check says of the logs", verdict_table(study.verdicts))]
     how = WINDOWS if study.windows is not None else FREE_RUNS
     return page("Motors from logs", how, sections, provenance, verdict=study.verdict)

@@ -13,6 +13,7 @@ from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.friction_curve import FrictionCurve, friction_curve, sliding_force
 from omnidyn.identification.identify import Identification
+from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.logs.path import path_of
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
@@ -20,6 +21,7 @@ from omnidyn.model.sliding import top_speeds
 from omnidyn.report.figures.channels import draw_run
 from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 from omnidyn.report.figures.friction_speed import draw_friction_speed, speeds_up_to
+from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
 from omnidyn.report.figures.raw_log import draw_raw_log
@@ -68,6 +70,13 @@ def _verdict(verdict: Verdict) -> Picture:
     return draw_raw_log(verdict.log, verdict)
 
 
+def _motors(study: MotorStudy) -> Picture:
+    windows = study.windows or study.drawn
+    if windows is None:
+        raise InputError("the logs have no windows to draw", expected="motors that turn, at more than 10 rows a second")
+    return draw_motor_lines(study.motors, windows, study.starts)
+
+
 def _of_file(robot: Robot) -> list[FrictionCurve]:
     """The curves of a robot as its file has it."""
     curves = []
@@ -96,4 +105,5 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     Comparison: draw_overlay,
     Estimate: lambda estimate: draw_estimates({WHOLE: estimate}),
     Identification: lambda found: draw_estimates(found.estimates),
+    MotorStudy: _motors,
 }

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from omnidyn.findings.finding import Verdict
+from omnidyn.identification.fit_document import verdict_table
 from omnidyn.identification.steady.operating_points import SPEEDS
 from omnidyn.identification.steady.study import SteadyStudy
 from omnidyn.identification.steady.study_table import study_document
@@ -17,8 +19,11 @@ from omnidyn.report.html import page, section
 from omnidyn.report.plots import draw_estimates
 
 
-def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
-    """The page of a steady-state study, as HTML."""
+def render_study(
+    study: SteadyStudy, provenance: Mapping[str, Any], *, verdict: str = "", verdicts: Sequence[Verdict] = ()
+) -> str:
+    """The page of a steady-state study, as HTML. verdict: what it came to; "" is the study's own word. verdicts: of
+    `check` on each log."""
     points, told = study.points, study_document(study)
     introduction = (
         f"Friction of {study.robot.name} from stretches of constant speed: there it balances what the motors push. "
@@ -26,15 +31,16 @@ def render_study(study: SteadyStudy, provenance: Mapping[str, Any]) -> str:
     )
     errors, *pictures = shape_pictures(study)
     sections = [
-        section("findings", "What the data say", told["statements"]),
         section("warnings", "Warnings", told.joined("warnings", "warnings of fits"), none="None."),
         section("next", "What to measure next", told["next"], none="Nothing: every number is well determined."),
         section("forces", "Forces", *pictures),
         section("friction", "Friction against speed", draw_estimates(study.estimates, driven=driven([points.twist]))),
+        section("findings", "What the data say", told["statements"]),
         section("shapes", "Which shape", errors, told["shapes"]),
         section("levels", "Friction, with 95 % intervals", told["levels"]),
         dead_zone_section({group: each.robot for group, each in study.estimates.items()}),
         section("data", "What was used", told["travel"]),
     ]
-    title, verdict = f"{study.robot.name}: friction from logs", steady_verdict(study)
-    return page(title, introduction, sections, provenance, verdict=verdict)
+    sections += [section("logs", "What check says of the logs", verdict_table(verdicts))] if verdicts else []
+    title = f"{study.robot.name}: friction from logs"
+    return page(title, introduction, sections, provenance, verdict=verdict or steady_verdict(study))

@@ -1,5 +1,7 @@
 """Dead, stuck, quantised, spiky and missing channels."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -22,6 +24,21 @@ def test_a_flat_line_is_dead(log, robot, with_channels, grave, channel, letter):
     verdict = check(with_channels(**{channel: values}), robot)
     assert [finding.where for finding in verdict.of("dead")] == [f"{letter}2"]
     assert grave(verdict) == {"dead"}
+
+
+def test_a_current_that_was_given_no_sign_is_not_dead(log, robot, with_channels, grave):
+    """Unsigned currents get 0 for a sign where a wheel is commanded to stand, as one is in each main direction."""
+    command, current = log.channels["wheel_speed"].copy(), np.abs(log.channels["current"])
+    command[:, 1] = 0.0
+    signed = replace(
+        with_channels(wheel_speed_command=command, current=current * np.sign(command)), current_unsigned=True
+    )
+    assert check(signed, robot).of("dead") == ()
+    dead = replace(
+        with_channels(wheel_speed_command=log.channels["wheel_speed"], current=current * np.sign(command)),
+        current_unsigned=True,
+    )
+    assert [finding.where for finding in check(dead, robot).of("dead")] == ["i2"]
 
 
 def test_a_sensor_that_is_noise_only_is_dead(log, robot, with_channels, grave):

@@ -15,6 +15,7 @@ from omnidyn.findings.values.stuck import check_stuck
 from omnidyn.logs.channels import place
 from omnidyn.logs.columns.mapping import SIDED, component_channel
 from omnidyn.logs.log import MAX_MISSING
+from omnidyn.logs.read_log import driven_way
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.units import known_unit
 
@@ -168,6 +169,8 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
         turned = speed is not None and k < speed.shape[1] and _moves(speed[:, k])
         return f"current and speed of motor {k + 1} change" if driven and turned and not all_flat else ""
     if channel == "current":
+        if work.log.current_unsigned and not _driven(work, k):
+            return ""  # 0 is what it was given for a sign
         for other in ("voltage", "duty"):
             values = work.get(other)
             if values is not None and k < values.shape[1] and _moves(values[:, k]):
@@ -211,6 +214,12 @@ def spread_of_motion(values: FloatArray) -> float:
     """How far a channel gets from 0, without its wildest rows."""
     values = values[np.isfinite(values)]
     return float(np.quantile(np.abs(values), 0.95)) if values.size else 0.0
+
+
+def _driven(work: LogUnderCheck, k: int) -> bool:
+    """Whether what gives an unsigned current its sign ever drives motor k."""
+    way, _ = driven_way(work.log, work.geometry)
+    return way is None or k >= way.shape[1] or bool((np.abs(way[:, k]) > 0.0).any())
 
 
 def _wheel_moves(work: LogUnderCheck, k: int) -> bool:

@@ -5,38 +5,46 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from omnidyn.document import Document, Points, Table
+from omnidyn.document import Document, Points, Table, sentence
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.findings.finding import Verdict
 from omnidyn.identification.grouping import held_out
+from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, unfit, verdict_advice
 from omnidyn.identification.motors.choice import is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.free_run import fit_rmse
 from omnidyn.identification.motors.line import fit_line
-from omnidyn.identification.motors.log import MotorLog, motor_logs
+from omnidyn.identification.motors.log import GROUND, MotorLog, motor_logs
 from omnidyn.identification.motors.start import STARTS_HEAD, MotorStart, motor_starts
 from omnidyn.identification.motors.static import is_slow, points_of_logs, starts_of_points, windows_of_points
 from omnidyn.identification.motors.verdict import motors_verdict, none_answers
 from omnidyn.identification.motors.windows import MotorWindows, motor_windows
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import MOTOR_FIT, MOTOR_LINES, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
+from omnidyn.shown import FIGURE, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, eq=False)
-class MotorStudy:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotorStudy(Shown):
     """motors: an estimate each, the last for all together where there are several in windows.
 
     plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
-    found. windows: that the lines go through, None of free runs. starts: each direction of each motor by itself, with
-    the input at which it sets off. supply [V]: of a duty, the mean of the logs; NaN where it is not logged.
-    log_warnings: of the logs, in words; `warnings` has those of each motor too.
+    found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts: each
+    direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the logs;
+    NaN where it is not logged. log_warnings: of the logs, in words; `warnings` has those of each motor too. verdicts:
+    of `check` on each log.
     """
 
     method: str
@@ -49,6 +57,18 @@ class MotorStudy:
     starts: tuple[MotorStart, ...] = ()
     supply: float = math.nan
     log_warnings: tuple[str, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
+    drawn: MotorWindows | None = None
+
+    def __repr__(self) -> str:
+        return f"<MotorStudy {self.kind} [{self.unit}], {self.verdict}>"
+
+    def plot(self) -> Figure:
+        """Input against speed, with the lines and where each motor starts, as a matplotlib Figure.
+
+        Raises InputError where the logs have no windows to draw.
+        """
+        return make(FIGURE, self)
 
     @property
     def statements(self) -> tuple[str, ...]:
@@ -65,13 +85,20 @@ class MotorStudy:
 
     @property
     def verdict(self) -> str:
-        """Which motors answer to their input, and at which input they start, in a sentence."""
+        """Which motors answer to their input, and at which input they start, in a sentence; failures first."""
+        if faults := unfit(self.verdicts):
+            return sentence(f"failed: {'; '.join(faults)}: the numbers mean nothing until that is mended")
         return motors_verdict(self.motors, self.starts)
 
     @property
     def failed(self) -> bool:
-        """Whether no motor is seen to answer to its input: the numbers mean nothing."""
-        return none_answers(self.motors, self.starts)
+        """Whether the numbers mean nothing: no motor is seen to answer to its input, or `check` finds a log unfit."""
+        return bool(unfit(self.verdicts)) or none_answers(self.motors, self.starts)
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to mend in the logs."""
+        return tuple(verdict_advice(self.verdicts))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -97,6 +124,7 @@ class MotorStudy:
             Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
             *([Table(STARTS_HEAD, [each.row() for each in self.starts], name="starts"), ""] if self.starts else []),
             Points(self.statements, name="statements"), Points(self.warnings, "warning:", "warnings"),
+            Points(self.advice, "next:", "next"),
         ]  # fmt: skip
         return Document(parts, self.to_dict(), self.warnings, verdict=self.verdict)
 
@@ -110,23 +138,24 @@ class MotorStudy:
             "unit": self.unit, "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
             "starts": [each.to_dict() for each in self.starts], "statements": list(self.statements),
-            "warnings": list(self.warnings),
+            "warnings": list(self.warnings), "next": list(self.advice), "check": checked(self.verdicts),
         }  # fmt: skip
 
 
 @shows_options(MOTOR_FIT, MOTOR_LINES)
 def identify_motors(
     runs: Run | Sequence[Run] | MotorTable, robot: Robot | None = None, *, question: Question | None = None,
-    now: Callable[[str], object] = lambda words: None, **options: Unpack[Options],
+    logs: Sequence[Log] = (), now: Callable[[str], object] = lambda words: None,
+    tell: Callable[[str], object] = lambda words: None, **options: Unpack[Options],
 ) -> MotorStudy:  # fmt: skip
     """Slope, dead band, lag and inertia of every motor of some logs.
 
     Steady state, which is the default, takes windows in integral form and gives the line of all motors together too;
     output error takes free runs of whole logs, with and without a dead band. question, options: see `Question`, such as
-    method=, input=, window= or hold_out=. robot: whose heading is the speed, where that is "ground". now: is told what
-    is done. runs may be a table of inputs and steady speeds, `read_motor_table`, and rows of a log that are more than
-    0.1 s apart are points like those of a table. Each direction of each motor has its own start, stop, line and lag in
-    `MotorStudy.starts`.
+    method=, input=, window= or hold_out=. robot: whose heading is the speed, where that is "ground". logs: where the
+    runs come from, to be checked as well. now: is told what is done; tell: what a user must know at once. runs may be a
+    table of inputs and steady speeds, `read_motor_table`, and rows of a log that are more than 0.1 s apart are points
+    like those of a table. Each direction of each motor has its own start, stop, line and lag in `MotorStudy.starts`.
     Raises InputError for options of another method and for a run without the channels, InsufficientDataError where the
     motors say nothing.
     """
@@ -137,9 +166,13 @@ def identify_motors(
                              expected="logs, or `method` steady-state", where="method")  # fmt: skip
         return _of_points(runs, "a table", ())
     every = as_list(runs)
+    more = ["pose"] if asked.speed == GROUND else []
+    verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, now, tell)
     if asked.method_asked() == OUTPUT_ERROR:
-        return _free_runs(every, asked, now)
-    return _lines(motor_logs(every, asked.input, asked.speed, robot), asked)
+        study = _free_runs(every, asked, now)
+    else:
+        study = _lines(motor_logs(every, asked.input, asked.speed, robot), asked)
+    return replace(study, verdicts=verdicts)
 
 
 def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
@@ -188,9 +221,12 @@ def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object
         pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
-    starts = starts_of_points(points_of_logs(logs)) if is_slow(logs) else motor_starts(logs, _windows_of(logs), motors)
+    slow = is_slow(logs)
+    seen = None if slow else _windows_of(logs)
+    starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
     return MotorStudy(
-        OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs)
+        OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs),
+        drawn=seen,
     )  # fmt: skip
 
 

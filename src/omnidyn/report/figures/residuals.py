@@ -7,8 +7,9 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.comparison.aligned import errors_for_whiteness
 from omnidyn.comparison.result import Comparison
-from omnidyn.comparison.traces import unit
+from omnidyn.comparison.traces import Trace, unit
 from omnidyn.comparison.whiteness import whiteness
+from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.report.style import BLUE, GREY, INK, PALE, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
 
 MOST, LAGS, BINS, SPAN = 4, 20, 41, 4.5
@@ -20,19 +21,18 @@ def draw_residuals(comparison: Comparison, noise: dict[str, float], name: str = 
 
     noise: component -> std; without one the errors are divided by their own. of: which logs, in words.
     """
-    robot = comparison.robots[0]
-    traces = {key: [comparison.trace(robot, key, s) for s in comparison.segments] for key in comparison.channels}
+    traces = _traces(comparison)
     shown = comparison.channels[:MOST]
     height = HEIGHT * len(shown) + 0.75
     with look():
         figure = new_figure(WIDTH, height)
         panels = figure.subplots(len(shown), 2, squeeze=False)
         figure.subplots_adjust(
-            left=0.1, right=0.975, top=1.0 - 0.3 / height, bottom=0.5 / height, hspace=0.32, wspace=0.24
+            left=0.13, right=0.975, top=1.0 - 0.3 / height, bottom=0.5 / height, hspace=0.32, wspace=0.24
         )
         for (left, right), key in zip(panels, shown, strict=True):
             errors = errors_for_whiteness(key, traces)
-            known = np.concatenate([e[np.isfinite(e)] for e in errors])
+            known = _known(errors)
             std = noise.get(key) or float(np.std(known)) or 1.0
             _histogram(left, known / std)
             left.set_ylabel(key)
@@ -54,9 +54,25 @@ def draw_residuals(comparison: Comparison, noise: dict[str, float], name: str = 
         caption = (
             f"Errors of the free run{of}. Left: their histogram (blue) and the normal curve that the intervals assume "
             "(dashed); wider shoulders mean outliers. Right: bars beyond the grey band mean that errors last: "
-            f"noise with a memory, or what the model misses. Noise of the fit: {sizes or 'not known'}."
+            f"noise with a memory, or what the model misses. Noise: {sizes or 'not known'}."
         )
+        if any(component_channel(key) == "wheel_angle" for key in shown):
+            caption += " Rounding by an encoder adds to that of an angle, and makes it flat."
         return picture(name, f"What the model leaves{of}", caption, figure)
+
+
+def residuals_of(comparison: Comparison, component: str) -> FloatArray:
+    """Errors of a component over all pieces, without what the start was off by. Shape (n,), in SI."""
+    return _known(errors_for_whiteness(component, _traces(comparison)))
+
+
+def _traces(comparison: Comparison) -> dict[str, list[Trace]]:
+    robot = comparison.robots[0]
+    return {key: [comparison.trace(robot, key, s) for s in comparison.segments] for key in comparison.channels}
+
+
+def _known(errors: list[FloatArray]) -> FloatArray:
+    return np.concatenate([each[np.isfinite(each)] for each in errors])
 
 
 def _histogram(axes, scaled: FloatArray) -> None:

@@ -1,0 +1,77 @@
+"""What `check` says of the logs behind an identification, and what of it keeps the numbers from meaning anything."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from omnidyn.findings.check import check_log
+from omnidyn.findings.finding import FATAL, Finding, Verdict
+from omnidyn.logs.log import Log
+from omnidyn.model.robot import Robot
+
+Tell = Callable[[str], object]
+
+CHECKED = 1_000_000  # rows that are checked on the way
+OF_MOTORS = ("voltage", "duty", "current", "supply", "wheel_speed", "wheel_angle")
+
+
+def log_verdicts(logs: Sequence[Log], robot: Robot | None, now: Tell, tell: Tell) -> tuple[Verdict, ...]:
+    """What check says of each log, where they are not too long; `tell` hears of fatal findings at once."""
+    if sum(len(log) for log in logs) > CHECKED:
+        tell("the logs are long: not checked on the way (omnidyn check does)")
+        return ()
+    found = []
+    for k, log in enumerate(logs):
+        now(f"checking {k + 1} of {len(logs)}")
+        found.append(check_log(log, robot))
+    for words in verdict_advice(found):
+        tell(f"warning: {words}")
+    return tuple(found)
+
+
+def of_motors(log: Log, *more: str) -> Log:
+    """The log with what concerns motors alone, and channels `more`: on a bench, neither body nor heading need move."""
+    kept = {name: each for name, each in log.channels.items() if name in (*OF_MOTORS, *more)}
+    return replace(log, channels=kept)
+
+
+def verdict_advice(verdicts: Sequence[Verdict]) -> list[str]:
+    """What to mend in logs of which `check` says that they give wrong results as they stand."""
+    alike: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
+    for each in verdicts:
+        for finding in _fatal(each):
+            alike.setdefault((finding.code, finding.remedy), []).append((each.source, finding))
+    return [
+        f"{_first(source for source, _ in found)}: {found[0][1].message}: {remedy or 'see omnidyn check'}"
+        for (_, remedy), found in alike.items()
+    ]
+
+
+def unfit(verdicts: Sequence[Verdict]) -> list[str]:
+    """Which logs are not fit for use as they stand, and why, in words: those with the same faults together."""
+    alike: dict[tuple[str, ...], list[Verdict]] = {}
+    for each in verdicts:
+        if each.fatal:
+            alike.setdefault(tuple(finding.code for finding in _fatal(each)), []).append(each)
+    return [
+        f"{_first(each.source for each in found)} {'is' if len(found) == 1 else 'are'} not fit for use as "
+        f"{'it stands' if len(found) == 1 else 'they stand'}: {'; '.join(each.message for each in _fatal(found[0]))}"
+        for found in alike.values()
+    ]
+
+
+def checked(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """The verdicts as JSON has them beside a fit."""
+    return [{"source": each.source, "fatal": each.fatal, "counts": each.counts} for each in verdicts]
+
+
+def _fatal(verdict: Verdict) -> list[Finding]:
+    return [finding for finding in verdict.findings if finding.level == FATAL]
+
+
+def _first(sources: Iterator[str]) -> str:
+    """ "exp00.csv and 215 more" """
+    names = [name or "the log" for name in sources]
+    return f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}"

@@ -1,0 +1,45 @@
+"""What to do next after a fit to whole logs: nothing that would undo something else that is asked for."""
+
+import numpy as np
+
+from omnidyn.identification.advice import advice
+from omnidyn.identification.estimate import Correlation
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
+from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.model.robot_file import load_robot
+
+DISC = Remedy("friction.direction", "friction along the direction of travel", 0.5, 0.1, share=0.95, chi2=1000.0)
+WHEELS = Remedy("friction.wheels", "friction at each wheel", 0.4, 0.1, share=0.9, chi2=900.0)
+MASS = Remedy("body.mass_kg", "another mass, 2.1 kg", 0.5, 0.1, ("gain",), share=0.95, chi2=1000.0)
+GAIN = Remedy("gain", "voltages 0.8 times those logged", 0.5, 0.1, ("body.mass_kg",), share=0.95, chi2=999.0)
+SAG = Remedy("sag", "a supply that sags under load", 0.6, 0.1, share=0.99, offered=False, chi2=1200.0)
+
+
+def missing(*remedies):
+    """What is advised where these would mend the model."""
+    lack = LackOfFit(True, {"vx": 0.5}, {"vx": 0.1}, (), remedies, {})
+    fit = OutputErrorEstimate(
+        robot=load_robot("axebot"), value={}, std={}, ci95={}, correlation=Correlation((), np.eye(0)),
+        degrees_of_freedom={}, study=lambda: Diagnosis(lack, {}),
+    )  # fmt: skip
+    return [words for words in advice(fit, None) if "would explain" in words]
+
+
+def test_of_remedies_that_explain_the_same_only_the_first_is_advised():
+    """Two shapes of friction, each of which explains what is missing: both together would be one too many."""
+    assert missing(DISC, WHEELS) == [
+        "friction along the direction of travel would explain what the model leaves out: put friction.direction into "
+        "the robot file, and fit again"
+    ]
+
+
+def test_what_the_logs_cannot_tell_apart_is_one_advice():
+    (words,) = missing(MASS, GAIN, DISC)
+    assert "cannot tell it from gain" in words
+    assert "measure or weigh one of them" in words
+
+
+def test_what_explains_much_less_than_the_first_is_not_advised():
+    weak = Remedy("friction.wheels", "friction at each wheel", 0.4, 0.1, share=0.75, chi2=600.0)
+    assert missing(SAG, weak) == []
+    assert len(missing(SAG, DISC)) == 1
