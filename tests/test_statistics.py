@@ -14,6 +14,7 @@ from omnidyn.statistics import (
     drawn_times,
     errors_in_variables,
     find_tick,
+    homogeneity,
     huber_loss,
     huber_mean,
     huber_weight,
@@ -262,3 +263,17 @@ def test_the_tick_of_a_wheel_that_never_turns_by_one_is_found():
         assert find_tick(np.round(counts * q, 5)) == pytest.approx(q, rel=1e-4)
     assert find_tick(np.cumsum(rng.uniform(0.1, 0.3, 800))) == 0.0
     assert find_tick(np.cumsum(rng.choice([0.10, 0.13], 800))) == 0.0  # two speeds have a common measure by chance
+
+
+def test_homogeneity_of_independent_estimates_is_cochrans_q():
+    values, std = np.array([1.0, 1.4, 0.7]), np.array([0.1, 0.2, 0.15])
+    weight = std**-2
+    mean = (weight @ values) / weight.sum()
+    chi2, degrees = homogeneity(values, np.diag(std**2))
+    assert (chi2, degrees) == (pytest.approx(weight @ (values - mean) ** 2), 2)
+
+
+def test_homogeneity_of_two_estimates_is_their_difference_over_its_error():
+    covariance = np.array([[0.04, 0.018], [0.018, 0.09]])
+    chi2, degrees = homogeneity(np.array([1.0, 1.7]), covariance)
+    assert (chi2, degrees) == (pytest.approx(0.7**2 / (0.04 + 0.09 - 2.0 * 0.018)), 1)

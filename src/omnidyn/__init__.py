@@ -34,6 +34,7 @@ _HOME = {
     "compare": "omnidyn.comparison.compare",
     "dead_zone": "omnidyn.model.known.dead_zone",
     "dead_zone_map": "omnidyn.model.deadzone",
+    "drift": "omnidyn.comparison.drift",
     "fit_output_error": "omnidyn.identification.whole_logs",
     "fit_steady_state": "omnidyn.identification.steady.steady_state",
     "identify": "omnidyn.identification.identify",
@@ -60,6 +61,7 @@ __all__ = ["__version__", *_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 
 if TYPE_CHECKING:
     from omnidyn.comparison.compare import compare
+    from omnidyn.comparison.drift import drift
     from omnidyn.comparison.result import Comparison
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check

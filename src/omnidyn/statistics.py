@@ -325,3 +325,16 @@ def _step(changes: FloatArray, step: float) -> tuple[float, FloatArray]:
         turns = np.round(changes / step)
         step = float((turns * changes).sum() / (turns * turns).sum())
     return step, np.round(changes / step)
+
+
+def homogeneity(values: FloatArray, covariance: FloatArray) -> tuple[float, int]:
+    """(chi squared, its degrees of freedom) of whether several estimates (K,) are of one number.
+
+    With covariance V (K, K) the best common value is m = 1'V^-1 x / 1'V^-1 1, and (x - m)'V^-1(x - m) is chi squared
+    with K - 1 degrees: W. G. Cochran, Suppl. J. R. Stat. Soc. 4, 102 (1937), there for independent estimates.
+    """
+    size = np.sqrt(np.diag(covariance))
+    inverse = np.linalg.pinv(covariance / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size)
+    weight = inverse.sum(axis=0)
+    off = values - float(weight @ values) / float(weight.sum())
+    return max(float(off @ inverse @ off), 0.0), len(values) - 1

@@ -21,6 +21,7 @@ PUBLIC = [
     "compare",
     "dead_zone",
     "dead_zone_map",
+    "drift",
     "fit_output_error",
     "fit_steady_state",
     "identify",

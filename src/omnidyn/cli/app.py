@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import check, compare, deadzone, demo, identify, init, robots, simulate, warm
+from omnidyn.cli import check, compare, deadzone, demo, drift, identify, init, robots, simulate, warm
 from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.streams import show
 
@@ -38,7 +38,7 @@ def _omnidyn(
 
 
 for _command in (
-    demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, deadzone.deadzone,
-    robots.robots, warm.warm,
+    demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, drift.drift,
+    deadzone.deadzone, robots.robots, warm.warm,
 ):  # fmt: skip
     app.command(cls=Grouped)(_command)

@@ -35,6 +35,7 @@ def fit_document(
         groups[group] = {
             **fit.to_dict(), "validation": beside[0].data if beside else None,
             "lack_of_fit": found.lack_of_fit.to_dict() if found else None, "rests_on": fit.rests_on,
+            "stability": found.stability.to_dict() if found else None,
         }  # fmt: skip
     blocks.append([difference_table(differences)] if differences else [])
     blocks.append(["next:", Points(advice, name="next")] if advice else [])
@@ -47,9 +48,9 @@ def fit_document(
 
 
 def _found(diagnosis: Diagnosis) -> list[Sequence[Part]]:
-    """What the model leaves out, and what the numbers rest on."""
-    rests = diagnosis.table()
-    return [diagnosis.lack_of_fit.parts(), ["what each number rests on:", rests] if rests else []]
+    """What the model leaves out, what is not the same throughout the logs, and what the numbers rest on."""
+    rests, stability = diagnosis.table(), diagnosis.stability
+    return [diagnosis.lack_of_fit.parts(), stability.parts(), ["what each number rests on:", rests] if rests else []]
 
 
 def number_table(fit: OutputErrorEstimate) -> Table:

@@ -8,6 +8,7 @@ from typing import Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Part, Table, all_of, plain
+from omnidyn.identification.stability import Stability
 from omnidyn.model.keys import find_key, in_words
 
 MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
@@ -157,10 +158,11 @@ class LackOfFit:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """lack_of_fit, and rests_on: number -> fixed key -> relative change of the number per percent of the key."""
+    """lack_of_fit; rests_on: number -> fixed key -> relative change of the number per percent of the key; stability."""
 
     lack_of_fit: LackOfFit
     rests_on: Mapping[str, Mapping[str, float]]
+    stability: Stability
 
     def table(self) -> Table | None:
         """What each number rests on, a row each; None where nothing moves any."""

@@ -63,6 +63,7 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
         section("findings", "What the data say", Points(_findings(fits, validations))),
         dead_zone_section({group: fit.robot for group, fit in fits.items()}),
         Section("rests", "What the numbers rest on", _each(fits, _rests)),
+        Section("stability", "Whether the numbers are the same throughout the logs", _each(fits, _stability)),
         Section("residuals", "Residuals", residuals),
         Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
         Section("numbers", "Numbers, with 95 % intervals", numbers),
@@ -115,6 +116,15 @@ def _misfit(group: str, fit: OutputErrorEstimate) -> str:
 def _rests(_group: str, fit: OutputErrorEstimate) -> str:
     table = fit.diagnosis.table() if fit.diagnosis else None
     return content(table) if table else paragraph("On nothing that was taken as it stands.")
+
+
+def _stability(_group: str, fit: OutputErrorEstimate) -> str:
+    stability = fit.stability
+    if stability is None or fit.not_followed:
+        return paragraph("Not looked for: the fit was cut short, or the model does not follow the logs at all.")
+    if not stability.found:
+        return paragraph("No number differs between parts of the logs by more than its errors allow.")
+    return content(Points(stability.statements()), *stability.tables())
 
 
 def _measured(validations: Mapping[str, Validation]) -> list[tuple[str, Run]]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from omnidyn.comparison.drift import Drift
 from omnidyn.comparison.result import Comparison
 from omnidyn.errors import InputError
 from omnidyn.findings.finding import Verdict
@@ -18,6 +19,7 @@ from omnidyn.logs.path import path_of
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
+from omnidyn.report.drift_picture import draw_drift
 from omnidyn.report.figures.channels import draw_run
 from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 from omnidyn.report.figures.friction_speed import draw_friction_speed, speeds_up_to
@@ -103,6 +105,7 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     Robot: _robot,
     Verdict: _verdict,
     Comparison: draw_overlay,
+    Drift: draw_drift,
     Estimate: lambda estimate: draw_estimates({WHOLE: estimate}),
     Identification: lambda found: draw_estimates(found.estimates),
     MotorStudy: _motors,

@@ -11,6 +11,7 @@ from omnidyn.document import Part, Points, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.study_parts import Difference
 
 
@@ -75,6 +76,11 @@ class OutputErrorEstimate(Estimate):
     def rests_on(self) -> Mapping[str, Mapping[str, float]]:
         """Number -> key of a number that was taken as it stands -> relative change of the first per percent of it."""
         return self.diagnosis.rests_on if self.diagnosis else {}
+
+    @property
+    def stability(self) -> Stability | None:
+        """Which numbers differ between parts of the logs, before and after a moment or from log to log."""
+        return self.diagnosis.stability if self.diagnosis else None
 
     @property
     def verdict(self) -> str:

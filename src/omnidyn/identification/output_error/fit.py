@@ -31,7 +31,7 @@ from omnidyn.identification.output_error.prepare import (
     read_records,
     stays_exact,
 )
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, NUISANCES, automatic, implausible
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated, refuse_unknown
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
@@ -42,7 +42,7 @@ from omnidyn.identification.output_error.solve.solver import Normal, Solution, S
 from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
-from omnidyn.identification.output_error.trust.support import supported, too_early, wanted
+from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
 from omnidyn.identification.recordings import count_once
@@ -121,14 +121,14 @@ class Fit:
         return self._solve_joint(self._settled_alone(progress), progress)
 
     def answer(self, found: Solution | Best, progress: Progress | None = None) -> Answer:
-        """What the best point says; of the best so far without profile, bootstrap, breakaway and what else would fit.
+        """What the best point says; of the best so far without profile, bootstrap and breakaway.
 
         Raises InputError for a name to profile that is not free, InsufficientDataError where the logs say nothing about
         any of the robot's numbers.
         """
         progress, done = progress or Progress(), isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
-        warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution, done)]
+        warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution)]
         solution, levels = self._levels(solution) if done else (solution, [])
         progress.doing("finding how sure the numbers are")
         sure = self.weighed(solution, progress, anew=done)
@@ -272,17 +272,11 @@ class Fit:
             warnings += [f"{name} was not fitted yet: its own numbers are where its fit begins" for name in late]
         return Solution(state, Normal(solver, state).held, 0, True, solver), warnings
 
-    def _hints(self, solution: Solution, done: bool) -> list[str]:
-        """Which logs are not used; and, of the best point, which nuisances the logs ask for beside automatic ones."""
-        group, problem = self.groups[0], solution.solver.problem
-        if len(self.groups) > 1:
-            return []
-        if group.engine == LOOP:
-            return left_out(group.records, problem.pieces)
-        if group.engine == IMPLICIT or self.question.nuisances is not None or not done:
-            return []
-        wider = group.problem(tuple(dict.fromkeys((*_nuisances(problem), *NUISANCES))))
-        return wanted(solution.solver, solution, Solver(wider, make_engine(EXACT, wider), self.nu))
+    def _hints(self, solution: Solution) -> list[str]:
+        """Which logs of a speed loop are not used."""
+        group = self.groups[0]
+        alone = len(self.groups) == 1 and group.engine == LOOP
+        return left_out(group.records, solution.solver.problem.pieces) if alone else []
 
     def _levels(self, solution: Solution) -> tuple[Solution, list[Breakaway]]:
         """Breakaway of the axes that were asked for, and the fit with it."""

@@ -1,6 +1,8 @@
-"""Is the model right? What a fit leaves out, what would mend it, what cannot be told apart, what each number rests on.
+"""Is the model right? What a fit leaves out, what would mend it, what cannot be told apart, what each number rests on,
+and which are not the same throughout the logs.
 
 Read in this order: linear.py (a fit in rows near its best point, noise made white), motion.py (how a small
 force shows), disturbances.py (forces that no model of ours has), misfit.py (whether residuals hold them), workbench.py,
-candidates.py, laws.py and remedies.py (what would explain them), rests_on.py, diagnosis.py (all of it).
+candidates.py, laws.py and remedies.py (what would explain them), rests_on.py, blocks.py (a fit in parts of its logs)
+and shifts.py (which numbers differ between them), diagnosis.py (all of it).
 """

@@ -1,4 +1,5 @@
-"""All that is asked of a fit beyond its numbers, once: misfit, remedies, and what the numbers rest on."""
+"""All that is asked of a fit beyond its numbers, once: misfit, remedies, what the numbers rest on, and whether they are
+the same throughout the logs."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from omnidyn.identification.structure.misfit import FALSE, Misfit, misfit
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.remedies import remedies
 from omnidyn.identification.structure.rests_on import rests_on
+from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.unoffered import unoffered
 from omnidyn.identification.structure.workbench import Workbench
 
@@ -41,7 +43,7 @@ def diagnose(solution: Solution) -> Diagnosis:
         found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
         pictures,
     )  # fmt: skip
-    return Diagnosis(lack, rests_on(seen.linear, bench))
+    return Diagnosis(lack, rests_on(seen.linear, bench), stability(seen.linear))
 
 
 def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:

@@ -1,0 +1,293 @@
+"""drift: several fits of one robot beside each other, of floors or weeks: which numbers changed by more than they may.
+
+    m = (sum W_k)^-1 sum W_k x_k,   chi2 = sum (x_k - m)' W_k (x_k - m),   W_k = C_k^-1
+
+x_k: the numbers of fit k, C_k: their covariance, as its file tells it. A number alone: chi squared with K - 1 degrees
+of freedom, W. G. Cochran, Suppl. J. R. Stat. Soc. 4, 102 (1937). All numbers are tested, so each chance is multiplied
+by how many there are (Bonferroni); all of them together are one more test: two that trade may change, and neither does.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import chdtrc, ndtri
+
+from omnidyn.arrays import FloatArray
+from omnidyn.document import Document, Part, Points, Table, all_of, chance_cell, interval_cell, plain, sentence
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.model.keys import Key, expand, in_words, unit
+from omnidyn.model.known.told import Told, told
+from omnidyn.model.robot import IDENTIFIED, Robot
+from omnidyn.model.robot_file import load_robot
+from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.statistics import homogeneity
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LEVEL = 0.05  # chance of any change in fits of one and the same robot
+NAMED = 4  # numbers that a sentence names
+UPPER = float(ndtri(0.975))
+SAME = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
+TAKEN = ("body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m",
+         "motor.resistance_ohm", "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad",
+         "motor.gear_ratio")  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Drifting:
+    """A number in the fits that tell it. fits: their names; value, std (K,); ci95: of each.
+
+    chi2, degrees: of whether all are one. p: the chance of as much, all numbers counted. share: from the first to the
+    last, over the first.
+    """
+
+    key: str
+    fits: tuple[str, ...]
+    value: FloatArray
+    std: FloatArray
+    ci95: tuple[tuple[float, float], ...]
+    chi2: float
+    degrees: int
+    p: float
+
+    @property
+    def changed(self) -> bool:
+        """Whether it changed by more than its errors allow."""
+        return self.p <= LEVEL
+
+    @property
+    def share(self) -> float:
+        """From the first to the last, over the first; infinite where that is 0."""
+        first, last = float(self.value[0]), float(self.value[-1])
+        return (last - first) / abs(first) if first else float("inf")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Drift(Shown):
+    """Fits beside each other. fits: their names, in the order given; numbers: each that two or more tell.
+
+    together: (chi squared, degrees of freedom, chance) of all numbers that all fits tell. warnings: what makes the
+    comparison doubtful, in words.
+    """
+
+    robot: str
+    fits: tuple[str, ...]
+    numbers: tuple[Drifting, ...]
+    together: tuple[float, int, float]
+    warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Drift of {self.robot}: {', '.join(self.fits)}; changed: {', '.join(self.changed) or 'nothing'}>"
+
+    def plot(self) -> Figure:
+        """Every number with its 95 % intervals, fit by fit, as a matplotlib Figure."""
+        return make(FIGURE, self)
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Keys of the numbers that changed by more than their errors allow."""
+        return tuple(each.key for each in self.numbers if each.changed)
+
+    @property
+    def verdict(self) -> str:
+        """What changed, in a sentence."""
+        moved = sorted((each for each in self.numbers if each.changed), key=lambda each: each.p)
+        count = len(self.numbers)
+        if not moved and self.together[2] <= LEVEL:
+            return sentence(
+                f"the {len(self.fits)} fits differ, though no number by itself by more than its errors allow"
+            )
+        if not moved:
+            return sentence(f"no number of {count} changed by more than its errors allow")
+        names = [f"{in_words(each.key)} ({_way(each)})" for each in moved[:NAMED]]
+        more = [f"{len(moved) - NAMED} more"] if len(moved) > NAMED else []
+        return sentence(f"{len(moved)} of {count} numbers changed by more than errors allow: {all_of([*names, *more])}")
+
+    def document(self) -> Document:
+        """All of it, as text, page and machines have it."""
+        chi2, degrees, p = self.together
+        whole = (
+            f"all numbers together: chi squared {chi2:.3g} with {degrees} degrees of freedom, chance {chance_cell(p)}"
+        )
+        parts: list[Part] = [self.table(), "", whole, Points(self.warnings, "warning:")]
+        return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
+
+    def table(self) -> Table:
+        """A row for every number of every fit."""
+        rows = []
+        for each in self.numbers:
+            for k, name in enumerate(each.fits):
+                first = k == 0
+                rows.append((
+                    in_words(each.key) if first else "", each.key if first else "", name, f"{each.value[k]:.4g}",
+                    interval_cell(each.ci95[k]), unit(each.key), chance_cell(min(each.p, 1.0)) if first else "",
+                    ("changed" if each.changed else "no change seen") if first else "",
+                ))  # fmt: skip
+        head = ("number", "key", "fit", "value", "95 % interval", "unit", "chance", "")
+        return Table(head, rows, "<<<>><><")
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        chi2, degrees, p = self.together
+        numbers = {
+            each.key: {
+                "words": in_words(each.key), "unit": unit(each.key), "chi2": each.chi2, "degrees": each.degrees,
+                "p": each.p, "changed": each.changed,
+                "fits": {
+                    name: {"value": each.value[k], "std": each.std[k], "ci95": each.ci95[k]}
+                    for k, name in enumerate(each.fits)
+                },
+            }
+            for each in self.numbers
+        }  # fmt: skip
+        return plain({
+            "fits": self.fits, "changed": self.changed, "numbers": numbers,
+            "together": {"chi2": chi2, "degrees": degrees, "p": p}, "warnings": self.warnings,
+        })  # fmt: skip
+
+
+def drift(fits: Sequence[Robot | str | os.PathLike], names: Sequence[str] = ()) -> Drift:
+    """Compare fits of one robot, such as of several floors or weeks: robots or robot files that `identify` wrote.
+
+    names: of the fits; files are called by their paths, robots by their names where these differ.
+
+    The covariances are those that `identify` writes, fits count as independent, and intervals are those of a normal
+    number. Raises InputError for fewer than two fits and for a file without fitted numbers, InsufficientDataError
+    where no number is in two of them.
+    """
+    if len(fits) < 2 or isinstance(fits, str | os.PathLike | Robot):
+        got = "one" if isinstance(fits, str | os.PathLike | Robot) else str(len(fits))
+        raise InputError("drift compares fits", got=got, expected="two robots or more", where="fits")
+    robots = [each if isinstance(each, Robot) else load_robot(each) for each in fits]
+    called = _names(fits, robots, names)
+    known = [_fitted(robot, name) for robot, name in zip(robots, called, strict=True)]
+    keys = list(dict.fromkeys(key for each in known for key in each))
+    shared = [key for key in keys if sum(key in each for each in known) > 1]
+    if not shared:
+        raise InsufficientDataError(
+            "no number is in two of the fits", got="; ".join(f"{n}: {', '.join(k)}" for n, k in zip(called, known,
+            strict=True)), expected="fits of the same numbers", where="fits",
+        )  # fmt: skip
+    numbers = [_number(key, called, known, len(shared)) for key in shared]
+    everywhere = [key for key in shared if all(key in each for each in known)]
+    return Drift(
+        robots[0].name,
+        tuple(called),
+        tuple(numbers),
+        _together(robots, known, everywhere),
+        tuple(_doubts(robots, called, set(shared))),
+    )
+
+
+Fitted = Mapping[str, tuple[float, float, bool]]  # key -> value, std, whether its scale is logarithmic
+
+
+def _fitted(robot: Robot, name: str) -> Fitted:
+    """The numbers of a robot that a fit found, each once: of a list that was one number, its first entry."""
+    own = told(robot)
+    found = {}
+    for k, key in enumerate(own.keys):
+        prior = robot.priors.get(key) or robot.priors.get(Key.parse(key).name)
+        of_list = key not in robot.priors and Key.parse(key).index not in (None, 0)
+        if prior is not None and prior.origin == IDENTIFIED and own.std[k] > 0.0 and not of_list:
+            found[key] = (float(own.value[k]), float(own.std[k]), bool(own.log[k]))
+    if not found:
+        raise InputError(
+            "no number of this file was fitted", got=", ".join(robot.priors) or "no std of any number",
+            expected="a robot file that identify wrote, with the std of its numbers", where=name,
+        )  # fmt: skip
+    return found
+
+
+def _names(fits: Sequence[Any], robots: Sequence[Robot], names: Sequence[str]) -> list[str]:
+    if names and (len(names) != len(fits) or len(set(names)) < len(names)):
+        got = f"{len(names)} names, {len(set(names))} of them different, for {len(fits)} fits"
+        raise InputError("every fit needs a name of its own", got=got, where="names")
+    found = list(names) or [r.name if isinstance(f, Robot) else os.fspath(f) for f, r in zip(fits, robots, strict=True)]
+    if len(set(found)) < len(found):
+        found = [f"{name} ({k + 1})" for k, name in enumerate(found)]
+    return found
+
+
+def _number(key: str, called: Sequence[str], known: Sequence[Fitted], tests: int) -> Drifting:
+    at = [k for k, each in enumerate(known) if key in each]
+    value, std = (np.array([known[k][key][i] for k in at]) for i in (0, 1))
+    log = all(known[k][key][2] for k in at)
+    # A logarithm where all have one: what is far from 0 is as far off as a share of itself.
+    x, spread = (np.log(value), std / value) if log else (value, std)
+    chi2, degrees = homogeneity(x, np.diag(spread**2))
+    ends = [(v - UPPER * s, v + UPPER * s) for v, s in zip(x.tolist(), spread.tolist(), strict=True)]
+    ci95 = tuple((float(np.exp(a)), float(np.exp(b))) if log else (a, b) for a, b in ends)
+    p = min(1.0, tests * float(chdtrc(degrees, chi2)))
+    return Drifting(key, tuple(called[k] for k in at), value, std, ci95, chi2, degrees, p)
+
+
+def _together(robots: Sequence[Robot], known: Sequence[Fitted], keys: Sequence[str]) -> tuple[float, int, float]:
+    """(chi squared, its degrees of freedom, the chance of as much) of the numbers that all fits tell."""
+    if not keys:
+        return 0.0, 0, 1.0
+    first = np.array([known[0][key][0] for key in keys])
+    unit_ = np.array([max(each[key][1] for each in known) for key in keys])
+    total, pulled, chi2, degrees = np.zeros((len(keys), len(keys))), np.zeros(len(keys)), 0.0, 0
+    for robot, each in zip(robots, known, strict=True):
+        std = np.array([each[key][1] for key in keys])
+        weight, rank = _inverse(_correlation(told(robot), keys) * np.outer(std / unit_, std / unit_))
+        off = (np.array([each[key][0] for key in keys]) - first) / unit_
+        total, pulled = total + weight, pulled + weight @ off
+        chi2, degrees = chi2 + float(off @ weight @ off), degrees + rank
+    common, rank = _inverse(total)
+    chi2, degrees = max(chi2 - float(pulled @ common @ pulled), 0.0), degrees - rank
+    return chi2, degrees, float(chdtrc(degrees, chi2)) if degrees else 1.0
+
+
+def _correlation(own: Told, keys: Sequence[str]) -> FloatArray:
+    at = [own.keys.index(key) for key in keys]
+    return own.correlation[np.ix_(at, at)]
+
+
+def _inverse(matrix: FloatArray) -> tuple[FloatArray, int]:
+    """(inverse without the directions in which it is 0, how many others there are)."""
+    size = np.sqrt(np.diag(matrix))
+    values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
+    kept = values > SAME * values[-1]
+    root = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
+    return root @ root.T, int(kept.sum())
+
+
+def _doubts(robots: Sequence[Robot], called: Sequence[str], compared: set[str]) -> list[str]:
+    """What makes the comparison doubtful: one log behind two fits, and numbers that were taken as they stand."""
+    words = []
+    seen: dict[str, str] = {}
+    for robot, name in zip(robots, called, strict=True):
+        sources = {p.source for k, p in robot.priors.items() if p.origin == IDENTIFIED and p.source and k in compared}
+        for source in sorted(sources):
+            if (other := seen.setdefault(source, name)) != name:
+                words.append(f"{other} and {name} were fitted to the same ({source}): they are not independent")
+    for name in TAKEN:
+        if any(Key.parse(each).name == name for each in compared):
+            continue
+        values = [_taken(robot, name) for robot in robots]
+        if len(set(values)) > 1:
+            own = ", ".join(f"{value} in {fit}" for value, fit in zip(values, called, strict=True))
+            words.append(f"{in_words(name)} was taken as {own}: fitted numbers that rest on it differ for that too")
+    return words
+
+
+def _taken(robot: Robot, name: str) -> str:
+    """A number as it stands in the file; of a list, all of them where they differ."""
+    values = (f"{Key.parse(key).get(robot):.4g}" for key in expand(name, robot))
+    return ", ".join(dict.fromkeys(values))
+
+
+def _way(each: Drifting) -> str:
+    low, high = int(np.argmin(each.value)), int(np.argmax(each.value))
+    first, last = sorted((low, high))
+    change = (each.value[last] - each.value[first]) / abs(each.value[first]) if each.value[first] else float("inf")
+    values = f"{each.value[first]:.3g} in {each.fits[first]}, {each.value[last]:.3g} in {each.fits[last]}"
+    return f"{values}: {100.0 * change:+.0f} %" if np.isfinite(change) else values

@@ -1,0 +1,106 @@
+"""Stability: which numbers of a fit are others in one part of its logs than in another; by structure/shifts.py."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from omnidyn.document import Part, Points, Table, all_of, chance_cell, interval_cell, plain
+from omnidyn.model.keys import in_words, unit
+
+TIME, LOGS = "time", "logs"  # parts before and after a moment; parts that are logs
+NAMED = 4  # numbers that a sentence names
+
+
+@dataclass(frozen=True)
+class Level:
+    """What a number is in a part of the logs: value, its standard error and 95 % interval."""
+
+    part: str
+    value: float
+    std: float
+    ci95: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A number that differs between parts by more than it may. p: the chance of as much, all tests counted."""
+
+    key: str
+    levels: tuple[Level, ...]
+    p: float
+
+
+@dataclass(frozen=True)
+class Split:
+    """Parts of the logs whose numbers differ. by: TIME or LOGS. where: the log that was cut, "" for all of them.
+
+    at: seconds from the start of the log to the cut, and from where to where that may be; NaN between logs, and where
+    logs of unlike length were cut at the same share. share: of the log that had gone by. p: the chance of as much in
+    all numbers together, all tests counted. shifts: the numbers that differ by themselves, may be none.
+    """
+
+    by: str
+    where: str
+    at: float
+    between: tuple[float, float]
+    share: float
+    p: float
+    shifts: tuple[Shift, ...]
+
+    def words(self) -> str:
+        """What differs, in a sentence."""
+        names = [in_words(each.key) for each in self.shifts]
+        more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
+        what = all_of([*names[:NAMED], *more]) or "no number by itself, but all of them together,"
+        differs = "differs" if len(names) <= 1 else "differ"
+        if self.by == LOGS:
+            return f"{what} {differs} from log to log by more than their errors allow"
+        of = f" of {self.where}" if self.where else ""
+        if self.at == self.at:
+            when = f"at {self.at:.4g} s{of} (between {self.between[0]:.4g} and {self.between[1]:.4g} s)"
+        else:
+            when = f"{100.0 * self.share:.0f} % into the logs"
+        return f"{what} {differs} before and after a moment, most likely {when}, by more than their errors allow"
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Whether numbers differ between parts of the logs by more than they may. tested: what was compared -> the least
+    chance of as much, of all tests of that kind. splits: those that differ, the clearest first."""
+
+    tested: Mapping[str, float]
+    splits: tuple[Split, ...]
+
+    @property
+    def found(self) -> bool:
+        """Whether any number differs."""
+        return bool(self.splits)
+
+    def statements(self) -> list[str]:
+        """What differs, a sentence each; none for a fit that is stable."""
+        return [split.words() for split in self.splits]
+
+    def table(self) -> Table:
+        """What each number that differs is in each part."""
+        rows = [
+            (in_words(shift.key), shift.key, level.part, f"{level.value:.4g}", interval_cell(level.ci95),
+             unit(shift.key), chance_cell(shift.p))
+            for split in self.splits for shift in split.shifts for level in shift.levels
+        ]  # fmt: skip
+        return Table(("number", "key", "in", "value", "95 % interval", "unit", "chance"), rows, "<<<>><>")
+
+    def parts(self) -> list[Part]:
+        """As lines and a table; nothing for a fit that is stable."""
+        if not self.found:
+            return []
+        return [Points(self.statements(), "not stable:"), *self.tables()]
+
+    def tables(self) -> list[Table]:
+        """The table, where any number differs by itself."""
+        return [self.table()] if any(split.shifts for split in self.splits) else []
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return plain({"found": self.found, "tested": self.tested, "splits": [asdict(each) for each in self.splits]})
