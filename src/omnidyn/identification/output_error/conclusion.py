@@ -15,6 +15,7 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified, printable
 from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
+from omnidyn.identification.output_error.belonging import with_nuisances
 from omnidyn.identification.output_error.combinations import combinations
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
@@ -58,15 +59,14 @@ def conclude(
     std, ci95 = intervals(problem, values, known)
     for name, (spread, interval) in (better or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
-    data = _data(records)
+    data, names = _data(records), [p.name for p in problem.parameters]
     own_levels, joint = _levels(levels, ci95), combinations(problem, values, known, moved)
-    names = [p.name for p in problem.parameters]
     fitted = problem.parameters[:own]
+    robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)
+    robot = with_nuisances(robot, problem, values, std, open_, records, data)
     warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-        robot=_together(
-            _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels), fitted, std, known
-        ),
+        robot=_together(robot, fitted, std, known),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},

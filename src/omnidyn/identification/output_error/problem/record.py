@@ -32,7 +32,7 @@ class Record:
     supplied: whether the voltage is a duty times a supply that was not logged. notes: what was decided on the way.
     unused: what the log holds and a fit does not use, and why, in words.
     set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
-    here then; else None.
+    here then; else None. run: what it was read from.
 
     Its arrays are read-only and in C order, whoever made them: a kernel for others would be compiled beside.
     """
@@ -48,6 +48,7 @@ class Record:
     notes: tuple[str, ...]
     set_point: FloatArray | None = None
     unused: tuple[str, ...] = ()
+    run: Run | None = None
 
     def __post_init__(self) -> None:
         for name in ("t", "voltage", "outputs", "set_point"):
@@ -115,7 +116,7 @@ def record(
         notes.append(f"{many} rows lack counts of an encoder, or follow on missing rows: the log is split there")
     return Record(
         run.t, voltage, found.values, found.columns, found.ticks, tuple(pieces), run.source,
-        supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused),
+        supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused), run,
     )  # fmt: skip
 
 
