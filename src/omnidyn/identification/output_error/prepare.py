@@ -187,7 +187,7 @@ def make_problem(
     engine = engine or engine_for(records, robot, keys)
     if engine != EXACT:
         own = [_within_reach(p, _drive(records, robot)) for p in own]
-    auto = automatic(records) if engine == EXACT else (LATENCY,)
+    auto = automatic(records, engine == EXACT)
     more = (
         nuisance_parameters(auto, records, robot, earliest(records)) if question.nuisances is None
         else nuisance_parameters(question.nuisances, records, robot)

@@ -2,7 +2,7 @@
 
 latency.CHANNEL   the channel shows what was t ago [s]; exact, by steps that end within a row
 gain              voltage at the motor = gain x logged; with a supply that is only nominal, a prior of 10 %
-dead_band         of the driver: (|u| - dead_band)+ sgn u reaches the motor [V]
+dead_band         of the driver: (|u| - dead_band)+ sgn u reaches the motor [V]; at most what is seen to have driven it
 tilt.AXIS         constant force on x, y [N], yaw [N m] of the body: a floor that is not level, while the heading stays
 fade              share of the voltage lost from the start of a run to its end, evenly: a battery that sags
 start             twist at the start of each piece of the log; pose and angles of the wheels too
@@ -17,6 +17,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
+from omnidyn.identification.output_error.problem.driven import least_that_drove
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.output_error.problem.record import Record
@@ -82,8 +83,9 @@ def nuisance_parameters(
             found.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
         elif name == DEAD_BAND:
             most = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
-            own = robot.drive.dead_band
-            found.append(Parameter(DEAD_BAND, own, 0.0, max(0.5 * most, own), prior=_of_file(robot, KEY_DEAD, own)))
+            own, seen = robot.drive.dead_band, least_that_drove(records, robot)
+            high = max(seen if np.isfinite(seen) else 0.5 * most, own)
+            found.append(Parameter(DEAD_BAND, own, 0.0, high, prior=_of_file(robot, KEY_DEAD, own)))
         elif name.partition(".")[0] == TILT:
             found += _tilts(name, robot)
         else:
@@ -131,9 +133,14 @@ def _tilts(name: str, robot: Robot) -> list[Parameter]:
     return found
 
 
-def automatic(records: Sequence[Record]) -> tuple[str, ...]:
-    """The nuisances that a log of a real robot is likely to have, before it is asked whether it determines them."""
-    return (LATENCY, DEAD_BAND, GAIN) if any(record.supplied for record in records) else (LATENCY, DEAD_BAND)
+def automatic(records: Sequence[Record], quick: bool = True) -> tuple[str, ...]:
+    """The nuisances that a log of a real robot is likely to have, before it is asked whether it determines them.
+
+    quick: whether another one costs next to nothing; else none is tried that has to be shown first. A nominal supply is
+    in the intervals of every fit.
+    """
+    tried = (LATENCY, DEAD_BAND) if quick else (LATENCY,)
+    return (*tried, GAIN) if any(record.supplied for record in records) else tried
 
 
 def pieces(
