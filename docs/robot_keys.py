@@ -46,6 +46,8 @@ MEANING = {
     "drive.kp_V_s_rad": "proportional gain, on the speed of a wheel",
     "drive.ki_V_rad": "integral gain, on the speed of a wheel",
     "drive.rate_Hz": "how often the speed loop runs; needed for it",
+    "drive.dead_band_V": "of the driver: of a voltage u, (|u| - dead band)+ sgn u reaches the motor",
+    "drive.latency_s": "from a command until it acts on the motors",
     "friction.axes.viscous": "B, per speed: along x, along y, about yaw",
     "friction.axes.coulomb": "C, whatever the speed: along x, along y, about yaw",
     "friction.axes.breakaway": "S, up to which it holds at rest; absent: as coulomb",

@@ -141,7 +141,7 @@ def test_what_is_refused(call, arguments, code, words):
 def test_names_are_refused_before_anything_is_simulated(call, monkeypatch):
     import omnidyn.comparison.replay as replay
 
-    monkeypatch.setattr(replay, "simulate", lambda *_, **__: pytest.fail("simulated"))
+    monkeypatch.setattr(replay, "simulate_seen", lambda *_, **__: pytest.fail("simulated"))
     assert call("run.csv", "--robot", "axebot", "--fail-if", "i1.rmse>1")[0] == 3
 
 

@@ -25,7 +25,7 @@ def test_there_are_as_many_keys_as_numbers_in_the_model():
         inner = [field.annotation for field in model.model_fields.values()]
         return sum(count(each) if hasattr(each, "model_fields") else 1 for each in inner)
 
-    assert len(KEYS) == count(Robot) - len({"name", "source", "priors", "correlation"})
+    assert len(KEYS) == count(Robot) - len({"name", "source", "priors", "correlation", "log"})
 
 
 def test_no_key_is_explained_that_is_not_there():

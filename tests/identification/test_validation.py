@@ -8,7 +8,6 @@ from scipy.integrate import cumulative_simpson, quad
 
 import omnidyn
 from omnidyn.errors import InputError
-from omnidyn.identification.as_fitted import as_fitted, mean_before
 from omnidyn.identification.identify import choose_method
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU
@@ -93,13 +92,9 @@ def test_scale_of_students_t_on_gaussian_noise():
 
 def test_without_nuisances_the_run_is_left_alone():
     run = noisy_draw(simulate(AXEBOT, excitation(5.0), 0.01), 1)
-    assert as_fitted(run, fit_output_error(run, AXEBOT, nuisances=())) is run
-
-
-def test_mean_of_a_held_voltage():
-    """u = 1, 2, 4 V held for 1 s each; the clock runs 0.25 s behind: 3/4 of each row, 1/4 of the last."""
-    mean = mean_before(np.array([0.0, 1.0, 2.0]), np.array([[1.0], [2.0], [4.0]]), 0.25)
-    assert mean[:, 0] == pytest.approx([1.0, 0.25 * 1.0 + 0.75 * 2.0, 0.25 * 2.0 + 0.75 * 4.0])
+    fit = fit_output_error(run, AXEBOT, nuisances=())
+    assert fit.robot.log is None
+    assert fit.robot.drive == AXEBOT.drive
 
 
 def test_voltage_at_the_motors():

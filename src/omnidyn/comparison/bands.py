@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from omnidyn.comparison.replay import HOLD, replay
 from omnidyn.comparison.result import Comparison
+from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.known.told import told
 from omnidyn.model.known.uncertainty import DRAWS, plausible
 from omnidyn.model.robot import Robot
@@ -18,12 +19,12 @@ FEW = 20  # robots drawn where each run is dear: the least that have a 95 % inte
 
 def with_bands(
     found: Comparison, robots: Sequence[Robot], *, logs: Sequence[int] | None = None, apply: str | None = None,
-    hold: float = HOLD, tol: float | None = COARSE, draws: int = DRAWS, seed: int = 0,
+    hold: float = HOLD, tol: float | None = COARSE, draws: int = DRAWS, seed: int = 0, log: LogEffects | None = None,
 ) -> Comparison:  # fmt: skip
     """The comparison with the band of each model: the same free runs by plausible robots.
 
-    robots: those compared, in order. logs: which logs, all by default. apply, hold, tol: as they were compared. A robot
-    whose file has no std has no band, and a warning says so.
+    robots: those compared, in order. logs: which logs, all by default. apply, hold, tol, log: as they were compared. A
+    robot whose file has no std has no band, and a warning says so.
     """
     which = range(len(found.measured)) if logs is None else logs
     bands: dict[str, Mapping[int, Band]] = {}
@@ -35,9 +36,11 @@ def with_bands(
             continue
         drawn = plausible(robot, draws, seed)
         bands[name] = {
-            k: band_of(drawn, lambda each, k=k: replay(each, found.measured[k], apply=apply, hold=hold, tol=tol).run)
+            k: band_of(
+                drawn, lambda each, k=k: replay(each, found.measured[k], apply=apply, hold=hold, tol=tol, log=log).run
+            )
             for k in which
-        }
+        }  # fmt: skip
         guessed[name] = known.guessed
         if known.guessed:
             words.append(f"the band of {name} rests on guesses: {', '.join(known.guessed)}")

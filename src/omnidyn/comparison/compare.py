@@ -17,6 +17,7 @@ from omnidyn.comparison.traces import Trace, compared_components, counts_from_st
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.model.first_guess import rests_on
+from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 from omnidyn.simulation.simulate import TOLERANCE
@@ -27,7 +28,7 @@ ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))
 def compare(
     robot: Robot, run: Run | Sequence[Run], other: Robot | None = None, *, apply: str | None = None,
     hold: float = HOLD, current_unsigned: bool = False, tol: float | None = TOLERANCE, seed: int = 0,
-    progress: Callable[[str], object] | None = None, band: bool = False,
+    progress: Callable[[str], object] | None = None, band: bool = False, log: LogEffects | None = None,
 ) -> Comparison:  # fmt: skip
     """Replay logs against one robot, or two, and measure how near each comes.
 
@@ -37,6 +38,8 @@ def compare(
     logged. hold: how long a missing input keeps its value [s]. current_unsigned: compare currents by size, for a
     sensor without sign. tol: as in `simulate`. seed: of the bootstrap. progress: is told what is being replayed.
     band: how far each model may be off by the std of its robot file, from a hundred plausible robots (`with_bands`).
+    log: what the logs do beside the robot, such as `robot.log` of a fit; None: what the file of a robot says of its own
+    logs, which are known by what they hold; others get none of it.
     Raises InputError when a log does not fit a robot, InsufficientDataError when there is nothing to compare.
     """
     other_robot = (Robot, type(None))
@@ -49,7 +52,7 @@ def compare(
         if progress is not None:
             progress(f"replaying {each.source or 'a run'}, {k + 1} of {len(runs)}")
         for name, model in robots.items():
-            replays[name].append(replay(model, each, apply=apply, hold=hold, tol=tol))
+            replays[name].append(replay(model, each, apply=apply, hold=hold, tol=tol, log=log))
     segments = _segments(runs, next(iter(replays.values())))
     traces = {name: _traces(runs, parts, segments, channels, current_unsigned) for name, parts in replays.items()}
     overall = {name: _overall(by) for name, by in traces.items()}
@@ -74,7 +77,7 @@ def compare(
         return found
     if progress is not None:
         progress("replaying plausible robots for the band")
-    return with_bands(found, [*robots.values()], apply=apply, hold=hold, seed=seed)
+    return with_bands(found, [*robots.values()], apply=apply, hold=hold, seed=seed, log=log)
 
 
 def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | None = None) -> tuple[str, ...]:

@@ -22,13 +22,17 @@ from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.logs.segments import segments
 from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL, Run
-from omnidyn.simulation.simulate import TOLERANCE, simulate
+from omnidyn.simulation.commands import Commands, commands
+from omnidyn.simulation.simulate import TOLERANCE, simulate_seen
+from omnidyn.simulation.view import LATE, View, seen_at_once, seen_through
 from omnidyn.statistics import stretches
 
 INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
 SET_SPEEDS = INPUTS[2:]
+STARTS = ("twist", "wheel_speed", "wheel_angle", "heading", "position")  # which channel tells where a run starts
 SIMULATED = ("voltage", "current", "wheel_speed", "wheel_angle", "twist", "pose")
 HOLD = 0.2  # [s] a missing input keeps its last value for so long
 FEWEST = 3  # rows of a piece
@@ -52,12 +56,14 @@ class Replay:
 
 
 def replay(
-    robot: Robot, run: Run, *, apply: str | None = None, hold: float = HOLD, tol: float | None = TOLERANCE
-) -> Replay:
+    robot: Robot, run: Run, *, apply: str | None = None, hold: float = HOLD, tol: float | None = TOLERANCE,
+    log: LogEffects | None = None,
+) -> Replay:  # fmt: skip
     """Simulate `robot` under what was applied in `run`, at the same times.
 
     apply: the channel to apply (voltage, duty, wheel_speed_command, twist_command); by default the first of these that
     was logged. hold: how long a missing input keeps its last value [s]; then the piece ends. tol: as in `simulate`.
+    log: what the log does beside the robot; None: what the file of the robot says of this very log (`effects_of`).
     Raises InputError when the log does not fit the robot (number of wheels, no input, set speeds but no speed loop),
     InsufficientDataError when no stretch of it can be replayed.
     """
@@ -65,13 +71,26 @@ def replay(
         refuse_other_robot(robot, run)
         applied = choose_input(robot, run, apply)
         pieces, inputs, supply, warnings = _prepared(run, applied, hold)
-        parts = [_free_run(robot, run, rows, applied, inputs, supply, tol) for rows in pieces]
+        log, told = (log, []) if log is not None else effects_of(robot, run)
+        parts = [_free_run(robot, run, rows, applied, inputs, supply, tol, log) for rows in pieces]
     except OmnidynError as error:
         raise error.at(run.source) if run.source else error from None
     warnings += [*_from_simulation(parts), *_loop_warnings(robot, run, applied, parts)]
     whole = _assembled(run, robot, pieces, [part for part, _ in parts])
     words = _words(robot, applied, supply)
-    return Replay(whole, tuple(pieces), applied, words, tuple(warnings))
+    words += f", and what the fit found of this log: {log.words}" if log is not None and log.words else ""
+    return Replay(whole, tuple(pieces), applied, words, tuple([*warnings, *told]))
+
+
+def effects_of(robot: Robot, run: Run) -> tuple[LogEffects | None, list[str]]:
+    """(what the file of the robot says of this log, None where it is another one; what is to be said of that)."""
+    log = robot.log
+    if log is None or log.is_of(run):
+        return log, []
+    return None, [
+        f"{robot.name} was fitted with what its own logs did beside the robot ({log.words}); this is another log, and "
+        "gets none of it"
+    ]
 
 
 def refuse_other_robot(robot: Robot, run: Run) -> None:
@@ -190,8 +209,9 @@ def _usable_pieces(rows: slice, usable: BoolArray) -> Iterator[slice]:
 
 
 def _free_run(
-    robot: Robot, run: Run, rows: slice, applied: str, inputs: FloatArray, supply: FloatArray | None, tol: float | None
-) -> tuple[Run, str]:
+    robot: Robot, run: Run, rows: slice, applied: str, inputs: FloatArray, supply: FloatArray | None, tol: float | None,
+    log: LogEffects | None,
+) -> tuple[Run, str]:  # fmt: skip
     """One piece: simulated from its measured start to its end. Also returns where the start came from."""
     start = start_of(run, robot, rows)
     held = slice(rows.start, rows.stop - 1)
@@ -199,17 +219,57 @@ def _free_run(
     current = None
     if run.current is not None and np.isfinite(run.current[rows.start]).all():
         current = run.current[rows.start]
-    simulated = simulate(
-        robot, dt=np.diff(run.t[rows]), **{applied: inputs[held]}, **extra, twist=start.twist, pose=start.pose,
-        current=current, tol=tol,
-    )  # fmt: skip
+    dt, twist = np.diff(run.t[rows]), start.twist
+    given = _commands(robot, dt, applied, inputs[held], extra)
+    view = _view(robot, run, held, given, log)
+    simulated = simulate_seen(robot, given, view, twist=twist, pose=start.pose, current=current, tol=tol)
     if run.wheel_angle is not None:
-        dt = np.diff(run.t[rows])
         parts = 2 * min(int(np.ceil(dt.max() / (2.0 * FINEST))), MOST_PARTS)
-        given = {name: np.repeat(values, parts, axis=0) for name, values in {applied: inputs[held], **extra}.items()}
-        fine = simulate(robot, dt=np.repeat(dt / parts, parts), **given, twist=start.twist, current=current, tol=tol)
+        many = {name: np.repeat(values, parts, axis=0) for name, values in extra.items()}
+        given = _commands(robot, np.repeat(dt / parts, parts), applied, np.repeat(inputs[held], parts, axis=0), many)
+        view = _view(robot, run, held, given, log, parts, of_angles=True)
+        fine = simulate_seen(robot, given, view, twist=twist, pose=np.zeros(3), current=current, tol=tol)
         simulated = simulated.replace(wheel_angle=start.angle + _turned(fine, parts))
     return simulated, start.source
+
+
+def _commands(robot: Robot, dt: FloatArray, applied: str, inputs: FloatArray, extra: dict[str, FloatArray]) -> Commands:
+    """The logged inputs as commands."""
+    named = dict.fromkeys((*INPUTS, "supply")) | {applied: inputs} | extra
+    return commands(
+        robot, named["voltage"], dt, named["duty"], named["wheel_speed_command"], named["twist_command"],
+        named["supply"],
+    )  # fmt: skip
+
+
+def _view(
+    robot: Robot, run: Run, held: slice, given: Commands, log: LogEffects | None, parts: int = 1,
+    of_angles: bool = False,
+) -> View:  # fmt: skip
+    """What a log shows of a piece, whose rows are `held`. parts: steps of the simulation in a row.
+
+    The start was measured by the first channel of LATE: the run begins by so much earlier as that is late.
+    of_angles: wheel speeds are wanted as late as the angles that they add up to.
+    """
+    moving = given.set_point is None  # a speed loop rests before its first command
+    if log is None:
+        return seen_at_once(robot, given, held=moving)
+    t, drive, row = run.t, robot.drive.latency, float(np.median(np.diff(run.t)))
+    late = {name: log.latency.of(name, drive, row) for name in LATE}
+    if of_angles:
+        late["wheel_speed"] = late["wheel_angle"]
+    share = np.repeat((t[held] - t[0]) / (t[-1] - t[0]), parts)
+    return seen_through(robot, given, log, late, share, late[_first(run)] if moving else None)
+
+
+def _first(run: Run) -> str:
+    """The channel that tells where a free run of this log starts."""
+    there = {name for name in LATE if getattr(run, name, None) is not None}
+    if run.pose is not None:
+        there |= {"heading"} if np.isfinite(run.pose[:, 2]).any() else {"position"}
+    return next(
+        (name for name in ("twist", "wheel_speed", "wheel_angle", "heading", "position") if name in there), "twist"
+    )
 
 
 def _turned(fine: Run, parts: int) -> FloatArray:

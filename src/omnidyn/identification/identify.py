@@ -273,9 +273,14 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
         [run for run, _ in fitted], robot, plain, [g for _, g in fitted] if asked.per else None, heard
     )
     validations: dict[str, Validation] = {}
+    aside = {
+        name: [run for run, own, out in zip(runs, groups, held, strict=True) if out and own == name]
+        for name in answer.estimates
+    }
+    answer = replace(answer, estimates={name: fit.beside(aside[name]) for name, fit in answer.estimates.items()})
     try:
         for group, fit in answer.estimates.items() if not cut else ():
-            beside = [run for run, own, out in zip(runs, groups, held, strict=True) if out and own == group]
+            beside = aside[group]
             validations[group] = validate(fit, [run for run, own in fitted if own == group], beside, heard.now)
     except KeyboardInterrupt:  # what is fitted stays
         if not heard.keep_best:

@@ -7,7 +7,7 @@ held-out logs where there are any. Headings and positions count on the logs they
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -15,12 +15,10 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.comparison.aligned import PATH, errors_for_whiteness
 from omnidyn.comparison.compare import compare
-from omnidyn.comparison.replay import choose_input
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import counts_from_start, unit
 from omnidyn.comparison.verdict import is_missed
 from omnidyn.document import Document, Table, cell, chance_cell
-from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
 from omnidyn.run import Run
@@ -171,16 +169,7 @@ def validate(
 
 
 def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[[str], object] | None) -> Comparison:
-    measured = [run.as_measured() for run in runs]
-    read = [as_fitted(run, fit) for run in measured]
-    found = compare(fit.robot, read, progress=progress)
-    if all(one is other for one, other in zip(measured, read, strict=True)):
-        return found
-    inputs = dict.fromkeys(choose_input(fit.robot, run).replace("_", " ") for run in measured)
-    more = dict.fromkeys(name.partition(".")[0].replace("_", " ") for name in fit.nuisances)
-    words = f"the logged {' or '.join(inputs)} as the motors had it"
-    words += f", with the fitted {', '.join(more)}" if more else ""
-    return replace(found, applied=dict.fromkeys(found.robots, words))
+    return compare(fit.robot, [run.as_measured() for run in runs], progress=progress, log=fit.robot.log)
 
 
 def _scores(fit: OutputErrorEstimate, found: Comparison, logged: Sequence[Run]) -> dict[str, Score]:
@@ -211,7 +200,7 @@ def _errors(found: Comparison, name: str) -> list[FloatArray]:
 def _tick(logged: Sequence[Run], name: str) -> float:
     """The largest tick of a counted angle in any log [rad]; 0 for what is not counted.
 
-    logged: as recorded. What a fitted latency has moved is interpolated, and shows no tick.
+    logged: as recorded.
     """
     channel, column = place(name) or ("", 0)
     if channel != "wheel_angle":

@@ -2,7 +2,7 @@
 
 Read in this order: value (what every part is), wheels, motor, drive, friction/ (one file per place where it acts),
 robot, keys (the names of its numbers), robot_file and presets/, first_guess (a robot from a few numbers), actuation
-(what reaches its motors), correlation (which of its numbers are off together). Then its mechanics: mass, frames,
+(what reaches its motors), fitted/ (what a fit writes beside its numbers). Then its mechanics: mass, frames,
 dynamics, statespace, deadzone; layout names the numbers that stick_slip/ works in, the inclusion that sticks exactly.
 Last what is known of its numbers, known/.
 """

@@ -15,6 +15,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.motor import Motor
+from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 
 
@@ -48,6 +49,14 @@ def clip_voltage(motor: Motor, voltage: FloatArray) -> FloatArray:
     """Voltage [V] kept within the limit of the driver, symmetric about zero. Shape (*batch, wheels)."""
     limit = per_wheel(motor.voltage_limit, voltage.shape[-1])
     return np.clip(voltage, -limit, limit)
+
+
+def reaching(robot: Robot, voltage: FloatArray) -> FloatArray:
+    """What the driver of a robot passes on to the motors [V]: all but its dead band. Shape (*batch, wheels)."""
+    band = robot.drive.dead_band
+    if band == 0.0:
+        return voltage
+    return np.sign(voltage) * np.maximum(np.abs(voltage) - band, 0.0)
 
 
 @part

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
+from omnidyn.model.actuation import reaching
 from omnidyn.model.dynamics import (
     acceleration,
     axes_hold_alone,
@@ -28,7 +29,7 @@ def moves(robot: Robot, voltage: ArrayLike) -> BoolArray:
 
     `voltage` has shape (*batch, wheels); returns (*batch, 3) for x, y, yaw. The voltage limit is not applied.
     """
-    voltage = _patterns(robot, voltage)
+    voltage = reaching(robot, _patterns(robot, voltage))
     at_rest = np.zeros((*voltage.shape[:-1], 3))
     if axes_move_alone(robot):
         return ~robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage))
@@ -55,7 +56,8 @@ def breakaway_voltage(robot: Robot, pattern: ArrayLike, halvings: int = BISECTIO
     Raises InputError when its last axis is not one entry per wheel.
     """
     pattern = _patterns(robot, pattern)
-    if axes_hold_alone(robot) and not np.any(robot.motor.voltage_drop) and robot.motor.current_limit is None:
+    linear = not np.any(robot.motor.voltage_drop) and robot.motor.current_limit is None
+    if axes_hold_alone(robot) and linear and robot.drive.dead_band == 0.0:
         wrench_per_volt = np.abs(drive_wrench(robot, np.zeros((*pattern.shape[:-1], 3)), pattern))
         breakaway = robot.friction.axes.levels[2]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -68,8 +70,9 @@ def dead_zone_map(robot: Robot, directions: ArrayLike) -> tuple[FloatArray, Floa
     """(breakaway voltage [V], shape (k,); voltage patterns, shape (k, wheels)) over directions of travel [rad], (k,).
 
     Each pattern pushes along its direction without a torque and has a largest entry of 1: the voltage is that of the
-    most loaded motor at which the robot starts to move. With a voltage drop, a current limit or a lossy gear the push
-    is no longer proportional to the pattern: it is then not quite along the direction, and not free of torque.
+    most loaded motor at which the robot starts to move. With a voltage drop, a dead band, a current limit or a lossy
+    gear the push is no longer proportional to the pattern: it is then not quite along the direction, and not free of
+    torque.
     """
     directions = np.atleast_1d(np.asarray(directions, dtype=float))
     wrench = np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1)
@@ -86,7 +89,7 @@ def dead_zone_force(robot: Robot, directions: ArrayLike) -> FloatArray:
     voltage, patterns = dead_zone_map(robot, directions)
     reached = np.isfinite(voltage)
     volts = np.where(reached, voltage, 0.0)[:, None] * patterns
-    wrench = drive_wrench(robot, np.zeros((len(directions), 3)), volts)
+    wrench = drive_wrench(robot, np.zeros((len(directions), 3)), reaching(robot, volts))
     along = wrench[:, 0] * np.cos(directions) + wrench[:, 1] * np.sin(directions)
     return np.where(reached, along, np.inf)
 
@@ -116,7 +119,11 @@ def _patterns(robot: Robot, pattern: ArrayLike) -> FloatArray:
 
 def _bisect(robot: Robot, patterns: FloatArray, halvings: int) -> FloatArray:
     """The largest scale that holds, by doubling and bisection on an exact test. Shape (k,)."""
-    holds_at = holds_under(robot)
+    holds = holds_under(robot)
+
+    def holds_at(volts: FloatArray) -> BoolArray:
+        return holds(reaching(robot, volts))
+
     low, high = np.zeros(len(patterns)), np.full(len(patterns), 1e-3)
     still = holds_at(high[:, None] * patterns)
     while still.any() and high.max() < HIGHEST:
@@ -124,6 +131,6 @@ def _bisect(robot: Robot, patterns: FloatArray, halvings: int) -> FloatArray:
         still &= holds_at(high[:, None] * patterns)
     for _ in range(halvings):
         middle = 0.5 * (low + high)
-        holds = holds_at(middle[:, None] * patterns)
-        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
+        held = holds_at(middle[:, None] * patterns)
+        low, high = np.where(held, middle, low), np.where(held, high, middle)
     return np.where(still, np.inf, low)

@@ -11,6 +11,8 @@ from omnidyn.model.value import PerWheel, Value, number, per_wheel_number
 VOLTAGE, DUTY, SPEED = "voltage", "duty", "speed"
 BRAKE, COAST = "brake", "coast"
 
+MOST_LATENCY = 10.0  # [s]
+
 Gain = Annotated[PerWheel, per_wheel_number(0.0, 1e6)]
 
 
@@ -22,6 +24,7 @@ class Drive(Value):
     "coast" opens it, so that no current flows.
     kp [V s/rad], ki [V/rad], rate [Hz]: the speed loop, on wheel-side speed; it saturates at the voltage limit and
     stops integrating there.
+    dead_band [V]: of a voltage u, (|u| - dead_band)+ sgn u reaches the motor. latency [s]: until a command does.
     """
 
     kind: Annotated[Literal["voltage", "duty", "speed"], Field(description="what a command is")] = VOLTAGE
@@ -34,6 +37,13 @@ class Drive(Value):
     rate: Annotated[
         Annotated[float, number(0.1, 1e6)] | None, Field(alias="rate_Hz", description="of the speed loop")
     ] = None
+    dead_band: Annotated[
+        Annotated[float, number(0.0, 1e4)], Field(alias="dead_band_V", description="of the driver, lost of any voltage")
+    ] = 0.0
+    latency: Annotated[
+        Annotated[float, number(0.0, MOST_LATENCY)],
+        Field(alias="latency_s", description="from a command to the motors"),
+    ] = 0.0
 
     @property
     def coasts(self) -> bool:

@@ -30,10 +30,12 @@ BOX = tuple(f"{BODY_AXES}.{level}[{axis}]" for level in (VISCOUS, COULOMB) for a
 TORQUE, EMF = "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad"
 ROTOR, WHEEL = "motor.rotor_inertia_kg_m2", "wheels.inertia_kg_m2"
 GAINS = ("drive.kp_V_s_rad", "drive.ki_V_rad")
+DEAD_BAND, LATENCY = "drive.dead_band_V", "drive.latency_s"
 
 _UNITS = {
     "_kg": "kg", "_kg_m2": "kg m^2", "_m": "m", "_deg": "deg", "_ohm": "ohm", "_H": "H", "_Nm_A": "N m/A",
     "_Vs_rad": "V s/rad", "_V": "V", "_A": "A", "_V_s_rad": "V s/rad", "_V_rad": "V/rad", "_Hz": "Hz",
+    "_s": "s",
 }  # fmt: skip
 _FORM = re.compile(r"(\w+(?:\.\w+)*)(?:\[(\d{1,9})\])?", re.ASCII)
 _FRICTIONS = {

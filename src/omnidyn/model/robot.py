@@ -8,8 +8,9 @@ from pydantic import AfterValidator, Field, model_validator
 
 from omnidyn.document import Document
 from omnidyn.errors import printable
-from omnidyn.model.correlation import KeyCorrelation
 from omnidyn.model.drive import Drive
+from omnidyn.model.fitted.correlation import KeyCorrelation
+from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor, mass_at_rim
 from omnidyn.model.robot_table import robot_table
@@ -75,6 +76,7 @@ class Robot(Shown, Value):
 
     priors: key of the robot file, such as "motor.resistance_ohm" or "friction.axes.coulomb[0]", -> Prior.
     correlation: which of these numbers are off together; numbers that a change took away have no part in it.
+    log: what the logs of the fit that wrote the robot did beside it, and which logs these are.
     """
 
     name: Annotated[Text, Field(min_length=1), AfterValidator(printable)]
@@ -85,6 +87,7 @@ class Robot(Shown, Value):
     drive: Drive = Drive()
     friction: Friction = Friction()
     correlation: Annotated[KeyCorrelation | None, Field(description="which numbers are off together")] = None
+    log: Annotated[LogEffects | None, Field(description="what the logs of its fit did beside the robot")] = None
     priors: Annotated[dict[str, Prior], Field(exclude=True, default_factory=dict)]
 
     @model_validator(mode="after")

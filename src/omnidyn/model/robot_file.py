@@ -131,7 +131,7 @@ def robot_to_toml(robot: Robot) -> str:
     if robot.source:
         head.append(f"source = {toml_literal(robot.source)}")
     tables = [_table(name, getattr(robot, name), robot.priors) for name in TABLES]
-    return "\n".join(head) + "\n" + "".join(tables) + _together(robot)
+    return "\n".join(head) + "\n" + "".join(tables) + _of_logs(robot) + _together(robot)
 
 
 def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
@@ -148,6 +148,11 @@ def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
             note = type(value).model_fields[field].description
             lines.append(f"{key} = {_with_prior(content, path, priors)}" + (f"  # {note}" if note else ""))
     return ("\n[" + name + "]\n" + "\n".join(lines) + "\n" if lines else "") + inner
+
+
+def _of_logs(robot: Robot) -> str:
+    """The table of what the logs of a fit did beside the robot."""
+    return "" if robot.log is None else _table("log", robot.log, {})
 
 
 def _together(robot: Robot) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,6 +11,7 @@ from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -21,6 +24,7 @@ from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import simulate_exact, why_not_exact
 from omnidyn.simulation.implicit.march import Outcome, capped, run_implicit
 from omnidyn.simulation.speed_loop import loop_of, no_loop
+from omnidyn.simulation.view import PLAIN, View, seen_at_once, seen_through
 
 TOLERANCE = 1e-6
 # Beyond these a step has no meaning and the implicit engine no end: [m/s, rad/s], [m, rad], [A].
@@ -40,6 +44,7 @@ def simulate(
     pose: ArrayLike = (0.0, 0.0, 0.0),
     current: ArrayLike | None = None,
     tol: float | None = TOLERANCE,
+    log: LogEffects | None = None,
 ) -> Run:
     """Simulate a robot under commands held from row to row, eqs (1)-(14).
 
@@ -51,6 +56,7 @@ def simulate(
     (wheels,); current [A] matters for dynamic electrics only.
     tol: global error of the implicit engine [m/s], 10 tol [rad/s]; None takes one fixed step per row. The exact
     engine, used wherever the robot allows it, needs no tolerance; Run.source says which engine ran.
+    log: what a log did beside the robot, such as `robot.log` of a fit: a battery that sagged, sensors that were late.
     Returns a Run of n + 1 samples: t, voltage (the last row repeats), current, wheel_speed, twist, pose.
     What is at rest within its dead zone has a speed of exactly 0.0.
     Raises InputError for wrong shapes, NaN, infinite values, a start beyond 1e3 m/s, dt outside 1e-9..3600 s, a missing
@@ -58,17 +64,28 @@ def simulate(
     """
     _check_order(robot, voltage, dt)
     given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
+    view = seen_at_once(robot, given) if log is None else seen_through(robot, given, log)
+    return simulate_seen(robot, given, view, twist=twist, pose=pose, current=current, tol=tol)
+
+
+def simulate_seen(
+    robot: Robot, given: Commands, view: View, *, twist: ArrayLike, pose: ArrayLike, current: ArrayLike | None,
+    tol: float | None,
+) -> Run:  # fmt: skip
+    """`simulate` of commands that were checked, as the log of a view shows them."""
     start = as_start("twist", twist, 3), as_start("pose", pose, 3)
     amperes = as_start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
     tolerance = as_tolerance(tol)  # refused for either engine: which one runs is not what the caller chose
+    acting = view.acting(robot, given)
     if given.set_point is None and given.open_circuit is None and not why_not_exact(robot):
-        assert given.voltage is not None
+        assert acting.voltage is not None
         if robot.motor.electrical == DYNAMIC:
-            twists, poses, currents = simulate_exact_inductance(robot, given.voltage, given.dt, *start, amperes)
+            twists, poses, currents = simulate_exact_inductance(robot, acting.voltage, acting.dt, *start, amperes)
         else:
-            (twists, poses), currents = simulate_exact(robot, given.voltage, given.dt, *start), None
-        return as_run(robot, given, given.voltage, twists, poses, None, "exact engine", (), currents)
-    return _implicit(robot, given, *start, amperes, tolerance)
+            (twists, poses), currents = simulate_exact(robot, acting.voltage, acting.dt, *start), None
+        done = Done(acting.voltage, twists, poses, None, currents)
+        return as_run(robot, given, acting, done, "exact engine", (), view)
+    return _implicit(robot, given, acting, *start, amperes, tolerance, view)
 
 
 def _check_order(robot: Robot, voltage: object, dt: object) -> None:
@@ -103,30 +120,37 @@ def as_start(name: str, value: ArrayLike, size: int) -> FloatArray:
 
 
 def _implicit(
-    robot: Robot, given: Commands, twist: FloatArray, pose: FloatArray, current: FloatArray, tol: float
-) -> Run:
+    robot: Robot, given: Commands, acting: Commands, twist: FloatArray, pose: FloatArray, current: FloatArray,
+    tol: float, view: View,
+) -> Run:  # fmt: skip
     """Run the implicit engine, on the grid of the speed loop where there is one, and keep the rows asked for."""
     numbers, n = plant(robot), robot.wheels.count
-    if given.set_point is None:
-        assert given.voltage is not None
-        dt, loop, keep, voltage = given.dt, no_loop(n), np.arange(len(given.dt) + 1), given.voltage.copy()
+    if acting.set_point is None:
+        assert acting.voltage is not None
+        dt, loop, keep, voltage = acting.dt, no_loop(n), np.arange(len(acting.dt) + 1), acting.voltage.copy()
     else:
-        dt, set_point, tick, keep = on_ticks(robot, given)
+        dt, set_point, tick, keep = on_ticks(robot, acting)
         voltage = np.zeros_like(set_point)
         loop = loop_of(robot, set_point, tick)
-    bound = current_bounds(robot, given, len(dt))
+    bound = current_bounds(robot, acting, len(dt))
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
     kept = Outcome(outcome.pose[keep], outcome.state[keep], outcome.iterations, outcome.steps)
-    return implicit_run(robot, given, voltage[keep[:-1]], kept, tol)
+    return implicit_run(robot, given, voltage[keep[:-1]], kept, tol, acting, view)
 
 
-def implicit_run(robot: Robot, given: Commands, voltage: FloatArray, outcome: Outcome, tol: float) -> Run:
-    """The Run of what the implicit engine found at the samples asked for, its warnings included."""
+def implicit_run(
+    robot: Robot, given: Commands, voltage: FloatArray, outcome: Outcome, tol: float, acting: Commands | None = None,
+    view: View = PLAIN,
+) -> Run:  # fmt: skip
+    """The Run of what the implicit engine found at the samples of a view, its warnings included.
+
+    acting: the commands as they reached the motors; None: as given. voltage [V]: at the motors then.
+    """
     how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
     stopped, rows = capped(outcome), len(outcome.iterations)
     warnings = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
     twists = outcome.state[:, :N_AXES] / [1.0, 1.0, plant(robot).body[LENGTH]]
-    return as_run(robot, given, voltage, twists, outcome.pose, outcome, how, warnings)
+    return as_run(robot, given, acting or given, Done(voltage, twists, outcome.pose, outcome), how, warnings, view)
 
 
 def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
@@ -138,34 +162,52 @@ def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
     return bound
 
 
+class Done(NamedTuple):
+    """What a simulation found: voltage [V] at the motors over each step; twist, pose and current at each sample.
+
+    outcome: of the implicit engine. current: of the exact engine with winding inductance.
+    """
+
+    voltage: FloatArray
+    twist: FloatArray
+    pose: FloatArray
+    outcome: Outcome | None = None
+    current: FloatArray | None = None
+
+
 def as_run(
-    robot: Robot, given: Commands, voltage: FloatArray, twists: FloatArray, poses: FloatArray,
-    outcome: Outcome | None, engine: str, warnings: tuple[str, ...], currents: FloatArray | None = None,
+    robot: Robot, given: Commands, acting: Commands, done: Done, engine: str, warnings: tuple[str, ...],
+    view: View = PLAIN,
 ) -> Run:  # fmt: skip
-    """The Run of a simulation: what the instruments of an ideal robot would have recorded."""
+    """The Run of a simulation: what the instruments of the robot would have recorded, as a view shows it."""
     dt, n = given.dt, robot.wheels.count
     t = np.arange(len(dt) + 1) * dt[0] if np.all(dt == dt[0]) else np.concatenate([[0.0], np.cumsum(dt)])
-    held, turning = _with_last(voltage), wheel_speed(robot.wheels, twists)
+    turning, outcome = wheel_speed(robot.wheels, done.twist), done.outcome
     if outcome is not None:  # a wheel that sticks is at rest, to the last bit
         turning[outcome.state[:, SIGNS + N_AXES : SIGNS + N_AXES + n] == 0.0] = 0.0
-    if currents is not None:
-        current = currents
+    if done.current is not None:
+        current = done.current
     elif outcome is not None and robot.motor.electrical == DYNAMIC:
         current = outcome.state[:, -n:]
     else:
-        current = settled_currents(robot, twists, held)
-    if given.open_circuit is not None:
-        current = np.where(_with_last(given.open_circuit), 0.0, current)
+        push = 0.0 if view.push is None else view.push  # of the floor, not of the motors
+        current = settled_currents(robot, done.twist, _with_last(done.voltage - push))
+    if acting.open_circuit is not None:
+        current = np.where(_with_last(acting.open_circuit), 0.0, current)
+    if given.voltage is None:  # a speed loop makes it, at its own ticks
+        voltage = view.of("voltage", _with_last(done.voltage))
+    else:
+        voltage = _with_last(given.voltage)
     return Run(
         t=t,
-        voltage=held,
+        voltage=voltage,
         duty=None if given.duty is None else _with_last(given.duty),
-        current=current,
-        wheel_speed=turning,
+        current=view.of("current", current),
+        wheel_speed=view.of("wheel_speed", turning),
         wheel_speed_command=None if given.set_point is None else _with_last(given.set_point),
-        twist=twists,
+        twist=view.of("twist", done.twist),
         twist_command=None if given.twist is None else _with_last(given.twist),
-        pose=poses,
+        pose=np.hstack([view.of("position", done.pose[:, :2]), view.of("heading", done.pose[:, 2:])]),
         supply=None if given.supply is None else _with_last(given.supply),
         source=f"simulated: {robot.name}, {engine}",
         warnings=given.warnings + warnings,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,10 @@ from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.study_parts import Difference
+from omnidyn.model.fitted.log_effects import log_mark
+from omnidyn.run import Run
+
+WORTH = 0.1  # share by which an interval is wider, from which on that is said
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,9 @@ class OutputErrorEstimate(Estimate):
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
     together. blind: directions that the data do not show, in words. covariance: "white", "autoregressive" or
     "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the
-    minimisation. not_followed: outputs that the model does not follow. study: makes the diagnosis, on first access.
+    minimisation. not_followed: outputs that the model does not follow. log_alone: name -> 95 % interval from the log
+    alone, were what the robot file knows with a std exact; empty where it knows nothing so. study: makes the diagnosis,
+    on first access.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -60,6 +66,7 @@ class OutputErrorEstimate(Estimate):
     iterations: int = 0
     converged: bool = True
     not_followed: tuple[str, ...] = ()
+    log_alone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
 
     @cached_property
@@ -76,6 +83,15 @@ class OutputErrorEstimate(Estimate):
     def rests_on(self) -> Mapping[str, Mapping[str, float]]:
         """Number -> key of a number that was taken as it stands -> relative change of the first per percent of it."""
         return self.diagnosis.rests_on if self.diagnosis else {}
+
+    def beside(self, runs: Sequence[Run]) -> OutputErrorEstimate:
+        """The same, where these logs are of the same series as those that were fitted, such as those held out: the file
+        of the robot knows them, and they get what the logs did beside the robot."""
+        log = self.robot.log
+        if log is None or not runs:
+            return self
+        of = dict.fromkeys((*log.of, *map(log_mark, runs)))
+        return replace(self, robot=self.robot.replace(log=log.replace(of=tuple(of))))
 
     @property
     def stability(self) -> Stability | None:
@@ -98,7 +114,19 @@ class OutputErrorEstimate(Estimate):
         ]
         noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
         left = [Points(self.blind, "not shown by the data:"), Points(self.unused, "not used:")]
-        return [*super()._parts(), *sums, *logs, *noise, *left]
+        return [*super()._parts(), *self.told_alone(), *sums, *logs, *noise, *left]
+
+    def told_alone(self) -> list[str]:
+        """What the intervals owe to numbers that the robot file gives with a std, where that is worth a word."""
+        found = []
+        for name, (low, high) in self.log_alone.items():
+            whole = self.ci95.get(name) or (self.nuisances[name].ci95 if name in self.nuisances else None)
+            if whole is not None and whole[1] - whole[0] > (1.0 + WORTH) * (high - low):
+                cell = interval_cell((low, high))
+                found.append(
+                    f"{name}: {cell} from the log alone, {interval_cell(whole)} with what is known of the robot"
+                )
+        return found
 
     @staticmethod
     def _of_log(own: Nuisance) -> str:
@@ -112,7 +140,8 @@ class OutputErrorEstimate(Estimate):
         return super().to_dict() | plain({
             "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable,
             "combinations": [asdict(one) for one in self.combinations], "blind": self.blind,
-            "covariance": self.covariance, "unused": self.unused, "converged": self.converged,
+            "from_the_log_alone": self.log_alone, "covariance": self.covariance, "unused": self.unused,
+            "converged": self.converged,
         })  # fmt: skip
 
 

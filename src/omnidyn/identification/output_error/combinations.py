@@ -51,9 +51,9 @@ def combinations(problem: Problem, values: FloatArray, known: Trust, moved: Bool
         return ()
     found = []
     for kind in KINDS:
-        now, slopes = kind.of(problem.robot_at(values)), _slopes(problem, values, kind.of)
+        now, slopes = kind.of(problem.robot_at(values)), slopes_of(problem, values, kind.of)
         for axis in np.flatnonzero(moved).tolist():
-            std = _std(slopes[axis], known)
+            std = std_of(slopes[axis], known)
             if now[axis] > 0.0 and std < VAGUE * now[axis]:
                 value, half = float(now[axis]), known.quantile * std
                 found.append(
@@ -65,7 +65,7 @@ def combinations(problem: Problem, values: FloatArray, known: Trust, moved: Bool
     return tuple(found)
 
 
-def _slopes(problem: Problem, values: FloatArray, of: Callable[[Robot], FloatArray]) -> FloatArray:
+def slopes_of(problem: Problem, values: FloatArray, of: Callable[[Robot], FloatArray]) -> FloatArray:
     """Derivatives by the numbers that the solver sees. Shape (3, P); nuisances have none."""
     slopes = np.zeros((3, len(values)))
     for j, p in enumerate(problem.robot_parameters):
@@ -80,7 +80,7 @@ def _slopes(problem: Problem, values: FloatArray, of: Callable[[Robot], FloatArr
     return slopes
 
 
-def _std(slope: FloatArray, known: Trust) -> float:
+def std_of(slope: FloatArray, known: Trust) -> float:
     """Standard error of a combination (P,); infinite where it moves with what is lost."""
     lost = np.flatnonzero(known.blind)
     if any(value < BLIND and _share(slope, way, lost) > LOST for value, way in known.directions):

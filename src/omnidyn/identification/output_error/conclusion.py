@@ -15,16 +15,20 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified, printable
 from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
+from omnidyn.identification.output_error.belonging import with_nuisances
 from omnidyn.identification.output_error.combinations import combinations
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
+from omnidyn.identification.output_error.trades import trades
+from omnidyn.identification.output_error.trust.alone import from_the_log_alone, given
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
+from omnidyn.identification.output_error.trust.ends import at_the_end, end_words
 from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
-from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, with_priors
+from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, unit, with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
 from omnidyn.statistics import difference_noise
@@ -48,7 +52,8 @@ def conclude(
     """
     problem, values = solver.problem, solution.state.point.values.copy()
     blind = tuple(p.name for p, b in zip(problem.parameters, known.blind, strict=True) if b)
-    open_ = tuple(p.name for p, b in zip(problem.parameters, known.open, strict=True) if b)
+    ended = tuple(p.name for p in at_the_end(problem, values))
+    open_ = tuple(p.name for p, b in zip(problem.parameters, known.open, strict=True) if b or p.name in ended)
     own = problem.robot_count
     missed = unexplained(solver, solution)
     if known.open[:own].all():
@@ -58,15 +63,14 @@ def conclude(
     std, ci95 = intervals(problem, values, known)
     for name, (spread, interval) in (better or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
-    data = _data(records)
+    data, names = _data(records), [p.name for p in problem.parameters]
     own_levels, joint = _levels(levels, ci95), combinations(problem, values, known, moved)
-    names = [p.name for p in problem.parameters]
     fitted = problem.parameters[:own]
+    robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)
+    robot = with_nuisances(robot, problem, values, std, open_, records, data)
     warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-        robot=_together(
-            _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels), fitted, std, known
-        ),
+        robot=_together(robot, fitted, std, known),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
@@ -85,7 +89,8 @@ def conclude(
         },
         noise=noise_of(solver, solution),
         unidentifiable=open_,
-        combinations=joint,
+        combinations=(*joint, *trades(problem, values, known, moved)),
+        log_alone=_log_alone(problem, values, known, open_),
         blind=tuple(_direction(problem, value, way, known.blind) for value, way in known.directions),
         covariance=known.kind,
         unused=_unused(records),
@@ -93,6 +98,21 @@ def conclude(
         converged=solution.converged,
         not_followed=tuple(missed),
     )
+
+
+def _log_alone(
+    problem: Problem, values: FloatArray, known: Trust, open_: Sequence[str]
+) -> dict[str, tuple[float, float]]:
+    """Name -> 95 % interval were what the robot file knows with a std exact; empty where it knows nothing so."""
+    alone = from_the_log_alone(problem, known)
+    if alone is None:
+        return {}
+    found, of_file = intervals(problem, values, alone)[1], given(problem)
+    return {
+        p.name: found[p.name]
+        for p, yes in zip(problem.parameters, of_file, strict=True)
+        if not yes and p.name not in open_
+    }
 
 
 def _scale(problem: Problem) -> str:
@@ -194,7 +214,7 @@ def intervals(
             below = value <= p.low
             low = inner if below else inner + min(-half, pushed - half)
             high = inner + max(half, pushed + half) if below else inner
-        low = max(low, p.inner(p.low)) if not p.log else low
+        low, high = (max(low, p.low), min(high, max(p.high, inner))) if not p.log else (low, high)
         ci95[p.name] = (p.outer(low), p.outer(high))
     return std, ci95
 
@@ -299,8 +319,12 @@ def _warnings(
         words.append(f"the fit was cut short after {solution.iterations} iterations: the numbers are of its last step")
     words += [f"{name} is not identifiable from these logs" for name in blind]
     words += [implausible(name, value) for name, value in too_early(solver, solution).items()]
+    values = solution.state.point.values
+    ended = {p.name: p for p in at_the_end(solver.problem, values)}
+    at = {name: float(values[solver.problem.where(name)]) for name in ended}
+    words += [end_words(p, at[name], _unit(name) or unit(name)) for name, p in ended.items()]
     for j, p in enumerate(solver.problem.parameters[: solver.problem.robot_count]):
-        if known.held[j]:
+        if known.held[j] and p.name not in ended:
             bound = f"{p.name} is at its bound {solution.state.point.values[j]:.4g}"
             still = Key.parse(p.name.partition("@")[0]).name in (ROTOR, WHEEL)
             why = "nothing is seen to spin beside the body" if still else "the best fit lies beyond it"

@@ -36,6 +36,7 @@ from omnidyn.model.keys import (
     BOX,
     BREAKAWAY,
     COULOMB,
+    DEAD_BAND,
     EMF,
     FRICTION,
     GAINS,
@@ -46,6 +47,7 @@ from omnidyn.model.keys import (
     friction_keys,
     unit,
 )
+from omnidyn.model.keys import LATENCY as DRIVE_LATENCY
 from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.run import Run
 
@@ -57,8 +59,16 @@ ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows th
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
 LIMIT = "motor.voltage_limit_V"
-# A drawing, a setting of the firmware and a battery: their std is for the reader. A nominal supply has a nuisance.
-NEVER_FREE = ("wheels.azimuth_deg", "wheels.roller_angle_deg", "drive.rate_Hz", "drive.supply_V")
+# A drawing, a setting of the firmware and a battery: their std is for the reader. A nominal supply has a nuisance,
+# and so have a dead band and a latency.
+NEVER_FREE = (
+    "wheels.azimuth_deg",
+    "wheels.roller_angle_deg",
+    "drive.rate_Hz",
+    "drive.supply_V",
+    DEAD_BAND,
+    DRIVE_LATENCY,
+)
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 
 
@@ -177,12 +187,12 @@ def make_problem(
     engine = engine or engine_for(records, robot, keys)
     if engine != EXACT:
         own = [_within_reach(p, _drive(records, robot)) for p in own]
-    auto = automatic(records) if engine == EXACT else (LATENCY,)
+    auto = automatic(records, engine == EXACT)
     more = (
         nuisance_parameters(auto, records, robot, earliest(records)) if question.nuisances is None
         else nuisance_parameters(question.nuisances, records, robot)
     )  # fmt: skip
-    late = any(p.name.startswith(LATENCY) for p in more)
+    late = any(p.name.startswith(LATENCY) for p in more) or robot.drive.latency > 0.0
     start = question.start
     parts = (
         loop_pieces(records, robot, start)

@@ -19,7 +19,7 @@ from omnidyn.findings.needs import CURRENT, VOLTAGE, force_origin
 from omnidyn.identification.recordings import count_once
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
-from omnidyn.model.actuation import asked_voltage
+from omnidyn.model.actuation import asked_voltage, reaching
 from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import settled_current, traction
@@ -221,7 +221,7 @@ def _current(run: Run, robot: Robot, each: Plateau, origin: str) -> tuple[FloatA
         return each.mean["current"], each.std["current"]
     _need(run, each, "voltage")
     _need(run, each, "wheel_speed")
-    volts, speed = each.mean["voltage"], each.mean["wheel_speed"]
+    volts, speed = reaching(robot, each.mean["voltage"]), each.mean["wheel_speed"]
     current = settled_current(robot.motor, volts, speed)
     by_volts = settled_current(robot.motor, volts + each.std["voltage"], speed) - current
     by_speed = settled_current(robot.motor, volts, speed + each.std["wheel_speed"]) - current

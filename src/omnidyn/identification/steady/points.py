@@ -17,6 +17,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import loses_in_gear
 from omnidyn.logs.steady_table import SteadyTable
+from omnidyn.model.actuation import reaching
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents, wrench_from_currents
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
@@ -84,7 +85,7 @@ def points_from_voltage(
     Raises InputError for wrong shapes and numbers that are not finite, UnsupportedError for losses it does not know.
     """
     twist = _rows("twist", twist, 3)
-    volts = _rows("voltage", voltage, robot.wheels.count, len(twist))
+    volts = reaching(robot, _rows("voltage", voltage, robot.wheels.count, len(twist)))
     refuse_losses(robot)
     spread = None
     if voltage_std is not None:

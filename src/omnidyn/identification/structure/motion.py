@@ -97,7 +97,7 @@ def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Mo
     t = record.t[piece.first : piece.last + 1]
     if record.set_point is None:
         asked, _ = at_motors(record.voltage[rows], record.share[rows], driver)
-        run = simulate(robot, asked, np.diff(t), twist=state[:N_AXES])
+        run = simulate(_ideal(robot), asked, np.diff(t), twist=state[:N_AXES])
     else:
         run = simulate(robot, dt=np.diff(t), wheel_speed_command=record.set_point[rows])
     assert run.twist is not None
@@ -107,6 +107,12 @@ def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Mo
     current = settled_currents(robot, run.twist, run.voltage)
     share = record.share[piece.first : piece.last + 1]
     return Motion(piece, robot, t, run.twist, run.pose, run.voltage, current, share, decay, gain)
+
+
+def _ideal(robot: Robot) -> Robot:
+    """The robot behind its driver, whose dead band and latency were taken off the voltages."""
+    drive = robot.drive.model_copy(update={"dead_band": 0.0, "latency": 0.0})
+    return robot.model_copy(update={"drive": drive})
 
 
 def _answers(robot: Robot, twist: FloatArray, voltage: FloatArray, dt: FloatArray) -> tuple[FloatArray, FloatArray]:

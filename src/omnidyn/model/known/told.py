@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.correlation import KeyCorrelation, key_correlation
-from omnidyn.model.keys import Key, expand, find_key
+from omnidyn.model.fitted.correlation import KeyCorrelation, key_correlation
+from omnidyn.model.keys import DEAD_BAND, LATENCY, Key, expand, find_key
 from omnidyn.model.robot import Prior, Robot
 
 NEAR = 0.5  # std over value, from which on a friction may be 0
@@ -80,9 +80,10 @@ def _has(robot: Robot, name: str) -> bool:
 
 
 def is_log(name: str, value: float, std: float) -> bool:
-    """Whether a number has a logarithmic scale: what must be positive, and a friction that is far from 0."""
+    """Whether a number has a logarithmic scale: what must be positive, and what may be 0 but is far from it."""
     key = Key.parse(name)
-    return key.name not in ANGLES and value > 0.0 and (not key.level or std < NEAR * value)
+    may_be_0 = bool(key.level) or key.name in (DEAD_BAND, LATENCY)
+    return key.name not in ANGLES and value > 0.0 and (not may_be_0 or std < NEAR * value)
 
 
 def correlation_of(robot: Robot) -> KeyCorrelation | None:

@@ -6,7 +6,6 @@ from scipy.integrate import cumulative_simpson
 from scipy.optimize import least_squares
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.identify import identify
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.fit import Fit
@@ -90,9 +89,9 @@ def test_an_ellipse_robot_seen_late(ellipse):
     for name in ("latency.twist", "latency.current"):
         late = fit.nuisances[name]
         assert abs(late.value - 0.007) < max(4.5 * late.std, 5e-4), name
-    moved = as_fitted(run, fit)
-    free = simulate(ellipse, dt=np.diff(moved.t), wheel_speed_command=moved.wheel_speed_command[:-1])
-    error = np.sqrt(np.mean((free.twist - moved.twist) ** 2, axis=0))
+    late = ellipse.replace(drive=fit.robot.drive.replace(kp=ellipse.drive.kp, ki=ellipse.drive.ki))
+    free = simulate(late, dt=np.diff(run.t), twist_command=run.twist_command[:-1], log=fit.robot.log)
+    error = np.sqrt(np.mean((free.twist - run.twist) ** 2, axis=0))
     np.testing.assert_allclose(error, NOISE, rtol=0.15)
 
 

@@ -5,9 +5,10 @@ import pytest
 from scipy.signal import lfilter
 
 from benchmarks.coloured import TICK, counted
-from omnidyn.identification.as_fitted import as_fitted
+from omnidyn.comparison.compare import compare
 from omnidyn.identification.output_error.problem.differences import added_up, differences
 from omnidyn.identification.output_error.problem.record import record
+from omnidyn.identification.validation import validate
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.run import Run
 from tests.support.axebot_logs import TRUTH, voltages
@@ -154,10 +155,10 @@ def test_a_latency_of_the_speeds_is_that_of_the_angles(axebot, log):
 
 def test_free_runs_are_compared_half_a_row_earlier(axebot, log):
     fit = fit_output_error(log, axebot, nuisances=())
-    read = as_fitted(log, fit)
-    assert read.t == pytest.approx(log.t - 0.5 / RATE)
-    assert read.wheel_speed is not None
-    assert read.wheel_speed == pytest.approx(log.wheel_speed)
+    assert fit.robot.log.latency.of("wheel_speed", 0.0, 1.0 / RATE) == pytest.approx(0.5 / RATE)
+    assert fit.robot.log.is_of(log)
+    found, anew = validate(fit, [log]).fitted, compare(fit.robot.replace(log=None), log)
+    assert found.rmse["w1"] < anew.rmse["w1"]
 
 
 def test_forces_that_no_model_has_are_errors_with_a_memory(axebot, make):

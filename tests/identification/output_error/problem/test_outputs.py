@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.identification.as_fitted import as_fitted
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -102,7 +101,7 @@ def test_a_tilted_floor_is_found_and_friction_with_it(axebot, clean):
         assert own.unit == ("N m" if axis == "yaw" else "N")
     assert fit.nuisances["tilt.x"].value > 10.0 * fit.nuisances["tilt.x"].std
     again = simulate(fit.robot.replace(motor=fit.robot.motor.replace(voltage_limit=100.0)),
-                     as_fitted(log, fit).voltage[:-1], 0.01)  # fmt: skip
+                     log.voltage[:-1], 0.01, log=fit.robot.log)  # fmt: skip
     assert np.sqrt(np.mean((again.twist - run.twist) ** 2, axis=0)) == pytest.approx(np.zeros(3), abs=0.005)
 
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.engines.actuation import driver_of
+from omnidyn.identification.output_error.engines.actuation import LATE as LATE
+from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march import (
     FINAL,
@@ -42,7 +43,6 @@ from omnidyn.model.mass import axis_masses
 from omnidyn.simulation.exact.position import PLACE_SIZE
 
 VECTOR = 4  # rows of slopes are padded to a multiple
-LATE = "latency."
 POSITION, HEADING = "position", ("heading", 0)
 TILT = ("tilt.x", "tilt.y", "tilt.yaw")
 
@@ -74,7 +74,8 @@ class ExactEngine:
         twists = all(name == "twist" for name, _ in self._columns)
         margins = any(piece.margin.any() for piece in problem.pieces)
         friction = self.mapping.linear and problem.robot_count == len(problem.parameters)
-        self._axes_only = fast and twists and friction and not margins
+        ideal = problem.robot.drive.dead_band == 0.0 and problem.robot.drive.latency == 0.0
+        self._axes_only = fast and twists and friction and ideal and not margins
 
     def on(self, problem: Problem) -> ExactEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
@@ -183,11 +184,11 @@ class ExactEngine:
 
         facing = state[N_AXES + columns.index(HEADING)] if HEADING in columns else 0.0
         maps, slopes = _maps(columns, now, facing), _maps(columns, by, facing, (robot_count,))
-        late = [problem.where(LATE + name) for name, _ in columns]
+        seconds, late = late_by(problem, values, columns)
         (driver, at_driver), tilt = driver_of(problem, values), self._tilt(values)
         physics = Physics(
             np.stack([now.rate, now.coulomb, now.hold]), now.drive, now.per_force * tilt, maps[0], maps[1], maps[2],
-            _wheel_of(columns), np.array([values[k] if k >= 0 else 0.0 for k in late]),
+            _wheel_of(columns), np.array(seconds),
             driver, bool(maps[1].any()),
         )  # fmt: skip
         at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)

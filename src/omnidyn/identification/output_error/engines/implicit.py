@@ -14,7 +14,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.actuation import driver_of
+from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, Weighting
 from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
@@ -102,8 +102,7 @@ class ImplicitEngine:
         """(residuals (C, rows), slopes (C, rows, U), index of each of the U among the P parameters and the states)."""
         record, count = piece.record, len(self.problem.parameters)
         t, measured = record.t[piece.first : piece.last + 1], record.outputs[piece.first : piece.last + 1].T
-        where = [self.problem.where(LATE + name) for name, _ in record.columns]
-        late = [float(values[k]) if k >= 0 else 0.0 for k in where]
+        late, where = late_by(self.problem, values, record.columns)
         distinct = sorted(set(late))
         seen, at, factors = self._run(robot, moved, scales, piece, state, values, distinct)
         residual = np.empty(measured.shape)

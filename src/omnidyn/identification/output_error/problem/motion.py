@@ -15,6 +15,7 @@ from omnidyn.identification.output_error.problem.starts import (
     measured_twist,
     window_rows,
 )
+from omnidyn.model.actuation import reaching
 from omnidyn.model.frames import AXES
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
@@ -69,7 +70,7 @@ def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot:
     drive, mass, most = state_space(robot).B, mass_matrix(robot), np.zeros(3)
     for record, known in zip(records, measured, strict=True):
         for first, last in record.pieces:
-            wrench = record.voltage[first:last] @ drive.T @ mass
+            wrench = reaching(robot, record.voltage[first:last]) @ drive.T @ mass
             most = np.maximum(most, np.where(known, np.abs(wrench).max(axis=0), 0.0))
     return most
 

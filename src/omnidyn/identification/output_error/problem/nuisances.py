@@ -2,7 +2,7 @@
 
 latency.CHANNEL   the channel shows what was t ago [s]; exact, by steps that end within a row
 gain              voltage at the motor = gain x logged; with a supply that is only nominal, a prior of 10 %
-dead_band         of the driver: (|u| - dead_band)+ sgn u reaches the motor [V]
+dead_band         of the driver: (|u| - dead_band)+ sgn u reaches the motor [V]; at most what is seen to have driven it
 tilt.AXIS         constant force on x, y [N], yaw [N m] of the body: a floor that is not level, while the heading stays
 fade              share of the voltage lost from the start of a run to its end, evenly: a battery that sags
 start             twist at the start of each piece of the log; pose and angles of the wheels too
@@ -17,6 +17,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
+from omnidyn.identification.output_error.problem.driven import least_that_drove
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.output_error.problem.record import Record
@@ -25,7 +26,9 @@ from omnidyn.identification.question import AUTO, REST
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.first_guess import GRAVITY
 from omnidyn.model.frames import AXES
-from omnidyn.model.robot import Robot
+from omnidyn.model.keys import DEAD_BAND as KEY_DEAD
+from omnidyn.model.keys import LATENCY as KEY_LATE
+from omnidyn.model.robot import IDENTIFIED, Robot
 
 LATENCY, TILT = "latency", "tilt"
 NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT)
@@ -69,23 +72,38 @@ def nuisance_parameters(
     found: list[Parameter] = []
     for name in wanted:
         if name == LATENCY:
-            found += [Parameter(f"{LATENCY}.{channel}", 0.0, from_, LATEST) for channel in channels]
+            found += [_latency(channel, robot, from_) for channel in channels]
         elif name.startswith(f"{LATENCY}."):
             channel = _as_fitted(name.partition(".")[2], channels)
             if channel not in channels:
                 raise InputError("no such channel", got=name, expected=", ".join(channels), where="nuisances")
-            found.append(Parameter(f"{LATENCY}.{channel}", 0.0, EARLIEST, LATEST))
+            found.append(_latency(channel, robot))
         elif name == GAIN:
             prior = (1.0, SUPPLY_STD) if any(record.supplied for record in records) else None
             found.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
         elif name == DEAD_BAND:
             most = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
-            found.append(Parameter(DEAD_BAND, 0.0, 0.0, 0.5 * most))
+            own, seen = robot.drive.dead_band, least_that_drove(records, robot)
+            high = max(seen if np.isfinite(seen) else 0.5 * most, own)
+            found.append(Parameter(DEAD_BAND, own, 0.0, high, prior=_of_file(robot, KEY_DEAD, own)))
         elif name.partition(".")[0] == TILT:
             found += _tilts(name, robot)
         else:
             found.append(Parameter(FADE, 0.0, -MOST_FADE, MOST_FADE))
     return list({p.name: p for p in found}.values())
+
+
+def _latency(channel: str, robot: Robot, from_: float = EARLIEST) -> Parameter:
+    """How late a channel is, that of the robot's own drive included, with which it begins."""
+    own = robot.drive.latency
+    prior = _of_file(robot, KEY_LATE, own)
+    return Parameter(f"{LATENCY}.{channel}", own, min(from_, own), max(LATEST, 2.0 * own), prior=prior)
+
+
+def _of_file(robot: Robot, key: str, value: float) -> tuple[float, float] | None:
+    """What the robot file knows of a number, unless a fit wrote it: its log would count twice."""
+    known = robot.priors.get(key)
+    return None if known is None or known.std is None or known.origin == IDENTIFIED else (value, known.std)
 
 
 def _as_fitted(channel: str, channels: Sequence[str]) -> str:
@@ -115,9 +133,14 @@ def _tilts(name: str, robot: Robot) -> list[Parameter]:
     return found
 
 
-def automatic(records: Sequence[Record]) -> tuple[str, ...]:
-    """The nuisances that a log of a real robot is likely to have, before it is asked whether it determines them."""
-    return (LATENCY, DEAD_BAND, GAIN) if any(record.supplied for record in records) else (LATENCY, DEAD_BAND)
+def automatic(records: Sequence[Record], quick: bool = True) -> tuple[str, ...]:
+    """The nuisances that a log of a real robot is likely to have, before it is asked whether it determines them.
+
+    quick: whether another one costs next to nothing; else none is tried that has to be shown first. A nominal supply is
+    in the intervals of every fit.
+    """
+    tried = (LATENCY, DEAD_BAND) if quick else (LATENCY,)
+    return (*tried, GAIN) if any(record.supplied for record in records) else tried
 
 
 def pieces(

@@ -19,9 +19,10 @@ from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
-from omnidyn.statistics import stretches
+from omnidyn.statistics import sensor_step, stretches
 
 SHORTEST = 3  # rows of a piece that is used
+COARSE = 0.01  # half a step of the duty, of the largest one, from which on it is worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Record:
     supplied: whether the voltage is a duty times a supply that was not logged. notes: what was decided on the way.
     unused: what the log holds and a fit does not use, and why, in words.
     set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
-    here then; else None.
+    here then; else None. run: what it was read from.
 
     Its arrays are read-only and in C order, whoever made them: a kernel for others would be compiled beside.
     """
@@ -48,6 +49,7 @@ class Record:
     notes: tuple[str, ...]
     set_point: FloatArray | None = None
     unused: tuple[str, ...] = ()
+    run: Run | None = None
 
     def __post_init__(self) -> None:
         for name in ("t", "voltage", "outputs", "set_point"):
@@ -115,7 +117,7 @@ def record(
         notes.append(f"{many} rows lack counts of an encoder, or follow on missing rows: the log is split there")
     return Record(
         run.t, voltage, found.values, found.columns, found.ticks, tuple(pieces), run.source,
-        supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused),
+        supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused), run,
     )  # fmt: skip
 
 
@@ -160,7 +162,8 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
     voltage = asked_voltage(run.voltage, run.duty, run.supply, nominal)
     if voltage is not None:
         supplied = run.voltage is None and run.supply is None
-        return voltage, supplied, [f"the supply is not logged: its nominal {nominal:g} V is taken"] if supplied else []
+        told = [f"the supply is not logged: its nominal {nominal:g} V is taken"] if supplied else []
+        return voltage, supplied, [*told, *_rounded(run, voltage)]
     if run.duty is not None:
         raise InputError(
             "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
@@ -172,6 +175,21 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
             expected="voltage or duty, or the speed loop of the firmware", where=run.source, remedy=LOOP_REMEDY,
         )  # fmt: skip
     raise InputError("the log has no input", got=", ".join(run.channels), expected="voltage or duty", where=run.source)
+
+
+def _rounded(run: Run, voltage: FloatArray) -> list[str]:
+    """What the steps of a logged duty may have lost, where that is worth a word."""
+    if run.voltage is not None or run.duty is None:
+        return []
+    step = max(sensor_step(column[np.isfinite(column)]) for column in run.duty.T)
+    largest = float(np.nanmax(np.abs(run.duty), initial=0.0))
+    if not largest or 0.5 * step < COARSE * largest:
+        return []
+    volts = 0.5 * step * float(np.nanmax(np.abs(voltage), initial=0.0)) / largest
+    return [
+        f"duties are logged in steps of {100.0 * step:.2g} %: up to {volts:.2g} V may have been rounded off, which the "
+        "intervals do not hold"
+    ]
 
 
 def _set_point(run: Run, robot: Robot, loop: bool) -> FloatArray | None:

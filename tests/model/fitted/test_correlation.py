@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.model.correlation import KeyCorrelation
+from omnidyn.model.fitted.correlation import KeyCorrelation
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.known.told import correlation_of, told, with_correlation
 from omnidyn.model.known.uncertainty import plausible

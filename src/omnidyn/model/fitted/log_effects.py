@@ -1,0 +1,86 @@
+"""What logs do to a robot that is right: the table [log] of a robot file that a fit has written.
+
+It belongs to the logs of that fit, and to no other: a battery that sagged, sensors that were late, a floor that was not
+level. What a fit finds of the robot itself, such as the dead band of its driver, stands in the robot's own tables.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Annotated
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from omnidyn.model.value import Flag, Levels, Text, Value, number, per_axis_number, to_list
+from omnidyn.run import Run
+
+SAME_TIME = 9  # decimals of a second to which times since the first row are compared
+MOST_LATE, HARDEST, MOST_FADE = 10.0, 1e6, 1.0  # [s], [N, N m], -
+
+Seconds = Annotated[float, number(-MOST_LATE, MOST_LATE)]
+
+
+class Lateness(Value):
+    """By how much channels of a log are late [s], the latency of the robot's own drive included; None: by that alone.
+
+    averaged: whether the speeds of the wheels are means over the row before, which is half a row more.
+    """
+
+    twist: Annotated[Seconds | None, Field(alias="twist_s")] = None
+    wheel_speed: Annotated[Seconds | None, Field(alias="wheel_speed_s")] = None
+    current: Annotated[Seconds | None, Field(alias="current_s")] = None
+    heading: Annotated[Seconds | None, Field(alias="heading_s")] = None
+    position: Annotated[Seconds | None, Field(alias="position_s")] = None
+    wheel_angle: Annotated[Seconds | None, Field(alias="wheel_angle_s")] = None
+    averaged: Annotated[Flag, Field(description="wheel speeds are means over the row before")] = False
+
+    def of(self, channel: str, drive: float, row: float) -> float:
+        """By how much a channel is late [s]. drive: the latency of the robot [s]; row: of the log [s]."""
+        if channel == "wheel_speed" and self.averaged:
+            return (drive if self.wheel_angle is None else self.wheel_angle) + 0.5 * row
+        own = getattr(self, channel)
+        return drive if own is None else float(own)
+
+
+class LogEffects(Value):
+    """gain: of the voltage. fade: share of it lost from the start of a run to its end, evenly. tilt: constant force on
+    the body along x and y [N] and about yaw [N m]. latency: of the channels. of: marks of the logs, see `log_mark`.
+    """
+
+    gain: Annotated[Annotated[float, number(0.01, 100.0)], Field(description="of the voltage, a battery")] = 1.0
+    fade: Annotated[
+        Annotated[float, number(-MOST_FADE, MOST_FADE)], Field(description="of the voltage, from start to end")
+    ] = 0.0
+    tilt: Annotated[
+        Annotated[Levels, per_axis_number(-HARDEST, HARDEST)], Field(description="force of the floor, N, N, N m")
+    ] = (0.0, 0.0, 0.0)
+    latency: Lateness = Lateness()
+    of: Annotated[Annotated[tuple[Text, ...], BeforeValidator(to_list)], Field(description="marks of these logs")] = ()
+
+    def is_of(self, run: Run) -> bool:
+        """Whether this run is one of its logs, by what it holds."""
+        return log_mark(run) in self.of
+
+    @property
+    def words(self) -> str:
+        """Its numbers in words: "gain 0.94, heading 0.038 s late"."""
+        told = [f"gain {self.gain:.3g}"] if self.gain != 1.0 else []
+        told += [f"fade {self.fade:.3g}"] if self.fade else []
+        told += ["a tilt of " + ", ".join(f"{each:.3g}" for each in self.tilt)] if any(self.tilt) else []
+        late = [(n.replace("_", " "), v) for n, v in dict(self.latency).items() if n != "averaged" and v is not None]
+        told += [f"{name} {abs(value):.3g} s {'late' if value >= 0.0 else 'early'}" for name, value in late]
+        return ", ".join(told + (["speeds that are means over a row"] if self.latency.averaged else []))
+
+
+def log_mark(run: Run) -> str:
+    """The mark by which a log is known again: a hash of its times since the first row and of its channels.
+
+    Of currents alone the size counts: one reader may have given them a sign, and another not.
+    """
+    measured = run.as_measured()
+    found = hashlib.sha256(np.round(run.t - run.t[0], SAME_TIME).tobytes())
+    for name, values in measured.channels.items():
+        found.update(name.encode())
+        found.update((np.abs(values) if name == "current" else np.ascontiguousarray(values) + 0.0).tobytes())
+    return found.hexdigest()[:32]

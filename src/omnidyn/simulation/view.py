@@ -1,0 +1,119 @@
+"""View: how commands reach the motors, and how a log shows what the robot does. From both a simulation is seen.
+
+    u = left gain (|u| - dead)+ sgn u + what pushes as hard as the tilt
+
+A robot has a dead band and a latency of its own; a log may add a gain, a fade, a tilt, and channels that are late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.errors import UnsupportedError
+from omnidyn.model.actuation import Driver, at_motors
+from omnidyn.model.dynamics import drive_wrench, linear_part
+from omnidyn.model.fitted.log_effects import LogEffects
+from omnidyn.model.robot import Robot
+from omnidyn.simulation.clocks import Clock, clock
+from omnidyn.simulation.commands import Commands
+
+LATE = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")  # the first sets where a start is
+DIGITS = 12  # of a second: latenesses that differ by less are one
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """clock: None, where nothing is late. late: channel -> which of the latenesses of the clock it has.
+
+    driver, share (rows,), push (wheels,) [V]: what becomes of voltages. held: whether the first command acted before it
+    was given, as in a log that begins in motion; else nothing did.
+    """
+
+    clock: Clock | None = None
+    late: Mapping[str, int] = field(default_factory=dict)
+    driver: Driver = Driver()  # noqa: RUF009
+    share: FloatArray | None = None
+    push: FloatArray | None = None
+    held: bool = False
+
+    def acting(self, robot: Robot, given: Commands) -> Commands:
+        """The commands as they reach the motors, or the speed loop, over each step of the simulation."""
+        voltage = given.voltage
+        if given.set_point is not None and self.driver.dead_band:
+            raise UnsupportedError(
+                "a speed loop behind a dead band has no law yet", got=f"dead_band_V = {self.driver.dead_band:g}",
+                expected="0 where set speeds are followed", where="[drive]",
+            )  # fmt: skip
+        if voltage is not None and self.driver != Driver():
+            share = np.zeros(len(given.dt)) if self.share is None else self.share
+            voltage = at_motors(np.ascontiguousarray(voltage), np.ascontiguousarray(share), self.driver)[0]
+        if self.clock is not None:
+            given = replace(
+                given, dt=self.clock.dt, set_point=self._stepped(given.set_point), open_circuit=self._open(given)
+            )
+            voltage = self._stepped(voltage)
+        if voltage is not None and self.push is not None:
+            voltage = voltage + self.push
+        return given if voltage is given.voltage else replace(given, voltage=voltage)
+
+    def of(self, channel: str, samples: FloatArray) -> FloatArray:
+        """What a channel shows at the rows, of all samples of the simulation. Shape (rows + 1, columns)."""
+        return samples if self.clock is None else samples[self.clock.at[self.late.get(channel, 0)]]
+
+    def _stepped(self, rows: FloatArray | None) -> FloatArray | None:
+        """Commands of rows, over each step; what acted before the first is itself, or nothing."""
+        if rows is None or self.clock is None:
+            return rows
+        found = rows[np.maximum(self.clock.row, 0)]
+        if not self.held:
+            found[self.clock.row < 0] = 0.0
+        return found
+
+    def _open(self, given: Commands) -> BoolArray | None:
+        if given.open_circuit is None or self.clock is None:
+            return given.open_circuit
+        found = given.open_circuit[np.maximum(self.clock.row, 0)]
+        return found if self.held else np.where((self.clock.row < 0)[:, None], True, found)
+
+
+PLAIN = View()
+
+
+def seen_at_once(robot: Robot, given: Commands, held: bool = False) -> View:
+    """What instruments that are never late show of a robot."""
+    latency, driver = robot.drive.latency, Driver(dead_band=robot.drive.dead_band)
+    return View(clock(given.dt, latency) if latency else None, {}, driver, held=held)
+
+
+def seen_through(
+    robot: Robot, given: Commands, log: LogEffects, late: Mapping[str, float] | None = None,
+    share: FloatArray | None = None, start: float | None = None,
+) -> View:  # fmt: skip
+    """What a log shows. late: channel -> by how much it is late [s]; None: as the log says. share (rows,): of the log
+    that had gone by at each row; None: it is all of the log.
+
+    start: by how much the channel that tells the start is late [s], for a log that begins in motion; None: it rests.
+    """
+    dt, drive, row = given.dt, robot.drive.latency, float(np.median(given.dt))
+    if share is None:
+        share = np.concatenate([[0.0], np.cumsum(dt[:-1])]) / float(np.sum(dt))
+    late = late or {name: log.latency.of(name, drive, row) for name in LATE}
+    main = drive if start is None else start
+    late = {name: round(each - main, DIGITS) for name, each in late.items()}
+    apart = sorted({0.0, *late.values()})
+    time = clock(dt, main, apart) if main or any(apart) else None
+    at = {"voltage": apart.index(0.0)} | {name: apart.index(each) for name, each in late.items()}
+    driver = Driver(log.gain, robot.drive.dead_band, log.fade)
+    return View(time, at, driver, share, pushing(robot, log.tilt), start is not None)
+
+
+def pushing(robot: Robot, tilt: tuple[float, float, float]) -> FloatArray | None:
+    """The least volts that push the body at rest as hard as a tilt (3,) [N, N, N m]; None without one. (wheels,)."""
+    if not any(tilt):
+        return None
+    per_volt = drive_wrench(linear_part(robot), np.zeros(3), np.eye(robot.wheels.count)).T
+    return np.asarray(np.linalg.lstsq(per_volt, np.array(tilt), rcond=None)[0], dtype=float)

@@ -1,0 +1,90 @@
+"""What two numbers are together where logs hardly tell them apart, and what intervals owe to the log alone."""
+
+import numpy as np
+import pytest
+
+from benchmarks.wrong_worlds.log import NOISE, Case, Setup, logged, robot_of
+from benchmarks.wrong_worlds.world import World, drive
+from omnidyn.identification.output_error.problem.parameters import Parameter
+from omnidyn.identification.output_error.trust.ends import at_the_end
+from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.robot import Prior
+from omnidyn.run import Run
+
+DEAD = 0.6
+WORLD = World(dead=DEAD)
+
+
+def turning(seed, world=WORLD, latency=0.0, seconds=30.0):
+    """A log of turning on the spot only, by another simulator: all wheels alike, at a few levels, half of it each way."""
+    rng, t = np.random.default_rng(seed), np.arange(0.0, seconds, 0.01)
+    levels = np.repeat([1.0, -1.0], 10) * rng.uniform(3.0, 7.0, 20)
+    voltage = np.repeat(levels, 150)[: len(t), None] * np.ones(3) * (t[:, None] > 0.5)
+    motion = drive(world, t, voltage, np.clip(t - latency, 0.0, None))
+    speed = motion.wheel_speed + NOISE * rng.normal(size=motion.wheel_speed.shape)
+    return Run(t, voltage=voltage, wheel_speed=speed)
+
+
+def sums(fit):
+    return {one.name: one for one in fit.combinations}
+
+
+def test_a_dead_band_and_coulomb_friction_that_trade_are_told_together():
+    """The voltage to set off about yaw is d + C/g, g = 3 b l K_t/(R r): known several times better than either."""
+    push = 3.0 * WORLD.robot_radius * WORLD.ke[0] / WORLD.resistance[0]
+    truth = DEAD + WORLD.coulomb[2] / push
+    off = []
+    for seed in range(960, 966):
+        fit = fit_output_error(turning(seed), robot_of(World()), nuisances=("dead_band",))
+        one = sums(fit)["sets_off.yaw"]
+        assert "dead band and Coulomb friction, which trade with each other" in one.words
+        assert one.std < 0.3 * fit.nuisances["dead_band"].std
+        off.append((one.value - truth) / one.std)
+    assert np.sqrt(np.mean(np.square(off))) < 2.0
+    assert one.words in fit.summary()
+
+
+def test_numbers_that_the_log_tells_apart_have_no_sum():
+    fit = fit_output_error(logged(Case(WORLD, World()), 967), robot_of(World()), nuisances=("latency", "dead_band"))
+    assert not [name for name in sums(fit) if name.startswith(("sets_off", "follows"))]
+
+
+def test_a_latency_beyond_the_search_is_no_estimate():
+    fit = fit_output_error(turning(968, World(), 0.36), robot_of(World()), nuisances=("latency",))
+    assert "latency.wheel_speed" in fit.unidentifiable
+    assert "latency.wheel_speed: not determined" in fit.summary()
+    assert any("latency.wheel_speed is at the end of its search range, 0.29" in words for words in fit.warnings)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "ended"),
+    [
+        (Parameter("dead_band", 0.0, 0.0, 2.0), 0.0, False),
+        (Parameter("dead_band", 0.0, 0.0, 2.0), 2.0, True),
+        (Parameter("fade", 0.0, -0.9, 0.9), -0.9, True),
+        (Parameter("gain", 1.0, 0.1, 10.0, True), 0.1, True),
+        (Parameter("friction.axes.coulomb[0]", 1.0, 0.0, 1e6), 0.0, False),
+    ],
+)
+def test_which_ends_are_no_estimates(parameter, value, ended):
+    class Of:
+        parameters = (parameter,)
+
+    assert [p.name for p in at_the_end(Of, np.array([value]))] == ([parameter.name] if ended else [])
+
+
+def test_the_log_alone_is_a_fit_of_the_same_log_with_the_file_taken_as_exact():
+    """Beside a fit that holds what the file knows, at the value that goes best: the same intervals, to 5 %."""
+    log = logged(Case(World(), World(), Setup()), 969)
+    robot = robot_of(World())
+    key = "body.mass_kg"
+    free = fit_output_error(log, robot.replace(priors={key: Prior(std=0.1, source="scales")}), nuisances=())
+    assert key in free.value
+    at = robot.replace(body=robot.body.replace(mass=free.value[key]))
+    held = fit_output_error(log, at, nuisances=())
+    assert set(free.log_alone) == set(held.value)
+    for name, (low, high) in free.log_alone.items():
+        assert high - low == pytest.approx(np.diff(held.ci95[name])[0], rel=0.05), name
+        assert high - low <= np.diff(free.ci95[name])[0] * (1.0 + 1e-9)
+    assert held.log_alone == {}
+    assert free.to_dict()["from_the_log_alone"] == {name: list(each) for name, each in free.log_alone.items()}
