@@ -42,7 +42,9 @@ class Remedy:
     """key: of the robot file, a nuisance or "change". words: what it is, with its value. gain: share of the squared
     held-out error that it takes away, with its standard error. same_as: keys that the log cannot tell from it.
     share: of all that residuals hold beside noise, that it explains. offered: whether a robot file or a fit holds such.
-    chi2: by how much it lowers the sum of squares, in those of the noise; numbers: how many it fits."""
+    chi2: by how much it lowers the sum of squares, in those of the noise; numbers: how many it fits. size, at: its
+    fitted change and where it was tried, both of a first step. after: number -> what it would be with it, to first
+    order."""
 
     key: str
     words: str
@@ -53,6 +55,9 @@ class Remedy:
     offered: bool = True
     chi2: float = field(default=0.0, repr=False)
     numbers: int = 1
+    size: tuple[float, ...] = ()
+    at: float = 0.0
+    after: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def confident(self) -> bool:

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Unpack
 
 from omnidyn.arguments import check_order
+from omnidyn.errors import UnsupportedError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
@@ -16,7 +17,7 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, State
 from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question
 from omnidyn.model.robot import Robot
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 
 
 @shows_options(FIT)
@@ -34,8 +35,7 @@ def fit_output_error(
     """
     check_order("fit_output_error(runs, robot)", (runs, Run), (robot, Robot))
     progress = Progress.of(watch)
-    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=progress)
-    return answered(fit, fit.solve(progress), progress).estimate
+    return fitted(as_list(runs), robot, Question.for_method(OUTPUT_ERROR, question, options), None, progress).estimate
 
 
 @shows_options(FIT)
@@ -52,8 +52,30 @@ def identify_groups(
     """
     check_order("identify_groups(runs, robot, groups)", (runs, Run), (robot, Robot))
     progress = Progress.of(watch)
-    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
-    return answered(fit, fit.solve(progress), progress)
+    return fitted(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
+
+
+def fitted(
+    runs: Sequence[Run], robot: Robot, question: Question, groups: Sequence[str] | None, progress: Progress
+) -> Answer:
+    """The answer to a question, with the ladder where it asks for it. groups: name of each run's group.
+
+    Raises UnsupportedError for a ladder of several groups; else as `identify_groups`.
+    """
+    if not question.ladder:
+        fit = Fit.of(runs, robot, question, groups, progress)
+        return answered(fit, fit.solve(progress), progress)
+    if groups is not None:
+        raise UnsupportedError(
+            "the ladder has one group only", got=f"{len(set(groups))} groups", expected="logs of one robot as it is",
+            remedy="climb it with the logs of one group, and fit the groups with the robot that it writes",
+            where="ladder",
+        )  # fmt: skip
+    from omnidyn.identification.structure.climb import climb  # here, for it takes time to load
+
+    fit, solution, ladder = climb(runs, robot, question, progress)
+    answer = answered(fit, solution, progress)
+    return replace(answer, estimates={name: replace(own, ladder=ladder) for name, own in answer.estimates.items()})
 
 
 def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:

@@ -10,6 +10,7 @@ from typing import Any
 from omnidyn.document import Part, Points, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.steady.study_parts import Difference
 
@@ -48,6 +49,7 @@ class OutputErrorEstimate(Estimate):
     together. blind: directions that the data do not show, in words. covariance: "white", "autoregressive" or
     "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the
     minimisation. not_followed: outputs that the model does not follow. study: makes the diagnosis, on first access.
+    ladder: what was switched on step by step, where that was asked for.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -60,6 +62,7 @@ class OutputErrorEstimate(Estimate):
     converged: bool = True
     not_followed: tuple[str, ...] = ()
     study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
+    ladder: Ladder | None = None
 
     @cached_property
     def diagnosis(self) -> Diagnosis | None:
@@ -107,6 +110,7 @@ class OutputErrorEstimate(Estimate):
             "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable,
             "combinations": [asdict(one) for one in self.combinations], "blind": self.blind,
             "covariance": self.covariance, "unused": self.unused, "converged": self.converged,
+            **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
         })  # fmt: skip
 
 

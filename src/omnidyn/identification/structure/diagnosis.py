@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.special import fdtrc
 
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.structure.binned import binned
@@ -21,8 +25,24 @@ from omnidyn.identification.structure.workbench import Workbench
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
 
 
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A diagnosis, and what it was made with. memory: of each column, of what is left beside all that residuals follow;
+    tried: how many causes were looked at; rows: how many numbers of the logs."""
+
+    diagnosis: Diagnosis
+    memory: Sequence[AutoRegression]
+    tried: int
+    rows: int
+
+
 def diagnose(solution: Solution) -> Diagnosis:
     """What is wrong with a fit at its best point."""
+    return examine(solution).diagnosis
+
+
+def examine(solution: Solution) -> Examined:
+    """The diagnosis of a fit at its best point, and what it was made with."""
     solver, point = solution.solver, solution.state.point
     problem = solver.problem.shortened(MOST_ROWS)
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
@@ -31,7 +51,8 @@ def diagnose(solution: Solution) -> Diagnosis:
     bench = Workbench(problem, point, engine_kind(solver.engine), moved)
     tried = [(one, one.tried(bench)) for one in (*candidates(bench), *unoffered(bench))]
     ranked = remedies(seen.linear, [each for each in tried if each[1]], seen.shown)
-    degrees = min(seen.linear.degrees, float(sum(there.sum() for there in rows.there)))
+    count = int(sum(there.sum() for there in rows.there))
+    degrees = min(seen.linear.degrees, float(count))
     strong = [r for r in ranked if fdtrc(r.numbers, degrees, r.chi2 / r.numbers) * len(tried) < FALSE]
     found = bool(seen.found or strong)
     told = ranked if found else ()
@@ -41,7 +62,7 @@ def diagnose(solution: Solution) -> Diagnosis:
         found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
         pictures,
     )  # fmt: skip
-    return Diagnosis(lack, rests_on(seen.linear, bench))
+    return Examined(Diagnosis(lack, rests_on(seen.linear, bench)), seen.linear.memory, len(tried), count)
 
 
 def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:
