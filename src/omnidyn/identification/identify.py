@@ -33,7 +33,7 @@ from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.identification.verdict import fit_failure, fits_verdict, lines_verdict, steady_failure, steady_verdict
-from omnidyn.identification.whole_logs import answered, fit_output_error, fitted
+from omnidyn.identification.whole_logs import fit_output_error, solved
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
@@ -326,11 +326,9 @@ def _answered(
         heard.now(f"fitting, step {steps}, -log likelihood {state.objective:.6g}")
 
     progress = Progress(better, lambda words: heard.now(f"fitting: {words}"))
-    if asked.ladder:
-        return fitted(runs, robot, asked, groups, progress), ""
     fit = Fit.of(runs, robot, asked, groups, progress)
     try:
-        return answered(fit, fit.solve(progress), progress), ""
+        return solved(fit, runs, progress), ""
     except KeyboardInterrupt:
         if not heard.keep_best or progress.best is None:
             raise

@@ -85,7 +85,7 @@ class Ladder:
 
     def parts(self) -> list[Part]:
         """As a line and a table."""
-        return [self.words(), self.table()]
+        return [self.words(), *([self.table()] if self.rungs else [])]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""

@@ -35,7 +35,8 @@ def fit_output_error(
     """
     check_order("fit_output_error(runs, robot)", (runs, Run), (robot, Robot))
     progress = Progress.of(watch)
-    return fitted(as_list(runs), robot, Question.for_method(OUTPUT_ERROR, question, options), None, progress).estimate
+    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=progress)
+    return solved(fit, as_list(runs), progress).estimate
 
 
 @shows_options(FIT)
@@ -52,30 +53,29 @@ def identify_groups(
     """
     check_order("identify_groups(runs, robot, groups)", (runs, Run), (robot, Robot))
     progress = Progress.of(watch)
-    return fitted(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
+    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
+    return solved(fit, runs, progress)
 
 
-def fitted(
-    runs: Sequence[Run], robot: Robot, question: Question, groups: Sequence[str] | None, progress: Progress
-) -> Answer:
-    """The answer to a question, with the ladder where it asks for it. groups: name of each run's group.
-
-    Raises UnsupportedError for a ladder of several groups; else as `identify_groups`.
-    """
-    if not question.ladder:
-        fit = Fit.of(runs, robot, question, groups, progress)
+def solved(fit: Fit, runs: Sequence[Run], progress: Progress) -> Answer:
+    """The answer of a fit of some runs, with the ladder where that is asked for."""
+    if not fit.question.ladder:
         return answered(fit, fit.solve(progress), progress)
-    if groups is not None:
+    if len(fit.groups) > 1:
         raise UnsupportedError(
-            "the ladder has one group only", got=f"{len(set(groups))} groups", expected="logs of one robot as it is",
+            "the ladder has one group only", got=f"{len(fit.groups)} groups", expected="logs of one robot as it is",
             remedy="climb it with the logs of one group, and fit the groups with the robot that it writes",
             where="ladder",
         )  # fmt: skip
     from omnidyn.identification.structure.climb import climb  # here, for it takes time to load
 
-    fit, solution, ladder = climb(runs, robot, question, progress)
-    answer = answered(fit, solution, progress)
-    return replace(answer, estimates={name: replace(own, ladder=ladder) for name, own in answer.estimates.items()})
+    best, solution, ladder = climb(fit, fit.solve(progress), runs, progress)
+    answer = answered(best, solution, progress)
+    estimates = {
+        name: replace(own, ladder=ladder, warnings=(*own.warnings, *ladder.warnings()))
+        for name, own in answer.estimates.items()
+    }
+    return replace(answer, estimates=estimates)
 
 
 def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:

@@ -66,13 +66,9 @@ class Model:
         return dict(zip(problem.names, values.tolist(), strict=True))
 
 
-def climb(runs: Sequence[Run], robot: Robot, question: Question, progress: Progress) -> tuple[Fit, Solution, Ladder]:
-    """The best fit of some runs, its solution, and the way to it.
-
-    Raises what `Fit.of` and `Fit.solve` raise for the robot as it was given.
-    """
-    fit = Fit.of(runs, robot, question, progress=progress)
-    stands, rungs = Model(fit, fit.solve(progress), robot, question), list[Rung]()
+def climb(fit: Fit, solution: Solution, runs: Sequence[Run], progress: Progress) -> tuple[Fit, Solution, Ladder]:
+    """The best fit of some runs, its solution, and the way to it. fit, solution: of the robot as it was given."""
+    stands, rungs = Model(fit, solution, fit.groups[0].robot, fit.question), list[Rung]()
     for step in range(1, STEPS + 1):
         if unexplained(stands.solution.solver, stands.solution):
             return _ended(
@@ -169,6 +165,7 @@ def judged(
         others = [models[o].key for o in same] + _not_fitted(models, each, own, before, lack)
         rungs.append(_rung(step, each, own, before, count, k == taken, words, others, stands))
     rungs.sort(key=lambda rung: (not rung.taken, -rung.gain))
+    rungs = [*{(rung.key, rung.words): rung for rung in reversed(rungs)}.values()][::-1]  # a limit found twice is one
     rungs += [
         Rung(step, remedy.key, way.words, 0, np.nan, np.nan, np.nan, np.nan, why=f"cannot be fitted: {words}")
         for each in tried if isinstance(each, tuple) for remedy, way, words in [each]

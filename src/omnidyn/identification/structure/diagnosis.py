@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import fdtrc
@@ -11,7 +11,9 @@ from scipy.special import fdtrc
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
+from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
+from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
 from omnidyn.identification.structure.laws import candidates
 from omnidyn.identification.structure.linear import Rows
@@ -44,7 +46,7 @@ def diagnose(solution: Solution) -> Diagnosis:
 def examine(solution: Solution) -> Examined:
     """The diagnosis of a fit at its best point, and what it was made with."""
     solver, point = solution.solver, solution.state.point
-    problem = solver.problem.shortened(MOST_ROWS)
+    problem = with_levels(solver.problem, levels_of(solution)).shortened(MOST_ROWS)
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     rows, moved = Rows.of(problem, point, engine.residuals(point)), motions(problem, point)
     seen = misfit(rows, moved)
@@ -63,6 +65,16 @@ def examine(solution: Solution) -> Examined:
         pictures,
     )  # fmt: skip
     return Examined(Diagnosis(lack, rests_on(seen.linear, bench)), seen.linear.memory, len(tried), count)
+
+
+def with_levels(problem: Problem, levels: Sequence[float] | None) -> Problem:
+    """The problem of a robot with the levels of breakaway that were found beside its numbers."""
+    if levels is None:
+        return problem
+    friction = problem.robot.friction
+    axes = friction.axes.model_copy(update={"breakaway": tuple(levels)})
+    robot = problem.robot.model_copy(update={"friction": friction.model_copy(update={"axes": axes})})
+    return replace(problem, robot=robot)
 
 
 def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:

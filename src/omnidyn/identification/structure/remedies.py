@@ -16,6 +16,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.structure.candidates import Candidate, Trial
 from omnidyn.identification.structure.linear import SAME, Linear, Rows
+from omnidyn.model.keys import BODY_AXES, DIRECTION
 
 CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
 BLOCKS = 10  # of the log, each held out once
@@ -129,18 +130,21 @@ def remedies(
         ranking.append(
             Remedy(
                 t.candidate.key, words, gain, std, same, share, t.candidate.offered, t.chi2, len(t.at),
-                tuple(t.size.tolist()), t.trial.at, _after(linear.rows, t.step),
+                tuple(t.size.tolist()), t.trial.at, _changes(linear.rows, t),
             )
         )  # fmt: skip
     return tuple(r for r in ranking if r.gain > -CLEAR * r.gain_std and r.chi2 > RIVAL * worth[0].chi2)[:most]
 
 
-def _after(rows: Rows, step: FloatArray) -> dict[str, float]:
-    """Number of the robot -> what it would be after a step of the numbers that the solver sees."""
-    return {
-        p.name: min(max(p.outer(p.inner(float(value)) + by), p.low), p.high)
-        for p, value, by in zip(rows.problem.robot_parameters, rows.point.values, step.tolist(), strict=False)
-    }  # fmt: skip
+def _changes(rows: Rows, tried: Tried) -> dict[str, tuple[float, float]]:
+    """Number of the robot -> (what it is, what it would be beside a candidate), to first order; none for a candidate
+    that takes the place of what these numbers belong to."""
+    if tried.candidate.key in (BODY_AXES, DIRECTION):
+        return {}
+    found = {}
+    for p, value, by in zip(rows.problem.robot_parameters, rows.point.values.tolist(), tried.step, strict=False):
+        found[p.name] = value, min(max(p.outer(p.inner(value) + float(by)), p.low), p.high)
+    return found
 
 
 def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried, other: Tried) -> bool:

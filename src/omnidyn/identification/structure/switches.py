@@ -16,11 +16,10 @@ from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
-from omnidyn.identification.output_error.prepare import expand_keys, guesses
+from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
-from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.solver import Solution
-from omnidyn.identification.output_error.trust.breakaway import HIGHEST
+from omnidyn.identification.output_error.trust.breakaway import HIGHEST, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.laws import along_axes, along_travel
@@ -55,9 +54,9 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
 
     robot, question: of the fit before, and `found` what it came to.
     """
-    start, asked = _where_it_ended(robot, found.solver.problem, found), _as_it_settled(robot, question, found)
+    start, asked = _where_it_ended(robot, found), _as_it_settled(robot, question, found)
     try:
-        return list(_ways(remedy, start, asked))
+        return [_with_levels_as_they_are(way) for way in _ways(remedy, start, asked)]
     except OmnidynError:  # a size that no robot file may have
         return []
 
@@ -99,15 +98,16 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         yield Switch(_as_one(robot, key), _free(asked, key), words)
 
 
-def _where_it_ended(robot: Robot, problem: Problem, found: Solution) -> Robot:
+def _where_it_ended(robot: Robot, found: Solution) -> Robot:
     """The robot with what was fitted, but for numbers with a prior, and what a wrong model drove to a bound."""
+    problem = found.solver.problem
     for p, value, held in zip(problem.robot_parameters, found.state.point.values.tolist(), found.held, strict=False):
         if p.prior is None and not held:
             robot = p.on(robot, value)
-    axes = robot.friction.axes
-    if axes.breakaway is not None:  # of which no level may be below Coulomb friction
-        levels = tuple(max(pair) for pair in zip(axes.breakaway, axes.coulomb, strict=True))
-        axes = axes.replace(breakaway=levels)
+    axes, levels = robot.friction.axes, levels_of(found)
+    if levels is not None:  # of which none may be below Coulomb friction
+        higher = [max(pair) for pair in zip(levels, axes.coulomb, strict=True)]
+        axes = axes.replace(breakaway=tuple(higher))
     return robot.replace(friction=robot.friction.replace(axes=axes))
 
 
@@ -124,10 +124,19 @@ def _free(asked: Question, *keys: str) -> Question:
     return replace(asked, free=tuple(dict.fromkeys((*(asked.free or ()), *keys))))
 
 
-def _of_another_shape(asked: Question, *kept: str) -> Question:
+def _with_levels_as_they_are(way: Switch) -> Switch:
+    """The same; where the engine cannot look for levels of breakaway, they stay."""
+    keys = expand_keys(way.question.free or (), way.robot)
+    kept = tuple(key for key in keys if Key.parse(key).name != BREAKAWAY)
+    if kept == keys or (is_exact(way.robot) and stays_exact(way.robot, kept)):
+        return way
+    return replace(way, question=replace(way.question, free=kept))
+
+
+def _of_another_shape(asked: Question) -> Question:
     """All friction of the robot is free, in the place of what was."""
     others = [key for key in asked.free or () if Key.parse(key).part != FRICTION]
-    return replace(asked, free=(FRICTION, *kept, *others))
+    return replace(asked, free=(FRICTION, *others), profile=())
 
 
 def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
@@ -136,8 +145,7 @@ def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
     levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
     changed = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=levels)))
-    keys = [f"{BREAKAWAY}[{axis}]" for axis in range(N_AXES)]
-    return Switch(changed, _free(asked, *keys) if is_exact(changed) else asked, remedy.words, N_AXES)
+    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
 
 
 def _at_wheels(robot: Robot, asked: Question, words: str) -> Iterator[Switch]:
