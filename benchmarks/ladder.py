@@ -156,7 +156,8 @@ def _cells(logs: Sequence[Climbed]) -> dict[str, Any]:
         "logs": len(logs), "found": _share(log.found for log in logs), "step": _share(log.steps > 0 for log in logs),
         "the cause": _share(log.cause for log in logs if log.steps), "silent": _share(log.silent for log in logs),
         "held before": _share(each for log in logs for each in log.before),
-        "held after": _share(each for log in logs for each in log.after), "s a log": _share(log.seconds for log in logs),
+        "held after": _share(each for log in logs for each in log.after),
+        "s a log": _share(log.seconds for log in logs),
     }  # fmt: skip
 
 
@@ -167,9 +168,9 @@ def _share(values: Iterable[Any]) -> float | None:
 
 def _legend() -> list[str]:
     return [
-        "found: a misfit of the robot as it was given; step: the ladder took one, in right worlds a false one; the cause:"
-        " of those, how often the first step is the true cause, or the ladder says that it is the same to the log",
+        "found: a misfit of the robot as it was given; step: the ladder took one, in right worlds a false one; the "
+        "cause: of those, how often the first step is the true cause, or the ladder says that it is the same to the log",
         "held: 95 % intervals of friction with the truth, as given, and at the end of the ladder over the group of its "
-        "first step; silent: at the end a number is more than 3 standard errors and 3 % off, no misfit is found, and no "
-        "step names the cause",
+        "first step; silent: at the end a number is more than 3 standard errors and 3 % off, no misfit is found, and "
+        "no step names the cause",
     ]

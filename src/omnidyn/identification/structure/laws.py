@@ -86,13 +86,11 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
         yield Candidate(f"{BODY_AXES}.breakaway", _breakaway, as_it_is("breakaway above Coulomb friction"))
     if boxed and not round_:
         yield Candidate(
-            DIRECTION, _in_place(along_travel(friction)),
+            DIRECTION, _in_place(along_travel),
             as_it_is("Coulomb friction along the direction of travel, an ellipse"),
         )  # fmt: skip
     if round_ and not boxed:
-        yield Candidate(
-            BODY_AXES, _in_place(along_axes(friction)), as_it_is("Coulomb friction on each axis by itself, a box")
-        )
+        yield Candidate(BODY_AXES, _in_place(along_axes), as_it_is("Coulomb friction on each axis by itself, a box"))
     if friction.wheels == WheelFriction():
         yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
 
@@ -115,9 +113,9 @@ def along_axes(friction: Friction) -> Friction:
     return Friction(axes=own, wheels=friction.wheels)
 
 
-def _in_place(friction: Friction) -> Callable[[Workbench], list[Trial]]:
-    """The same robot with other friction; a change by 1 is the whole of it."""
-    return lambda b: [Trial(b.change(b.robot.model_copy(update={"friction": friction})))]
+def _in_place(other: Callable[[Friction], Friction]) -> Callable[[Workbench], list[Trial]]:
+    """The same robot with friction of another shape; a change by 1 is the whole of it."""
+    return lambda b: [Trial(b.change(b.robot.model_copy(update={"friction": other(b.robot.friction)})))]
 
 
 def _breakaway(bench: Workbench) -> list[Trial]:
