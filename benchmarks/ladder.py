@@ -169,7 +169,7 @@ def _share(values: Iterable[Any]) -> float | None:
 def _legend() -> list[str]:
     return [
         "found: a misfit of the robot as it was given; step: the ladder took one, in right worlds a false one; the "
-        "cause: of those, how often the first step is the true cause, or the ladder says that it is the same to the log",
+        "cause: of those, how often the first step is the true cause, or the ladder says that they are the same",
         "held: 95 % intervals of friction with the truth, as given, and at the end of the ladder over the group of its "
         "first step; silent: at the end a number is more than 3 standard errors and 3 % off, no misfit is found, and "
         "no step names the cause",
