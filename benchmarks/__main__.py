@@ -29,6 +29,7 @@ NAMES = {
     "identify_loop": "output error through a firmware's speed loop, simulated logs: coverage (a few minutes)",
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
+    "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"

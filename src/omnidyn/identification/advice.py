@@ -77,7 +77,10 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
     remedy = next(near, None)
     if remedy is not None:
         alike = f"; these logs cannot tell it from {all_of(list(map(named, remedy.same_as)))}" if remedy.same_as else ""
-        yield f"{remedy.words} would explain what the model leaves out{alike}: {how_to(remedy)}"
+        change = f" ({words})" if (words := remedy.would_change()) else ""
+        yield f"{remedy.words} would explain what the model leaves out{change}{alike}: {how_to(remedy)}"
+    if fit.ladder is None:
+        yield "let `ladder` fit the logs with each of the best causes, step by step: it keeps what predicts better"
 
 
 def how_to(remedy: Remedy) -> str:

@@ -31,6 +31,7 @@ def fit_document(
         told = [fit.document(), *beside]
         found = fit.diagnosis
         blocks += [[f"group {group}"] if len(fits) > 1 else [], *(each.parts for each in told)]
+        blocks += [fit.ladder.parts()] if fit.ladder else []
         blocks += _found(found) if found and not fit.not_followed else []
         groups[group] = {
             **fit.to_dict(), "validation": beside[0].data if beside else None,

@@ -33,7 +33,7 @@ from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import study_document
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.identification.verdict import fit_failure, fits_verdict, lines_verdict, steady_failure, steady_verdict
-from omnidyn.identification.whole_logs import answered, fit_output_error
+from omnidyn.identification.whole_logs import fit_output_error, solved
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
@@ -262,15 +262,15 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
     sources = [run.source for run in runs]
     groups = group_names(sources, asked.per, "per") if asked.per else [WHOLE] * len(runs)
     held = held_out(sources, asked.hold_out)
-    fitted = [(run, group) for run, group, out in zip(runs, groups, held, strict=True) if group and not out]
-    names = list(dict.fromkeys(group for _, group in fitted))
+    chosen = [(run, group) for run, group, out in zip(runs, groups, held, strict=True) if group and not out]
+    names = list(dict.fromkeys(group for _, group in chosen))
     if asked.per and len(names) == 1:
         raise InputError("the logs have only one group", got=names[0], expected="two or more", where="per")
     verdicts = log_verdicts(logs, robot, heard.now, heard.tell)
     heard.now("fitting: loading")
     plain = replace(asked, per=(), hold_out=())
     answer, cut = _answered(
-        [run for run, _ in fitted], robot, plain, [g for _, g in fitted] if asked.per else None, heard
+        [run for run, _ in chosen], robot, plain, [g for _, g in chosen] if asked.per else None, heard
     )
     validations: dict[str, Validation] = {}
     aside = {
@@ -281,7 +281,7 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
     try:
         for group, fit in answer.estimates.items() if not cut else ():
             beside = aside[group]
-            validations[group] = validate(fit, [run for run, own in fitted if own == group], beside, heard.now)
+            validations[group] = validate(fit, [run for run, own in chosen if own == group], beside, heard.now)
     except KeyboardInterrupt:  # what is fitted stays
         if not heard.keep_best:
             raise
@@ -322,7 +322,7 @@ def _answered(
     progress = Progress(better, lambda words: heard.now(f"fitting: {words}"))
     fit = Fit.of(runs, robot, asked, groups, progress)
     try:
-        return answered(fit, fit.solve(progress), progress), ""
+        return solved(fit, runs, progress), ""
     except KeyboardInterrupt:
         if not heard.keep_best or progress.best is None:
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Part, Table, all_of, plain
 from omnidyn.identification.stability import Stability
-from omnidyn.model.keys import find_key, in_words
+from omnidyn.model.keys import find_key, in_words, unit
 
 MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
 # What robots do that no law holds yet: key -> words.
@@ -25,6 +26,7 @@ UNOFFERED = {
     "filter": "speeds that went through a filter",
 }
 WORTH = 0.01  # share of the variance of a residual that is worth a line
+CHANGED, SEEN = 2, 0.02  # numbers that a remedy would change that are named; relative change that is worth it
 MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
 
@@ -43,7 +45,9 @@ class Remedy:
     """key: of the robot file, a nuisance or "change". words: what it is, with its value. gain: share of the squared
     held-out error that it takes away, with its standard error. same_as: keys that the log cannot tell from it.
     share: of all that residuals hold beside noise, that it explains. offered: whether a robot file or a fit holds such.
-    chi2: by how much it lowers the sum of squares, in those of the noise; numbers: how many it fits."""
+    chi2: by how much it lowers the sum of squares, in those of the noise; numbers: how many it fits. size, at: its
+    fitted change and where it was tried, both of a first step. changes: number -> (what it is, what it would be with
+    it, to first order)."""
 
     key: str
     words: str
@@ -54,11 +58,23 @@ class Remedy:
     offered: bool = True
     chi2: float = field(default=0.0, repr=False)
     numbers: int = 1
+    size: tuple[float, ...] = ()
+    at: float = 0.0
+    changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def confident(self) -> bool:
         """Whether it explains most of what is to be explained, and nothing that nobody offers explains the same."""
         return self.offered and self.share >= MOST and not self.rivals
+
+    def would_change(self, most: int = CHANGED) -> str:
+        """The numbers that it would change most, in words; "" where it changes none that anybody would see."""
+        shares = {name: abs(after - now) / abs(now) if now else math.inf for name, (now, after) in self.changes.items()}
+        worst = sorted((name for name in shares if shares[name] >= SEEN), key=lambda name: -shares[name])[:most]
+        return all_of([
+            f"{in_words(name)} {now:.3g} -> {after:.3g} {unit(name)}".rstrip()
+            for name in worst for now, after in [self.changes[name]]
+        ])  # fmt: skip
 
     @property
     def rivals(self) -> tuple[str, ...]:
@@ -128,10 +144,12 @@ class LackOfFit:
     def table(self) -> Table:
         """The remedies, a row each."""
         rows = [
-            (r.words, r.key, f"{100.0 * r.gain:.2g} +- {100.0 * r.gain_std:.2g} %", all_of([*map(named, r.same_as)]))
+            (r.words, r.key, f"{100.0 * r.gain:.2g} +- {100.0 * r.gain_std:.2g} %", r.would_change(1),
+             all_of([*map(named, r.same_as)]))
             for r in self.remedies
         ]  # fmt: skip
-        return Table(("what may be missing", "key", "held-out error less by", "the same to this log"), rows, "<<><")
+        head = ("what may be missing", "key", "held-out error less by", "would change", "the same to this log")
+        return Table(head, rows, "<<><<")
 
     def statements(self) -> list[str]:
         """What was found, a sentence each."""

@@ -28,6 +28,7 @@ class Options(TypedDict, total=False):
     per_free: Names
     profile: Names
     bootstrap: int
+    ladder: bool
     start: Literal["auto", "rest", "free"]
     between: str
     what: Literal["friction", "motors"]

@@ -102,6 +102,13 @@ class Question:
         "Std and intervals of all come from them; runs of a group are drawn among themselves. Deterministic.",
         of=(FIT,), metavar="N",
     )  # fmt: skip
+    ladder: bool = _option(
+        False, "Switch on what the model leaves out, step by step, while it pays.",
+        "Each step fits the logs with each of the best remedies of `lack_of_fit`, and takes the one that best predicts "
+        "blocks of the logs that it was not fitted to, where BIC says so too; the simpler one within a standard error. "
+        "`Estimate.ladder` has all that was tried.",
+        of=(FIT,),
+    )  # fmt: skip
     start: str = _option(
         AUTO, "How logs begin: rest, free, or auto: at rest where that shows.", of=(FIT,), choices=(AUTO, REST, FREE)
     )

@@ -49,9 +49,11 @@ def fits_verdict(
 
 
 def _led_by_misfit(fit: OutputErrorEstimate, words: str) -> str:
-    """The verdict of a fit, led by what it leaves out."""
+    """The verdict of a fit, led by the steps of its ladder and by what it leaves out."""
     lack = fit.lack_of_fit
-    return f"{sentence(lack.words())} {words}" if lack is not None and lack.found and not fit.not_followed else words
+    if lack is not None and lack.found and not fit.not_followed:
+        words = f"{sentence(lack.words())} {words}"
+    return f"{sentence(fit.ladder.words())} {words}" if fit.ladder is not None else words
 
 
 def fit_failure(fit: OutputErrorEstimate, validation: Validation | None = None) -> str:

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Unpack
 
 from omnidyn.arguments import check_order
+from omnidyn.errors import UnsupportedError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
@@ -16,7 +17,7 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, State
 from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question
 from omnidyn.model.robot import Robot
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 
 
 @shows_options(FIT)
@@ -35,7 +36,7 @@ def fit_output_error(
     check_order("fit_output_error(runs, robot)", (runs, Run), (robot, Robot))
     progress = Progress.of(watch)
     fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=progress)
-    return answered(fit, fit.solve(progress), progress).estimate
+    return solved(fit, as_list(runs), progress).estimate
 
 
 @shows_options(FIT)
@@ -53,7 +54,28 @@ def identify_groups(
     check_order("identify_groups(runs, robot, groups)", (runs, Run), (robot, Robot))
     progress = Progress.of(watch)
     fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
-    return answered(fit, fit.solve(progress), progress)
+    return solved(fit, runs, progress)
+
+
+def solved(fit: Fit, runs: Sequence[Run], progress: Progress) -> Answer:
+    """The answer of a fit of some runs, with the ladder where that is asked for."""
+    if not fit.question.ladder:
+        return answered(fit, fit.solve(progress), progress)
+    if len(fit.groups) > 1:
+        raise UnsupportedError(
+            "the ladder has one group only", got=f"{len(fit.groups)} groups", expected="logs of one robot as it is",
+            remedy="climb it with the logs of one group, and fit the groups with the robot that it writes",
+            where="ladder",
+        )  # fmt: skip
+    from omnidyn.identification.structure.climb import climb  # here, for it takes time to load
+
+    best, solution, ladder = climb(fit, fit.solve(progress), runs, progress)
+    answer = answered(best, solution, progress)
+    estimates = {
+        name: replace(own, ladder=ladder, warnings=(*own.warnings, *ladder.warnings()))
+        for name, own in answer.estimates.items()
+    }
+    return replace(answer, estimates=estimates)
 
 
 def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:

@@ -12,7 +12,7 @@ import numpy as np
 
 from omnidyn.comparison.bands import FEW, with_bands
 from omnidyn.comparison.result import Comparison
-from omnidyn.document import Points
+from omnidyn.document import Points, sentence
 from omnidyn.identification.fit_document import difference_table, number_table, verdict_table
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
@@ -52,12 +52,14 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     checked = content(verdict_table(found.verdicts)) if found.verdicts else unchecked
     warnings, advice = list(dict.fromkeys(_warnings(fits, validations))), list(dict.fromkeys(found.advice))
     residuals = "".join(_residuals(g, fits[g], v) for g, v in validations.items())
+    climbed = _each({group: fit for group, fit in fits.items() if fit.ladder}, _ladder)
     numbers = _each(fits, lambda group, fit: content(number_table(fit)))
     sections = [
         section("warnings", "Warnings", Points(warnings), none="None."),
         section("next", "What to measure next", Points(advice), none="Nothing: every number is well determined."),
         Section("runs", "Measured and model", _each(validations, partial(_runs, fits))),
         Section("misfit", "What the model leaves out", _each(fits, _misfit)),
+        *([Section("ladder", "What was switched on, step by step", climbed)] if climbed else []),
         section("friction", "Friction against speed", friction),
         *([section("path", "Where the logs went", draw_path(travelled))] if travelled else []),
         section("findings", "What the data say", Points(_findings(fits, validations))),
@@ -111,6 +113,13 @@ def _misfit(group: str, fit: OutputErrorEstimate) -> str:
         return paragraph("Not looked for: the fit was cut short, or the model does not follow the logs at all.")
     drawn = [draw_misfit(lack.pictures, _anchor(f"misfit-in-bins{group}"))] if lack.pictures else []
     return content(Points(lack.statements()), *drawn, *([lack.table()] if lack.found and lack.remedies else []))
+
+
+def _ladder(_group: str, fit: OutputErrorEstimate) -> str:
+    """Every model that the ladder fitted, and what it came to."""
+    if fit.ladder is None:
+        return ""
+    return paragraph(sentence(fit.ladder.words())) + (content(fit.ladder.table()) if fit.ladder.rungs else "")
 
 
 def _rests(_group: str, fit: OutputErrorEstimate) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from omnidyn.document import Part, Points, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.study_parts import Difference
@@ -54,7 +55,7 @@ class OutputErrorEstimate(Estimate):
     "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the
     minimisation. not_followed: outputs that the model does not follow. log_alone: name -> 95 % interval from the log
     alone, were what the robot file knows with a std exact; empty where it knows nothing so. study: makes the diagnosis,
-    on first access.
+    on first access. ladder: what was switched on step by step, where that was asked for.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -68,6 +69,7 @@ class OutputErrorEstimate(Estimate):
     not_followed: tuple[str, ...] = ()
     log_alone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
+    ladder: Ladder | None = None
 
     @cached_property
     def diagnosis(self) -> Diagnosis | None:
@@ -141,7 +143,7 @@ class OutputErrorEstimate(Estimate):
             "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable,
             "combinations": [asdict(one) for one in self.combinations], "blind": self.blind,
             "from_the_log_alone": self.log_alone, "covariance": self.covariance, "unused": self.unused,
-            "converged": self.converged,
+            "converged": self.converged, **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
         })  # fmt: skip
 
 

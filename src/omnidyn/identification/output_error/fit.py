@@ -129,7 +129,7 @@ class Fit:
         progress, done = progress or Progress(), isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
         warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution)]
-        solution, levels = self._levels(solution) if done else (solution, [])
+        solution, levels = self.with_levels(solution) if done else (solution, [])
         progress.doing("finding how sure the numbers are")
         sure = self.weighed(solution, progress, anew=done)
         known, by, warnings = sure.known, sure.solution, [*warnings, *sure.warnings]
@@ -278,7 +278,7 @@ class Fit:
         alone = len(self.groups) == 1 and group.engine == LOOP
         return left_out(group.records, solution.solver.problem.pieces) if alone else []
 
-    def _levels(self, solution: Solution) -> tuple[Solution, list[Breakaway]]:
+    def with_levels(self, solution: Solution) -> tuple[Solution, list[Breakaway]]:
         """Breakaway of the axes that were asked for, and the fit with it."""
         group = self.groups[0]
         axes = [axis for axis in asked_axes(self.question.free or (), self.question.fixed) if group.moved[axis]]

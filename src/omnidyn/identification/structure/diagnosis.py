@@ -3,12 +3,18 @@ the same throughout the logs."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
 from scipy.special import fdtrc
 
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
+from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
+from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
 from omnidyn.identification.structure.laws import candidates
 from omnidyn.identification.structure.linear import Rows
@@ -23,17 +29,34 @@ from omnidyn.identification.structure.workbench import Workbench
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
 
 
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A diagnosis, and what it was made with. memory: of each column, of what is left beside all that residuals follow;
+    tried: how many causes were looked at; rows: how many numbers of the logs."""
+
+    diagnosis: Diagnosis
+    memory: Sequence[AutoRegression]
+    tried: int
+    rows: int
+
+
 def diagnose(solution: Solution) -> Diagnosis:
     """What is wrong with a fit at its best point."""
+    return examine(solution).diagnosis
+
+
+def examine(solution: Solution) -> Examined:
+    """The diagnosis of a fit at its best point, and what it was made with."""
     solver, point = solution.solver, solution.state.point
-    problem = solver.problem.shortened(MOST_ROWS)
+    problem = with_levels(solver.problem, levels_of(solution)).shortened(MOST_ROWS)
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     rows, moved = Rows.of(problem, point, engine.residuals(point)), motions(problem, point)
     seen = misfit(rows, moved)
     bench = Workbench(problem, point, engine_kind(solver.engine), moved)
     tried = [(one, one.tried(bench)) for one in (*candidates(bench), *unoffered(bench))]
     ranked = remedies(seen.linear, [each for each in tried if each[1]], seen.shown)
-    degrees = min(seen.linear.degrees, float(sum(there.sum() for there in rows.there)))
+    count = int(sum(there.sum() for there in rows.there))
+    degrees = min(seen.linear.degrees, float(count))
     strong = [r for r in ranked if fdtrc(r.numbers, degrees, r.chi2 / r.numbers) * len(tried) < FALSE]
     found = bool(seen.found or strong)
     told = ranked if found else ()
@@ -43,7 +66,18 @@ def diagnose(solution: Solution) -> Diagnosis:
         found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
         pictures,
     )  # fmt: skip
-    return Diagnosis(lack, rests_on(seen.linear, bench), stability(seen.linear))
+    diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stability(seen.linear))
+    return Examined(diagnosis, seen.linear.memory, len(tried), count)
+
+
+def with_levels(problem: Problem, levels: Sequence[float] | None) -> Problem:
+    """The problem of a robot with the levels of breakaway that were found beside its numbers."""
+    if levels is None:
+        return problem
+    friction = problem.robot.friction
+    axes = friction.axes.model_copy(update={"breakaway": tuple(levels)})
+    robot = problem.robot.model_copy(update={"friction": friction.model_copy(update={"axes": axes})})
+    return replace(problem, robot=robot)
 
 
 def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:

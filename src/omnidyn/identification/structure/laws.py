@@ -85,28 +85,37 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
     if boxed and axes.breakaway is None:
         yield Candidate(f"{BODY_AXES}.breakaway", _breakaway, as_it_is("breakaway above Coulomb friction"))
     if boxed and not round_:
-        other = DirectionFriction(
-            coulomb=axes.coulomb[:2], viscous=0.5 * (axes.viscous[0] + axes.viscous[1]), yaw_coulomb=axes.coulomb[YAW],
-            yaw_viscous=axes.viscous[YAW],
-        )  # fmt: skip
         yield Candidate(
-            DIRECTION, _in_place(Friction(direction=other, wheels=friction.wheels)),
+            DIRECTION, _in_place(along_travel),
             as_it_is("Coulomb friction along the direction of travel, an ellipse"),
         )  # fmt: skip
     if round_ and not boxed:
-        viscous = (direction.viscous, direction.viscous, direction.yaw_viscous)
-        own = AxesFriction(viscous=viscous, coulomb=(*direction.coulomb, direction.yaw_coulomb))
-        yield Candidate(
-            BODY_AXES, _in_place(Friction(axes=own, wheels=friction.wheels)),
-            as_it_is("Coulomb friction on each axis by itself, a box"),
-        )  # fmt: skip
+        yield Candidate(BODY_AXES, _in_place(along_axes), as_it_is("Coulomb friction on each axis by itself, a box"))
     if friction.wheels == WheelFriction():
         yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
 
 
-def _in_place(friction: Friction) -> Callable[[Workbench], list[Trial]]:
-    """The same robot with other friction; a change by 1 is the whole of it."""
-    return lambda b: [Trial(b.change(b.robot.model_copy(update={"friction": friction})))]
+def along_travel(friction: Friction) -> Friction:
+    """An ellipse in the place of a box, at the same levels."""
+    axes = friction.axes
+    other = DirectionFriction(
+        coulomb=axes.coulomb[:2], viscous=0.5 * (axes.viscous[0] + axes.viscous[1]), yaw_coulomb=axes.coulomb[YAW],
+        yaw_viscous=axes.viscous[YAW],
+    )  # fmt: skip
+    return Friction(direction=other, wheels=friction.wheels)
+
+
+def along_axes(friction: Friction) -> Friction:
+    """A box in the place of an ellipse, at the same levels."""
+    direction = friction.direction
+    viscous = (direction.viscous, direction.viscous, direction.yaw_viscous)
+    own = AxesFriction(viscous=viscous, coulomb=(*direction.coulomb, direction.yaw_coulomb))
+    return Friction(axes=own, wheels=friction.wheels)
+
+
+def _in_place(other: Callable[[Friction], Friction]) -> Callable[[Workbench], list[Trial]]:
+    """The same robot with friction of another shape; a change by 1 is the whole of it."""
+    return lambda b: [Trial(b.change(b.robot.model_copy(update={"friction": other(b.robot.friction)})))]
 
 
 def _breakaway(bench: Workbench) -> list[Trial]:

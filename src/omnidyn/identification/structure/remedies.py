@@ -15,7 +15,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.structure.candidates import Candidate, Trial
-from omnidyn.identification.structure.linear import SAME, Linear
+from omnidyn.identification.structure.linear import SAME, Linear, Rows
+from omnidyn.model.keys import BODY_AXES, DIRECTION
 
 CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
 BLOCKS = 10  # of the log, each held out once
@@ -25,13 +26,15 @@ TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one mu
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A candidate at its best trial: where its columns stand, and what it explains."""
+    """A candidate at its best trial: where its columns stand, what it explains, its size, and how far the parameters
+    would follow it."""
 
     candidate: Candidate
     trial: Trial
     at: IntArray
     chi2: float
     size: FloatArray
+    step: FloatArray
 
 
 class Blocks:
@@ -48,7 +51,7 @@ class Blocks:
         self.count, self.rows = j.shape[1], len(e)
         self.block = self._blocks(linear, len(e))
         self.matrix = np.array([every[own].T @ every[own] for own in self.block])
-        self.total = self.matrix.sum(axis=0)
+        self.total = every.T @ every  # with what is known beforehand, which is held out of no block
 
     def _blocks(self, linear: Linear, rows: int) -> list[IntArray]:
         """Rows by the time at which they stand, in blocks that are whole stretches of time; priors in all of them."""
@@ -106,11 +109,13 @@ def remedies(
         at = np.arange(first, first + k)
         first += k
         chi2 = (base - blocks.left(np.concatenate([known, at]))) / noise
-        size = blocks.fitted(blocks.total, np.concatenate([known, at]))[len(known) :] / blocks.size[at]
+        both = np.concatenate([known, at])
+        fitted = blocks.fitted(blocks.total, both) / blocks.size[both]
+        size, step = fitted[len(known) :], fitted[: len(known)]
         if one.one_sided and k == 1 and size[0] < 0.0:
             continue
         if one.key not in best or chi2 - penalty * k > best[one.key].chi2 - penalty * len(best[one.key].at):
-            best[one.key] = Tried(one, trial, at, float(chi2), size)
+            best[one.key] = Tried(one, trial, at, float(chi2), size, step)
     ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * len(t.at), reverse=True)
     worth = [t for t in ranked if t.chi2 > penalty * len(t.at) + 2.0 * np.log(max(len(best), 1))][: 2 * most]
     ranking = []
@@ -122,8 +127,24 @@ def remedies(
         words = t.candidate.told(float(t.size[0]), t.trial.at)
         every = (base - blocks.left(np.concatenate([known, t.at, themes]))) / noise
         share = (t.chi2 - len(t.at)) / max(every - len(t.at) - len(themes), t.chi2 - len(t.at), 1e-300)
-        ranking.append(Remedy(t.candidate.key, words, gain, std, same, share, t.candidate.offered, t.chi2, len(t.at)))
+        ranking.append(
+            Remedy(
+                t.candidate.key, words, gain, std, same, share, t.candidate.offered, t.chi2, len(t.at),
+                tuple(t.size.tolist()), t.trial.at, _changes(linear.rows, t),
+            )
+        )  # fmt: skip
     return tuple(r for r in ranking if r.gain > -CLEAR * r.gain_std and r.chi2 > RIVAL * worth[0].chi2)[:most]
+
+
+def _changes(rows: Rows, tried: Tried) -> dict[str, tuple[float, float]]:
+    """Number of the robot -> (what it is, what it would be beside a candidate), to first order; none for a candidate
+    that takes the place of what these numbers belong to."""
+    if tried.candidate.key in (BODY_AXES, DIRECTION):
+        return {}
+    found = {}
+    for p, value, by in zip(rows.problem.robot_parameters, rows.point.values.tolist(), tried.step, strict=False):
+        found[p.name] = value, min(max(p.outer(p.inner(value) + float(by)), p.low), p.high)
+    return found
 
 
 def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried, other: Tried) -> bool:

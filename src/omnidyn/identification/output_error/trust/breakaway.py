@@ -71,6 +71,18 @@ def with_breakaway(solver: Solver, levels: FloatArray) -> Solver:
     return Solver(solver.problem, solver.engine.with_breakaway(levels), solver.nu)
 
 
+def levels_of(solution: Solution) -> list[float] | None:
+    """The levels of breakaway of a solution [N, N, N m]; None where all follow coulomb."""
+    problem, engine = solution.solver.problem, solution.solver.engine
+    axes = problem.robot_at(solution.state.point.values).friction.axes
+    if not isinstance(engine, ExactEngine):
+        return None if axes.breakaway is None else list(axes.breakaway)
+    found = engine.mapping.breakaway
+    if np.isnan(found).all():
+        return None
+    return np.where(np.isnan(found), axes.coulomb, found).tolist()
+
+
 def find_breakaway(solution: Solution, axes: list[int], known: Trust) -> tuple[Solution, list[Breakaway]]:
     """Profile S of the axes, one after the other, twice where there are several: (solution, levels) there.
 

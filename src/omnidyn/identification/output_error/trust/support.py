@@ -18,7 +18,8 @@ def supported(solver: Solver, solution: Solution, names: tuple[str, ...]) -> tup
     A gain stays: it is there because the supply is only nominal, and its prior keeps it.
     """
     normal = Normal(solver, solution.state)
-    std = np.sqrt(np.diag(np.linalg.pinv(normal.information, hermitian=True)))
+    variance = np.diag(np.linalg.pinv(normal.information, hermitian=True))
+    std = np.sqrt(np.where(variance >= 0.0, variance, np.inf))  # rounding, where the model does not follow at all
     blind = np.diag(normal.information) <= 0.0
     largest = max(float(np.nanmax(np.abs(piece.record.voltage))) for piece in solver.problem.pieces)
     limits = {LATENCY: LATENCY_STD, DEAD_BAND: DEAD_SHARE * largest, GAIN: np.inf}

@@ -1,0 +1,112 @@
+"""Ladder: what was switched on to mend a model that leaves something out, step by step, and whether it paid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from omnidyn.document import Part, Table, all_of, plain
+from omnidyn.identification.lack_of_fit import named
+from omnidyn.model.keys import FRICTION, in_words, unit
+
+STANDS = "as it is"  # the key of a model into which nothing was put
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A model that was fitted to all of the logs, on the way up.
+
+    step: of the ladder, 0 for the robot as it was given. key: what was switched on, "" for nothing; words: the same,
+    with its fitted value. numbers: how many are fitted. held_out: root mean square of what it leaves of blocks that it
+    was not fitted to, in those of the noise; gain: share of the squared one of the step before that it takes away, with
+    its standard error. bic: less that of the step before, for the number of causes that were tried. taken: whether
+    the ladder went on from here; why: or why not, in words. same_as: keys that as good a model has in its place.
+    value: number of the robot, or of the log -> fitted.
+    """
+
+    step: int
+    key: str
+    words: str
+    numbers: int
+    held_out: float
+    gain: float = 0.0
+    gain_std: float = 0.0
+    bic: float = 0.0
+    taken: bool = False
+    why: str = ""
+    same_as: tuple[str, ...] = ()
+    value: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """rungs: every model that was fitted, step by step, what was taken first. end: why it went no further."""
+
+    rungs: tuple[Rung, ...]
+    end: str
+
+    @property
+    def taken(self) -> tuple[Rung, ...]:
+        """The steps that paid."""
+        return tuple(rung for rung in self.rungs if rung.taken and rung.step)
+
+    def words(self) -> str:
+        """What it came to, in a sentence without a full stop."""
+        if not self.taken:
+            return f"the ladder took no step: {self.end}"
+        return f"the ladder took {all_of([_with_others(rung) for rung in self.taken])}; then {self.end}"
+
+    def warnings(self) -> list[str]:
+        """What a reader of the numbers must know: other robots that these logs do not tell from the one taken."""
+        found = []
+        for rung in self.taken:
+            others = [r for r in self.rungs if r.step == rung.step and not r.taken and r.key in rung.same_as]
+            if not rung.same_as:
+                continue
+            by = _spread([rung, *others])
+            found.append(
+                f"the ladder took {rung.words}; to these logs {all_of([*map(named, rung.same_as)])} would be the same"
+                + (f", with {by}" if by else "") + ": measure one of them, and put it into the robot file"
+            )  # fmt: skip
+        return found
+
+    def table(self) -> Table:
+        """Every model that was fitted, a row each."""
+        rows = [
+            (str(r.step), r.words, r.key, str(r.numbers or ""), _cell(r.held_out, "{:.4g}"),
+             _cell(r.gain, "{:.2g}", 100.0) + _cell(r.gain_std, " +- {:.2g} %", 100.0) if r.step else "",
+             _cell(r.bic, "{:+.3g}") if r.step else "", "taken" if r.taken else r.why)
+            for r in self.rungs
+        ]  # fmt: skip
+        head = ("step", "with", "key", "numbers", "held-out error", "less by", "BIC", "")
+        return Table(head, rows, "<<<>>>><")
+
+    def parts(self) -> list[Part]:
+        """As a line and a table."""
+        return [self.words(), *([self.table()] if self.rungs else [])]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return plain({"rungs": [asdict(rung) for rung in self.rungs], "end": self.end})
+
+
+def _cell(value: float, form: str, times: float = 1.0) -> str:
+    """A number in a table, "" for one that there is not."""
+    return form.format(times * value) if math.isfinite(value) else ""
+
+
+def _with_others(rung: Rung) -> str:
+    same = all_of([*map(named, rung.same_as)])
+    return f"{rung.words} (or, the same to these logs, {same})" if same else rung.words
+
+
+def _spread(rungs: Sequence[Rung]) -> str:
+    """The friction that differs most between models, in words; "" where none is in all of them."""
+    kept = [name for name in rungs[0].value if name.startswith(FRICTION) and all(name in r.value for r in rungs)]
+    if len(rungs) < 2 or not kept:
+        return ""
+    values = {name: [rung.value[name] for rung in rungs] for name in kept}
+    name = max(kept, key=lambda each: (max(values[each]) - min(values[each])) / (abs(values[each][0]) or 1.0))
+    return f"{in_words(name)} from {min(values[name]):.3g} to {max(values[name]):.3g} {unit(name)}"

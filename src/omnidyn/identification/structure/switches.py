@@ -1,0 +1,190 @@
+"""A remedy switched on: the robot and the question with it, ready to be fitted; what a fit cannot hold has none.
+
+A number begins at the size of its first step. All that was fitted before stays free, and begins where it was found,
+but for what has a prior: that would move with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.document import all_of
+from omnidyn.errors import OmnidynError
+from omnidyn.findings.needs import is_exact
+from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
+from omnidyn.identification.output_error.problem.nuisances import NUISANCES
+from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.output_error.trust.breakaway import HIGHEST, levels_of
+from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
+from omnidyn.identification.question import Question
+from omnidyn.identification.structure.laws import along_axes, along_travel
+from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
+from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
+from omnidyn.model.layout import N_AXES
+from omnidyn.model.motor import per_wheel
+from omnidyn.model.robot import Robot
+
+LIMIT, FRAME, EFFICIENCY = "motor.current_limit_A", "body.rotating_frame", "motor.gear_efficiency"
+LOSS = 0.01  # of a gear, from which its fit begins at least
+# Numbers of each wheel that change together, and what stands for them in a robot.
+OF_ALL = {
+    "wheels.wheel_radius_m": ("wheels", ("wheel_radius",)), "motor.resistance_ohm": ("motor", ("resistance",)),
+    "motor.torque_constant_Nm_A": ("motor", ("torque_constant", "emf_constant")),
+}  # fmt: skip
+OFF = {"motor.voltage_drop_V": "voltage_drop", "motor.rotor_inertia_kg_m2": "rotor_inertia"}
+
+
+@dataclass(frozen=True, eq=False)
+class Switch:
+    """What to fit. words: what is different. numbers: that the logs decide on beside the parameters of the fit."""
+
+    robot: Robot
+    question: Question
+    words: str
+    numbers: int = 0
+
+
+def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) -> list[Switch]:
+    """The ways in which a remedy can be switched on; none where no robot file and no fit holds it.
+
+    robot, question: of the fit before, and `found` what it came to.
+    """
+    start, asked = _where_it_ended(robot, found), _as_it_settled(robot, question, found)
+    try:
+        return [_with_levels_as_they_are(way) for way in _ways(remedy, start, asked)]
+    except OmnidynError:  # a size that no robot file may have
+        return []
+
+
+def told(words: str, before: Mapping[str, float], after: Mapping[str, float]) -> str:
+    """What was switched on, with its values where they are numbers of their own: before, after: what was fitted."""
+    new = [name for name in after if name not in before and not name.startswith(FRICTION)]
+    if not new or len(new) > N_AXES:
+        return words
+    return all_of([f"{in_words(name)} {after[name]:.3g} {unit(name)}".rstrip() for name in new])
+
+
+def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
+    key, words = remedy.key, remedy.words
+    friction = robot.friction
+    if key.partition(".")[0] in NUISANCES:
+        yield Switch(robot, replace(asked, nuisances=(*(asked.nuisances or ()), key)), words)
+    elif key == FRAME:
+        body = robot.body.replace(rotating_frame=not robot.body.rotating_frame)
+        yield Switch(robot.replace(body=body), asked, words)
+    elif key == BREAKAWAY:
+        yield _breaking_away(remedy, robot, asked)
+    elif key == DIRECTION:
+        yield Switch(robot.replace(friction=along_travel(friction)), _of_another_shape(asked), words)
+    elif key == BODY_AXES:
+        yield Switch(robot.replace(friction=along_axes(friction)), _of_another_shape(asked), words)
+    elif key == WHEELS:
+        yield from _at_wheels(robot, asked, words)
+    elif key == LIMIT:
+        limited = robot.replace(motor=robot.motor.replace(current_limit=remedy.at))
+        yield Switch(limited, _free(asked, key), words)
+    elif key in OFF:
+        on = robot.replace(motor=robot.motor.replace(**{OFF[key]: remedy.size[0]}))
+        yield Switch(on, _free(asked, key), words)
+    elif key == EFFICIENCY:
+        lossy = robot.replace(motor=robot.motor.replace(gear_efficiency=1.0 - max(remedy.size[0], LOSS)))
+        yield Switch(lossy, _free(asked, key), words)
+    elif find_key(key):
+        yield Switch(_as_one(robot, key), _free(asked, key), words)
+
+
+def _where_it_ended(robot: Robot, found: Solution) -> Robot:
+    """The robot with what was fitted, but for numbers with a prior, and what a wrong model drove to a bound."""
+    problem = found.solver.problem
+    for p, value, held in zip(problem.robot_parameters, found.state.point.values.tolist(), found.held, strict=False):
+        if p.prior is None and not held:
+            robot = p.on(robot, value)
+    axes, levels = robot.friction.axes, levels_of(found)
+    if levels is not None:  # of which none may be below Coulomb friction
+        higher = [max(pair) for pair in zip(levels, axes.coulomb, strict=True)]
+        axes = axes.replace(breakaway=tuple(higher))
+    return robot.replace(friction=robot.friction.replace(axes=axes))
+
+
+def _as_it_settled(robot: Robot, question: Question, found: Solution) -> Question:
+    """The question with every key that was free, and every nuisance that stayed, written out."""
+    names = question.free if question.free is not None else (FRICTION, *guesses(robot))
+    keys, fixed = expand_keys(names, robot), set(expand_keys(question.fixed, robot))
+    problem = found.solver.problem
+    stayed = problem.names[problem.robot_count :]
+    return replace(question, free=tuple(key for key in keys if key not in fixed), fixed=(), nuisances=stayed)
+
+
+def _free(asked: Question, *keys: str) -> Question:
+    return replace(asked, free=tuple(dict.fromkeys((*(asked.free or ()), *keys))))
+
+
+def _with_levels_as_they_are(way: Switch) -> Switch:
+    """The same; where the engine cannot look for levels of breakaway, they stay."""
+    keys = expand_keys(way.question.free or (), way.robot)
+    kept = tuple(key for key in keys if Key.parse(key).name != BREAKAWAY)
+    if kept == keys or (is_exact(way.robot) and stays_exact(way.robot, kept)):
+        return way
+    return replace(way, question=replace(way.question, free=kept))
+
+
+def _of_another_shape(asked: Question) -> Question:
+    """All friction of the robot is free, in the place of what was."""
+    others = [key for key in asked.free or () if Key.parse(key).part != FRICTION]
+    return replace(asked, free=(FRICTION, *others), profile=())
+
+
+def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
+    """Levels above Coulomb friction as the first step has them; the exact engine finds better ones."""
+    axes = robot.friction.axes
+    above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
+    levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
+    changed = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=levels)))
+    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
+
+
+def _at_wheels(robot: Robot, asked: Question, words: str) -> Iterator[Switch]:
+    """In the place of what acts on the body, at the levels that come nearest to it; and Coulomb friction beside it."""
+    g = robot.wheels.wrench_matrix
+    viscous, coulomb = _on_axes(robot.friction)
+    level = float(np.mean(coulomb / np.abs(g).sum(axis=1)))
+    rim = float(np.mean(viscous / (g**2).sum(axis=1)))
+    yield Switch(
+        robot.replace(friction=Friction(wheels=WheelFriction(coulomb=level, viscous=rim))), _of_another_shape(asked),
+        f"{words} in the place of the other",
+    )  # fmt: skip
+    half = AxesFriction(viscous=_levels(viscous), coulomb=_levels(0.5 * coulomb))
+    if any(robot.friction.axes.coulomb):
+        beside = Friction(axes=half, wheels=WheelFriction(coulomb=0.5 * level))
+        yield Switch(
+            robot.replace(friction=beside), _of_another_shape(asked), f"Coulomb {words} beside that on the axes"
+        )
+
+
+def _on_axes(friction: Friction) -> tuple[FloatArray, FloatArray]:
+    """(viscous (3,), Coulomb (3,)) of what acts on the body, as a box."""
+    box = friction if any(friction.axes.coulomb) else along_axes(friction)
+    return np.array(box.axes.viscous), np.array(box.axes.coulomb)
+
+
+def _levels(values: FloatArray) -> tuple[float, float, float]:
+    x, y, yaw = values.tolist()
+    return x, y, yaw
+
+
+def _as_one(robot: Robot, key: str) -> Robot:
+    """The robot with one number for all wheels, where it has the same for each and the key means them all."""
+    if key not in OF_ALL:
+        return robot
+    part, fields = OF_ALL[key]
+    table = getattr(robot, part)
+    values = {name: per_wheel(getattr(table, name), robot.wheels.count) for name in fields}
+    if any(np.ptp(each) for each in values.values()):
+        return robot
+    same = table.replace(**{name: float(each[0]) for name, each in values.items()})
+    return robot.replace(**{part: same})

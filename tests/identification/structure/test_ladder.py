@@ -1,0 +1,221 @@
+"""The ladder on logs of the simulator of wrong_worlds, which shares no code with the engines that fit them."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.wrong_worlds.kinds import by_name
+from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
+from omnidyn.errors import UnsupportedError
+from omnidyn.identification.identify import Identification, identify
+from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.ladder import Ladder, Rung
+from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.question import Question
+from omnidyn.identification.structure.climb import offered
+from omnidyn.identification.structure.held_out import Errors, errors, margins_of
+from omnidyn.model.robot_file import load_robot, save_robot
+from omnidyn.report.fit_page import render_fit
+from tests.support.axebot_logs import excitation, noisy
+
+SEED = 91  # of no log of a benchmark, nor of their pilots
+FREE = ("friction",)
+
+
+def world(name, size, seed=SEED, sensor=SPEEDS):
+    """(log, robot file of an owner who does not know, friction as it is) of a kind of wrong world."""
+    case = by_name(name).make(right_case(seed).setup_but(sensor=sensor, memory=0.0), size)
+    return logged(case, seed), robot_of(case.told), truths(case.told, case.told.shape)
+
+
+def climbed(name, size, **options):
+    run, robot, true = world(name, size)
+    return identify(run, robot, free=FREE, ladder=True, **options), true
+
+
+def held(estimate, true):
+    return sum(low <= true[name] <= high for name in true for low, high in [estimate.ci95[name]])
+
+
+def test_a_right_world_takes_no_step():
+    run, robot, _ = world("mass", 0.0)
+    estimate = identify(run, robot, free=FREE, ladder=True)
+    plain = identify(run, robot, free=FREE)
+    assert estimate.ladder == Ladder((), "the residuals hold nothing but noise")
+    assert plain.ladder is None
+    assert estimate.value == plain.value
+    assert "ladder" not in plain.to_dict()
+
+
+@pytest.mark.parametrize(
+    "name, size, key",
+    [
+        ("turning frame", 1.0, "body.rotating_frame"),
+        ("voltage drop", 0.106, "motor.voltage_drop_V"),
+        ("weak motor", 0.064, "motor.torque_constant_Nm_A[1]"),
+        ("mass", 0.5, "body.mass_kg"),
+        ("fade", 0.05, "fade"),
+    ],
+)
+def test_what_is_missing_is_switched_on_and_then_nothing_is(name, size, key):
+    estimate, true = climbed(name, size)
+    (step,) = estimate.ladder.taken
+    assert key in (step.key, *step.same_as)
+    assert step.gain > step.gain_std > 0.0
+    assert step.bic < 0.0
+    assert not estimate.lack_of_fit.found
+    assert held(estimate, true) >= 5
+
+
+def test_the_robot_that_is_written_is_the_fitted_one(tmp_path):
+    estimate, _ = climbed("turning frame", 1.0)
+    save_robot(estimate.robot, tmp_path / "robot.toml")
+    again = load_robot(str(tmp_path / "robot.toml"))
+    assert again.body.rotating_frame
+    assert again.friction.axes.coulomb == pytest.approx(estimate.robot.friction.axes.coulomb)
+
+
+def test_another_shape_takes_the_place_of_the_one_given():
+    """An ellipse under the file of a box: the levels of the truth, and no box is left."""
+    run, robot, _ = world("ellipse", 0.3)
+    estimate = identify(run, robot, free=FREE, ladder=True)
+    assert [rung.key for rung in estimate.ladder.taken] == ["friction.direction"]
+    assert not any(estimate.robot.friction.axes.coulomb)
+    case = by_name("ellipse").make(right_case(SEED), 0.3)
+    true = {f"friction.direction.coulomb[{k}]": case.world.coulomb[k] for k in range(2)}
+    assert held(estimate, true) == 2
+
+
+def test_a_limit_far_from_the_fit_is_found():
+    """So many rows are at it that no first step sees it; the fit with it does."""
+    estimate, true = climbed("current limit", 0.85)
+    assert [rung.key for rung in estimate.ladder.taken] == ["motor.current_limit_A"]
+    assert held(estimate, true) >= 5
+
+
+def test_what_the_log_cannot_tell_apart_is_said_and_each_is_fitted():
+    """Worn wheels look like a stronger supply."""
+    estimate, _ = climbed("wheel radius", 0.1)
+    step = estimate.ladder.taken[0]
+    group = {step.key, *step.same_as}
+    assert {"gain", "wheels.wheel_radius_m"} <= group
+    rungs = [rung for rung in estimate.ladder.rungs if rung.step == 1 and rung.key in group]
+    assert len({rung.key for rung in rungs}) >= 2
+    assert max(rung.bic for rung in rungs if not rung.why.startswith("pays less")) - step.bic < 6.0
+    assert any("would be the same" in words for words in estimate.warnings)
+
+
+@pytest.mark.parametrize("name, size", [("umbilical", 2.3), ("sag", 0.4)])
+def test_what_no_robot_file_holds_is_said_and_not_taken(name, size):
+    estimate, _ = climbed(name, size)
+    assert estimate.ladder.taken == ()
+    assert "no law that is known here holds" in estimate.ladder.end
+    assert estimate.lack_of_fit.found
+
+
+def test_a_remedy_says_what_it_would_change():
+    """A first step goes to what the fit with it then finds, most of the way or to within a standard error."""
+    run, robot, _ = world("turning frame", 0.3)
+    best = identify(run, robot, free=FREE).lack_of_fit.remedies[0]
+    assert best.key == "body.rotating_frame"
+    with_it = identify(run, robot.replace(body=robot.body.replace(rotating_frame=True)), free=FREE)
+    without = identify(run, robot, free=FREE)
+    for name, (now, then) in best.changes.items():
+        assert now == pytest.approx(without.value[name], rel=1e-3)
+        assert abs(then - with_it.value[name]) < max(0.5 * abs(now - with_it.value[name]), with_it.std[name])
+
+
+def test_words_of_a_change():
+    remedy = Remedy(
+        "gain", "gain 1.1", 0.1, 0.01, changes={"body.mass_kg": (2.0, 2.5), "body.inertia_kg_m2": (1.0, 1.0)}
+    )
+    assert remedy.would_change() == "mass 2 -> 2.5 kg"
+    assert Remedy("gain", "gain 1.1", 0.1, 0.01).would_change() == ""
+
+
+def test_blocks_held_out_by_a_step_are_those_that_a_fit_without_them_misses():
+    """The squared error of tenths of a log, by fits that really never saw them; friction at rest has kinks."""
+    run, robot, _ = world("turning frame", 0.3)
+    question = Question(free=FREE, nuisances=())
+    whole = Fit.of(run, robot, question).solve()
+    variance = float(whole.state.variance[0])
+    memory = [AutoRegression(np.zeros(0), variance, len(run))] * 3
+    by_step = errors(whole, memory, margins_of([whole])).held_out
+    rows = len(run)
+    block = np.minimum(np.arange(rows) * 10 // rows, 9)
+    for k in (0, 4, 9):
+        seen = run.wheel_speed.copy()
+        seen[block == k] = np.nan
+        point = Fit.of(run.replace(wheel_speed=seen), robot, question).solve().state.point
+        (residual, _, _), *_ = whole.solver.engine.residuals(point)
+        assert np.nansum(residual[:, block == k] ** 2) / variance == pytest.approx(by_step[k], rel=0.01)
+
+
+def test_more_numbers_must_pay_for_themselves():
+    fewer, more = Errors(np.full(10, 10.0), 99.0, 100, 6), Errors(np.full(10, 10.0), 99.0, 100, 7)
+    assert more.bic() - fewer.bic() == pytest.approx(np.log(100.0))
+    assert more.bic(20) - more.bic() == pytest.approx(2.0 * np.log(20.0))
+    better = replace(more, held_out=np.full(10, 9.0))
+    assert better.gain(fewer) == pytest.approx((0.1, 0.0))
+    assert fewer.size == pytest.approx(1.0)
+
+
+def test_remedies_that_are_worth_a_fit():
+    def remedy(key, *same, offered=True):
+        return Remedy(key, key, 0.1, 0.01, same, offered=offered, chi2=10.0)
+
+    class Lack:
+        remedies = (
+            remedy("sag", offered=False), remedy("gain", "motor.resistance_ohm"), remedy("fade", "heat"),
+            remedy("change"), remedy("body.mass_kg"), remedy("body.inertia_kg_m2"),
+            remedy("motor.resistance_ohm", "gain"),
+        )  # fmt: skip
+
+    assert [each.key for each in offered(Lack)] == [
+        "gain", "body.mass_kg", "body.inertia_kg_m2", "motor.resistance_ohm"
+    ]  # fmt: skip
+
+
+def test_groups_have_no_ladder():
+    run, robot, _ = world("mass", 0.0)
+    runs = [run.replace(source="a/1.csv"), run.replace(t=run.t + 1.0, source="b/1.csv")]
+    with pytest.raises(UnsupportedError, match="one group only"):
+        Identification.of(runs, robot, free=FREE, ladder=True, per=("a=a/*", "b=b/*"))
+
+
+def test_the_page_and_the_values_for_machines_have_every_model_that_was_fitted():
+    run, robot, _ = world("turning frame", 1.0)
+    found = Identification.of(run, robot, free=FREE, ladder=True)
+    assert found.verdict.startswith("The ladder took the forces of a turning frame; then ")
+    told = found.document()
+    data = json.loads(json.dumps(told.data, allow_nan=False))["ladder"]
+    assert [rung["taken"] for rung in data["rungs"]][:2] == [True, True]
+    assert data["rungs"][0]["words"] == "as it is"
+    assert "held-out error" in told.to_text()
+    page = render_fit(found, {"omnidyn": "0", "command": "", "inputs": []})
+    assert "What was switched on, step by step" in page
+    assert "the forces of a turning frame" in page
+
+
+def test_a_model_that_follows_nothing_is_not_mended():
+    robot = load_robot("axebot")
+    run = noisy_of(robot)
+    twist = run.twist * [1.0, 1.0, -1.0]  # the gyroscope upside down
+    estimate = identify(run.replace(wheel_speed=None, twist=twist), robot, ladder=True)
+    assert estimate.ladder.rungs == ()
+    assert "does not follow" in estimate.ladder.end
+
+
+def noisy_of(robot):
+    from omnidyn.simulation.simulate import simulate
+
+    return noisy(simulate(robot, dt=0.01, voltage=excitation(20.0, 100.0, 3)), 3)
+
+
+def test_a_cell_that_has_no_number_is_empty():
+    ladder = Ladder((Rung(1, "gain", "gain", 0, np.nan, np.nan, np.nan, np.nan, why="cannot be fitted: why"),), "end")
+    assert ladder.table().rows[0][3:7] == ("", "", "", "")
+    assert ladder.words() == "the ladder took no step: end"
