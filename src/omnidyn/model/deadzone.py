@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import (
@@ -28,6 +29,7 @@ def moves(robot: Robot, voltage: ArrayLike) -> BoolArray:
 
     `voltage` has shape (*batch, wheels); returns (*batch, 3) for x, y, yaw. The voltage limit is not applied.
     """
+    check_order("moves(robot, voltage)", (robot, Robot), (voltage, object))
     voltage = _patterns(robot, voltage)
     at_rest = np.zeros((*voltage.shape[:-1], 3))
     if axes_move_alone(robot):
@@ -44,6 +46,7 @@ def axis_patterns(robot: Robot) -> FloatArray:
     Each row is the pattern of least norm that pushes along its axis only, scaled to a largest entry of 1: for the
     paper's robot (0, 1, -1), (-1, 1/2, 1/2) and (1, 1, 1).
     """
+    check_order("axis_patterns(robot)", (robot, Robot))
     return _scaled(_voltage_per_wrench(robot).T)
 
 
@@ -54,6 +57,7 @@ def breakaway_voltage(robot: Robot, pattern: ArrayLike, halvings: int = BISECTIO
     halvings: of where there is no closed form; the share of the scale that each leaves open is half of the last one's.
     Raises InputError when its last axis is not one entry per wheel.
     """
+    check_order("breakaway_voltage(robot, pattern)", (robot, Robot), (pattern, object))
     pattern = _patterns(robot, pattern)
     if axes_hold_alone(robot) and not np.any(robot.motor.voltage_drop) and robot.motor.current_limit is None:
         wrench_per_volt = np.abs(drive_wrench(robot, np.zeros((*pattern.shape[:-1], 3)), pattern))
@@ -71,6 +75,7 @@ def dead_zone_map(robot: Robot, directions: ArrayLike) -> tuple[FloatArray, Floa
     most loaded motor at which the robot starts to move. With a voltage drop, a current limit or a lossy gear the push
     is no longer proportional to the pattern: it is then not quite along the direction, and not free of torque.
     """
+    check_order("dead_zone_map(robot, directions)", (robot, Robot), (directions, object))
     directions = np.atleast_1d(np.asarray(directions, dtype=float))
     wrench = np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1)
     patterns = _scaled(wrench @ _voltage_per_wrench(robot).T)
