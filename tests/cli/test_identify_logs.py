@@ -274,6 +274,12 @@ def test_motors_from_a_table_without_a_time(call, tmp_path):
     assert start["parameters"]["offset"]["value"] == pytest.approx(0.4)
     assert "Where each direction starts" in report.read_text("utf-8")
     code, out, _ = call(str(table), "--what", "motors")
+    assert "nan" not in out
+    assert "both ways" not in out  # it turned one way only
+    code, _, err = call(str(table))
+    assert code == 2
+    assert "table.csv is a table of motors: say --what motors" in err
+    code, out, _ = call(str(table), "--what", "motors")
     assert "Motor 1 starts at 0.7 V." in out
     assert "the dead band is 0.7 V" in out
 
