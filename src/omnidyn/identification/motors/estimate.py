@@ -118,7 +118,7 @@ class MotorEstimate:
             self.name.removeprefix("motor "), f"{self.count} windows" if self.way == WINDOWS else self.way,
             "yes" if band else "no", f"{self.value[SLOPE]:.5g}", f"{self.std[SLOPE]:.2g}",
             *((f"{self.value[BAND]:.3g}", f"{self.std[BAND]:.2g}", "[{:.3g}, {:.3g}]".format(*self.ci95[BAND]))
-              if band else ("-", "-", "-")),
+              if band and math.isfinite(self.value[BAND]) else ("-", "-", "-")),
             *(f"{1e3 * each:{form}}" if math.isfinite(each) else "-"
               for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))),
             f"{self.unit}, s/rad", f"{self.rmse:.4g}",
