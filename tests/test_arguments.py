@@ -1,5 +1,7 @@
 """Arguments in each other's place: both are named, in one sentence."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from omnidyn.run import Run
 ROBOT = omnidyn.load_robot("axebot")
 RUN = Run(t=np.arange(3.0), twist=np.zeros((3, 3)))
 VOLTS = np.zeros((4, 3))
+TABLE = omnidyn.read_steady_table(Path(__file__).resolve().parents[1] / "examples" / "table1.csv")
 
 
 @pytest.mark.parametrize(
@@ -34,6 +37,10 @@ VOLTS = np.zeros((4, 3))
         (lambda: omnidyn.identify_groups(ROBOT, [RUN], ["a"]), "a Robot before a list of Run", "identify_groups"),
         (lambda: omnidyn.write_run("run.csv", RUN), "the text 'run.csv' before a Run", r"write_run\(run, path\)"),
         (lambda: omnidyn.save_robot("robot.toml", ROBOT), "the text 'robot.toml' before a Robot", "save_robot"),
+        (lambda: omnidyn.fit_steady_state(TABLE, ROBOT), "a SteadyTable before a Robot", "fit_steady_state"),
+        (lambda: omnidyn.identify_motors(ROBOT, RUN), "a Robot before a Run", "identify_motors"),
+        (lambda: omnidyn.breakaway_voltage(VOLTS, ROBOT), "a ndarray before a Robot", "breakaway_voltage"),
+        (lambda: omnidyn.moves(VOLTS, ROBOT), "a ndarray before a Robot", r"moves\(robot, voltage\)"),
     ],
 )
 def test_a_swapped_pair_is_recognised(call, got, expected):
@@ -60,3 +67,19 @@ def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
     check_order("f(runs, robot)", ((RUN, RUN), Run), (ROBOT, omnidyn.Robot))
     check_order("f(runs, robot)", ([], Run), (ROBOT, omnidyn.Robot))
     check_order("f(runs, robot)", (iter([RUN]), Run), (ROBOT, omnidyn.Robot))
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        omnidyn.dead_zone, omnidyn.axis_patterns, omnidyn.state_space, omnidyn.plausible,
+        lambda name: omnidyn.dead_zone_map(name, [0.0]), lambda name: omnidyn.breakaway_voltage(name, VOLTS),
+        lambda name: omnidyn.moves(name, VOLTS), lambda name: omnidyn.band(name, VOLTS, 0.1),
+        lambda name: omnidyn.acceleration(name, np.zeros(3), np.zeros(3)),
+        lambda name: omnidyn.fit_steady_state(name, TABLE),
+    ],
+)  # fmt: skip
+def test_the_name_of_a_robot_is_no_robot_anywhere(call):
+    """It was AttributeError: 'str' object has no attribute 'motor'."""
+    with pytest.raises(InputError, match=r"no Robot; got the text 'axebot'.*load_robot"):
+        call("axebot")

@@ -12,6 +12,7 @@ MADE_BY = {
     "Robot": 'omnidyn.load_robot("axebot"), or of a file, makes one',
     "Run": "omnidyn.read_log(path) makes one",
     "Log": "omnidyn.load_log(path) makes one",
+    "SteadyTable": "omnidyn.read_steady_table(path) makes one",
     "OutputErrorEstimate": "omnidyn.fit_output_error(runs, robot) makes one",
 }
 

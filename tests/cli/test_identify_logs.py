@@ -244,6 +244,24 @@ def test_motors_of_a_log_with_a_fatal_fault_end_with_4_and_are_shown(call, bench
     assert (code, strict(out)["ok"]) == (0, True)
 
 
+@pytest.mark.parametrize("what", ["motors", "friction"])
+def test_what_a_log_lacks_is_said_with_the_column_that_looks_like_it(call, tmp_path, what):
+    """A PWM without a unit: "expected voltage, duty, current", and the remedy stood in a doubt three lines above."""
+    rows = [f"{0.02 * k:.2f},{k % 200},{-(k % 200)},{k % 100},{0.1 * k},{-0.1 * k},{0.05 * k}" for k in range(400)]
+    (tmp_path / "pwm.csv").write_text("t_s,pwm1,pwm2,pwm3,w1_rad_s,w2_rad_s,w3_rad_s\n" + "\n".join(rows) + "\n")
+    code, _, err = call(str(tmp_path / "pwm.csv"), "--robot", "axebot", "--what", what)
+    assert code == 3
+    last = err.strip().splitlines()[-1]
+    assert "error: " in last
+    assert "no motor input: pwm1 .. pwm3, no unit is given (say --assume d=" in last
+
+
+def test_a_file_named_twice_counts_once_and_so_it_says(call):
+    _, out, err = call("smooth", "smooth/run3.csv", "--robot", "axebot", "--json")
+    assert json.loads(out)["groups"]["all"]["along_travel"]["runs"] == 12
+    assert "1 of 13 files are named twice: each counts once" in err
+
+
 def test_motors_from_a_table_without_a_time(call, tmp_path):
     """u = 0.5 w + 0.4: at rest up to 0.6 V, and 0.8 V moves it."""
     table, report = tmp_path / "table.csv", tmp_path / "m.html"
@@ -255,6 +273,12 @@ def test_motors_from_a_table_without_a_time(call, tmp_path):
     assert start["parameters"]["start"]["ci95"] == pytest.approx([0.6, 0.8])
     assert start["parameters"]["offset"]["value"] == pytest.approx(0.4)
     assert "Where each direction starts" in report.read_text("utf-8")
+    code, out, _ = call(str(table), "--what", "motors")
+    assert "nan" not in out
+    assert "both ways" not in out  # it turned one way only
+    code, _, err = call(str(table))
+    assert code == 2
+    assert "table.csv is a table of motors: say --what motors" in err
     code, out, _ = call(str(table), "--what", "motors")
     assert "Motor 1 starts at 0.7 V." in out
     assert "the dead band is 0.7 V" in out

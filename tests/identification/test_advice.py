@@ -43,3 +43,19 @@ def test_what_explains_much_less_than_the_first_is_not_advised():
     weak = Remedy("friction.wheels", "friction at each wheel", 0.4, 0.1, share=0.75, chi2=600.0)
     assert missing(SAG, weak) == []
     assert len(missing(SAG, DISC)) == 1
+
+
+def together(std):
+    """What is advised where two numbers of value 2, with this standard error, have a correlation of 0.97."""
+    names = ("friction.axes.coulomb[0]", "friction.axes.coulomb[1]")
+    fit = OutputErrorEstimate(
+        robot=load_robot("axebot"), value=dict.fromkeys(names, 2.0), std=dict.fromkeys(names, std), ci95={},
+        correlation=Correlation(names, np.array([[1.0, 0.97], [0.97, 1.0]])), degrees_of_freedom={},
+    )  # fmt: skip
+    return [words for words in advice(fit, None) if "move together" in words]
+
+
+def test_numbers_that_move_together_are_named_where_that_widens_them():
+    """Known within 0.01 % each, they were to be "measured otherwise"."""
+    assert together(0.0002) == []
+    assert len(together(0.3)) == 1

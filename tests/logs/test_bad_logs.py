@@ -84,7 +84,7 @@ def test_18_a_gap_splits_the_log(run):
 
 def test_19_a_time_that_may_be_two_units_is_refused(tmp_path):
     (tmp_path / "t.csv").write_text("t,w1_rad_s\n0,1\n0.5,1\n1,1\n1.5,1\n")
-    with pytest.raises(InputError, match=r"cannot tell the time of the rows; .*t=t:s.* or .*t=t:ms"):
+    with pytest.raises(InputError, match=r"cannot tell the time of the rows: .*t=t:s.* or .*t=t:ms"):
         read_log(tmp_path / "t.csv")
 
 

@@ -178,14 +178,24 @@ def test_overrides_and_maps(tmp_path):
     np.testing.assert_allclose(run.voltage[:, 0], [1e-3, 3e-3])
     np.testing.assert_allclose(run.wheel_speed[:, 0], [-2, -4])
     (tmp_path / "map.toml").write_text('[t]\ncolumn = "t_s"\nunit = "s"\n[u1]\ncolumn = "nope"\nunit = "V"\n')
-    with pytest.raises(InputError, match=r"the log has no column for u1; got t_s, foo, bar; expected nope"):
+    with pytest.raises(InputError, match=r"the log has no column nope for u1; got t_s, foo, bar"):
         read_log(path, columns=tmp_path / "map.toml")
 
 
 def test_a_log_without_a_clock_is_refused_with_a_remedy(tmp_path):
     path = write(tmp_path, "step,w1_rad_s\n0,1\n1,2\n2,3\n")
-    with pytest.raises(InputError, match=r'cannot tell the time of the rows; .*`column` "t=step:UNIT"'):
+    with pytest.raises(InputError, match=r'cannot tell the time of the rows: .*`column` "t=step:UNIT"'):
         read_log(path)
+
+
+def test_why_a_time_cannot_be_told_is_whole_and_a_name_that_is_nearly_right_is_known(tmp_path):
+    """The reason ended in "say how long one...": its words were cut in the middle."""
+    path = write(tmp_path, "timestep (8Hz),voltage (V),velocity (turns/s)\n0,1,2\n8,2,3\n16,2,3\n")
+    with pytest.raises(InputError, match="its name and unit do not say how long one") as caught:
+        read_log(path)
+    assert "..." not in str(caught.value).partition("`column`")[0]
+    with pytest.raises(InputError, match=r'no column timestep for t; .*; did you mean "timestep \(8Hz\)"\?'):
+        read_log(path, columns={"t": "timestep:s"})
 
 
 def test_words_where_numbers_are_needed_are_refused(tmp_path):

@@ -30,7 +30,7 @@ def _omnidyn(
     """From the logs of an omnidirectional robot to a model that can be trusted.
 
     stdout is the result, stderr is talk. Exit codes: 0 ok, 1 a bug of omnidyn, 2 usage, 3 bad input,
-    4 the data cannot answer, 5 a --fail-if holds, 6 an extra is missing, 130 interrupted.
+    4 the data cannot answer or the result means nothing, 5 a --fail-if holds, 6 an extra is missing, 130 interrupted.
     """
     if context.invoked_subcommand is None:
         typer.echo(context.get_help(), err=True)

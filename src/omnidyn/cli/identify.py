@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -79,7 +80,9 @@ def identify(
     question, to = _question(asked), Out(report, out, force, json)
     question = replace(question, method=question.method_asked())
     if not robot and question.what != MOTORS:
-        raise typer.BadParameter("Missing option '--robot'.")
+        of_motors = len(logs) == 1 and os.path.isfile(logs[0]) and is_motor_table(logs[0])
+        table = f" {logs[0]} is a table of motors: say --what motors, which needs no robot." if of_motors else ""
+        raise typer.BadParameter(f"Missing option '--robot'.{table}")
     for path in (out, report):  # before any work
         if path:
             check_output(path, force)

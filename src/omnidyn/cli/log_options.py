@@ -117,7 +117,10 @@ def log_files(arguments: Sequence[str]) -> list[str]:
         files += sorted(found, key=_natural)
     if len(files) > MAX_FILES:
         raise InputError("too many files", got=len(files), expected=f"at most {MAX_FILES}")
-    return list(dict.fromkeys(files))
+    once = list(dict.fromkeys(files))
+    if len(once) < len(files):
+        say(f"omnidyn: {len(files) - len(once)} of {len(files)} files are named twice: each counts once")
+    return once
 
 
 def keep_inputs(logs: Sequence[str], robots: Sequence[str], others: Sequence[str], *outputs: str) -> None:

@@ -116,12 +116,20 @@ def _guesses(fit: OutputErrorEstimate) -> Iterator[str]:
         )
 
 
+def _share(fit: OutputErrorEstimate, name: str) -> float:
+    """Standard error over value; 0 for what is no number of the robot."""
+    value = fit.value.get(name)
+    return fit.std[name] / abs(value) if value else 0.0
+
+
 def _together(fit: OutputErrorEstimate) -> Iterator[str]:
+    """Numbers that move together, and are wide for it: where both are known well, it does no harm."""
     names, matrix = fit.correlation.names, fit.correlation.matrix
     pairs = [
         f"{first} and {names[j]} move together (correlation {matrix[i, j]:+.2f})"
         for i, first in enumerate(names) for j in range(i + 1, len(names))
         if abs(matrix[i, j]) > TOGETHER and not {first, names[j]} & set(fit.unidentifiable)
+        and max(_share(fit, first), _share(fit, names[j])) > GOAL
     ]  # fmt: skip
     if pairs:
         one = "one of them" if len(pairs) == 1 else "one of each pair"
@@ -131,9 +139,8 @@ def _together(fit: OutputErrorEstimate) -> Iterator[str]:
 def _wide(fit: OutputErrorEstimate) -> Iterator[str]:
     """What is known too roughly. A longer log helps against noise only: not where the model itself misses something."""
     shares = {
-        name: fit.std[name] / abs(value) for name, value in fit.value.items()
-        if value and name not in fit.unidentifiable and name not in fit.at_bound
-    }  # fmt: skip
+        name: _share(fit, name) for name in fit.value if name not in fit.unidentifiable and name not in fit.at_bound
+    }
     wide = {name: share for name, share in shares.items() if share > WIDE}
     if wide:
         known = ", ".join(f"{name} is known within {100.0 * share:.0f} % only" for name, share in wide.items())

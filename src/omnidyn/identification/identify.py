@@ -13,12 +13,13 @@ from omnidyn.arguments import check_order
 from omnidyn.document import Document, Points, apart, sentence
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.finding import Verdict
+from omnidyn.findings.fitness import STEADY as STEADY_USE
 from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.advice import advice
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
-from omnidyn.identification.log_verdicts import checked, log_verdicts, unfit, verdict_advice
+from omnidyn.identification.log_verdicts import checked, log_verdicts, told_why, unfit, verdict_advice
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit
@@ -251,7 +252,8 @@ def _steady(runs: Sequence[Run], robot: Robot, asked: Question, verdicts: tuple[
     if asked.shape == LINE:
         lines = identify_lines(used, robot, groups=groups, question=plain)
         return Identification(asked, STEADY_STATE, lines, verdicts=verdicts, advice=mend)
-    study = identify_steady(used, robot, groups=groups, question=plain)
+    with told_why(verdicts, STEADY_USE):
+        study = identify_steady(used, robot, groups=groups, question=plain)
     study = replace(study, advice=(*mend, *study.advice))
     return Identification(
         asked, STEADY_STATE, study.estimates, study.differences, study=study, verdicts=verdicts, advice=study.advice

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
+from omnidyn.errors import InputError
 from omnidyn.findings.check import check_log
 from omnidyn.findings.finding import FATAL, Finding, Verdict
 from omnidyn.logs.log import Log
@@ -29,6 +31,23 @@ def log_verdicts(logs: Sequence[Log], robot: Robot | None, now: Tell, tell: Tell
     for words in verdict_advice(found):
         tell(f"warning: {words}")
     return tuple(found)
+
+
+@contextmanager
+def told_why(verdicts: Sequence[Verdict], use: str) -> Iterator[None]:
+    """While it holds, an InputError that says no remedy says why `check` finds the logs not good for this use.
+
+    That names the column that looks like what is missing, and what to say about it.
+    """
+    try:
+        yield
+    except InputError as error:
+        why = next((own.words for each in verdicts for own in each.uses if own.name == use and not own.good), "")
+        if error.remedy or not why:
+            raise
+        raise InputError(
+            error.what, got=error.got or None, expected=error.expected, remedy=why, where=error.where
+        ) from None
 
 
 def of_motors(log: Log, *more: str) -> Log:

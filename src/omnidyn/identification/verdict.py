@@ -102,8 +102,8 @@ def steady_verdict(study: SteadyStudy) -> str:
     alike = f"; as good, as far as these data tell: {all_of(ties[:NAMED])}" if ties else ""
     lacks = [each for each in study.lack_of_fit.values() if each.found]
     if lacks:
-        best = next((remedy.words for each in lacks for remedy in each.remedies), "the errors repeat")
-        alike = f"; but no offered shape fits: {best}"
+        best = next((remedy.words for each in lacks for remedy in each.remedies), "")
+        alike = f"; but no offered shape fits: {f'it takes {best} beside it' if best else 'the errors repeat'}"
     known = _of_groups({group: each.numbers_known() for group, each in study.estimates.items()})
     return (
         f"Friction along travel is {levels}; its shape, {score.name} ({score.words.partition(';')[0]}), predicts "

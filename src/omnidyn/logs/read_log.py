@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -105,9 +106,11 @@ def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> Colum
     columns = _delayed(columns.with_columns(more), options.latency)
     for component, column in columns.columns.items():
         if column.name not in table.names:
+            close = difflib.get_close_matches(column.name, table.names, n=1, cutoff=0.5)
+            remedy = f'did you mean "{close[0]}"?' if close else ""
             raise InputError(
-                f"the log has no column for {component}", got=", ".join(table.names), expected=column.name,
-                where=table.source,
+                f"the log has no column {column.name} for {component}", got=", ".join(table.names),
+                expected="one of its columns", remedy=remedy, where=table.source,
             )  # fmt: skip
     refuse_doubtful(columns, table.source)
     return columns

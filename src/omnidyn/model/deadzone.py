@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.actuation import reaching
@@ -30,6 +31,8 @@ def moves(robot: Robot, voltage: ArrayLike) -> BoolArray:
     `voltage` has shape (*batch, wheels); returns (*batch, 3) for x, y, yaw. The voltage limit is not applied.
     """
     voltage = reaching(robot, _patterns(robot, voltage))
+    check_order("moves(robot, voltage)", (robot, Robot), (voltage, object))
+    voltage = _patterns(robot, voltage)
     at_rest = np.zeros((*voltage.shape[:-1], 3))
     if axes_move_alone(robot):
         return ~robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage))
@@ -45,6 +48,7 @@ def axis_patterns(robot: Robot) -> FloatArray:
     Each row is the pattern of least norm that pushes along its axis only, scaled to a largest entry of 1: for the
     paper's robot (0, 1, -1), (-1, 1/2, 1/2) and (1, 1, 1).
     """
+    check_order("axis_patterns(robot)", (robot, Robot))
     return _scaled(_voltage_per_wrench(robot).T)
 
 
@@ -55,6 +59,7 @@ def breakaway_voltage(robot: Robot, pattern: ArrayLike, halvings: int = BISECTIO
     halvings: of where there is no closed form; the share of the scale that each leaves open is half of the last one's.
     Raises InputError when its last axis is not one entry per wheel.
     """
+    check_order("breakaway_voltage(robot, pattern)", (robot, Robot), (pattern, object))
     pattern = _patterns(robot, pattern)
     linear = not np.any(robot.motor.voltage_drop) and robot.motor.current_limit is None
     if axes_hold_alone(robot) and linear and robot.drive.dead_band == 0.0:
@@ -74,6 +79,7 @@ def dead_zone_map(robot: Robot, directions: ArrayLike) -> tuple[FloatArray, Floa
     gear the push is no longer proportional to the pattern: it is then not quite along the direction, and not free of
     torque.
     """
+    check_order("dead_zone_map(robot, directions)", (robot, Robot), (directions, object))
     directions = np.atleast_1d(np.asarray(directions, dtype=float))
     wrench = np.stack([np.cos(directions), np.sin(directions), np.zeros_like(directions)], axis=-1)
     patterns = _scaled(wrench @ _voltage_per_wrench(robot).T)

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.layout import LENGTH, N_AXES
@@ -72,6 +73,7 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
     `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
     Raises InputError for other shapes.
     """
+    check_order("acceleration(robot, twist, voltage)", (robot, Robot), (twist, object), (voltage, object))
     twist, voltage = _vectors("twist", twist, N_AXES), _vectors("voltage", voltage, robot.wheels.count)
     batch, n = _batch(twist, voltage), robot.wheels.count
     if axes_move_alone(robot):

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.dynamics import drive_wrench, linear_part
@@ -66,6 +67,7 @@ def state_space(robot: Robot, motors: MotorWrench | None = None) -> StateSpace:
     Left out: inductance, drop and limit of the motors, terms of a turning frame, friction of other shapes.
     motors: its `motor_wrench`, where that is known.
     """
+    check_order("state_space(robot)", (robot, Robot))
     motors = motors or motor_wrench(robot)
     viscous, coulomb, _ = robot.friction.axes.levels
     return StateSpace(

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.model.known.uncertainty import DRAWS, Ends, plausible
 from omnidyn.model.robot import Robot
@@ -40,6 +41,7 @@ def band(
 
     Raises InsufficientDataError where no number of the robot has a std, and what `simulate` raises.
     """
+    check_order("band(robot, voltage, dt)", (robot, Robot), (voltage, object))
     return band_of(plausible(robot, draws, seed), lambda each: simulate(each, voltage, dt, **options))
 
 

@@ -93,6 +93,7 @@ def test_one_speed_gives_no_dead_band_and_says_so():
     _speed, angle = motor(voltage, 0.01, 0.3)
     study = identify_motors([Run(t=np.arange(600) * 0.01, voltage=voltage[:, None], wheel_angle=angle[:, None])])
     assert np.isnan(study.motors[0].value["dead_band"])
+    assert "nan" not in str(study)  # what is not known is a dash
     assert "one speed or one input only" in study.statements[0]
 
 

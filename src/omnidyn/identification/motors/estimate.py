@@ -88,7 +88,8 @@ class MotorEstimate:
         if started and self.dead_band_seen:
             low, high = self.ci95[BAND]
             band = f"{self.value[BAND]:.3g} +- {self.std[BAND]:.2g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
-            return f"{words}; its line, both ways together, meets speed 0 at {band}"
+            line = "its line" if self.one_way else "its line, both ways together,"
+            return f"{words}; {line} meets speed 0 at {band}"
         return f"{words}; {self._of_dead_band()}"
 
     def _of_dead_band(self) -> str:
@@ -117,8 +118,10 @@ class MotorEstimate:
             self.name.removeprefix("motor "), f"{self.count} windows" if self.way == WINDOWS else self.way,
             "yes" if band else "no", f"{self.value[SLOPE]:.5g}", f"{self.std[SLOPE]:.2g}",
             *((f"{self.value[BAND]:.3g}", f"{self.std[BAND]:.2g}", "[{:.3g}, {:.3g}]".format(*self.ci95[BAND]))
-              if band else ("-", "-", "-")),
-            f"{1e3 * self.value[LAG]:.3g}", f"{1e3 * self.std[LAG]:.2g}", f"{self.unit}, s/rad", f"{self.rmse:.4g}",
+              if band and math.isfinite(self.value[BAND]) else ("-", "-", "-")),
+            *(f"{1e3 * each:{form}}" if math.isfinite(each) else "-"
+              for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))),
+            f"{self.unit}, s/rad", f"{self.rmse:.4g}",
             f"{self.held_out:.4g}" if math.isfinite(self.held_out) else "-",
         )  # fmt: skip
 

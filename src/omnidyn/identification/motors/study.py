@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
+from omnidyn.arguments import check_order
 from omnidyn.document import Document, Points, Table, sentence
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.finding import Verdict
+from omnidyn.findings.fitness import MOTORS as MOTORS_USE
 from omnidyn.identification.grouping import held_out
-from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, unfit, verdict_advice
+from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, told_why, unfit, verdict_advice
 from omnidyn.identification.motors.choice import is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
@@ -160,6 +162,9 @@ def identify_motors(
     motors say nothing.
     """
     asked = (question or Question()).but({**options, "what": MOTORS})
+    check_order(
+        "identify_motors(runs) or identify_motors(runs, robot)", (runs, (Run, MotorTable)), (robot, (Robot, type(None)))
+    )
     if isinstance(runs, MotorTable):
         if asked.method_asked() == OUTPUT_ERROR:
             raise InputError("a table of steady speeds has no time in it", got="a table input,speed",
@@ -168,10 +173,11 @@ def identify_motors(
     every = as_list(runs)
     more = ["pose"] if asked.speed == GROUND else []
     verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, now, tell)
-    if asked.method_asked() == OUTPUT_ERROR:
-        study = _free_runs(every, asked, now)
-    else:
-        study = _lines(motor_logs(every, asked.input, asked.speed, robot), asked)
+    with told_why(verdicts, MOTORS_USE):
+        if asked.method_asked() == OUTPUT_ERROR:
+            study = _free_runs(every, asked, now)
+        else:
+            study = _lines(motor_logs(every, asked.input, asked.speed, robot), asked)
     return replace(study, verdicts=verdicts)
 
 

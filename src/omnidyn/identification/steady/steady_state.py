@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
@@ -66,6 +67,7 @@ def fit_steady_state(
     axis can be fitted; UnsupportedError for a robot with friction on the direction of travel or at the wheels, which
     would count twice; InputError for a wrong option.
     """
+    check_order("fit_steady_state(robot, data)", (robot, Robot), (data, SteadyTable))
     limits = _options(rest, rest_speed, absolute_std, data)
     _refuse_other_friction(robot)
     found = _Findings(warnings=about_points(robot, data))

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, shortened
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns import names as words
@@ -353,5 +353,5 @@ def refuse_doubtful(columns: ColumnMap, where: str) -> None:
         settled = doubt.rpartition("; ")[2] if "; " in doubt else ""
         written = "write seconds, or dates such as 2026-11-20T10:00:00.125" if doubt else ""
         remedy = settled or written or "say which column it is: `column` t=COLUMN:s"
-        got = doubt.partition(": not taken")[0] or "no column that looks like a time"
-        raise InputError("cannot tell the time of the rows", got=got, remedy=remedy, where=where)
+        why = shortened(doubt.partition(": not taken")[0] or "no column looks like a time", 300)
+        raise InputError(f"cannot tell the time of the rows: {why}", remedy=remedy, where=where)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Table, Words, all_of, plain
 from omnidyn.model.actuation import clip_voltage
@@ -186,6 +187,7 @@ def dead_zone(robot: Robot, patterns: ArrayLike | None = None, *, draws: int = D
     any std has none. A pattern stays the same volts for every draw.
     Raises InputError where a pattern has not one entry per wheel, or for a strange number of draws.
     """
+    check_order("dead_zone(robot)", (robot, Robot), (patterns, object))
     own = axis_patterns(robot) if patterns is None else np.atleast_2d(np.asarray(patterns, dtype=float))
     scale = breakaway_voltage(robot, own)
     voltage, around = dead_zone_map(robot, AROUND)

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import BREAKAWAY, Key
@@ -52,6 +53,7 @@ def plausible(robot: Robot, count: int = DRAWS, seed: int = 0) -> list[Robot]:
 
     Raises InsufficientDataError where no number of the robot has a std, InputError for a strange count.
     """
+    check_order("plausible(robot, count)", (robot, Robot), (count, object))
     known = told(robot)
     if not known.keys:
         raise InsufficientDataError(
