@@ -11,6 +11,7 @@ from omnidyn.document import Part, Points, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.output_error.trust.cures import Blind
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.study_parts import Difference
 
@@ -46,21 +47,27 @@ class OutputErrorEstimate(Estimate):
     unidentifiable: names of what the data do not determine. Where the std of the robot file is a prior, the value is
     the one that goes best with all others, std and interval are those of the posterior, hardly more than what the file
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
-    together. blind: directions that the data do not show, in words. covariance: "white", "autoregressive" or
-    "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the
-    minimisation. not_followed: outputs that the model does not follow. study: makes the diagnosis, on first access.
+    together. directions: of these numbers, that the data do not show, with what would. covariance: "white",
+    "autoregressive" or "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations,
+    converged: of the minimisation. not_followed: outputs that the model does not follow. study: makes the diagnosis, on
+    first access.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     combinations: tuple[Combination, ...] = ()
-    blind: tuple[str, ...] = ()
+    directions: tuple[Blind, ...] = ()
     covariance: str = ""
     unused: tuple[str, ...] = ()
     iterations: int = 0
     converged: bool = True
     not_followed: tuple[str, ...] = ()
     study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
+
+    @property
+    def blind(self) -> tuple[str, ...]:
+        """What the data do not show, and what would, a sentence each."""
+        return tuple(map(str, self.directions))
 
     @cached_property
     def diagnosis(self) -> Diagnosis | None:
@@ -112,6 +119,7 @@ class OutputErrorEstimate(Estimate):
         return super().to_dict() | plain({
             "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable,
             "combinations": [asdict(one) for one in self.combinations], "blind": self.blind,
+            "directions": [asdict(one) for one in self.directions],
             "covariance": self.covariance, "unused": self.unused, "converged": self.converged,
         })  # fmt: skip
 
