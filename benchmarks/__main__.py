@@ -30,6 +30,7 @@ NAMES = {
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
     "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
+    "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"

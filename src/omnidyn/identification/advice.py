@@ -9,6 +9,7 @@ from omnidyn.document import all_of
 from omnidyn.identification.lack_of_fit import Remedy, named
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
+from omnidyn.identification.output_error.trust.cures import MEASURED
 from omnidyn.identification.structure.candidates import CHANGE
 from omnidyn.identification.validation import Validation
 from omnidyn.model.frames import AXES
@@ -46,10 +47,7 @@ def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
             "with currents, says more than a longer log"
         )
     for words in fit.blind:
-        yield (
-            f"{words}: fix one of them to what was measured otherwise (`fixed`), or write what is known of it into the "
-            "robot file, with a std"
-        )
+        yield f"{words}; what is measured goes into the robot file, with its std, or is fixed (`fixed`)"
 
 
 def _remedy(name: str) -> str:
@@ -81,12 +79,21 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
         yield f"{remedy.words} would explain what the model leaves out{change}{alike}: {how_to(remedy)}"
     if fit.ladder is None:
         yield "let `ladder` fit the logs with each of the best causes, step by step: it keeps what predicts better"
+    told: set[str] = set()
+    for remedy in lack.remedies:
+        if remedy.key in told or not remedy.confident or remedy.chi2 < NEARLY * lack.remedies[0].chi2:
+            continue
+        told |= {remedy.key, *remedy.same_as}
+        alike = f"; these logs cannot tell it from {lack.alike(remedy)}" if remedy.same_as else ""
+        yield f"{remedy.words} would explain what the model leaves out{alike}: {how_to(remedy)}"
 
 
 def how_to(remedy: Remedy) -> str:
     """What to do about a remedy, in words."""
     if remedy.same_as:
-        return "measure or weigh one of them, or record what tells them apart (currents, another load)"
+        group = {Key.parse(each).name if find_key(each) else each for each in (remedy.key, *remedy.same_as)}
+        ways = [words for key, words in MEASURED.items() if key in group] or ["measure one of them"]
+        return f"{' or '.join(ways)}, or record what tells them apart (currents, another load)"
     if remedy.key.partition(".")[0] in NUISANCES:
         return f"fit it (`nuisances` {remedy.key})"
     if remedy.key == CHANGE:

@@ -138,8 +138,15 @@ class LackOfFit:
                 f"{100.0 * near.share:.0f} % of it"
             )
         best = self.remedies[0]
-        same = f", or what this log cannot tell from it ({', '.join(map(named, best.same_as))})" if best.same_as else ""
+        same = f", or what this log cannot tell from it ({self.alike(best)})" if best.same_as else ""
         return f"{words}; most likely {best.words}{same}"
+
+    def alike(self, remedy: Remedy) -> str:
+        """What the log cannot tell from a remedy, with their values: "gain 0.94, torque constant -6 %"."""
+        words = {each.key: each.words for each in self.remedies}
+        keys = sorted(remedy.same_as, key=lambda key: key not in words)
+        more = [f"{len(keys) - MOST_NAMED} more"] if len(keys) > MOST_NAMED else []
+        return ", ".join([*(words.get(key, named(key)) for key in keys[:MOST_NAMED]), *more])
 
     def table(self) -> Table:
         """The remedies, a row each."""

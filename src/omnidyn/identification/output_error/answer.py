@@ -12,6 +12,7 @@ from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.output_error.trust.cures import Blind
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.model.fitted.log_effects import log_mark
@@ -56,12 +57,16 @@ class OutputErrorEstimate(Estimate):
     minimisation. not_followed: outputs that the model does not follow. log_alone: name -> 95 % interval from the log
     alone, were what the robot file knows with a std exact; empty where it knows nothing so. study: makes the diagnosis,
     on first access. ladder: what was switched on step by step, where that was asked for.
+    together. directions: of these numbers, that the data do not show, with what would. covariance: "white",
+    "autoregressive" or "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations,
+    converged: of the minimisation. not_followed: outputs that the model does not follow. study: makes the diagnosis, on
+    first access.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     combinations: tuple[Combination, ...] = ()
-    blind: tuple[str, ...] = ()
+    directions: tuple[Blind, ...] = ()
     covariance: str = ""
     unused: tuple[str, ...] = ()
     iterations: int = 0
@@ -70,6 +75,11 @@ class OutputErrorEstimate(Estimate):
     log_alone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
     ladder: Ladder | None = None
+
+    @property
+    def blind(self) -> tuple[str, ...]:
+        """What the data do not show, and what would, a sentence each."""
+        return tuple(map(str, self.directions))
 
     @cached_property
     def diagnosis(self) -> Diagnosis | None:
@@ -144,6 +154,8 @@ class OutputErrorEstimate(Estimate):
             "combinations": [asdict(one) for one in self.combinations], "blind": self.blind,
             "from_the_log_alone": self.log_alone, "covariance": self.covariance, "unused": self.unused,
             "converged": self.converged, **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
+            "directions": [asdict(one) for one in self.directions],
+            "covariance": self.covariance, "unused": self.unused, "converged": self.converged,
         })  # fmt: skip
 
 

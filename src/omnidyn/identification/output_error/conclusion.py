@@ -25,16 +25,16 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trades import trades
 from omnidyn.identification.output_error.trust.alone import from_the_log_alone, given
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
+from omnidyn.identification.output_error.trust.cures import Blind, blind_in_words
 from omnidyn.identification.output_error.trust.ends import at_the_end, end_words
 from omnidyn.identification.output_error.trust.support import too_early
-from omnidyn.identification.output_error.trust.uncertainty import BLIND, SHARE, Trust
+from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, unit, with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
 from omnidyn.statistics import difference_noise
 
 IN_METRES = (("twist", 0), ("twist", 1), ("position", 0), ("position", 1))  # outputs that know of no wheel radius
-LEAST_SHARE = 1e-4  # of a lost direction that a number lost with it must have to be named
 LARGEST_STD = 1e9  # what a robot file takes
 SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted to Gaussian noise of std 1
 
@@ -56,8 +56,9 @@ def conclude(
     open_ = tuple(p.name for p, b in zip(problem.parameters, known.open, strict=True) if b or p.name in ended)
     own = problem.robot_count
     missed = unexplained(solver, solution)
+    directions = () if missed else tuple(blind_in_words(problem, values, way, moved) for way in known.ways)
     if known.open[:own].all():
-        _refuse_blind([p.name for p in problem.parameters[:own]], missed, records[0].source, known.unseen[:own])
+        _refuse_blind(problem.names[:own], missed, records[0].source, known.unseen[:own], directions)
     as_they_were = [p.value if p.prior is None else p.prior[0] for p in problem.parameters]
     values = np.where(known.unseen, as_they_were, values)
     std, ci95 = intervals(problem, values, known)
@@ -92,6 +93,8 @@ def conclude(
         combinations=(*joint, *trades(problem, values, known, moved)),
         log_alone=_log_alone(problem, values, known, open_),
         blind=tuple(_direction(problem, value, way, known.blind) for value, way in known.directions),
+        combinations=joint,
+        directions=directions,
         covariance=known.kind,
         unused=_unused(records),
         iterations=solution.iterations,
@@ -156,10 +159,12 @@ def _not_followed(missed: Mapping[str, float]) -> list[str]:
     ]
 
 
-def _refuse_blind(free: Sequence[str], missed: Mapping[str, float], where: str, unseen: BoolArray) -> NoReturn:
+def _refuse_blind(
+    free: Sequence[str], missed: Mapping[str, float], where: str, unseen: BoolArray, directions: Sequence[Blind]
+) -> NoReturn:
     """Raises InsufficientDataError: nothing moved, or all that is free can be traded, or the model does other things.
 
-    unseen: for each of `free`, whether the outputs do not change with it at all.
+    unseen: for each of `free`, whether the outputs do not change with it at all. directions: that they do not show.
     """
     if missed:
         raise InsufficientDataError(
@@ -170,8 +175,10 @@ def _refuse_blind(free: Sequence[str], missed: Mapping[str, float], where: str, 
         )  # fmt: skip
     if not unseen.all():
         raise InsufficientDataError(
-            "of what is free each number can be made up for by others, so that none can be told", got=", ".join(free),
-            expected="fewer numbers", remedy="leave out one that is known, such as body.mass_kg", where=where,
+            "; ".join(["of what is free each number can be made up for by others, so that none can be told",
+                       *(each.words for each in directions)]), got=", ".join(free), expected="fewer numbers",
+            remedy="; ".join(" or ".join(each.cures) for each in directions if each.cures) or "fix one that is known",
+            where=where,
         )  # fmt: skip
     raise InsufficientDataError(
         "the logs say nothing about what is free", got=", ".join(free), expected="motion",
@@ -348,15 +355,6 @@ def _unused(records: Sequence[Record]) -> tuple[str, ...]:
         words if len(own) == len(records) else f"{words} ({len(own)} of {len(records)} logs, such as {own[0]})"
         for words, own in where.items()
     )
-
-
-def _direction(problem: Problem, value: float, way: FloatArray, lost: BoolArray) -> str:
-    """A direction of the parameters in words: how many percent each moves where one moves by 1 %."""
-    least = np.where(lost & (value < BLIND), LEAST_SHARE, SHARE)
-    told = np.abs(way) > least
-    parts = [f"{p.name} {share:+.2g} %" for p, share, yes in zip(problem.parameters, way, told, strict=True) if yes]
-    change = "leaves the outputs as they are" if value < BLIND else "hardly changes the outputs"
-    return f"{' with '.join(parts)} {change}"
 
 
 def _column(column: tuple[str, int]) -> str:

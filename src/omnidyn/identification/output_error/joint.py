@@ -99,6 +99,7 @@ class JointEngine:
             unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],
             plain=known.plain[np.ix_(at, at)], guessed=known.guessed[at],
             directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
+            ways=tuple(replace(way, step=way.step[at], size=way.size[at]) for way in known.ways if way.step[at].any()),
         )  # fmt: skip
         return Solution(state, solution.held[at], solution.iterations, solution.converged, solver), own
 

@@ -18,7 +18,7 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import CURRENT, VOLTAGE, force_origin
 from omnidyn.identification.recordings import count_once
 from omnidyn.identification.steady.points import refuse_losses
-from omnidyn.logs.plateaus import ANGLE, Plateau, find_plateaus, pool
+from omnidyn.logs.plateaus import ANGLE, COMMANDS, SAME_COMMAND, Plateau, find_plateaus, pool
 from omnidyn.model.actuation import asked_voltage, reaching
 from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.mass import mass_matrix
@@ -139,6 +139,35 @@ def force_points(
         _refuse_unsigned(runs, [each for *_, each in found])
     points = _stacked(found, robot, names, speed, origin, notes)
     return _moving(points, robot)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldForces:
+    """The steady windows of one run in the order of time: start, end (n,) [s]; command (n,): number of what was asked
+    for, alike where that is the same; force (n, 3): what friction balances, (F_x, F_y) and T / b [N]."""
+
+    start: FloatArray
+    end: FloatArray
+    command: IntArray
+    force: FloatArray
+
+
+def held_forces(
+    run: Run, robot: Robot, speed: str, origin: str, window: tuple[float, float] | None = None
+) -> HeldForces:
+    """The windows of a run one by one; in ForcePoints those of one command are a single point. As `force_points`."""
+    run = _with_voltage(run, robot) if origin == VOLTAGE else run
+    found = list(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
+    arm = np.array([1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
+    force = [_point(run, robot, each, speed, origin)["wrench"] / arm for each in found]
+    names = [name for name in COMMANDS if found and name in found[0].mean]
+    asked = np.array([each.mean[names[0]] for each in found]) if names else np.zeros((0, 1))
+    alike = SAME_COMMAND * max(float(np.abs(asked).max(initial=0.0)), 1e-12)
+    command = np.unique(np.round(asked / alike / 2.0), axis=0, return_inverse=True)[1].ravel()
+    return HeldForces(
+        np.array([each.start for each in found]), np.array([each.end for each in found]), command,
+        np.array(force).reshape(-1, 3),
+    )  # fmt: skip
 
 
 def _origin(runs: Sequence[Run], asked: str) -> str:

@@ -25,6 +25,7 @@ from omnidyn.identification.question import STEADY, STEADY_STATE, Question
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
+from omnidyn.identification.steady.moment import Moment, moments
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
@@ -36,7 +37,7 @@ from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import GUESS, Prior, Robot
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 from omnidyn.statistics import t_quantile
 
 MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
@@ -49,8 +50,8 @@ class SteadyStudy:
     points: what was used. choice: shapes compared. estimates: group -> Estimate, whose robot holds that group's
     friction. travel: group -> force along travel. viscous: group -> what is known of the viscous levels. differences
     between groups. internal: group -> rms of the forces with which the wheels work against each other [N], where there
-    are more than three. lack_of_fit: group -> whether any offered shape fits, and what would. statements, warnings,
-    advice: in words.
+    are more than three. lack_of_fit: group -> whether any offered shape fits, and what would. moments: changes
+    inside a run. statements, warnings, advice: in words.
     """
 
     robot: Robot
@@ -65,6 +66,7 @@ class SteadyStudy:
     statements: tuple[str, ...]
     warnings: tuple[str, ...]
     advice: tuple[str, ...]
+    moments: tuple[Moment, ...] = ()
 
     @property
     def estimate(self) -> Estimate:
@@ -103,6 +105,7 @@ def identify_steady(
     estimates = {group: _estimate(robot, own, choice, group, robust) for group, own in parts.items()}
     differences = _differences(choice)
     internal = {group: _internal(robot, own) for group, own in parts.items()} if robot.wheels.count > 3 else {}
+    changed = moments(as_list(runs), robot, points.speed_from, points.force_from, asked.window)
     lack = {group: lack_of_fit(robot, own, choice.fits[choice.chosen][group]) for group, own in parts.items()}
     turning = any(is_turning(robot, own) for own in parts.values())
     return SteadyStudy(
@@ -113,7 +116,11 @@ def identify_steady(
             *words.statements(choice, viscous, differences, internal, lack, MATTERS),
             scale_of_traction(robot, points.force_from == CURRENT),
         ),
-        warnings=(*points.notes, *words.about_points(points, choice, turning), *words.about_lack_of_fit(lack, choice)),
+        warnings=(
+            *points.notes, *words.about_points(points, choice, turning), *words.about_lack_of_fit(lack, choice),
+            *(each.words() for each in changed),
+        ),
+        moments=changed,
         advice=words.lack_advice(lack) + words.advice(choice, viscous, turning, points.force_from),
     )  # fmt: skip
 

@@ -95,6 +95,7 @@ def _data(study: SteadyStudy) -> dict[str, Any]:
             for group in study.estimates
         },
         "lack_of_fit": any(each.found for each in study.lack_of_fit.values()),
+        "moments": [asdict(each) for each in study.moments],
         "differences": [{**asdict(each), "differs": each.differs} for each in study.differences],
         "statements": list(study.statements),
         "warnings": list(study.warnings),

@@ -64,9 +64,12 @@ def test_what_only_the_product_shows_is_named(axebot, clean):
     fit = fit_output_error(noisy(clean, 1), start, free=[*BOX, KT, "motor.gear_ratio"], start="rest")
     assert set(fit.unidentifiable) == {KT, "motor.gear_ratio"}
     assert fit.value[KT] * fit.value["motor.gear_ratio"] == pytest.approx(0.0059 * 19.0, rel=0.01)
-    (words,) = fit.blind
-    assert "motor.gear_ratio +1 %" in words or "motor.gear_ratio -1 %" in words
-    assert "friction" not in words
+    (lost,) = fit.directions
+    assert lost.exact
+    assert set(lost.changes) == {KT, "motor.gear_ratio"}
+    assert lost.changes[KT] == pytest.approx(-lost.changes["motor.gear_ratio"], rel=1e-3)
+    assert abs(lost.changes[KT]) == pytest.approx(0.01, rel=1e-3)
+    assert "friction" not in fit.blind[0]
     assert np.isfinite([fit.std[key] for key in BOX]).all()
 
 
@@ -166,8 +169,8 @@ def test_a_number_with_a_small_share_of_a_lost_direction_is_lost_too(axebot, cle
     lost = {KT, resistance, *BOX[:3]}
     assert set(fit.unidentifiable) == lost
     assert all(np.isinf(fit.std[key]) for key in lost)
-    (words,) = fit.blind
-    assert all(key in words for key in lost)
+    (direction,) = fit.directions
+    assert set(direction.changes) == lost
     known = fit_output_error(noisy(clean, 1), axebot, start="rest")
     for key in BOX[3:]:  # as well known as where the other numbers are: no better
         assert fit.value[key] == pytest.approx(known.value[key], abs=0.2 * known.std[key])

@@ -22,6 +22,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.statistics import difference_noise
 
+DRIVE = ("drive it forward and back", "drive it sideways", "turn it")
 CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any log
 
 
@@ -42,7 +43,7 @@ class Motion:
         place = f" in {where}" if where else ""
         if not self.seen[axis]:
             return f"axis {AXES[axis]} was not measured{place}: its friction is not fitted"
-        return f"axis {AXES[axis]} never visibly moved{place}: its friction is not fitted"
+        return f"axis {AXES[axis]} never visibly moved{place}: its friction is not fitted ({DRIVE[axis]})"
 
 
 def motion(records: Sequence[Record], robot: Robot) -> Motion:

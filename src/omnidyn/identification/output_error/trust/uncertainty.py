@@ -26,6 +26,7 @@ from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import PieceSums, per_column
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
+from omnidyn.identification.output_error.trust.blind import Way, blind_ways
 from omnidyn.identification.output_error.trust.rounding import rounding_scatter, silent
 from omnidyn.statistics import t_quantile
 
@@ -60,7 +61,7 @@ class Trust:
     behind it. neighbours (columns,): correlation of successive residuals. directions: blind or weak ones no prior
     holds: (eigenvalue, relative change of each parameter). runs: that were the blocks, 0 where these were shorter than
     a run. plain (P, P): inverse of the information, which is what the likelihood itself curves by; the covariance where
-    the noise is white.
+    the noise is white. ways: what the rows do not tell, priors or none (blind.py).
     """
 
     covariance: FloatArray
@@ -77,6 +78,7 @@ class Trust:
     runs: int
     plain: FloatArray
     guessed: BoolArray
+    ways: tuple[Way, ...] = ()
 
     @property
     def open(self) -> BoolArray:
@@ -136,7 +138,9 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     return Trust(
         covariance, normal.held, ~seen, _unseen(normal), _free_step(plain, normal), kind, widening,
         t_quantile(degrees if degrees > 0 else np.inf), max(int(degrees), 0), neighbours, directions,
-        count if kind == SANDWICH else 0, plain, guessed,
+        count if kind == SANDWICH else 0, plain, guessed, blind_ways(
+            solver.problem, solution.state.point.values, normal.information - np.diag(normal.prior_information)
+        ),
     )  # fmt: skip
 
 
