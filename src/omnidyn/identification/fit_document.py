@@ -12,6 +12,7 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import Validation
+from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.keys import in_words, unit
 
 SHOWN = 6  # findings of a log that are named
@@ -63,12 +64,17 @@ def number_table(fit: OutputErrorEstimate) -> Table:
         if name in fit.unidentifiable:
             rows.append((name, f"{own.value:.4g}", "", "", own.unit, NOT_DETERMINED))
         else:
-            rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, "of the log"))
+            rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, _whose(name)))
     rows += [
         (one.name, f"{one.value:.5g}", f"{one.std:.2g}", interval_cell(one.ci95), one.unit, one.words)
         for one in fit.combinations
     ]
     return Table(("number", "value", "std error", "95 % interval", "unit", ""), rows)
+
+
+def _whose(name: str) -> str:
+    """What a number belongs to that was fitted beside the robot file: a dead band is of the driver, the rest of logs."""
+    return "of the driver" if name == DEAD_BAND else "of the log"
 
 
 def difference_table(differences: Sequence[Difference]) -> Table:

@@ -49,7 +49,7 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     checked = content(verdict_table(found.verdicts)) if found.verdicts else unchecked
     warnings, advice = list(dict.fromkeys(_warnings(fits, validations))), list(dict.fromkeys(found.advice))
     residuals = "".join(_residuals(g, fits[g], v) for g, v in validations.items())
-    numbers = _each(fits, lambda group, fit: content(number_table(fit)))
+    numbers = _each(fits, lambda group, fit: content(*filter(None, (number_table(fit), fit.alone_table()))))
     sections = [
         section("findings", "What the data say", Points(_findings(fits, validations))),
         section("warnings", "Warnings", Points(warnings), none="None."),
