@@ -73,7 +73,7 @@ def number_table(fit: OutputErrorEstimate) -> Table:
 
 
 def _whose(name: str) -> str:
-    """What a number belongs to that was fitted beside the robot file: a dead band is of the driver, the rest of logs."""
+    """What a number belongs to that was fitted beside those of the file: a dead band is of the driver."""
     return "of the driver" if name == DEAD_BAND else "of the log"
 
 

@@ -66,15 +66,17 @@ def _sums(
 ) -> Iterator[Combination]:
     of = _friction if trade is OFF else _lag
     now, slopes = of(problem.robot_at(values)), slopes_of(problem, values, of)
-    robot, share = problem.robot_at(values), np.ones(3)
+    robot, share, least = problem.robot_at(values), np.ones(3), np.ones(3)
     if trade is OFF:
         share = taken(robot) / push_per_volt(robot)
+        patterns = np.abs(axis_patterns(robot))
+        least = np.where(patterns > 0.0, patterns, np.inf).min(axis=1)  # all that push are beyond the dead band then
     own = np.zeros(len(values))
     for axis in np.flatnonzero(moved & np.isfinite(now) & slopes.any(axis=1)).tolist():
         own[j] = share[axis] * problem.parameters[j].slope(float(values[j]))
         alone, single, both = (std_of(each, known) for each in (slopes[axis], own, slopes[axis] + own))
         value, half = float(now[axis] + share[axis] * values[j]), known.quantile * both
-        if not np.isfinite(both) or not 0.0 < both < value:
+        if not np.isfinite(both) or not 0.0 < both < value or (trade is OFF and value * least[axis] < values[j]):
             continue
         between = -1.0
         if np.isfinite(alone) and np.isfinite(single):
