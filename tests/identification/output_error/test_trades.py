@@ -40,6 +40,9 @@ def test_a_dead_band_and_coulomb_friction_that_trade_are_told_together():
         assert "dead band and Coulomb friction, which trade with each other" in one.words
         assert one.std < 0.3 * fit.nuisances["dead_band"].std
         off.append((one.value - truth) / one.std)
+        beside = fit.robot.correlation.of(("drive.dead_band_V", "friction.axes.coulomb[2]"))
+        assert beside[0, 1] == pytest.approx(fit.correlation.between("dead_band", "friction.axes.coulomb[2]"))
+        assert beside[0, 1] < -0.95
     assert np.sqrt(np.mean(np.square(off))) < 2.0
     assert one.words in fit.summary()
 
