@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import omnidyn
-from benchmarks.wrong_worlds.log import Case, Setup, logged, robot_of
-from benchmarks.wrong_worlds.world import World
+from benchmarks.wrong_worlds.log import NOISE, Case, Setup, logged, robot_of
+from benchmarks.wrong_worlds.world import World, drive
 from omnidyn.identification.validation import validate
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot, save_robot
+from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
 DEAD, LATE, GAIN, FADE = 0.8, 0.023, 0.92, 0.1
@@ -48,7 +49,7 @@ def test_the_written_robot_meets_its_log_as_the_fit_did(fit, log, tmp_path):
         each.rmse == pytest.approx(fit.noise[f"wheel_speed[{k}]"], rel=0.02) for k, each in enumerate(score.values())
     )
     assert all(each.samples == len(log) for each in score.values())  # a latency drops no row
-    assert "dead band" not in found.applied[read.name]
+    assert "behind a dead band of 0.801 V, 0.0231 s later" in found.applied[read.name]
     assert f"gain {log_gain(fit):.3g}" in found.applied[read.name]
 
 
@@ -87,3 +88,35 @@ def test_a_fit_that_starts_from_a_fitted_file_ends_at_the_same_robot(fit, log):
     for key, value in fit.value.items():
         assert held.value[key] == pytest.approx(value, abs=0.05 * fit.std[key])
     assert held.robot.drive == fit.robot.drive
+
+
+def stairs(seed, world):
+    """Held voltages along x, along y and about yaw, both ways, of another simulator: fit for both methods."""
+    rng, t, rows = np.random.default_rng(seed), np.arange(0.0, 60.0, 0.01), []
+    for axis in range(3):
+        for k in range(10):
+            twist = np.eye(3)[axis] * (-1.0) ** k / (world.robot_radius if axis == 2 else 1.0)
+            rim = twist @ world.G
+            rows.append(np.repeat(rim[None] / np.abs(rim).max() * rng.uniform(3.5, 9.0), 200, axis=0))
+    voltage = np.concatenate(rows) * (t[:, None] > 0.5)
+    speed = drive(world, t, voltage, t).wheel_speed
+    return Run(t, voltage=voltage, wheel_speed=speed + NOISE * rng.normal(size=speed.shape))
+
+
+def overlap(one, other):
+    return one[0] <= other[1] and other[0] <= one[1]
+
+
+def test_two_methods_on_one_log_agree_or_say_why_not():
+    """Whole logs tell a dead band from Coulomb friction, steady stretches do not; with the fitted file they agree."""
+    log, robot = stairs(971, World(dead=DEAD)), robot_of(World())
+    how = {"method": "steady-state", "shape": "box+viscous"}
+    whole = omnidyn.identify(log, robot)
+    steady, again = omnidyn.identify(log, robot, **how), omnidyn.identify(log, whole.robot, **how)
+    for key, interval in whole.ci95.items():
+        assert overlap(interval, again.ci95[key]), key
+    assert not overlap(whole.ci95["friction.axes.coulomb[0]"], steady.ci95["friction.axes.coulomb[0]"])
+    assert "no dead band of the driver was taken off: every 0.1 V more would be 0.66 N, " in steady.scale
+    more = steady.value["friction.axes.coulomb[0]"] - whole.value["friction.axes.coulomb[0]"]
+    assert more == pytest.approx(0.66 * DEAD / 0.1, rel=0.03)
+    assert f"a dead band of {whole.robot.drive.dead_band:.4g} V, identified" in again.scale

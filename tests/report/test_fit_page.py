@@ -54,7 +54,9 @@ def test_every_id_is_there_once(page):
 
 def test_a_logged_duty_is_called_duty(page, found):
     text = Reader(page).text
-    assert "the logged duty as the motors had it, with the fitted latency, dead band" in text
+    drive = found.estimate.robot.drive
+    assert f"the logged duty times the logged supply, behind a dead band of {drive.dead_band:.3g} V" in text
+    assert drive.dead_band > 0.0
     assert "the logged voltage" not in text
     validation = next(iter(found.validations.values()))
     assert list(validation.fitted.applied) == ["axebot"]

@@ -77,7 +77,7 @@ def replay(
         raise error.at(run.source) if run.source else error from None
     warnings += [*_from_simulation(parts), *_loop_warnings(robot, run, applied, parts)]
     whole = _assembled(run, robot, pieces, [part for part, _ in parts])
-    words = _words(robot, applied, supply)
+    words = _words(robot, applied, supply) + _driver_words(robot)
     words += f", and what the fit found of this log: {log.words}" if log is not None and log.words else ""
     return Replay(whole, tuple(pieces), applied, words, tuple([*warnings, *told]))
 
@@ -338,6 +338,13 @@ def _words(robot: Robot, applied: str, supply: FloatArray | None) -> str:
         f"the logged set {speeds}, through the speed loop of the robot file (kp {_listed(robot.drive.kp)} V s/rad, "
         f"ki {_listed(robot.drive.ki)} V/rad, {robot.drive.rate:g} Hz): no voltage was applied as logged"
     )
+
+
+def _driver_words(robot: Robot) -> str:
+    """What the driver of the robot file does to it, for people."""
+    drive = robot.drive
+    words = f", behind a dead band of {drive.dead_band:.3g} V" if drive.dead_band else ""
+    return f"{words}, {drive.latency:.3g} s later" if drive.latency else words
 
 
 def _listed(value: float | tuple[float, ...]) -> str:

@@ -13,6 +13,7 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import Validation
+from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.keys import in_words, unit
 
 SHOWN = 6  # findings of a log that are named
@@ -72,11 +73,17 @@ def number_table(fit: OutputErrorEstimate) -> Table:
             rows.append(
                 ("", name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, "of the log")
             )
+            rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, _whose(name)))
     rows += [
         (one.words, one.name, f"{one.value:.5g}", f"{one.std:.2g}", interval_cell(one.ci95), one.unit, "together")
         for one in fit.combinations
     ]
     return Table(("number", "key", "value", "std error", "95 % interval", "unit", ""), rows, "<<>>><<")
+
+
+def _whose(name: str) -> str:
+    """What a number belongs to that was fitted beside those of the file: a dead band is of the driver."""
+    return "of the driver" if name == DEAD_BAND else "of the log"
 
 
 def difference_table(differences: Sequence[Difference]) -> Table:

@@ -14,14 +14,16 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from omnidyn.model.keys import EMF, GAINS, ROTOR, TORQUE, WHEEL, Key, unit
+from omnidyn.model.keys import DEAD_BAND, EMF, GAINS, ROTOR, TORQUE, WHEEL, Key, unit
 from omnidyn.model.mass import added_mass
 from omnidyn.model.robot import GIVEN, Prior, Robot
+from omnidyn.model.statespace import taken
 
 MASS, INERTIA, RADIUS = "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m"
 AT = "@"  # KEY@GROUP is the number that a group has for itself
 RATIO = f"the ratio of {TORQUE} to {EMF}"
 RESISTANCE = "motor.resistance_ohm"
+STEP = 0.1  # [V] of a dead band
 
 
 def scale_of_motion(robot: Robot, free: Collection[str], current: bool, metres: bool) -> str:
@@ -47,7 +49,18 @@ def scale_of_motion(robot: Robot, free: Collection[str], current: bool, metres: 
 
 def scale_of_traction(robot: Robot, from_current: bool) -> str:
     """The sentence of a fit to steady stretches, whose forces are those of the motors, l K_t i/r."""
-    return _sentence(robot, [TORQUE, *(() if from_current else (RESISTANCE,)), "motor.gear_ratio", RADIUS])
+    words = _sentence(robot, [TORQUE, *(() if from_current else (RESISTANCE,)), "motor.gear_ratio", RADIUS])
+    return words if from_current else f"{words}; {_behind(robot)}"
+
+
+def _behind(robot: Robot) -> str:
+    """What a dead band, which steady stretches do not tell from Coulomb friction, would take off it."""
+    lost = [f"{STEP * force:.2g} {unit}" for force, unit in zip(taken(robot), ("N", "N", "N m"), strict=True)]
+    band = f"a dead band of {_known(robot, DEAD_BAND)}" if robot.drive.dead_band else "no dead band of the driver"
+    return (
+        f"of the voltages {band} was taken off: every {STEP:g} V more would be {_listed(lost)} less Coulomb friction "
+        "along x, y and about yaw, and a fit to whole logs, which tells the two apart, differs by that"
+    )
 
 
 def _sentence(robot: Robot, held: Collection[str], free: Collection[str] = ()) -> str:

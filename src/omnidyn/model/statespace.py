@@ -92,6 +92,11 @@ def push_per_volt(robot: Robot) -> FloatArray:
     return np.diag(drive_wrench(linear_part(robot), np.zeros(3), axis_patterns(robot))).copy()
 
 
+def taken(robot: Robot) -> FloatArray:
+    """What each volt of a dead band takes of the push along each axis, by `axis_patterns`, [N/V, N/V, N m/V], (3,)."""
+    return np.diag(drive_wrench(linear_part(robot), np.zeros(3), np.sign(axis_patterns(robot)))).copy()
+
+
 def is_decoupled(system: StateSpace, tolerance: float = 1e-12) -> bool:
     """Whether each axis moves for itself: A diagonal within `tolerance`, relative to the axes it joins."""
     scale = np.sqrt(np.abs(np.outer(np.diag(system.A), np.diag(system.A))))

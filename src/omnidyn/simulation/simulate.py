@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
+from omnidyn.model.actuation import reaching
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.layout import LENGTH, N_AXES
@@ -135,22 +136,26 @@ def _implicit(
     bound = current_bounds(robot, acting, len(dt))
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
     kept = Outcome(outcome.pose[keep], outcome.state[keep], outcome.iterations, outcome.steps)
-    return implicit_run(robot, given, voltage[keep[:-1]], kept, tol, acting, view)
+    asked = voltage[keep[:-1]]
+    motors = asked if acting.set_point is None else reaching(robot, asked)
+    return implicit_run(robot, given, motors, kept, tol, acting, view, asked)
 
 
 def implicit_run(
     robot: Robot, given: Commands, voltage: FloatArray, outcome: Outcome, tol: float, acting: Commands | None = None,
-    view: View = PLAIN,
+    view: View = PLAIN, asked: FloatArray | None = None,
 ) -> Run:  # fmt: skip
     """The Run of what the implicit engine found at the samples of a view, its warnings included.
 
-    acting: the commands as they reached the motors; None: as given. voltage [V]: at the motors then.
+    acting: the commands as they reached the motors; None: as given. voltage [V]: at the motors then. asked: by a speed
+    loop; None: the same.
     """
     how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
     stopped, rows = capped(outcome), len(outcome.iterations)
     warnings = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
     twists = outcome.state[:, :N_AXES] / [1.0, 1.0, plant(robot).body[LENGTH]]
-    return as_run(robot, given, acting or given, Done(voltage, twists, outcome.pose, outcome), how, warnings, view)
+    done = Done(voltage, twists, outcome.pose, outcome, asked=asked)
+    return as_run(robot, given, acting or given, done, how, warnings, view)
 
 
 def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
@@ -165,7 +170,7 @@ def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
 class Done(NamedTuple):
     """What a simulation found: voltage [V] at the motors over each step; twist, pose and current at each sample.
 
-    outcome: of the implicit engine. current: of the exact engine with winding inductance.
+    outcome: of the implicit engine. current: of the exact engine with winding inductance. asked: by a speed loop.
     """
 
     voltage: FloatArray
@@ -173,6 +178,7 @@ class Done(NamedTuple):
     pose: FloatArray
     outcome: Outcome | None = None
     current: FloatArray | None = None
+    asked: FloatArray | None = None
 
 
 def as_run(
@@ -195,7 +201,7 @@ def as_run(
     if acting.open_circuit is not None:
         current = np.where(_with_last(acting.open_circuit), 0.0, current)
     if given.voltage is None:  # a speed loop makes it, at its own ticks
-        voltage = view.of("voltage", _with_last(done.voltage))
+        voltage = view.of("voltage", _with_last(done.voltage if done.asked is None else done.asked))
     else:
         voltage = _with_last(given.voltage)
     return Run(

@@ -2,8 +2,9 @@
 
     e = set speed - speed,  u = clip(kp e + sum, +-limit),  sum += ki e period unless that pushes further into the limit
 
-Between ticks the voltage stays. The branch of a tick is told apart from what it gives, so that the derivative of the
-loop is taken of the same lines, on the branch that the run took.
+Between ticks the voltage stays. Of what it asks for the motors get all but the dead band of the driver. The branch of a
+tick is told apart from what it gives, so that the derivative of the loop is taken of the same lines, on the branch that
+the run took.
 """
 
 from __future__ import annotations
@@ -31,17 +32,26 @@ class Loop(NamedTuple):
     tick: BoolArray  # (rows,) whether the loop runs at the start of the row; else its voltage stays
     period: float  # [s]
     sum: FloatArray  # (n,) integral so far [V]
+    dead: float  # [V] of what the loop asks for the driver passes on all but this
 
 
 def no_loop(wheels: int) -> Loop:
     """No speed loop: voltages are given."""
     zeros = np.zeros(wheels)
-    return Loop(zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy())
+    return Loop(zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy(), 0.0)
 
 
 def loop_of(robot: Robot, set_point: FloatArray, tick: BoolArray) -> Loop:
     """The loop of a robot at rest. set_point [rad/s], shape (rows, n), and tick, shape (rows,): see `on_ticks`."""
-    return Loop(*loop_gains(robot), set_point, tick, 1.0 / (robot.drive.rate or np.inf), np.zeros(robot.wheels.count))
+    period, total = 1.0 / (robot.drive.rate or np.inf), np.zeros(robot.wheels.count)
+    return Loop(*loop_gains(robot), set_point, tick, period, total, robot.drive.dead_band)
+
+
+@part
+def passed(voltage, dead):
+    """What a driver with a dead band makes of a voltage [V], as `reaching` does."""
+    size = abs(voltage) - dead
+    return 0.0 if size <= 0.0 else (size if voltage > 0.0 else -size)
 
 
 @part

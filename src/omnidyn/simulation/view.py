@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.errors import UnsupportedError
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.fitted.log_effects import LogEffects
@@ -41,13 +40,11 @@ class View:
     held: bool = False
 
     def acting(self, robot: Robot, given: Commands) -> Commands:
-        """The commands as they reach the motors, or the speed loop, over each step of the simulation."""
+        """The commands as they reach the motors, or the speed loop, over each step of the simulation.
+
+        The dead band behind a speed loop is the loop's own affair.
+        """
         voltage = given.voltage
-        if given.set_point is not None and self.driver.dead_band:
-            raise UnsupportedError(
-                "a speed loop behind a dead band has no law yet", got=f"dead_band_V = {self.driver.dead_band:g}",
-                expected="0 where set speeds are followed", where="[drive]",
-            )  # fmt: skip
         if voltage is not None and self.driver != Driver():
             share = np.zeros(len(given.dt)) if self.share is None else self.share
             voltage = at_motors(np.ascontiguousarray(voltage), np.ascontiguousarray(share), self.driver)[0]

@@ -17,6 +17,7 @@ WORLD = World(dead=DEAD)
 
 def turning(seed, world=WORLD, latency=0.0, seconds=30.0):
     """A log of turning on the spot only, by another simulator: wheels alike, a few levels, half of it each way."""
+    """A log of turning on the spot only, by another simulator: all wheels alike, at a few levels, each way for half."""
     rng, t = np.random.default_rng(seed), np.arange(0.0, seconds, 0.01)
     levels = np.repeat([1.0, -1.0], 10) * rng.uniform(3.0, 7.0, 20)
     voltage = np.repeat(levels, 150)[: len(t), None] * np.ones(3) * (t[:, None] > 0.5)
@@ -40,6 +41,9 @@ def test_a_dead_band_and_coulomb_friction_that_trade_are_told_together():
         assert "dead band and Coulomb friction, which trade with each other" in one.words
         assert one.std < 0.3 * fit.nuisances["dead_band"].std
         off.append((one.value - truth) / one.std)
+        beside = fit.robot.correlation.of(("drive.dead_band_V", "friction.axes.coulomb[2]"))
+        assert beside[0, 1] == pytest.approx(fit.correlation.between("dead_band", "friction.axes.coulomb[2]"))
+        assert beside[0, 1] < -0.95
     assert np.sqrt(np.mean(np.square(off))) < 2.0
     assert one.words in fit.summary()
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from omnidyn.document import Part, Points, all_of, interval_cell, plain
+from omnidyn.document import Part, Points, Table, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.ladder import Ladder
@@ -126,19 +126,19 @@ class OutputErrorEstimate(Estimate):
         ]
         noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
         left = [Points(self.blind, "not shown by the data:"), Points(self.unused, "not used:")]
-        return [*super()._parts(), *self.told_alone(), *sums, *logs, *noise, *left]
+        alone = [table] if (table := self.alone_table()) else []
+        return [*super()._parts(), *alone, *sums, *logs, *noise, *left]
 
-    def told_alone(self) -> list[str]:
-        """What the intervals owe to numbers that the robot file gives with a std, where that is worth a word."""
-        found = []
+    def alone_table(self) -> Table | None:
+        """What the intervals owe to what the robot file gives with a std; None where that is not worth a word."""
+        rows = []
         for name, (low, high) in self.log_alone.items():
             whole = self.ci95.get(name) or (self.nuisances[name].ci95 if name in self.nuisances else None)
             if whole is not None and whole[1] - whole[0] > (1.0 + WORTH) * (high - low):
-                cell = interval_cell((low, high))
-                found.append(
-                    f"{name}: {cell} from the log alone, {interval_cell(whole)} with what is known of the robot"
-                )
-        return found
+                rows.append((name, interval_cell((low, high)), interval_cell(whole)))
+        return (
+            Table(("95 % intervals", "from the log alone", "with what is known of the robot"), rows) if rows else None
+        )
 
     @staticmethod
     def _of_log(own: Nuisance) -> str:

@@ -19,7 +19,7 @@ from omnidyn.model import keys
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.fitted.log_effects import Lateness, LogEffects, log_mark
 from omnidyn.model.frames import AXES
-from omnidyn.model.keys import with_priors
+from omnidyn.model.keys import find_key, with_priors
 from omnidyn.model.robot import GUESS, WITH_THE_FIT, Prior, Robot
 from omnidyn.run import Run
 
@@ -50,6 +50,14 @@ def with_nuisances(
     told = {name: each for name, each in told.items() if keys.Key.parse(name).get(robot.replace(drive=drive)) > 0.0}
     robot = robot.replace(drive=drive, priors=priors, log=_effects(found, late, own, records))
     return with_priors(robot, told)
+
+
+def key_of(name: str, robot: Robot) -> str:
+    """Under which key a fitted number stands in the file of the robot, "" for one of the logs."""
+    if find_key(name) is not None:
+        return name
+    key = {DEAD_BAND: keys.DEAD_BAND}.get(name, "")
+    return key if key in robot.priors and robot.priors[key].std is not None else ""
 
 
 def _known(name: str, std: Mapping[str, float], open_: Sequence[str], data: str) -> Prior:

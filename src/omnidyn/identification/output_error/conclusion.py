@@ -15,7 +15,7 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified, printable
 from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
-from omnidyn.identification.output_error.belonging import with_nuisances
+from omnidyn.identification.output_error.belonging import key_of, with_nuisances
 from omnidyn.identification.output_error.combinations import combinations
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
@@ -71,7 +71,7 @@ def conclude(
     robot = with_nuisances(robot, problem, values, std, open_, records, data)
     warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-        robot=_together(robot, fitted, std, known),
+        robot=_together(robot, problem.parameters, std, known),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
@@ -306,12 +306,12 @@ def _correlation(names: Sequence[str], known: Trust) -> Correlation:
 def _together(robot: Robot, fitted: Sequence[Parameter], std: Mapping[str, float], known: Trust) -> Robot:
     """The robot with what the fit knows of how its numbers are off together; what is tied to a number goes with it.
 
-    Numbers without a std of this fit have no part in it.
+    Numbers without a std of this fit have no part in it, nor have those of the logs.
     """
     tied = [
         (j, key, std[p.name] * factor) for j, p in enumerate(fitted)
         if 0.0 < std[p.name] < LARGEST_STD and 0.0 < known.std[j] < math.inf
-        for key, factor in ((p.name, 1.0), *p.also)
+        for key, factor in ((key_of(p.name, robot), 1.0), *p.also) if key
     ]  # fmt: skip
     at = [j for j, _, _ in tied]
     matrix = _correlation([p.name for p in fitted], known).matrix[np.ix_(at, at)]

@@ -1,7 +1,9 @@
 """Numbers that trade with each other, and the sum that the logs know where they hardly know the two.
 
-    u_off = dead band + C/g          the voltage at which a robot sets off along an axis, g its push per volt
+    u_off = q dead band + C/g        the voltage at which a robot sets off along an axis, g its push per volt
     t_by  = latency + M/(B + k)      by how much it follows late
+
+q is what the dead band takes of the push, over g: 1 where all motors that push have the same voltage.
 
 A dead band and Coulomb friction show apart only in how hard motors push per volt, a latency and a lag only in the shape
 of the first rows of a step. The variance of each is g' C g, as in combinations.py.
@@ -26,7 +28,7 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.layout import YAW
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import damping, push_per_volt
+from omnidyn.model.statespace import damping, push_per_volt, taken
 
 TRADE = 0.9  # correlation beyond which the sum of two numbers is known 2.3 to 4.4 times as well as they are
 
@@ -64,12 +66,17 @@ def _sums(
 ) -> Iterator[Combination]:
     of = _friction if trade is OFF else _lag
     now, slopes = of(problem.robot_at(values)), slopes_of(problem, values, of)
+    robot, share, least = problem.robot_at(values), np.ones(3), np.ones(3)
+    if trade is OFF:
+        share = taken(robot) / push_per_volt(robot)
+        patterns = np.abs(axis_patterns(robot))
+        least = np.where(patterns > 0.0, patterns, np.inf).min(axis=1)  # all that push are beyond the dead band then
     own = np.zeros(len(values))
-    own[j] = problem.parameters[j].slope(float(values[j]))
     for axis in np.flatnonzero(moved & np.isfinite(now) & slopes.any(axis=1)).tolist():
+        own[j] = share[axis] * problem.parameters[j].slope(float(values[j]))
         alone, single, both = (std_of(each, known) for each in (slopes[axis], own, slopes[axis] + own))
-        value, half = float(now[axis] + values[j]), known.quantile * both
-        if not np.isfinite(both) or not 0.0 < both < value:
+        value, half = float(now[axis] + share[axis] * values[j]), known.quantile * both
+        if not np.isfinite(both) or not 0.0 < both < value or (trade is OFF and value * least[axis] < values[j]):
             continue
         between = -1.0
         if np.isfinite(alone) and np.isfinite(single):

@@ -36,7 +36,7 @@ from omnidyn.model.stick_slip.plant import Plant
 from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, settle, sticks, with_given_currents
 from omnidyn.model.stick_slip.workspace import copy_row, workspace
 from omnidyn.simulation.implicit.step import GAMMA, step
-from omnidyn.simulation.speed_loop import Loop, close_loop
+from omnidyn.simulation.speed_loop import Loop, close_loop, passed
 
 FORGETS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its MEMORY, within these bounds
 SHORT = 1.5e-4  # [s] no step is given less than the share of tol of one so long
@@ -237,7 +237,7 @@ def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, most,
 @kernel
 def _march(
     body, element, bare_body, bare_element, s, spare, voltage, bound, dt, kp, ki, limit, radius, command, tick, period,
-    total, tol, most, poses, states, iterations, steps,
+    total, dead, tol, most, poses, states, iterations, steps,
 ):  # fmt: skip
     """All rows; see run_implicit. Returns how many of them were done before `most` steps were."""
     state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(3, np.int64)
@@ -247,7 +247,7 @@ def _march(
         if len(command) > 0:
             close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total)
         for w in range(voltage.shape[1]):
-            element[N_AXES + w, VOLTAGE], element[N_AXES + w, BOUND] = voltage[k, w], bound[k, w]
+            element[N_AXES + w, VOLTAGE], element[N_AXES + w, BOUND] = passed(voltage[k, w], dead), bound[k, w]
         if tol > 0.0:
             h = _row(body, element, bare_body, bare_element, s, spare, state, dt[k], tol, most, h, pose, counts)
             most -= counts[1]

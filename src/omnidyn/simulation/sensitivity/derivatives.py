@@ -7,13 +7,14 @@ a derivative of exactly 0 along what it holds; a stop, a reversal and a release 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
+from omnidyn.model.keys import DEAD_BAND, LATENCY
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -35,6 +36,7 @@ from omnidyn.simulation.sensitivity.loop import run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.march import march_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
 from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, current_bounds, implicit_run
+from omnidyn.simulation.view import seen_at_once
 
 RATE = "drive.rate_Hz"
 
@@ -74,17 +76,32 @@ def derivatives(
     UnsupportedError for the rate of a speed loop.
     """
 
-    def applied(robot: Robot) -> Commands:
+    if robot.drive.latency or LATENCY in keys:
+        raise UnsupportedError(
+            "derivatives of a run know no latency", got=f"{robot.drive.latency:g} s", expected="0",
+            remedy="set latency_s = 0: it moves the run in time, and nothing else", where=LATENCY,
+        )  # fmt: skip
+
+    def asked(robot: Robot) -> Commands:
         return commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
+
+    def applied(robot: Robot) -> Commands:
+        given = asked(robot)
+        return seen_at_once(robot, given).acting(robot, given)
 
     ready, given = prepared(robot, keys), applied(robot)
     rows = given.voltage if given.set_point is None else given.set_point
     assert rows is not None
     each = [one.voltage if given.set_point is None else one.set_point for one in map(applied, ready.robots)]
     rates = difference(np.array(each, dtype=float).reshape(-1, *rows.shape))
-    return differentiate(
+    found = differentiate(
         ready, given, rates, (as_start("twist", twist, 3), as_start("pose", pose, 3)), as_tolerance(tol)
     )
+    if given.set_point is not None or not robot.drive.dead_band:
+        return found
+    whole = asked(robot).voltage
+    assert whole is not None
+    return replace(found, run=found.run.replace(voltage=np.concatenate([whole, whole[-1:]])))
 
 
 def differentiate(
@@ -127,7 +144,12 @@ def differentiate(
 
 
 def refuse_rate(keys: Sequence[str]) -> None:
-    """Raises UnsupportedError where the rate of a speed loop is among the keys."""
+    """Raises UnsupportedError where the rate of a speed loop, or the dead band behind it, is among the keys."""
+    if DEAD_BAND in keys:
+        raise UnsupportedError(
+            "no derivative by the dead band behind a speed loop", got=DEAD_BAND, expected="other keys", where="keys",
+            remedy="try a few dead bands instead",
+        )  # fmt: skip
     if RATE in keys:
         raise UnsupportedError(
             "no derivative by the rate of the speed loop", got=RATE, expected="other keys",

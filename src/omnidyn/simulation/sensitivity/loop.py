@@ -25,7 +25,7 @@ from omnidyn.simulation.sensitivity.directions import EPS, Directions
 from omnidyn.simulation.sensitivity.march import apply_row, pose_derivatives, row_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples, take_samples
 from omnidyn.simulation.simulate import current_bounds
-from omnidyn.simulation.speed_loop import close_loop, loop_of, seen_speed, tick_answer, tick_branch
+from omnidyn.simulation.speed_loop import close_loop, loop_of, passed, seen_speed, tick_answer, tick_branch
 
 
 class LoopDirections(NamedTuple):
@@ -49,7 +49,7 @@ class LoopRun(NamedTuple):
     outcome: Outcome
     dstate: FloatArray  # (rows + 1, K, 3 + n)
     dpose: FloatArray  # (rows + 1, K, 3)
-    voltage: FloatArray  # (J, n)
+    voltage: FloatArray  # (J, n) at the motors
     dvoltage: FloatArray  # (K, J, n)
     edges: FloatArray  # (J + 1,) [s] when each begins, and the end
     keep: IntArray  # (rows + 1,) the interval with which each row begins, and J
@@ -128,6 +128,15 @@ def _tick(element, along, loop, extra, state, d, row, voltage, flag):
 
 
 @part
+def _pass_on(loop, voltage, dvoltage, motors, dmotors):
+    """What reaches the motors of the voltages (n,) that a loop asks for, and its derivatives (K, n)."""
+    for w in range(len(voltage)):
+        motors[w] = passed(voltage[w], loop.dead)
+        for k in range(len(dvoltage)):
+            dmotors[k, w] = dvoltage[k, w] if loop.dead == 0.0 or motors[w] != 0.0 else 0.0
+
+
+@part
 def _as_before(loop, extra, state, d, settled):
     """Whether nothing has changed since the last tick; and remembers this one."""
     change = 0.0
@@ -152,6 +161,7 @@ def march_loop(
     out, seen, keep, edges, m = found.outcome, found.seen, found.keep, found.edges, len(element)
     state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
+    motors, dmotors = np.zeros(len(bound)), np.zeros((len(first), len(bound)))
     voltage, row, still, kept = np.zeros((1, len(bound))), 0, False, len(found.dstate) > 0
     for j in range(len(dt)):
         if j == keep[row + 1]:
@@ -163,11 +173,12 @@ def march_loop(
         if loop.tick[j] and not still:
             still = settled > 0.0 and j > keep[row] and _as_before(loop, extra, state, d, settled)
             _tick(element, along, loop, extra, state, d, row, voltage, loop.tick[j : j + 1])
-        copy_row(found.voltage[j], voltage[0])
+        _pass_on(loop, voltage[0], extra.voltage, motors, dmotors)
+        copy_row(found.voltage[j], motors)
         for k in range(len(d)):
-            copy_row(found.dvoltage[k, j], extra.voltage[k])
+            copy_row(found.dvoltage[k, j], dmotors[k])
         if not still:
-            apply_row(element, along, voltage[0], bound, extra.voltage)
+            apply_row(element, along, motors, bound, dmotors)
             h = row_with_derivatives(
                 body, element, bare_body, bare_element, s, spare, along, state, dt[j], tol, h, pose, d, dnext, dpose,
                 counts, kept, seen, edges[j],
