@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import real_loop, udea
+from benchmarks import real_loop, real_nuisances, udea
 from benchmarks.table import Table, machine
 from omnidyn.identification.motors.between import MEAN
 from omnidyn.identification.motors.choice import choose_motor
@@ -48,6 +48,7 @@ def measure() -> Table:
     udea.turning(table)
     udea.drives(table)
     real_loop.robotino(table)
+    real_nuisances.nuisances(table)
     return table
 
 

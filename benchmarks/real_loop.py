@@ -31,12 +31,12 @@ def floors(section: slice) -> tuple[list[Run], list[str]]:
     runs, names = [], []
     for group, every in logs.robotino_groups(logs.folder()).items():
         chosen = every[section]
-        runs += [_prepared(run) for run in chosen]
+        runs += [prepared(run) for run in chosen]
         names += [group.split()[0]] * len(chosen)
     return runs, names
 
 
-def _prepared(run: Run, blank: float = SETS_OFF) -> Run:
+def prepared(run: Run, blank: float = SETS_OFF) -> Run:
     """The first SECONDS; wheel speed from the angle, which has no bias of a coarse step; blank where it sets off."""
     keep = run.t - run.t[0] <= SECONDS
     t = run.t[keep]
@@ -105,7 +105,7 @@ def robotino(table: Table) -> None:
 def _transient(table: Table, robot: Robot) -> None:
     """What the first second shows: when it sets off, and what mass says."""
     gray = [run for run in logs.robotino_groups(logs.folder())["gray 0.2"][::6]]
-    runs = [_prepared(run, 0.0) for run in gray]
+    runs = [prepared(run, 0.0) for run in gray]
     fit = fit_output_error(
         runs, robot, free=[*LEVELS, GAIN, "body.mass_kg"], nuisances=["latency.wheel_speed", "latency.current"],
         outputs=OUTPUTS, start="rest",

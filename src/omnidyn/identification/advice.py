@@ -77,7 +77,8 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
         alike = f"; these logs cannot tell it from {all_of(list(map(named, remedy.same_as)))}" if remedy.same_as else ""
         change = f" ({words})" if (words := remedy.would_change()) else ""
         yield f"{remedy.words} would explain what the model leaves out{change}{alike}: {how_to(remedy)}"
-    if fit.ladder is None:
+    best = next(iter(lack.remedies), None)
+    if fit.ladder is None and (best is None or (best.offered and best.key != CHANGE)):
         yield "let `ladder` fit the logs with each of the best causes, step by step: it keeps what predicts better"
     told: set[str] = set()
     for remedy in lack.remedies:

@@ -27,6 +27,7 @@ UNOFFERED = {
 }
 WORTH = 0.01  # share of the variance of a residual that is worth a line
 CHANGED, SEEN = 2, 0.02  # numbers that a remedy would change that are named; relative change that is worth it
+NONE = 1e-3  # of what a number was, below which nothing is left of it
 MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
 
@@ -72,7 +73,7 @@ class Remedy:
         shares = {name: abs(after - now) / abs(now) if now else math.inf for name, (now, after) in self.changes.items()}
         worst = sorted((name for name in shares if shares[name] >= SEEN), key=lambda name: -shares[name])[:most]
         return all_of([
-            f"{in_words(name)} {now:.3g} -> {after:.3g} {unit(name)}".rstrip()
+            f"{in_words(name)} {now:.3g} -> {after if abs(after) > NONE * abs(now) else 0.0:.3g} {unit(name)}".rstrip()
             for name in worst for now, after in [self.changes[name]]
         ])  # fmt: skip
 
