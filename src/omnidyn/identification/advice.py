@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from omnidyn.document import all_of
-from omnidyn.identification.lack_of_fit import Remedy, named
+from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
 from omnidyn.identification.output_error.trust.cures import MEASURED
@@ -74,19 +73,12 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
     near = (each for each in lack.remedies if each.confident and each.chi2 >= NEARLY * lack.remedies[0].chi2)
     remedy = next(near, None)
     if remedy is not None:
-        alike = f"; these logs cannot tell it from {all_of(list(map(named, remedy.same_as)))}" if remedy.same_as else ""
+        alike = f"; these logs cannot tell it from {lack.alike(remedy)}" if remedy.same_as else ""
         change = f" ({words})" if (words := remedy.would_change()) else ""
         yield f"{remedy.words} would explain what the model leaves out{change}{alike}: {how_to(remedy)}"
     best = next(iter(lack.remedies), None)
     if fit.ladder is None and (best is None or (best.offered and best.key != CHANGE)):
         yield "let `ladder` fit the logs with each of the best causes, step by step: it keeps what predicts better"
-    told: set[str] = set()
-    for remedy in lack.remedies:
-        if remedy.key in told or not remedy.confident or remedy.chi2 < NEARLY * lack.remedies[0].chi2:
-            continue
-        told |= {remedy.key, *remedy.same_as}
-        alike = f"; these logs cannot tell it from {lack.alike(remedy)}" if remedy.same_as else ""
-        yield f"{remedy.words} would explain what the model leaves out{alike}: {how_to(remedy)}"
 
 
 def how_to(remedy: Remedy) -> str:

@@ -71,9 +71,8 @@ def number_table(fit: OutputErrorEstimate) -> Table:
             rows.append(("", name, f"{own.value:.4g}", "", "", own.unit, NOT_DETERMINED))
         else:
             rows.append(
-                ("", name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, "of the log")
+                ("", name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, _whose(name))
             )
-            rows.append((name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, _whose(name)))
     rows += [
         (one.words, one.name, f"{one.value:.5g}", f"{one.std:.2g}", interval_cell(one.ci95), one.unit, "together")
         for one in fit.combinations

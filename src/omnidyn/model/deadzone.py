@@ -30,9 +30,8 @@ def moves(robot: Robot, voltage: ArrayLike) -> BoolArray:
 
     `voltage` has shape (*batch, wheels); returns (*batch, 3) for x, y, yaw. The voltage limit is not applied.
     """
-    voltage = reaching(robot, _patterns(robot, voltage))
     check_order("moves(robot, voltage)", (robot, Robot), (voltage, object))
-    voltage = _patterns(robot, voltage)
+    voltage = reaching(robot, _patterns(robot, voltage))
     at_rest = np.zeros((*voltage.shape[:-1], 3))
     if axes_move_alone(robot):
         return ~robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage))

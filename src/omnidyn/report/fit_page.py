@@ -53,7 +53,6 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     warnings, advice = list(dict.fromkeys(_warnings(fits, validations))), list(dict.fromkeys(found.advice))
     residuals = "".join(_residuals(g, fits[g], v) for g, v in validations.items())
     climbed = _each({group: fit for group, fit in fits.items() if fit.ladder}, _ladder)
-    numbers = _each(fits, lambda group, fit: content(number_table(fit)))
     numbers = _each(fits, lambda group, fit: content(*filter(None, (number_table(fit), fit.alone_table()))))
     sections = [
         section("warnings", "Warnings", Points(warnings), none="None."),

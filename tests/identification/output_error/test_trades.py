@@ -16,7 +16,6 @@ WORLD = World(dead=DEAD)
 
 
 def turning(seed, world=WORLD, latency=0.0, seconds=30.0):
-    """A log of turning on the spot only, by another simulator: wheels alike, a few levels, half of it each way."""
     """A log of turning on the spot only, by another simulator: all wheels alike, at a few levels, each way for half."""
     rng, t = np.random.default_rng(seed), np.arange(0.0, seconds, 0.01)
     levels = np.repeat([1.0, -1.0], 10) * rng.uniform(3.0, 7.0, 20)

@@ -52,15 +52,11 @@ class OutputErrorEstimate(Estimate):
     unidentifiable: names of what the data do not determine. Where the std of the robot file is a prior, the value is
     the one that goes best with all others, std and interval are those of the posterior, hardly more than what the file
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
-    together. blind: directions that the data do not show, in words. covariance: "white", "autoregressive" or
-    "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations, converged: of the
-    minimisation. not_followed: outputs that the model does not follow. log_alone: name -> 95 % interval from the log
-    alone, were what the robot file knows with a std exact; empty where it knows nothing so. study: makes the diagnosis,
-    on first access. ladder: what was switched on step by step, where that was asked for.
     together. directions: of these numbers, that the data do not show, with what would. covariance: "white",
     "autoregressive" or "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations,
-    converged: of the minimisation. not_followed: outputs that the model does not follow. study: makes the diagnosis, on
-    first access.
+    converged: of the minimisation. not_followed: outputs that the model does not follow. log_alone: name -> 95 %
+    interval from the log alone, were what the robot file knows with a std exact; empty where it knows nothing so.
+    study: makes the diagnosis, on first access. ladder: what was switched on step by step, where that was asked for.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -155,7 +151,6 @@ class OutputErrorEstimate(Estimate):
             "from_the_log_alone": self.log_alone, "covariance": self.covariance, "unused": self.unused,
             "converged": self.converged, **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
             "directions": [asdict(one) for one in self.directions],
-            "covariance": self.covariance, "unused": self.unused, "converged": self.converged,
         })  # fmt: skip
 
 

@@ -92,8 +92,6 @@ def conclude(
         unidentifiable=open_,
         combinations=(*joint, *trades(problem, values, known, moved)),
         log_alone=_log_alone(problem, values, known, open_),
-        blind=tuple(_direction(problem, value, way, known.blind) for value, way in known.directions),
-        combinations=joint,
         directions=directions,
         covariance=known.kind,
         unused=_unused(records),
