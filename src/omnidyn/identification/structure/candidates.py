@@ -23,6 +23,7 @@ from omnidyn.model.keys import EMF, TORQUE, in_words
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 
+LEAST = -0.9  # relative change of a number that is above 0: what goes further is no explanation
 STEP = 0.02  # relative change that a smooth number is tried with
 CHANGE = "change"  # friction that is another one from some time of the log on
 WHEN = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
@@ -40,12 +41,12 @@ class Trial:
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """key: of the robot file, a nuisance, or CHANGE. trials: one or more. told: its fitted change and where it was
-    tried, in words. one_sided: a change below 0 makes no sense. offered: whether a robot file or a fit can hold it."""
+    tried, in words. least: a change below it makes no sense. offered: whether a robot file or a fit can hold it."""
 
     key: str
     trials: Callable[[Workbench], list[Trial]]
     told: Callable[[float, float], str]
-    one_sided: bool = False
+    least: float = -np.inf
     offered: bool = True
 
     def tried(self, bench: Workbench) -> list[Trial]:
@@ -83,7 +84,7 @@ def _number(robot: Robot, key: str, beside: str = "") -> Iterator[Candidate]:
     def trials(bench: Workbench) -> list[Trial]:
         return [Trial([own / STEP for own in bench.change(changed)])]
 
-    yield Candidate(key, trials, lambda change, _: f"{in_words(key)} {100.0 * change:+.2g} %")
+    yield Candidate(key, trials, lambda change, _: f"{in_words(key)} {100.0 * change:+.2g} %", LEAST)
 
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
@@ -94,7 +95,7 @@ def of_the_log(bench: Workbench) -> Iterator[Candidate]:
             FADE, _driver(FADE, Driver(fade=STEP), STEP), lambda by, _: f"a voltage that fades by {100.0 * by:.2g} %"
         )
         yield Candidate(
-            DEAD_BAND, _driver(DEAD_BAND, Driver(dead_band=0.1), 0.1), lambda by, _: f"dead band {by:.2g} V", True
+            DEAD_BAND, _driver(DEAD_BAND, Driver(dead_band=0.1), 0.1), lambda by, _: f"dead band {by:.2g} V", 0.0
         )
     yield Candidate(TILT, _tilt, as_it_is("a constant force, as of a floor that is not level"))
     for channel in dict.fromkeys(name for name, _ in bench.problem.columns):

@@ -54,7 +54,7 @@ def _of_motors(bench: Workbench) -> Iterator[Candidate]:
         lossy = _with(bench.robot, gear_efficiency=1.0 - LOSS)
         yield Candidate(
             "motor.gear_efficiency", lambda b: [Trial([own / LOSS for own in b.change(lossy)])],
-            lambda by, _: f"gear efficiency {1.0 - by:.2g}", True,
+            lambda by, _: f"gear efficiency {1.0 - by:.2g}", 0.0,
         )  # fmt: skip
 
 
@@ -63,7 +63,7 @@ def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
     on = _with(robot, **{field: size})
     return Candidate(
         key, lambda b: [Trial([own / size for own in b.change(on)])],
-        lambda by, _: f"{in_words(key)} {by:.2g} {unit(key)}", True,
+        lambda by, _: f"{in_words(key)} {by:.2g} {unit(key)}", 0.0,
     )  # fmt: skip
 
 
