@@ -239,7 +239,8 @@ def _rung(
     words += f" in the place of {model.instead}" if model.instead else ""
     return Rung(
         step, model.key, words, own.numbers, own.size, gain, std,
-        own.bic(count) - before.bic(), taken, why, tuple(others), model.value,
+        own.bic(count) - before.bic(), taken, why, tuple(others), bool(model.instead),
+        model.value,
     )  # fmt: skip
 
 
