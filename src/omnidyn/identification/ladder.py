@@ -23,7 +23,8 @@ class Rung:
     was not fitted to, in those of the noise; gain: share of the squared one of the step before that it takes away, with
     its standard error. bic: less that of the step before, for the number of causes that were tried. taken: whether
     the ladder went on from here; why: or why not, in words. same_as: keys that as good a model has in its place.
-    value: number of the robot, or of the log -> fitted.
+    instead: whether it is without what the step before had switched on. value: number of the robot, or of the log ->
+    fitted.
     """
 
     step: int
@@ -37,6 +38,7 @@ class Rung:
     taken: bool = False
     why: str = ""
     same_as: tuple[str, ...] = ()
+    instead: bool = False
     value: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -49,8 +51,10 @@ class Ladder:
 
     @property
     def taken(self) -> tuple[Rung, ...]:
-        """The steps that paid."""
-        return tuple(rung for rung in self.rungs if rung.taken and rung.step)
+        """The steps that paid, and are still there at the end."""
+        steps = [rung for rung in self.rungs if rung.taken and rung.step]
+        gone = {rung.step - 1 for rung in steps if rung.instead}
+        return tuple(rung for rung in steps if rung.step not in gone)
 
     def words(self) -> str:
         """What it came to, in a sentence without a full stop."""

@@ -218,6 +218,12 @@ def noisy_of(robot):
     return noisy(simulate(robot, dt=0.01, voltage=excitation(20.0, 100.0, 3)), 3)
 
 
+def test_a_step_whose_place_another_took_is_gone():
+    first, second = Rung(1, "gain", "gain 1.1", 7, 1.1, taken=True), Rung(2, "fade", "fade 0.1", 7, 1.0, taken=True)
+    assert Ladder((first, second), "end").taken == (first, second)
+    assert Ladder((first, replace(second, instead=True)), "end").taken == (replace(second, instead=True),)
+
+
 def test_a_cell_that_has_no_number_is_empty():
     ladder = Ladder((Rung(1, "gain", "gain", 0, np.nan, np.nan, np.nan, np.nan, why="cannot be fitted: why"),), "end")
     assert ladder.table().rows[0][3:7] == ("", "", "", "")

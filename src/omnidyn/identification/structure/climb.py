@@ -1,11 +1,11 @@
 """The ladder: from a fit that leaves something out to the robot that leaves least, one remedy at a time.
 
 A step fits the logs anew with each of the best remedies of the diagnosis, and with what is the same as the first of
-them. Where none of these pays, it tries what a diagnosis near the best point tells little of: other shapes of friction,
-a limit. Of those that predict blocks of the logs which they were not fitted to better than what stands, by more than a
-standard error, and that BIC prefers though they are the best of many, the simplest within a standard error of the best
-is taken. Then the fit is diagnosed again. What no robot file holds is never taken; nor is what explains less than such
-a cause would.
+them. Where none of these leaves only noise, it tries what a diagnosis near the best point tells little of: other shapes
+of friction, a limit; and, once it has found the best, the same without the step before. Of those that predict blocks of
+the logs which they were not fitted to better than what stands, by more than a standard error, and that BIC prefers
+though they are the best of many, the simplest within a standard error of the best is taken. Then the fit is diagnosed
+again. What no robot file holds is never taken; nor is what explains less than such a cause would.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.candidates import CHANGE
-from omnidyn.identification.structure.diagnosis import examine
+from omnidyn.identification.structure.diagnosis import Examined, examine
 from omnidyn.identification.structure.held_out import Errors, errors, margins_of
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.switches import LIMIT, Switch, switches, told
@@ -44,7 +44,8 @@ CLEAR = 1.0  # standard errors of its gain by which a step must pay
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A fit, what it came to, and the robot and question it began from. numbers: see `Switch`."""
+    """A fit, what it came to, and the robot and question it began from. numbers: see `Switch`. before: what stood when
+    it was tried; instead: of which step it is in the place, in words."""
 
     fit: Fit
     solution: Solution
@@ -53,6 +54,8 @@ class Model:
     remedy: Remedy | None = None
     words: str = STANDS
     numbers: int = 0
+    before: Model | None = None
+    instead: str = ""
 
     @property
     def key(self) -> str:
@@ -69,28 +72,34 @@ class Model:
 def climb(fit: Fit, solution: Solution, runs: Sequence[Run], progress: Progress) -> tuple[Fit, Solution, Ladder]:
     """The best fit of some runs, its solution, and the way to it. fit, solution: of the robot as it was given."""
     stands, rungs = Model(fit, solution, fit.groups[0].robot, fit.question), list[Rung]()
+    seen: Examined | None = None
     for step in range(1, STEPS + 1):
         if unexplained(stands.solution.solver, stands.solution):
             return _ended(
                 stands, rungs, "the model does not follow the logs: first mend signs, units, the order of wheels"
             )
         progress.doing(f"step {step} of the ladder: looking for what the model leaves out")
-        seen = examine(stands.solution)
+        seen = seen or examine(stands.solution)
         lack = seen.diagnosis.lack_of_fit
         if not lack.found:
             return _ended(stands, rungs, "the residuals hold nothing but noise")
         count, beyond = seen.tried, _beyond(lack, seen.rows)
-        tried, found, best = [], list[Rung](), None
+        tried, found, best, after = [], list[Rung](), None, None
         for worth in (offered(lack), unseen(lack, stands)):
             tried += [each for remedy in worth for each in _tried(remedy, stands, runs, progress)]
             if tried:
                 found, best = judged(step, stands, tried, seen.memory, count, beyond, lack)
-            if best is not None:
+            after = examine(best.solution) if best is not None else None
+            if after is not None and not after.diagnosis.lack_of_fit.found:
                 break
+        if best is not None and best.remedy is not None and stands.before is not None:  # may the step before go?
+            tried += _tried(best.remedy, stands.before, runs, progress, stands.words)
+            found, best = judged(step, stands, tried, seen.memory, count, beyond, lack)
+            after = examine(best.solution) if best is not None and best.instead else after
         rungs += found
         if best is None:
             return _ended(stands, rungs, f"nothing that was tried pays{_said(lack)}")
-        stands = best
+        stands, seen = best, after
     return _ended(stands, rungs, f"{STEPS} steps are the most that it takes")
 
 
@@ -120,7 +129,7 @@ def unseen(lack: LackOfFit, stands: Model) -> list[Remedy]:
 
 
 def _tried(
-    remedy: Remedy, stands: Model, runs: Sequence[Run], progress: Progress
+    remedy: Remedy, stands: Model, runs: Sequence[Run], progress: Progress, instead: str = ""
 ) -> list[Model | tuple[Remedy, Switch, str]]:
     """A remedy, fitted in every way in which it can be switched on; (remedy, way, why not) where it cannot."""
     found: list[Model | tuple[Remedy, Switch, str]] = []
@@ -133,7 +142,7 @@ def _tried(
             found.append((remedy, way, str(error)))
             continue
         numbers = stands.numbers + way.numbers
-        found.append(Model(fit, solution, way.robot, way.question, remedy, way.words, numbers))
+        found.append(Model(fit, solution, way.robot, way.question, remedy, way.words, numbers, stands, instead))
     return found
 
 
@@ -157,7 +166,7 @@ def judged(
         k for k in paying
         if best is not None and (_is_alike(seen[best], seen[k]) or _is_same(seen[best], seen[k]))
     ]  # fmt: skip
-    taken = min(alike, key=lambda k: (seen[k].numbers, seen[k].bic(count)), default=None)
+    taken = min(alike, key=lambda k: (seen[k].numbers, not models[k].instead, seen[k].bic(count)), default=None)
     rungs = []
     for k, (each, own) in enumerate(zip(models, seen, strict=True)):
         same = [o for o in paying if taken in (k, o) and o != k and k in paying and _is_same(seen[k], seen[o])]
@@ -226,9 +235,12 @@ def _rung(
 ) -> Rung:  # fmt: skip
     gain, std = own.gain(before)
     others = dict.fromkeys(key for key in same if taken and key != model.key)
+    words = told(model.words, stands.value, model.value)
+    words += f" in the place of {model.instead}" if model.instead else ""
     return Rung(
-        step, model.key, told(model.words, stands.value, model.value), own.numbers, own.size, gain, std,
-        own.bic(count) - before.bic(), taken, why, tuple(others), model.value,
+        step, model.key, words, own.numbers, own.size, gain, std,
+        own.bic(count) - before.bic(), taken, why, tuple(others), bool(model.instead),
+        model.value,
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from omnidyn.model.keys import BODY_AXES, DIRECTION
 
 CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
 BLOCKS = 10  # of the log, each held out once
+NOTHING = 1e-4  # of where a number began, below which there is none of it
 RIVAL = 0.3  # of what the best explains, from which another explanation is worth a look
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
 
@@ -156,7 +157,9 @@ def _changes(rows: Rows, tried: Tried) -> dict[str, tuple[float, float]]:
         return {}
     found = {}
     for p, value, by in zip(rows.problem.robot_parameters, rows.point.values.tolist(), tried.step, strict=False):
-        found[p.name] = value, min(max(p.outer(p.inner(value) + float(by)), p.low), p.high)
+        then = min(max(p.outer(p.inner(value) + float(by)), p.low), p.high)
+        if max(abs(value), abs(then)) > NOTHING * abs(p.value):  # else it is 0, and stays so
+            found[p.name] = value, then
     return found
 
 

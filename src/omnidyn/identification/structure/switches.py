@@ -18,6 +18,7 @@ from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
+from omnidyn.identification.output_error.problem.parameters import EFFICIENCY
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
@@ -29,7 +30,7 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Robot
 
-LIMIT, FRAME, EFFICIENCY = "motor.current_limit_A", "body.rotating_frame", "motor.gear_efficiency"
+LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
 LOSS = 0.01  # of a gear, from which its fit begins at least
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {

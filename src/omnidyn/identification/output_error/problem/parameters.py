@@ -13,6 +13,7 @@ from omnidyn.model.robot import Robot
 
 FRICTION_LIMIT = 1e6  # what a robot file takes
 AT = "@"  # KEY@GROUP is the number that a group has for itself
+EFFICIENCY = "motor.gear_efficiency"  # of which nothing is above 1
 SPAN = 1e4  # a number that must be positive stays within so many times its start, either way
 LIGHT = 1e-3  # of its start, that what spins stays above: it has no place where it would be off, but slopes need a size
 
@@ -92,8 +93,9 @@ def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, o
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")
     if place.name in (ROTOR, WHEEL):
         return Parameter(key, value, LIGHT * value, value * SPAN, prior=prior)
+    most = 1.0 if place.name == EFFICIENCY else value * SPAN
     also = tuple((str(each), float(each.get(robot)) / value) for each in _followers(robot, place, others))
-    return Parameter(key, value, value / SPAN, value * SPAN, True, prior, also)
+    return Parameter(key, value, value / SPAN, most, True, prior, also)
 
 
 def _followers(robot: Robot, key: Key, others: Sequence[str]) -> list[Key]:
