@@ -30,7 +30,8 @@ def diagnose(solution: Solution) -> Diagnosis:
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     rows, moved = Rows.of(problem, point, engine.residuals(point)), motions(problem, point)
     seen = misfit(rows, moved)
-    bench = Workbench(problem, point, engine_kind(solver.engine), moved)
+    stable = stability(seen.linear)
+    bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
     tried = [(one, one.tried(bench)) for one in (*candidates(bench), *unoffered(bench))]
     ranked = remedies(seen.linear, [each for each in tried if each[1]], seen.shown)
     degrees = min(seen.linear.degrees, float(sum(there.sum() for there in rows.there)))
@@ -43,7 +44,7 @@ def diagnose(solution: Solution) -> Diagnosis:
         found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
         pictures,
     )  # fmt: skip
-    return Diagnosis(lack, rests_on(seen.linear, bench), stability(seen.linear))
+    return Diagnosis(lack, rests_on(seen.linear, bench), stable)
 
 
 def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:
