@@ -38,7 +38,8 @@ class Split:
 
     at: seconds from the start of the log to the cut, and from where to where that may be; NaN between logs, and where
     logs of unlike length were cut at the same share. share: of the log that had gone by. p: the chance of as much in
-    all numbers together, all tests counted. shifts: the numbers that differ by themselves, may be none.
+    all numbers together, all tests counted. shifts: the numbers that differ by themselves, may be
+    none: one that would leave its bounds is no cause.
     """
 
     by: str
@@ -53,7 +54,7 @@ class Split:
         """What differs, in a sentence."""
         names = [in_words(each.key) for each in self.shifts]
         more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
-        what = all_of([*names[:NAMED], *more]) or "no number by itself, but all of them together,"
+        what = all_of([*names[:NAMED], *more]) or "no number by itself, but what they do together"
         differs = "differs" if len(names) <= 1 else "differ"
         if self.by == LOGS:
             return f"{what} {differs} from log to log by more than their errors allow"
@@ -68,10 +69,12 @@ class Split:
 @dataclass(frozen=True)
 class Stability:
     """Whether numbers differ between parts of the logs by more than they may. tested: what was compared -> the least
-    chance of as much, of all tests of that kind. splits: those that differ, the clearest first."""
+    chance of as much, of all tests of that kind. splits: those that differ, the clearest first. likely: the share of
+    all logs at which a moment explains most, whether it is more than chance or not."""
 
     tested: Mapping[str, float]
     splits: tuple[Split, ...]
+    likely: tuple[float, ...] = ()
 
     @property
     def found(self) -> bool:

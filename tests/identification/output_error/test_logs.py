@@ -244,15 +244,17 @@ def test_logs_that_cannot_be_used(axebot, four_wheel, clean):
 
 
 def test_nuisances_by_default_are_those_that_a_log_supports(axebot, clean):
-    """Latency and dead band are fitted where the log tells them; a gain of 0.96 is not, but is asked for in words."""
+    """Latency and dead band are fitted where the log tells them; a gain of 0.96 is not, but the diagnosis names it."""
     log = noisy(clean, 20)
     fit = whole.fit_output_error(log, axebot)
     assert set(fit.nuisances) == {"latency.twist", "dead_band"}
     assert holds(fit)
     assert not fit.warnings
     wrong = whole.fit_output_error(log.replace(voltage=log.voltage / 0.96), axebot)
-    (words,) = [words for words in wrong.warnings if '"gain"' in words]
-    assert float(words.split("gain = ")[1].split()[0]) == pytest.approx(0.96, abs=0.02)
+    remedies = wrong.lack_of_fit.remedies
+    assert "gain" in {remedies[0].key, *remedies[0].same_as}
+    (gain,) = [remedy for remedy in remedies if remedy.key == "gain"]
+    assert float(gain.words.split("gain ")[1]) == pytest.approx(0.96, abs=0.02)
     again = whole.fit_output_error(log.replace(voltage=log.voltage / 0.96), axebot, nuisances=["latency", "gain"])
     assert holds(again)
 

@@ -105,8 +105,9 @@ def of_the_log(bench: Workbench) -> Iterator[Candidate]:
         )
     for words, force in (("friction", _friction), ("mass", _inertia), ("supply", _drive)):
         yield Candidate(
-            CHANGE, _later(force), lambda _, at, words=words: f"{words} that changes {100.0 * at:.0f} % into the log"
-        )
+            CHANGE, _later(force),
+            lambda by, at, words=words: f"{_about(bench.robot, words, by)} {_when(bench, at)}",
+        )  # fmt: skip
 
 
 def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], list[Trial]]:
@@ -138,10 +139,29 @@ def _later(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[
     def trials(bench: Workbench) -> list[Trial]:
         return [
             Trial(bench.by_force(lambda m, when=when: force(m) * (m.share >= when)[:, None, None]), when)
-            for when in WHEN.tolist()
+            for when in [*WHEN.tolist(), *bench.moments]
         ]
 
     return trials
+
+
+def _when(bench: Workbench, share: float) -> str:
+    """A moment of the logs, in seconds where all of them are as long."""
+    spans = [piece.record.span for piece in bench.problem.pieces]
+    seconds = f", at {share * max(spans):.3g} s" if max(spans) < 1.02 * min(spans) else ""
+    return f"{100.0 * share:.0f} % into the log{seconds}"
+
+
+def _about(robot: Robot, words: str, change: float) -> str:
+    """The levels of a mass or a supply: rough, for to first order a large change is not what it is."""
+    first = float(robot.body.mass)
+    if words == "mass":
+        return f"{words} that changes from {first:.3g} to about {max(first + change, 0.0):.2g} kg"
+    return (
+        f"{words} that changes to about {1.0 + change:.3g} times as much"
+        if words == "supply"
+        else f"{words} that changes"
+    )
 
 
 def _friction(motion: Motion) -> FloatArray:

@@ -52,7 +52,8 @@ def examine(solution: Solution) -> Examined:
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     rows, moved = Rows.of(problem, point, engine.residuals(point)), motions(problem, point)
     seen = misfit(rows, moved)
-    bench = Workbench(problem, point, engine_kind(solver.engine), moved)
+    stable = stability(seen.linear)
+    bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
     tried = [(one, one.tried(bench)) for one in (*candidates(bench), *unoffered(bench))]
     ranked = remedies(seen.linear, [each for each in tried if each[1]], seen.shown)
     count = int(sum(there.sum() for there in rows.there))
@@ -66,7 +67,7 @@ def examine(solution: Solution) -> Examined:
         found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
         pictures,
     )  # fmt: skip
-    diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stability(seen.linear))
+    diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
     return Examined(diagnosis, seen.linear.memory, len(tried), count)
 
 

@@ -76,7 +76,8 @@ class _Look:
             names = [record.source or f"log {k + 1}" for k, record in enumerate(self.blocks.records)]
             split = self._split(between, LOGS, names, len(self.told) + 1, "", (np.nan, (np.nan, np.nan)), np.nan)
             splits += [split] if split else []
-        return Stability(tested, tuple(splits))
+        likely = max(cuts[0], key=lambda cut: cuts[0][cut].joint[1]) / BLOCKS
+        return Stability(tested, tuple(splits), (likely,))
 
     def _moment(self, log: int | None) -> dict[int, _Compared]:
         """Every cut of a log, or of all: blocks before it -> what differs."""
@@ -187,8 +188,14 @@ class _Look:
             Shift(self.problem.parameters[self.told[j]].name, tuple(self._levels(found, j, names)), float(tests * p))
             for j, p in enumerate(found.p.tolist()) if tests * p <= FALSE
         ]  # fmt: skip
+        shifts = [each for each in shifts if self._possible(each)]
         shifts.sort(key=lambda shift: shift.p)
         return Split(by, where, *when, share, min(1.0, tests * found.joint[0]), tuple(shifts))
+
+    def _possible(self, shift: Shift) -> bool:
+        """Whether its levels are ones that it can have: what is another one than any friction is no change of that."""
+        p = self.problem.parameters[self.problem.names.index(shift.key)]
+        return all(level.ci95[1] > p.low and level.ci95[0] < p.high for level in shift.levels)
 
     def _levels(self, found: _Compared, j: int, names: Sequence[str]) -> list[Level]:
         """What a number is in each part that tells it."""

@@ -23,12 +23,14 @@ IDEAL = Driver()
 
 @dataclass(frozen=True, eq=False)
 class Workbench:
-    """problem, point: of the fit. kind: of its engine. motions: of its pieces."""
+    """problem, point: of the fit. kind: of its engine. motions: of its pieces. moments: shares of
+    the log at which something may have changed."""
 
     problem: Problem
     point: Point
     kind: str
     motions: Sequence[Motion]
+    moments: Sequence[float] = ()
     _before: dict[str, list[FloatArray]] = field(default_factory=dict)
 
     @property

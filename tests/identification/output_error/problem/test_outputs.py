@@ -105,16 +105,19 @@ def test_a_tilted_floor_is_found_and_friction_with_it(axebot, clean):
     assert np.sqrt(np.mean((again.twist - run.twist) ** 2, axis=0)) == pytest.approx(np.zeros(3), abs=0.005)
 
 
-def test_a_tilted_floor_is_asked_for_in_words(axebot, clean):
+def test_the_diagnosis_names_a_tilted_floor(axebot, clean):
     run = tilted(axebot, clean.voltage[:-1], TILTED * [1.0, 0.0, 0.0])
     log = Run(
         t=run.t, voltage=run.voltage, twist=run.twist + np.random.default_rng(7).normal(size=run.twist.shape) * NOISE
     )
     fit = fit_output_error(log, axebot)
-    assert any('"tilt.x"' in words for words in fit.warnings)
+    assert fit.lack_of_fit is not None
+    first = fit.lack_of_fit.remedies[0]
+    assert "tilt" in {first.key, *first.same_as}
+    assert "floor that is not level" in fit.lack_of_fit.words()
     assert "tilt.x" not in fit.nuisances
     level = Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + (log.twist - run.twist))
-    assert not any("tilt" in words for words in fit_output_error(level, axebot).warnings)
+    assert not fit_output_error(level, axebot).lack_of_fit.remedies
 
 
 def test_an_axis_that_is_none_is_refused(axebot, clean):
