@@ -172,10 +172,11 @@ def _refuse_blind(
             remedy="check signs, units and the order of the wheels, and the voltages (omnidyn check)",
         )  # fmt: skip
     if not unseen.all():
+        ways = "; ".join(" or ".join(each.cures) for each in directions if each.cures)
         raise InsufficientDataError(
             "; ".join(["of what is free each number can be made up for by others, so that none can be told",
                        *(each.words for each in directions)]), got=", ".join(free), expected="fewer numbers",
-            remedy="; ".join(" or ".join(each.cures) for each in directions if each.cures) or "fix one that is known",
+            remedy=": ".join(["leave out one that is known", *([ways] if ways else [])]),
             where=where,
         )  # fmt: skip
     raise InsufficientDataError(
