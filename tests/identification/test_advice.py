@@ -6,6 +6,7 @@ from omnidyn.identification.advice import advice
 from omnidyn.identification.estimate import Correlation
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.identification.stability import Stability
 from omnidyn.model.robot_file import load_robot
 
 DISC = Remedy("friction.direction", "friction along the direction of travel", 0.5, 0.1, share=0.95, chi2=1000.0)
@@ -20,7 +21,7 @@ def missing(*remedies):
     lack = LackOfFit(True, {"vx": 0.5}, {"vx": 0.1}, (), remedies, {})
     fit = OutputErrorEstimate(
         robot=load_robot("axebot"), value={}, std={}, ci95={}, correlation=Correlation((), np.eye(0)),
-        degrees_of_freedom={}, study=lambda: Diagnosis(lack, {}),
+        degrees_of_freedom={}, study=lambda: Diagnosis(lack, {}, Stability({}, ())),
     )  # fmt: skip
     return [words for words in advice(fit, None) if "would explain" in words]
 
@@ -35,8 +36,8 @@ def test_of_remedies_that_explain_the_same_only_the_first_is_advised():
 
 def test_what_the_logs_cannot_tell_apart_is_one_advice():
     (words,) = missing(MASS, GAIN, DISC)
-    assert "cannot tell it from gain" in words
-    assert "measure or weigh one of them" in words
+    assert "cannot tell it from voltages 0.8 times those logged" in words
+    assert "weigh the robot" in words
 
 
 def test_what_explains_much_less_than_the_first_is_not_advised():

@@ -35,7 +35,7 @@ def fit():
 
 def test_the_robot_file_holds_what_the_fit_knows(fit):
     again = parse_robot(robot_to_toml(fit.robot))
-    assert again.correlation.keys == tuple(BOX)
+    assert again.correlation.keys == (*BOX, "drive.dead_band_V")
     for one in BOX:
         for other in BOX:
             wanted = fit.correlation.between(one, other)

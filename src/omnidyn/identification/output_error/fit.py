@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.output_error.answer import Answer
-from omnidyn.identification.output_error.conclusion import conclude
+from omnidyn.identification.output_error.conclusion import conclude, unexplained
 from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
 from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
 from omnidyn.identification.output_error.prepare import (
@@ -179,7 +179,11 @@ class Fit:
         why = why_not(solution)
         if asked and why:
             raise UnsupportedError(why, got=kind, expected="auto, white or sandwich", where="covariance")
-        return as_it_is if why else whitened(solution, known, (progress or Progress()).doing) or as_it_is
+        found = None if why else whitened(solution, known, (progress or Progress()).doing)
+        missed = unexplained(solution.solver, solution)
+        if found is None or unexplained(found.plain.solver, found.plain).keys() - missed.keys():
+            return as_it_is  # a memory that explains a whole output leaves nothing to the model
+        return found
 
     def _settled(self, group: Group, progress: Progress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""

@@ -148,7 +148,7 @@ def _damage(pyarrow: Any, source: str) -> Iterator[None]:
     """Every way in which pyarrow stumbles over a broken file, as an InputError."""
     try:
         yield
-    except (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError, MemoryError) as error:
+    except (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise InputError(
             "the Parquet file is damaged or cut short",
             got=" ".join(str(error).split()) or type(error).__name__,
@@ -272,19 +272,29 @@ class _Rows:
             return column
         if hasattr(array, "dictionary_decode"):
             array = array.dictionary_decode()
-        missing = np.array(array.is_null())
+        missing = _missing(array)
         if kind in (MOMENT, DURATION, DAY):
             return np.where(missing, np.nan, _seconds(array))
         if str(array.type) in ("int64", "uint64") and not _is_exact(_whole(array)).all():
             self.rounded.add(name)
         if kind == TRUTH:
             array = array.cast("int8")
-        return np.array(array.cast("float64", safe=False).to_numpy(zero_copy_only=False), dtype=float)
+        return np.where(missing, np.nan, _numbers(array.cast("float64", safe=False)))
 
 
 def _whole(array: Any) -> Any:
     """Whole numbers, 0 where missing."""
-    return array.fill_null(0).to_numpy(zero_copy_only=False)
+    return np.where(_missing(array), np.array(0, dtype=str(array.type)), _numbers(array))
+
+
+def _missing(array: Any) -> Any:
+    return _numbers(array.is_null().cast("uint8")) == 1
+
+
+def _numbers(array: Any) -> Any:
+    """Numbers as they lie in memory, any where one is missing. `to_numpy` imports pandas where it is installed."""
+    start, stop = array.offset, array.offset + len(array)
+    return np.frombuffer(array.buffers()[1], dtype=str(array.type).replace("double", "float64"))[start:stop]
 
 
 def _is_exact(whole: Any) -> Any:

@@ -43,7 +43,6 @@ from omnidyn.statistics import t_quantile
 
 ROUNDS, TURNS = 6, 20  # of simulations; of memory and numbers in turn between them
 FEW_STEPS = 4  # of one: what the next memory moves is near
-SWALLOWED = 4.0  # times the variance: a fit that leaves as much no longer follows the log, its memory does
 SETTLED = 0.1  # standard errors: a round that moves no number further is the last one
 LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the sandwich
 ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
@@ -113,8 +112,6 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
     # all that came before, would have intervals many times too narrow.
     known = left if left.kind == SANDWICH else _trusted(found, before, models)
     plain = replace(found, state=solver.state(found.state.point), solver=solver)
-    if (plain.state.variance > SWALLOWED * solution.state.variance).any():
-        return None
     return Weighed(found, plain, known, models, tuple(_words(found, models, known)))
 
 
