@@ -9,6 +9,9 @@ so that the sums from which the memory is found are those of r and of the column
 where the restricted likelihood is largest: its memory is not too short because the fit has swallowed slow errors
 (D. A. Harville, J. Am. Stat. Assoc. 72, 320 (1977)).
 
+Simulations are dear and memories are not: between two simulations memory and numbers settle in turn on rows that are
+taken as straight, by the residuals and slopes of the last one.
+
 The covariance is (J~' J~ / s^2)^-1, ~ the filtered rows, and as much wider or narrower as the change of the score
 between the ends of the intervals says: of slow errors only what is fast counts, and there a robot that stops or sets
 off a row earlier bends the likelihood. Observed information is the better one: B. Efron, D. V. Hinkley, Biometrika 65,
