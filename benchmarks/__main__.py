@@ -20,6 +20,7 @@ NAMES = {
     "steady": "steady-state identification: real logs beside their README; coverage on simulated ones (3 minutes)",
     "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
     "big_log": "a log of 1 GB in pieces, CSV and Parquet: processor time and memory (writes it to a temporary folder)",
+    "big_bag": "an MCAP of 2 GB: rate and memory beside rosbags and mcap (writes it to a temporary folder)",
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
     "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
@@ -27,10 +28,14 @@ NAMES = {
     "identify": "output error on simulated logs: coverage, starts, nuisances, time beside peers (ten minutes)",
     "identify_ellipse": "the same by the implicit engine: an ellipse of friction in a turning frame (four minutes)",
     "identify_loop": "output error through a firmware's speed loop, simulated logs: coverage (a few minutes)",
+    "control": "tracking on the eight references of the peers, seven conditions, every controller (three minutes)",
+    "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
     "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
+    "mpc": "the predictive controller: a step beside others' in the same run, cold starts, tracking, C (8 minutes)",
     "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",
+    "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"

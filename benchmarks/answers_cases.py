@@ -341,7 +341,7 @@ write_run(simulate(load_robot("mixed.toml"), [[0, 3, -3]] * 50, 0.01), "written.
 Run(t=[0, 1, 1])
 Run(t=[0, 1, 2], voltage=[[1, 2]])
 read_log("full.csv", load_robot("box.toml"))
-read_log("bad/missing.csv").as_measured()
+read_log("bad/missing.csv")
 read_log("dialect/motor.csv", load_robot("box.toml"), columns={f"w{k}": f"m{k}vel:rpm@motor" for k in (1, 2, 3)})
 read_log("dialect/ticks.csv", assume={"a": "ticks/2000", "u": "V"}, latency={"a1": 0.015})
 [read_log(f"dialect/{name}") for name in ("semicolon.csv", "utf16.csv", "units.csv", "stamp.csv", "change.csv")]

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import faulthandler
 import io
 import json
 import os
 import random
+import re
 import resource
+import struct
 import subprocess
 import sys
 import tempfile
@@ -29,6 +32,7 @@ import numpy as np
 from benchmarks.table import Table, machine
 from omnidyn.errors import OmnidynError
 from omnidyn.logs.command_file import read_commands
+from omnidyn.logs.info import read_info
 from omnidyn.logs.read_log import read_log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.run_file import read_run, run_to_csv, run_to_parquet
@@ -38,6 +42,10 @@ from omnidyn.run import CHANNELS, Run
 SECONDS = float(os.environ.get("OMNIDYN_FUZZ_SECONDS", "60"))
 ROOT = Path(__file__).resolve().parents[1]
 SLOW_S, MAX_MB = 2.0, 2048
+START_S = 60.0  # to load the libraries and make the seeds
+HANG_S = float(
+    os.environ.get("OMNIDYN_FUZZ_HANG", "20")
+)  # a reader that is no further by then is ended, wherever it hangs, and the file kept
 MAX_SEED_BYTES = 6000
 
 PIECES = [
@@ -96,6 +104,84 @@ def _parquet_seeds() -> list[bytes]:
     return seeds
 
 
+def _bag_maker(ros1: bool = False) -> Any:
+    from tests.support.bags import BagMaker, drive
+
+    return drive(BagMaker(ros1=ros1), 0.05, (100.0, 40.0, 25.0))
+
+
+def _made(write: Callable[[Path], Any]) -> bytes:
+    """The bytes of a file that a writer makes."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = write(Path(folder) / "seed")
+        return (next(made.glob("*.db3")) if made.is_dir() else made).read_bytes()
+
+
+def _mcap_seeds() -> list[bytes]:
+    from tests.support.bags import write_mcap
+
+    maker = _bag_maker()
+    return [_made(lambda path, kind=kind: write_mcap(maker, path, kind, 500)) for kind in ("none", "lz4", "zstd")]
+
+
+def _db3_seeds() -> list[bytes]:
+    from tests.support.bags import write_ros2
+
+    return [_made(lambda path: write_ros2(_bag_maker(), path))]
+
+
+def _bag_seeds() -> list[bytes]:
+    from tests.support.bags import write_ros1
+
+    maker = _bag_maker(ros1=True)
+    return [_made(lambda path, kind=kind: write_ros1(maker, path, kind)) for kind in ("", "bz2", "lz4")]
+
+
+def _wpilog_seeds() -> list[bytes]:
+    """A log of every kind of entry, written here."""
+
+    def record(entry: int, stamp: int, value: bytes) -> bytes:
+        return b"\x70" + bytes([entry, len(value)]) + stamp.to_bytes(8, "little") + value
+
+    def text(words: str) -> bytes:
+        return len(words).to_bytes(4, "little") + words.encode()
+
+    entries = [
+        ("w1_rad_s", "double", struct.pack("<d", 1.5)), ("u1_V", "float", struct.pack("<f", 2.0)),
+        ("n", "int64", struct.pack("<q", 3)), ("on", "boolean", b"\x01"), ("mode", "string", b"auto"),
+        ("i", "double[]", struct.pack("<3d", 1.0, 2.0, 3.0)), ("pose", "struct:Pose2d", struct.pack("<3d", 1, 2, 3)),
+        ("/.schema/struct:Two", "structschema", b"double a;int8 b[2]"), ("two", "struct:Two[]", bytes(20)),
+    ]  # fmt: skip
+    content = b"WPILOG\x00\x01\x00\x00\x00\x00"
+    for number, (name, kind, _) in enumerate(entries, 1):
+        content += record(0, 0, b"\x00" + number.to_bytes(4, "little") + text(name) + text(kind) + text(""))
+    for k in range(6):
+        content += b"".join(record(number, 20_000 * k, each[2]) for number, each in enumerate(entries, 1))
+    return [content]
+
+
+def _mat_seeds() -> list[bytes]:
+    from scipy.io import savemat
+
+    seeds = []
+    variables = {"t_s": np.arange(9) / 10, "w": np.ones((9, 3)), "s": {"t": np.arange(5.0), "vx": np.arange(5.0)}}
+    for packed in (False, True):
+        sink = io.BytesIO()
+        savemat(sink, variables, do_compression=packed)
+        seeds.append(sink.getvalue())
+    return seeds
+
+
+def _hdf5_seeds() -> list[bytes]:
+    import h5py
+
+    sink = io.BytesIO()
+    with h5py.File(sink, "w") as file:
+        file["t_s"], file["s/vx"] = np.arange(9) / 10, np.arange(9.0)
+        file.create_dataset("w", data=np.ones((3, 9)), chunks=True, compression="gzip")
+    return [sink.getvalue()]
+
+
 READERS: dict[str, tuple[Callable[[], list[bytes]], Callable[[str], Any]]] = {
     "read_table, text": (_table_seeds, read_table),
     "read_table, options": (_table_seeds, lambda path: read_table(path, header=False, skip_bad_rows=True)),
@@ -107,6 +193,30 @@ READERS: dict[str, tuple[Callable[[], list[bytes]], Callable[[str], Any]]] = {
     "read_table, Parquet": (_parquet_seeds, read_table),
     "iter_tables, Parquet": (_parquet_seeds, lambda path: list(iter_tables(path, 3, skip_bad_rows=True))),
     "read_run, Parquet": (_parquet_seeds, read_run),
+    "read_log, MCAP": (_mcap_seeds, read_log),
+    "read_log, ROS 2 db3": (_db3_seeds, read_log),
+    "read_log, ROS 1": (_bag_seeds, read_log),
+    "read_log, wpilog": (_wpilog_seeds, read_log),
+    "read_log, MAT": (_mat_seeds, read_log),
+    "read_log, HDF5": (_hdf5_seeds, read_log),
+    "info": (lambda: [*_mcap_seeds(), *_wpilog_seeds(), *_bag_seeds()], read_info),
+}
+
+
+# None of ours: it hangs in C, for the test of what ends such a reader.
+HANGS = "hangs"
+_SLOW_WORD = "a" * 60 + "b"
+_ALL: dict[str, tuple[Callable[[], list[bytes]], Callable[[str], Any]]] = {
+    **READERS, HANGS: (lambda: [b"x"], lambda _: re.match(r"(a+)+$", _SLOW_WORD))
+}  # fmt: skip
+
+# What reads each format: a minute of a format is shared by these.
+FORMATS = {
+    "text": [name for name in READERS if "text" in name or (name.startswith("read_") and ", " not in name)]
+    + ["read_table, options"],
+    "Parquet": [name for name in READERS if name.endswith("Parquet")],
+    **{name.partition(", ")[2]: [name] for name in READERS if name.startswith("read_log, ")},
+    "info": ["info"],
 }
 
 
@@ -133,7 +243,7 @@ def fuzz(reader: str, seconds: float, seed: int, folder: Path) -> dict[str, Any]
     """Fuzz one reader in this process; the file at work is always `current`, for the case of a crash."""
     with contextlib.suppress(ValueError, OSError):
         resource.setrlimit(resource.RLIMIT_AS, (MAX_MB * 4 * 2**20,) * 2)
-    seeds, read = READERS[reader][0](), READERS[reader][1]
+    seeds, read = _ALL[reader][0](), _ALL[reader][1]
     rng, end = random.Random(seed), time.monotonic() + seconds
     told: dict[str, Any] = {"files": 0, "read": 0, "refused": 0, "slow": 0, "escaped": []}
     path = folder / "current"
@@ -142,6 +252,7 @@ def fuzz(reader: str, seconds: float, seed: int, folder: Path) -> dict[str, Any]
         path.write_bytes(content)
         start = time.monotonic()
         told["files"] += 1
+        faulthandler.dump_traceback_later(HANG_S, exit=True)  # a thread of its own: C code cannot stop it
         try:
             read(str(path))
             told["read"] += 1
@@ -151,6 +262,7 @@ def fuzz(reader: str, seconds: float, seed: int, folder: Path) -> dict[str, Any]
             kept = folder / f"escaped-{len(told['escaped'])}"
             kept.write_bytes(content)
             told["escaped"].append([str(kept), traceback.format_exc().splitlines()[-1][:200]])
+        faulthandler.cancel_dump_traceback_later()
         if time.monotonic() - start > SLOW_S:
             (folder / f"slow-{told['slow']}").write_bytes(content)
             told["slow"] += 1
@@ -169,12 +281,18 @@ def measure(seconds: float = SECONDS, readers: list[str] | None = None, seed: in
     for reader in readers or list(READERS):
         request = json.dumps([reader, seconds, seed, str(folder)])
         command = [sys.executable, "-m", "benchmarks.fuzz_readers", "--child", request]
-        child = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+        try:
+            child = subprocess.run(
+                command, capture_output=True, text=True, cwd=ROOT, timeout=seconds + HANG_S + START_S, check=False
+            )
+        except subprocess.TimeoutExpired:
+            child = subprocess.CompletedProcess(command, 1, "", "it never ended")
         if child.returncode:
             kept = folder / f"crash-{reader.replace(', ', '-')}"
-            os.replace(folder / "current", kept)
+            with contextlib.suppress(OSError):
+                os.replace(folder / "current", kept)
             table.add("0 escaped", False, reader=reader, escaped=1)
-            table.notes.append(f"{reader}: the process died ({child.returncode}) on {kept}: {child.stderr[-300:]}")
+            table.notes.append(f"{reader}: the process died ({child.returncode}) on {kept}: {child.stderr[-600:]}")
             continue
         told = json.loads(child.stdout)
         escaped = told.pop("escaped")

@@ -61,9 +61,15 @@ def installed(name: str) -> ModuleType | None:
         return None
 
 
+def installed_sysid() -> ModuleType | None:
+    """mujoco.sysid, where all of it is: mujoco alone has an empty one."""
+    found = installed("mujoco.sysid")
+    return found if hasattr(found, "ParameterDict") else None
+
+
 def peers(table: Table) -> Iterator[Peer]:
     """Those that are installed; a note for each that is not."""
-    sysid, lmfit = installed("mujoco.sysid"), installed("lmfit")
+    sysid, lmfit = installed_sysid(), installed("lmfit")
     if sysid is None:
         table.notes.append(f"mujoco.sysid skipped: not installed here ({INSTALL})")
     else:

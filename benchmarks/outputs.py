@@ -17,10 +17,10 @@ from omnidyn.identification.output_error.kernel.counts import information
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -133,15 +133,12 @@ def _pose(table: Table, robot: Robot) -> None:
 
 
 def _tilt(table: Table, robot: Robot) -> None:
-    """A floor of 1 degree that the robot heads down: friction and force, and what becomes of friction without."""
-    mass = np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
-    force = np.array([robot.body.mass * 9.81 * np.sin(SLOPE), 0.0, 0.0])
+    """A floor of 1 degree under a robot that turns: friction and force, and what becomes of friction without."""
+    force = (float(robot.body.mass * 9.81 * np.sin(SLOPE)), 0.0)
     voltage = excitation()
-    volts = np.linalg.solve(state_space(robot).B, force / mass)
-    wide = robot.replace(motor=robot.motor.replace(voltage_limit=100.0))
-    run = simulate(wide, voltage + volts, 0.01)
+    run = simulate(robot, voltage, 0.01, log=LogEffects(tilt=force))
     assert run.twist is not None
-    true = truth(robot) | {f"tilt.{axis}": float(f) for axis, f in zip(("x", "y", "yaw"), force, strict=True)}
+    true = truth(robot) | {f"tilt.{axis}": float(f) for axis, f in zip("xy", force, strict=True)}
     known, ignored = Draws(true), Draws(truth(robot))
     held = np.vstack([voltage, voltage[-1:]])
     for seed in range(TILTED):

@@ -55,6 +55,14 @@ def test_a_swapped_pair_is_recognised(call, got, expected):
         (lambda: omnidyn.identify("log.csv", ROBOT), "no Run; got the text 'log.csv'.*read_log"),
         (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "no Run; got a list of Run and Robot"),
         (lambda: omnidyn.check(None), "no Log or Run; got nothing.*load_log"),
+        (
+            lambda: omnidyn.read_log(RUN),
+            r"no str or PathLike; got a Run; expected read_log.*ready to use",
+        ),
+        (
+            lambda: omnidyn.validate(ROBOT, [RUN]),
+            r"no OutputErrorEstimate; got a Robot; expected validate",
+        ),
         (lambda: omnidyn.simulate("axebot", VOLTS, 0.1), "no Robot; got the text 'axebot'"),
     ],
 )

@@ -15,8 +15,10 @@ from omnidyn.logs.log import Log
 from tests.support.compared_logs import clean_log, coulomb_times, noisy
 from tests.support.figures import shown_texts
 from tests.support.outputs import Reader
+from tests.support.steady_logs import clean_runs, robot_with
 
 ROBOT = omnidyn.load_robot("axebot")
+AROUND = range(0, 360, 45)
 
 
 @pytest.fixture(scope="module")
@@ -35,10 +37,11 @@ def results(run):
         "estimate": fit,
         "identification": omnidyn.Identification.of([run], ROBOT, nuisances="none"),
         "motors": omnidyn.identify_motors([run]),
+        "steady": omnidyn.identify_steady(clean_runs(robot_with("disc"), AROUND), ROBOT, shape="disc"),
     }
 
 
-NAMES = ["run", "robot", "verdict", "comparison", "estimate", "identification", "motors"]
+NAMES = ["run", "robot", "verdict", "comparison", "estimate", "identification", "motors", "steady"]
 
 
 @pytest.mark.parametrize("name", NAMES)

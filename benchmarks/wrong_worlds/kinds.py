@@ -163,7 +163,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("mass", "more than weighed", _scaled("mass"), "body.mass_kg"),
     Kind("inertia", "more than calculated", _scaled("inertia"), "body.inertia_kg_m2", most=3.0),
     Kind("turning frame", "left out", _turning, "body.rotating_frame"),
-    Kind("tilt", "of the floor [rad], the heading kept", _tilted, "tilt", most=0.15),
+    Kind("tilt", "of the floor [rad], the heading kept", _tilted, "tilt", ("push",), most=0.15),
     Kind("payload", "dropped on the way", lambda case, size: case.world_but(
         change=WHEN, after_mass=1.0 / (1.0 + size)), CHANGE, ("body.mass_kg",), most=3.0),
     Kind("floor", "another one on the way", _changed(after_friction=1.0), CHANGE),
@@ -185,7 +185,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("drag", "that grows with the square of the speed", _world("drag", 0.0), most=3.0),
     Kind("warming", "viscous friction that falls as it runs", _world("cooling", 0.0), near=(CHANGE,), most=0.9),
     Kind("umbilical", "a pull in the world, the robot turning [N]",
-         lambda case, size: case.world_but(pull=(size, 0.0)), most=8.0),
+         lambda case, size: case.world_but(pull=(size, 0.0)), "tilt", most=8.0),
     Kind("slip", "wheels that spin where the floor gives no more", _slips, near=("motor.current_limit_A",), most=0.9),
     Kind("eccentric", "wheels out of round", _rolling(eccentric=1.0), most=0.3),
     Kind("rollers", "nine bumps a turn", _rolling(eccentric=1.0, bumps=9.0), most=0.1),

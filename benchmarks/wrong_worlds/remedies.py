@@ -16,7 +16,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, Run
 
-NUISANCES = ("gain", "fade", "tilt", "latency", "dead_band")
+NUISANCES = ("gain", "fade", "tilt", "push", "latency", "dead_band")
 USUAL = ("latency", "dead_band")  # what a default fit has
 SHAPES = {f"friction.{shape}": shape for shape in (BOX, ELLIPSE, WHEELS)}
 FRAME, LIMIT, FRICTION = "body.rotating_frame", "motor.current_limit_A", ("friction",)

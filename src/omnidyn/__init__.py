@@ -26,6 +26,8 @@ _HOME = {
     "Question": "omnidyn.identification.question",
     "Robot": "omnidyn.model.robot",
     "Run": "omnidyn.run",
+    "Tracking": "omnidyn.control.tracking",
+    "Tuned": "omnidyn.control.tune",
     "acceleration": "omnidyn.model.dynamics",
     "axis_patterns": "omnidyn.model.deadzone",
     "band": "omnidyn.simulation.band",
@@ -34,7 +36,9 @@ _HOME = {
     "compare": "omnidyn.comparison.compare",
     "dead_zone": "omnidyn.model.known.dead_zone",
     "dead_zone_map": "omnidyn.model.deadzone",
+    "demand": "omnidyn.control.demand",
     "drift": "omnidyn.comparison.drift",
+    "feedforward_table": "omnidyn.control.table",
     "fit_output_error": "omnidyn.identification.whole_logs",
     "fit_steady_state": "omnidyn.identification.steady.steady_state",
     "identify": "omnidyn.identification.identify",
@@ -44,6 +48,7 @@ _HOME = {
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
+    "path": "omnidyn.control.paths.path",
     "plausible": "omnidyn.model.known.uncertainty",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
@@ -53,7 +58,11 @@ _HOME = {
     "save_robot": "omnidyn.model.robot_file",
     "simulate": "omnidyn.simulation.simulate",
     "state_space": "omnidyn.model.statespace",
+    "track": "omnidyn.control.closed_loop",
+    "tune": "omnidyn.control.tune",
     "validate": "omnidyn.identification.validation",
+    "vary": "omnidyn.model.varied.vary",
+    "voltage_for": "omnidyn.control.feedforward",
     "write_run": "omnidyn.logs.run_file",
 }
 
@@ -63,6 +72,13 @@ if TYPE_CHECKING:
     from omnidyn.comparison.compare import compare
     from omnidyn.comparison.drift import drift
     from omnidyn.comparison.result import Comparison
+    from omnidyn.control.closed_loop import track
+    from omnidyn.control.demand import demand
+    from omnidyn.control.feedforward import voltage_for
+    from omnidyn.control.paths.path import path
+    from omnidyn.control.table import feedforward_table
+    from omnidyn.control.tracking import Tracking
+    from omnidyn.control.tune import Tuned, tune
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate
@@ -84,6 +100,7 @@ if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
     from omnidyn.model.robot_file import load_robot, preset_names, save_robot
     from omnidyn.model.statespace import state_space
+    from omnidyn.model.varied.vary import vary
     from omnidyn.run import Run
     from omnidyn.simulation.band import band
     from omnidyn.simulation.simulate import simulate
@@ -94,6 +111,8 @@ _MAKERS = {
     shown.HTML: ("omnidyn.report.notebook", "document_html"),
     shown.FIGURE: ("omnidyn.report.plots", "plot"),
     shown.FRAME: ("omnidyn.interop.dataframe", "to_dataframe"),
+    shown.DATASET: ("omnidyn.interop.dataset", "to_xarray"),
+    shown.RUN: ("omnidyn.interop.runs", "run_of"),
 }
 
 
@@ -104,7 +123,13 @@ def _maker(module: str, name: str) -> Callable[..., Any]:
 shown.made_by(**{what: _maker(*place) for what, place in _MAKERS.items()})
 
 
+# Public rooms: `omnidyn.export.mjcf(robot)`, `omnidyn.interop.linear_system(robot)`.
+_ROOMS = ("export", "interop")
+
+
 def __getattr__(name: str) -> Any:
+    if name in _ROOMS:
+        return importlib.import_module(f"omnidyn.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'omnidyn' has no attribute {name!r}")
     value = getattr(importlib.import_module(_HOME[name]), name)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from omnidyn.errors import InputError
 
@@ -12,11 +13,21 @@ MADE_BY = {
     "Robot": 'omnidyn.load_robot("axebot"), or of a file, makes one',
     "Run": "omnidyn.read_log(path) makes one",
     "Log": "omnidyn.load_log(path) makes one",
+    "PathLike": "what stands in a file is read by its path; a Run is ready to use",
     "SteadyTable": "omnidyn.read_steady_table(path) makes one",
     "OutputErrorEstimate": "omnidyn.fit_output_error(runs, robot) makes one",
 }
 
 Kinds = type | tuple[type, ...]
+
+
+_FRAMES = ("pandas", "polars", "xarray")
+
+
+def is_frame(value: object) -> bool:
+    """Whether a value is a data frame of pandas or polars, or an xarray Dataset; none of them is imported for this."""
+    kind = type(value)
+    return kind.__module__.partition(".")[0] in _FRAMES and kind.__name__ in ("DataFrame", "Dataset")
 
 
 def check_order(call: str, *places: tuple[object, Kinds]) -> None:
@@ -45,11 +56,27 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
     )  # fmt: skip
 
 
+def unknown_option(owner: str, option: str, known: Iterable[str], where: str) -> InputError:
+    """The error of an option that something does not have, with the nearest that it has."""
+    near = difflib.get_close_matches(option, list(known), 1, 0.4)
+    return InputError(
+        f"{owner} has no such option", got=option, expected=", ".join(known),
+        remedy=f"did you mean {near[0]}?" if near else "", where=where,
+    )  # fmt: skip
+
+
 def _is(value: object, wanted: Kinds) -> bool:
-    """Whether a value, or every item of a list, is of a kind."""
+    """Whether a value, or every item of a list, is of a kind. A table in memory stands for a Run."""
     if isinstance(value, list | tuple):
-        return all(isinstance(each, wanted) for each in value)
-    return isinstance(value, Iterator) or isinstance(value, wanted)  # noqa: SIM101  what an iterator holds is not known
+        return all(isinstance(each, wanted) or _stands_for(each, wanted) for each in value)
+    known = isinstance(value, Iterator) or isinstance(value, wanted)  # noqa: SIM101  what an iterator holds is not known
+    return known or _stands_for(value, wanted)
+
+
+def _stands_for(value: object, wanted: Kinds) -> bool:
+    """Whether a table in memory stands where a Run is wanted."""
+    kinds = wanted if isinstance(wanted, tuple) else (wanted,)
+    return is_frame(value) and any(each.__name__ == "Run" for each in kinds)
 
 
 def _kind(value: object) -> str:

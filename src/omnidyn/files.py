@@ -20,6 +20,7 @@ from omnidyn.errors import InputError
 MAX_TEXT_BYTES = 64 * 2**20
 STALE_TEMPORARY_S = 3600.0
 TEMPORARY_PREFIX = ".tmp-omnidyn-"
+PIECE_BYTES = 2**20
 
 MAX_TOML_BYTES = 2**20
 MAX_KEY_PARTS = 16
@@ -27,6 +28,7 @@ _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 _DEEP_KEY = re.compile(rf"(?:^|[{{,\[])[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_KEY_PARTS}}}", re.MULTILINE)
 
 CSV_REMEDY = "export it as CSV or Parquet"
+LOG_REMEDY = "give it to a command that reads logs, or save it as CSV"
 NUMPY_REMEDY = "save it with numpy.savetxt(NAME, array, delimiter=',', header='t_s,...')"
 
 
@@ -38,18 +40,19 @@ class Format(NamedTuple):
     remedy: str = CSV_REMEDY
 
 
+_ROAD_RUNNER = Format("road-runner", "a log of Road Runner", "open it in AdvantageScope and export it as WPILOG or CSV")
 # Told by their first bytes; the first that fits counts.
 _MAGIC = {
-    b"PAR1": Format("parquet", "a Parquet file", "give it to a command that reads logs, or save it as CSV"),
+    b"PAR1": Format("parquet", "a Parquet file", LOG_REMEDY),
     b"PARE": Format("parquet-encrypted", "an encrypted Parquet file", "decrypt it first"),
     b"\x93NUMPY": Format("npy", "a NumPy .npy file", NUMPY_REMEDY),
-    b"\x89MCAP0\r\n": Format("mcap", "an MCAP recording"),
-    b"SQLite format 3\x00": Format("sqlite", "an SQLite database (a ROS 2 .db3 bag)"),
-    b"\x89HDF\r\n\x1a\n": Format("hdf5", "an HDF5 file (also MATLAB v7.3)"),
-    b"MATLAB 5.0 MAT-file": Format("mat", "a MATLAB .mat file", "in MATLAB: writetable(T, 'log.csv')"),
-    b"MATLAB 7.3 MAT-file": Format("mat", "a MATLAB .mat file (7.3)", "in MATLAB: writetable(T, 'log.csv')"),
-    b"#ROSBAG V": Format("bag", "a ROS 1 bag", "rostopic echo -b BAG -p TOPIC > log.csv"),
-    b"WPILOG": Format("wpilog", "a WPILib data log", "export it as CSV with the Data Log Tool"),
+    b"\x89MCAP0\r\n": Format("mcap", "an MCAP recording", LOG_REMEDY),
+    b"SQLite format 3\x00": Format("sqlite", "an SQLite database (a ROS 2 .db3 bag)", LOG_REMEDY),
+    b"\x89HDF\r\n\x1a\n": Format("hdf5", "an HDF5 file (also MATLAB v7.3)", LOG_REMEDY),
+    b"MATLAB 5.0 MAT-file": Format("mat", "a MATLAB .mat file", LOG_REMEDY),
+    b"MATLAB 7.3 MAT-file": Format("mat", "a MATLAB .mat file (7.3)", LOG_REMEDY),
+    b"#ROSBAG V": Format("bag", "a ROS 1 bag", LOG_REMEDY),
+    b"WPILOG": Format("wpilog", "a WPILib data log", LOG_REMEDY),
     b"\x1f\x8b": Format("gzip", "a gzip archive", "unpack it first: gunzip FILE"),
     b"BZh": Format("bzip2", "a bzip2 archive", "unpack it first: bunzip2 FILE"),
     b"\xfd7zXZ\x00": Format("xz", "an xz archive", "unpack it first: unxz FILE"),
@@ -58,6 +61,8 @@ _MAGIC = {
     b"Rar!\x1a\x07": Format("rar", "a RAR archive", "unpack it first"),
     b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1": Format("ole", "an old Excel (.xls) or Office file"),
     b"ARROW1": Format("arrow", "an Arrow (Feather) file", "save it as Parquet"),
+    b"RR\x00\x00": _ROAD_RUNNER,
+    b"RR\x00\x01": _ROAD_RUNNER,
     b"ULog\x01\x12\x35": Format("ulog", "a PX4 ULog file", "export it with ulog2csv"),
     b"%PDF-": Format("pdf", "a PDF file"),
     b"\x89PNG\r\n\x1a\n": Format("png", "a PNG picture"),
@@ -129,6 +134,22 @@ def open_regular(path: str | os.PathLike) -> Iterator[BinaryIO]:
         raise InputError("cannot read it", got=error.strerror, where=str(path)) from None
     except (OSError, ValueError) as error:
         raise InputError("cannot open it", got=str(error), expected="a file name", where=str(path)[:80]) from None
+
+
+def pieces(stream: BinaryIO, size: int) -> Iterator[bytes]:
+    """The first `size` bytes from where a stream stands, piece by piece: what a file that grows held when opened."""
+    while size > 0 and (block := stream.read(min(size, PIECE_BYTES))):
+        size -= len(block)
+        yield block
+
+
+def growth(stream: BinaryIO, size: int, who: str = "") -> tuple[str, ...]:
+    """What is to be said of a file that no longer is as long as when it was opened: `size` bytes; else nothing."""
+    now = os.fstat(stream.fileno()).st_size
+    if now == size:
+        return ()
+    how = "grew" if now > size else "shrank"
+    return (f"{who or 'the file'} {how} while it was read, from {size} to {now} bytes: is it still being written?",)
 
 
 def read_bytes(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> bytes:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.arguments import is_frame
+from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
-from omnidyn.shown import FIGURE, FRAME, Shown, make
+from omnidyn.shown import DATASET, FIGURE, FRAME, RUN, Shown, make
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pandas import DataFrame  # pyright: ignore[reportMissingImports]
 
 WHEEL, AXIS, SCALAR = "wheel", "axis", "scalar"
 
@@ -52,8 +52,8 @@ class Run(Shown):
     pose: (x, y, heading) in the world [m, m, rad], heading not wrapped. Shape (samples, 3).
     supply: voltage of the battery [V]. Shape (samples,).
     source: where it comes from. warnings: what a reader should know, in words.
-    interpolated: channel -> which of its values no sensor gave: a reader put them on the line between two measurements.
-    Same shape as the channel. What must count measurements, and no others, takes `as_measured()`.
+    Sensors with clocks of their own keep their times: t holds the stamps of all, and a channel is NaN where its sensor
+    gave nothing. Nothing is interpolated.
     Inputs (voltage, duty, commands) of row k hold over [t_k, t_k+1). All arrays are read-only.
     Raises InputError when a channel has another shape or time does not increase.
     """
@@ -71,7 +71,6 @@ class Run(Shown):
     supply: FloatArray | None = None
     source: str = ""
     warnings: tuple[str, ...] = ()
-    interpolated: Mapping[str, BoolArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         time = _read_only("t", self.t, None)
@@ -83,10 +82,6 @@ class Run(Shown):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, _read_only(name, value, kind, len(time)))
-        for name, mask in self.interpolated.items():
-            own = getattr(self, name, None) if name in CHANNELS else None
-            if own is not None and np.shape(mask) != own.shape:
-                raise InputError("wrong shape", got=np.shape(mask), expected=own.shape, where=f"interpolated {name}")
 
     @property
     def channels(self) -> dict[str, FloatArray]:
@@ -98,14 +93,6 @@ class Run(Shown):
         """Number of wheels, None where no channel of wheels was measured."""
         counts = {len(value[0]) for name, value in self.channels.items() if CHANNELS[name] == WHEEL}
         return counts.pop() if counts else None
-
-    def as_measured(self) -> Run:
-        """The run with NaN in place of what was interpolated; the run itself where nothing was."""
-        masks = {name: mask for name, mask in self.interpolated.items() if getattr(self, name, None) is not None}
-        if not masks:
-            return self
-        channels = {name: np.where(mask, np.nan, getattr(self, name)) for name, mask in masks.items()}
-        return self.replace(**channels, interpolated={})
 
     def __len__(self) -> int:
         return len(self.t)
@@ -144,12 +131,19 @@ class Run(Shown):
         """
         return make(FIGURE, self, path=True, robot=robot)
 
-    def to_dataframe(self) -> DataFrame:
-        """A pandas DataFrame with the columns of a run file (u1_V, w1_rad_s, vx_m_s), over time t_s.
+    def to_dataframe(self, library: str = "pandas") -> Any:
+        """A DataFrame with the columns of a run file (u1_V, w1_rad_s, vx_m_s), over time t_s.
 
-        Raises MissingExtraError where pandas is not installed.
+        library: "pandas" or "polars". Raises MissingExtraError where it is not installed.
         """
-        return make(FRAME, self)
+        return make(FRAME, self, library=library)
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset: a variable for each channel, over time and wheel or axis, with its unit.
+
+        Raises MissingExtraError where xarray is not installed.
+        """
+        return make(DATASET, self)
 
     def __eq__(self, other: object) -> bool:
         """Equal to the last bit in every channel and word; NaN equals NaN."""
@@ -165,8 +159,13 @@ class Run(Shown):
 
 
 def as_list(runs: Run | Sequence[Run]) -> list[Run]:
-    """One run, or several, as a list."""
-    return [runs] if isinstance(runs, Run) else list(runs)
+    """One run, or several, as a list. Data frames and Datasets become runs."""
+    return [as_run(runs)] if isinstance(runs, Run) or is_frame(runs) else [as_run(each) for each in runs]
+
+
+def as_run(run: Any) -> Any:
+    """The Run in a data frame or an xarray Dataset; anything else as it is."""
+    return make(RUN, run) if is_frame(run) else run
 
 
 def _rows(channel: str, values: FloatArray) -> Iterator[tuple[str, ...]]:
@@ -187,8 +186,6 @@ def _values(run: Run) -> Iterator[Any]:
 
 
 def _same(a: Any, b: Any) -> bool:
-    if isinstance(a, Mapping) and isinstance(b, Mapping):
-        return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         return a.shape == b.shape and bool(np.array_equal(a, b, equal_nan=True))
     return bool(a is b or a == b) if not (isinstance(a, np.ndarray) or isinstance(b, np.ndarray)) else False

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from omnidyn.document import Document
 
-HTML, FIGURE, FRAME = "html", "figure", "frame"
+HTML, FIGURE, FRAME, DATASET, RUN = "html", "figure", "frame", "dataset", "run"
 
 _MAKERS: dict[str, Callable[..., Any]] = {}
 
 
 def made_by(**makers: Callable[..., Any]) -> None:
-    """Who makes what of a result: html(document), figure(result, **options), frame(run)."""
+    """Who makes what: html(document), figure(result, **options), frame(result), dataset(run), run(table)."""
     _MAKERS.update(makers)
 
 

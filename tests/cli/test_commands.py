@@ -102,6 +102,17 @@ def test_deadzone_has_intervals_and_names_the_guesses_behind_them(call):
     assert "it rests on guesses" in call("deadzone", "robotino", "--json")[2]
 
 
+def test_friction_says_what_holds_and_draws_it(call, tmp_path):
+    picture = tmp_path / "friction.png"
+    code, out, _ = call("friction", "axebot", "--picture", str(picture))
+    assert code == 0
+    assert "2.2, 2.2, 2.2, 2.2" in out
+    assert picture.stat().st_size > 5000
+    told = strict(call("friction", "axebot", "--json")[1])
+    assert [row["holds"] for row in told["axes"]] == [[2.2, 2.2], [1.5, 1.5], [0.099, 0.099]]
+    assert told["axes"][0]["law"] == "Coulomb (axes)"
+
+
 def test_deadzone_for_machines(call):
     result = strict(call("deadzone", "axebot", "--json")[1])
     assert [row["axis"] for row in result["dead_zone"]] == ["x", "y", "yaw"]

@@ -9,7 +9,7 @@ import pytest
 import omnidyn
 from omnidyn.cli import main
 from omnidyn.model.robot import Prior
-from omnidyn.model.robot_file import load_robot
+from omnidyn.model.robot_file import load_robot, robot_to_toml
 from omnidyn.run import Run
 from tests.support.compared_logs import clean_log, coulomb_times, noisy
 
@@ -161,3 +161,18 @@ def test_columns_can_be_named(call, tmp_path):
     named = [f"--column={u}={name}:V" for u, name in (("u1", "left"), ("u2", "front"), ("u3", "rear"))]
     code, out, _ = call("own.csv", "--robot", "axebot", *named)
     assert (code, "applied: the logged voltage" in out) == (0, True)
+
+
+def test_with_the_load_of_the_log(call, tmp_path):
+    file = robot_to_toml(AXEBOT) + "\n[variations.payload.crate]\nmass_kg = 1.0\ninertia_kg_m2 = 0.01\n"
+    (tmp_path / "own.toml").write_text(file, "utf-8")
+    loaded = omnidyn.vary(load_robot("own.toml"), payload="crate")
+    omnidyn.write_run(noisy(clean_log(loaded, 1), 1), "loaded.csv")
+    found = {}
+    for name, more in (("with", ("--with", "payload=crate")), ("without", ())):
+        code, out, _ = call("loaded.csv", "--robot", "own.toml", *more, "--json")
+        assert code == 0
+        (robot,) = json.loads(out)["robots"].values()
+        found[name] = robot["overall"]["vx"]["rmse"]
+    assert found["with"] == pytest.approx(0.01, rel=0.15)
+    assert found["without"] > 2.0 * found["with"]

@@ -7,7 +7,7 @@ import pytest
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.write import write_logs
 from omnidyn.cli import main
-from omnidyn.identification.structure import climb
+from omnidyn.identification.structure.ladder import climb
 from omnidyn.model.robot_file import load_robot
 
 

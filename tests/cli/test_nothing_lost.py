@@ -139,10 +139,10 @@ def test_a_missing_file_is_told_before_anything_slow_is_loaded(here, arguments):
     assert "no such file" in result.stderr
 
 
-@pytest.mark.parametrize("name", ["run.xlsx", "run.XLS", "run.mat", "run.mcap", "run.npz", "run.json"])
+@pytest.mark.parametrize("name", ["run.xlsx", "run.XLS", "run.db3", "run.wpilog", "run.npz", "run.json"])
 def test_a_run_is_not_written_under_the_name_of_another_format(call, here, name):
     code, _, err = call("simulate", "r.toml", "u.csv", "-o", name)
     assert code == 3
     assert f"{name}: a run is not written in this format" in err
-    assert "expected .csv or .parquet" in err
+    assert "expected .csv, .parquet, .mcap or .mat" in err
     assert not (here / name).exists()

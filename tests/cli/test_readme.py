@@ -56,7 +56,7 @@ def test_every_link_leads_somewhere():
 def test_every_command_it_names_exists():
     from omnidyn.cli.app import app
 
-    known = {command.callback.__name__ for command in app.registered_commands if command.callback}
+    known = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
     named = set(re.findall(r"`omnidyn ([a-z]+)", README))
     assert named == known
 

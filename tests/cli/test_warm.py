@@ -30,6 +30,7 @@ def few(monkeypatch, tmp_path):
     compiled._cache.flush()
     monkeypatch.setattr("omnidyn.compiled.warmed.place", lambda: tmp_path / "warmed.json")
     monkeypatch.setattr("omnidyn.identification.first_runs.first_runs", lambda: [("halves", lambda: compiled(1.0))])
+    monkeypatch.setattr("omnidyn.control.first_runs.first_runs", list)
     monkeypatch.setattr("omnidyn.compiled.kernel.kept", lambda: [compiled._cache])
     yield compiled
     compiled._cache.flush()
@@ -113,8 +114,9 @@ def noted(self, sig, context):
 Entries.load_overload = noted
 if len(sys.argv) == 1:
     from omnidyn.compiled.kernel import kept
-    from omnidyn.identification.first_runs import first_runs
-    for _, make in first_runs():
+    from omnidyn.control import first_runs as of_control
+    from omnidyn.identification import first_runs as of_identification
+    for _, make in [*of_identification.first_runs(), *of_control.first_runs()]:
         make()
     assert {cache._stem for cache in kept()} == set(asked), "a kernel that no first run needs"
 else:
@@ -143,6 +145,7 @@ def test_the_first_runs_need_what_commands_need(tmp_path):
     needed = asked(
         tmp_path, "simulate axebot u.csv -o run.csv", "simulate robotino u.csv", "check run.csv --robot axebot",
         "compare run.csv --robot axebot", "identify run.csv --robot axebot --report fit.html -o fit.toml",
+        "track axebot --path eight --controller mpc --duration 1",
     )  # fmt: skip
     assert len(enough) >= 15
     assert len(needed) >= 5

@@ -100,7 +100,7 @@ def test_two_floors_of_another_simulator(tmp_path, monkeypatch, capsys):
     assert "Coulomb friction forward" in data["verdict"]
     assert (tmp_path / "drift.svg").stat().st_size > 1000
     assert main(["drift", "first.toml", "second.toml"]) == 0
-    assert capsys.readouterr().out.startswith("No number of 7 changed by more than its errors allow.")
+    assert capsys.readouterr().out.startswith("No number of 6 changed by more than its errors allow.")
 
 
 def test_what_is_taken_as_it_stands_and_one_log_twice_are_warned_of():

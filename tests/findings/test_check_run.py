@@ -1,7 +1,5 @@
 """check of a Run in memory: the findings of its log, and the log is kept for the picture."""
 
-import numpy as np
-
 import omnidyn
 from omnidyn.findings.check import check_log
 from omnidyn.logs.log import Log
@@ -23,14 +21,6 @@ def test_two_wheels_swapped_are_found_in_memory_too():
     swapped = RUN.replace(wheel_speed=RUN.wheel_speed[:, [1, 0, 2]])
     assert omnidyn.check(swapped, ROBOT).fatal
     assert not omnidyn.check(RUN, ROBOT).fatal
-
-
-def test_what_was_interpolated_is_no_measurement():
-    mask = np.zeros_like(RUN.wheel_speed, dtype=bool)
-    mask[1::2] = True
-    log = Log.of_run(RUN.replace(interpolated={"wheel_speed": mask}))
-    assert np.isnan(log.channels["wheel_speed"][1::2]).all()
-    assert np.isfinite(log.channels["wheel_speed"][::2]).all()
 
 
 def test_the_verdict_that_the_command_keeps_holds_no_log():

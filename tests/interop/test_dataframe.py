@@ -37,7 +37,8 @@ def test_what_pandas_is_given(monkeypatch):
     np.testing.assert_array_equal(frame.columns["u2_V"], RUN.voltage[:, 1])
     np.testing.assert_array_equal(frame.index[0], RUN.t)
     assert frame.index[1] == "t_s"
-    assert frame.attrs == {"source": "log.csv", "warnings": ["a doubt"]}
+    units = {"t_s": "s", **dict.fromkeys(COLUMNS, "V")}
+    assert frame.attrs == {"source": "log.csv", "warnings": ["a doubt"], "units": units}
 
 
 def test_a_real_frame():

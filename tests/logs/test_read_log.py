@@ -102,17 +102,14 @@ def test_rows_without_numbers_are_left_out_up_to_a_fifth(tmp_path):
         read_log(write(tmp_path, "t_s,w1_rad_s,w2_rad_s\n" + "\n".join(rows)))
 
 
-def test_a_log_on_change_holds_commands_and_interpolates_measurements(tmp_path):
+def test_a_log_on_change_holds_commands_and_makes_nothing_up(tmp_path):
     text = "t_s,u1_V,w1_rad_s,supply_V\n0,1,,9\n0.1,,10,9\n0.2,,,9\n0.3,2,,9\n0.4,,40,9\n0.5,,,9\n"
     run = read_log(write(tmp_path, text))
     np.testing.assert_array_equal(run.voltage[:, 0], [1, 1, 1, 2, 2, 2])
-    np.testing.assert_allclose(run.wheel_speed[:, 0], [np.nan, 10, 20, 30, 40, np.nan])
+    np.testing.assert_array_equal(run.wheel_speed[:, 0], [np.nan, 10, np.nan, np.nan, 40, np.nan])
     assert any("u1 is recorded on change (67% of its cells are blank): held" in words for words in run.warnings)
-    np.testing.assert_array_equal(run.interpolated["wheel_speed"][:, 0], [1, 0, 1, 1, 0, 1])
-    assert set(run.interpolated) == {"wheel_speed"}
-    np.testing.assert_array_equal(run.as_measured().wheel_speed[:, 0], [np.nan, 10, np.nan, np.nan, 40, np.nan])
     late = read_log(write(tmp_path, text), latency={"w": 0.1})
-    np.testing.assert_allclose(late.as_measured().wheel_speed[:, 0], [10, np.nan, np.nan, 40, np.nan, np.nan])
+    np.testing.assert_allclose(late.wheel_speed[:, 0], [10, np.nan, np.nan, 40, np.nan, np.nan])
 
 
 def test_rows_of_one_time_that_fill_each_other_s_blanks_are_one_row(tmp_path):
@@ -160,6 +157,22 @@ def test_a_latency_is_taken_out(tmp_path):
     np.testing.assert_allclose(run.wheel_speed[:, 0], [1, 2, 3, 4, 5, np.nan])
     with pytest.raises(InputError, match="no such channel to delay; got i"):
         read_log(write(tmp_path, "t_s,w1_rad_s\n" + rows), latency={"i": 0.1})
+
+
+def test_a_latency_between_rows_makes_rows_of_its_own_and_changes_no_number(tmp_path):
+    rows = "\n".join(f"{0.1 * k:.1f},{k},{10 * k}" for k in range(6))
+    run = read_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + rows), latency={"w": 0.03})
+    known = np.isfinite(run.wheel_speed[:, 0])
+    np.testing.assert_allclose(run.t[known], 0.1 * np.arange(1, 6) - 0.03)
+    np.testing.assert_array_equal(run.wheel_speed[known, 0], 10 * np.arange(1, 6))
+    np.testing.assert_allclose(run.t[~known], 0.1 * np.arange(6))
+    np.testing.assert_array_equal(run.voltage[:, 0], [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5])
+    assert any("w1 was moved back by its latency of 0.03 s" in words for words in run.warnings)
+
+
+def test_a_battery_holds_what_was_measured(tmp_path):
+    run = read_log(write(tmp_path, "t_s,u1_V,supply_V\n0,1,12\n0.1,1,\n0.2,1,\n0.3,1,11\n0.4,1,\n"))
+    np.testing.assert_array_equal(run.supply, [12, 12, 12, 11, 11])
 
 
 def test_unsigned_currents_get_the_sign_of_the_command(tmp_path):
@@ -264,6 +277,12 @@ def test_a_clock_whose_counter_is_full_goes_on(tmp_path, unit, period, step):
     assert any(f"starts over after {period:.6g} {unit}" in words for words in run.warnings)
     pieces = list(iter_logs(path, rows=150))
     np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), run.t, rtol=1e-12)
+
+
+def test_a_clock_that_counts_with_a_sign_goes_on(tmp_path):
+    counts = np.mod(2**31 - 2_000_500 + 10_000 * np.arange(500) + 2**31, 2**32) - 2**31
+    run = read_log(write(tmp_path, "t_us,w1_rad_s\n" + "".join(f"{count},1\n" for count in counts)))
+    np.testing.assert_allclose(np.diff(run.t), 0.01, rtol=1e-9)
 
 
 def test_two_logs_in_one_file_are_no_full_counter(tmp_path):

@@ -32,7 +32,7 @@ def bits(run):
     return {
         field.name: None if (value := getattr(run, field.name)) is None else value.tobytes()
         for field in fields(run)
-        if field.name not in ("source", "warnings", "interpolated")
+        if field.name not in ("source", "warnings")
     }
 
 

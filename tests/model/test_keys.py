@@ -24,7 +24,7 @@ def is_list(name):
 
 def test_the_page_has_the_numbers_of_all_tables():
     assert len(NUMBERS) >= 33
-    tables = {"body", "wheels", "motor", "drive", "friction.axes", "friction.direction", "friction.wheels"}
+    tables = {"body", "wheels", "motor", "drive", "friction.axes", "friction.direction", "friction.wheels", "floor"}
     assert {key.table for key in NUMBERS} == {Key.parse(name).table for name in NAMES} == tables
 
 

@@ -26,7 +26,7 @@ multipliers need not be unique.
 A mode ends where a speed or a current becomes 0, a load reaches the edge of what holds, or a current meets or
 leaves its limit; the instant is found on the dense output, then polished on a step that ends there.
 
-What it cannot express, or only so: (1) Stribeck, bristles and slipping wheels are not here. (2) The ellipse
+What it cannot express, or only so: (1) Bristles and slipping wheels are not here. (2) The ellipse
 is singular at rest: it stops where its speed is below `NEARLY_STOPPED`, and starts 1e-9 s after its release
 (after 1e-3 of the time its load needs to double where it is released without a jump); both cost below 1e-11
 m/s. (3) A tie, a decision nearer than about 1e-9 to its edge, is decided one way; `Truth.margin` tells, and
@@ -169,8 +169,16 @@ class Mode:
         if p.turning:
             f[0] += p.mass[0] * v[2] * v[1]
             f[1] -= p.mass[0] * v[2] * v[0]
+        for e in np.flatnonzero(np.isfinite(p.stribeck) & (self.sigma != 0.0)):
+            speed, side = np.maximum(self.sigma[e] * (p.direction[e] @ v), 0.0), 0 if self.sigma[e] > 0 else 1
+            more = (p.hold[e, side] - p.slide[e, side]) * np.exp(-((speed / p.stribeck[e]) ** p.exponent[e]))
+            f -= np.multiply.outer(p.direction[e] * self.sigma[e], more)
         if self.ellipse_slides:
-            cx, cy = p.slide_ellipse
+            fallen = np.exp(-((np.hypot(v[0], v[1]) / p.stribeck_ellipse) ** p.exponent_ellipse))
+            if not math.isfinite(p.stribeck_ellipse):
+                fallen = 0.0 * fallen
+            cx = p.slide_ellipse[0] + (p.hold_ellipse[0] - p.slide_ellipse[0]) * fallen
+            cy = p.slide_ellipse[1] + (p.hold_ellipse[1] - p.slide_ellipse[1]) * fallen
             size = np.hypot(cx * v[0], cy * v[1]) + 1e-300
             f[0] -= cx * cx * v[0] / size
             f[1] -= cy * cy * v[1] / size

@@ -333,8 +333,8 @@ def decide(plant, force, at_rest, ellipse_at_rest, sigma, extra) -> Decision:
     released, ellipse_released, margin = set(), False, math.inf
     while True:
         level = plant.hold + extra[:, None]
-        level[sorted(released)] = (plant.slide + extra[:, None])[sorted(released)]
-        ellipse = plant.slide_ellipse if ellipse_released else plant.hold_ellipse
+        level[sorted(released)] = (plant.slide_at_rest + extra[:, None])[sorted(released)]
+        ellipse = plant.ellipse_at_rest if ellipse_released else plant.hold_ellipse
         problem = Problem(plant, force, at_rest, ellipse_at_rest, level[:, 0], level[:, 1], ellipse)
         a, sign, moves, edge = problem.solve()
         margin = min(margin, edge)

@@ -36,7 +36,9 @@ CLOSE = 1e-9  # a margin below this is a tie
 def key(robot, voltage, dt) -> str:
     """What the numbers of a robot and its program hash to, to ten digits: the same on every platform."""
     plant = plant_of(robot)
-    left_out = ("names",) if plant.spin.any() else ("names", "spin")  # as before there was any
+    left_out = ["names"] if plant.spin.any() else ["names", "spin"]  # as before there was any
+    if not np.isfinite([*plant.stribeck, plant.stribeck_ellipse]).any():
+        left_out += ["stribeck", "exponent", "stribeck_ellipse", "exponent_ellipse"]
     numbers = [getattr(plant, f.name) for f in fields(plant) if f.name not in left_out]
     flat = [*(n for n in numbers if n is not None), voltage, dt]
     text = " ".join(f"{x + 0.0:.10g}" for n in flat for x in np.where(np.abs(n) < 1e-12, 0.0, n).ravel().tolist())

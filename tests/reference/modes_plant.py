@@ -34,6 +34,20 @@ class Plant:
     names: tuple[str, ...]
     slide_ellipse: np.ndarray | None
     hold_ellipse: np.ndarray | None
+    stribeck: np.ndarray  # (elements,) speed [m/s, rad/s] over which hold falls to slide, inf: at once, from rest
+    exponent: np.ndarray  # (elements,)
+    stribeck_ellipse: float = math.inf
+    exponent_ellipse: float = 2.0
+
+    @property
+    def slide_at_rest(self) -> np.ndarray:
+        """Levels of what has just given way: what falls with the speed has not fallen yet."""
+        return np.where(np.isfinite(self.stribeck)[:, None], self.hold, self.slide)
+
+    @property
+    def ellipse_at_rest(self) -> np.ndarray | None:
+        """The same of the ellipse."""
+        return self.hold_ellipse if math.isfinite(self.stribeck_ellipse) else self.slide_ellipse
 
     @property
     def wheels(self) -> int:
@@ -76,10 +90,26 @@ def plant_of(robot) -> Plant:
     forward = each(rim.coulomb)
     backward = forward if rim.coulomb_backward is None else each(rim.coulomb_backward)
     hold_forward, hold_backward = each(rim.hold_forward), each(rim.hold_backward)
+    back = np.array(coulomb if axes.coulomb_backward is None else axes.coulomb_backward, dtype=float)
+    hold_back = np.array(breakaway if axes.coulomb_backward is None else back, dtype=float)
+    if axes.breakaway_backward is not None:
+        hold_back = np.array(axes.breakaway_backward, dtype=float)
+    falls = np.broadcast_to(np.asarray(axes.stribeck_speed or math.inf, dtype=float), (3,)).copy()
+    powers = [axes.stribeck_exponent] * 3
+    if way.yaw_stribeck_speed is not None:
+        falls[2], powers[2] = way.yaw_stribeck_speed, way.stribeck_exponent
+    rim_falls = each(rim.stribeck_speed, math.inf)
     b, efficiency = each(rim.viscous), each(m.gear_efficiency)
-    rows = [(np.eye(3)[k], (coulomb[k],) * 2, (breakaway[k],) * 2, -1, "xyw"[k]) for k in range(3) if breakaway[k] > 0]
+    rows = [
+        (np.eye(3)[k], (coulomb[k], back[k]), (breakaway[k], hold_back[k]), -1, "xyw"[k], falls[k], powers[k])
+        for k in range(3)
+        if breakaway[k] > 0
+    ]
     rows += [
-        (G[:, k], (forward[k], backward[k]), (hold_forward[k], hold_backward[k]), k, f"wheel {k + 1}")
+        (
+            *(G[:, k], (forward[k], backward[k]), (hold_forward[k], hold_backward[k]), k, f"wheel {k + 1}"),
+            *(rim_falls[k], rim.stribeck_exponent),
+        )
         for k in range(n)
         if hold_forward[k] > 0 or hold_backward[k] > 0 or efficiency[k] < 1
     ]
@@ -106,4 +136,8 @@ def plant_of(robot) -> Plant:
         names=tuple(row[4] for row in rows),
         slide_ellipse=np.array(way.coulomb) if max(holds) > 0 else None,
         hold_ellipse=np.array(holds) if max(holds) > 0 else None,
+        stribeck=np.array([row[5] for row in rows], dtype=float),
+        exponent=np.array([row[6] for row in rows], dtype=float),
+        stribeck_ellipse=math.inf if way.stribeck_speed is None else way.stribeck_speed,
+        exponent_ellipse=way.stribeck_exponent,
     )

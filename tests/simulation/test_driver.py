@@ -11,6 +11,7 @@ from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
 from omnidyn.model.drive import Drive
 from omnidyn.model.fitted.log_effects import Lateness, LogEffects
 from omnidyn.model.keys import Key
+from omnidyn.model.surroundings.floor import Floor
 from omnidyn.simulation.clocks import clock
 from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
@@ -118,14 +119,30 @@ def test_a_log_shows_each_channel_late_in_its_own_way():
     assert seen.twist == pytest.approx(plain.twist, abs=1e-9)
 
 
-def test_a_tilt_of_the_log_is_no_current_of_the_motors():
-    tilted = LogEffects(tilt=(3.0, 0.0, 0.0))
-    still = simulate(robot(), np.zeros((50, 3)), 0.01, log=tilted)
+def test_a_push_of_the_log_is_no_current_of_the_motors():
+    pushed = LogEffects(push=(3.0, 0.0, 0.0))
+    still = simulate(robot(), np.zeros((50, 3)), 0.01, log=pushed)
     assert not still.current.any()
-    gone = simulate(robot(), np.zeros((50, 3)), 0.01, log=LogEffects(tilt=(5.0, 0.0, 0.0)))
+    gone = simulate(robot(), np.zeros((50, 3)), 0.01, log=LogEffects(push=(5.0, 0.0, 0.0)))
     assert gone.twist[-1, 0] > 0.0
     rim = WORLD.G.T @ gone.twist[-1]
     assert gone.current[-1] == pytest.approx(-WORLD.ke * rim / np.array(WORLD.resistance))
+
+
+def test_a_tilt_of_the_log_is_a_slope_under_the_robot():
+    pull = 4.0
+    degrees = float(np.degrees(np.arcsin(pull / (robot().body.mass * 9.81))))
+    slope = robot().replace(floor=Floor(tilt=degrees, downhill=90.0))
+    run = simulate(robot(), volts(4), 0.01, log=LogEffects(tilt=(0.0, pull)), pose=(0.0, 0.0, 0.6))
+    assert "implicit" in run.source
+    same = simulate(slope, volts(4), 0.01, pose=(0.0, 0.0, 0.6))
+    assert run.twist == pytest.approx(same.twist, abs=1e-9)
+    assert run.pose == pytest.approx(same.pose, abs=1e-9)
+
+
+def test_a_tilt_of_three_numbers_was_a_push():
+    with pytest.raises(InputError, match=r"tilt \[0.4, 0.0, 0.0\] has three entries.*on the body: call it push"):
+        LogEffects(tilt=(0.4, 0.0, 0.0))  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(

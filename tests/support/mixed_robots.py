@@ -84,6 +84,64 @@ def with_spin(robot: Robot, seed: int, heavy: float = 1.0) -> Robot:
     )
 
 
+def with_stribeck(robot: Robot, seed: int) -> Robot:
+    """The robot with levels that fall with the speed, each its own, wherever its breakaway is above coulomb."""
+    random, changed = Random(f"stribeck {seed}"), {}
+
+    def speed(scale: float = 1.0) -> float:
+        return float(f"{scale * 10 ** random.uniform(-2.2, -0.8):.4g}")
+
+    for name in [n for n in ("axes", "direction", "wheels") if n in robot.friction.model_fields_set]:
+        law = getattr(robot.friction, name)
+        if law.breakaway is None:
+            continue
+        falls = {"stribeck_exponent": random.choice((2.0, 2.0, 1.0, 1.4, 3.0))}
+        if name == "axes":
+            falls["stribeck_speed"] = (speed(), speed(), speed(10.0))
+        elif name == "direction":
+            falls |= {"stribeck_speed": speed()}
+            if "axes" not in robot.friction.model_fields_set:
+                falls |= {"yaw_stribeck_speed": speed(10.0)}
+        else:
+            falls["stribeck_speed"] = tuple(speed() for _ in range(robot.wheels.count))
+        changed[name] = law.replace(**falls)
+    if "axes" in changed and "direction" in changed:  # about yaw there is one law
+        way = changed["direction"].replace(yaw_coulomb=0.0, yaw_breakaway=None, yaw_stribeck_speed=None)
+        changed["direction"] = way
+    return robot.replace(friction=Friction(**changed))
+
+
+def with_bristles(robot: Robot, seed: int) -> Robot:
+    """The robot with bristles of its own wherever it has friction, and plain motors: what bristles.py integrates."""
+    random, changed, about_yaw = Random(f"bristles {seed}"), {}, False
+
+    def stiff(low: float = 3.0, high: float = 4.5) -> float:
+        return float(f"{10 ** random.uniform(low, high):.4g}")
+
+    for name in [n for n in ("axes", "direction", "wheels") if n in robot.friction.model_fields_set]:
+        law, kind = getattr(robot.friction, name), random.choice(("lugre", "lugre", "dahl"))
+        new = {"law": kind, "stiffness": stiff()}
+        falls = kind == "lugre" and law.breakaway is not None
+        if kind == "dahl":
+            new |= {k: None for k in ("breakaway", "breakaway_backward", "yaw_breakaway") if hasattr(law, k)}
+        elif random.random() < 0.4:
+            new["damping_speed"] = (0.1, 0.1, 1.0) if name == "axes" else 0.1
+        if name == "axes":
+            about_yaw, new["stiffness"] = True, (stiff(), stiff(), 0.02 * stiff())
+            new |= {"stribeck_speed": (0.02, 0.05, 0.3)} if falls else {}
+            new |= {"dahl_exponent": random.choice((1.0, 1.5, 2.0))} if kind == "dahl" else {}
+        elif name == "direction":
+            turning = {"yaw_stiffness": 0.02 * stiff()} | ({"yaw_stribeck_speed": 0.3} if falls else {})
+            none = {"yaw_coulomb": 0.0, "yaw_breakaway": None}
+            new |= ({"stribeck_speed": 0.03} if falls else {}) | (none if about_yaw else turning)
+        else:
+            new["stiffness"] = tuple(stiff() for _ in range(robot.wheels.count))
+            new |= {"stribeck_speed": 0.04} if falls else {}
+        changed[name] = law.replace(**new)
+    plain = robot.motor.replace(voltage_drop=0.0, current_limit=None, gear_efficiency=1.0)
+    return robot.replace(friction=Friction(**changed), motor=plain)
+
+
 def _wheels(random, around, some) -> Wheels:
     """3 to 6 wheels at random azimuths, or four mecanum wheels."""
     radius = some(0.035, 0.2, 4)

@@ -5,7 +5,11 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import check, compare, deadzone, demo, drift, identify, init, robots, simulate, warm
+from omnidyn.cli import check, compare, demo, drift, identify, init, robots, simulate, warm
+from omnidyn.cli.at_rest import deadzone, friction
+from omnidyn.cli.control import track, tune
+from omnidyn.cli.exchange import bring, export
+from omnidyn.cli.logs import convert, info
 from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.streams import show
 
@@ -39,6 +43,8 @@ def _omnidyn(
 
 for _command in (
     demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, drift.drift,
-    deadzone.deadzone, robots.robots, warm.warm,
+    deadzone.deadzone, friction.friction, track.track, tune.tune, info.info, convert.convert, robots.robots,
+    export.export, warm.warm,
 ):  # fmt: skip
     app.command(cls=Grouped)(_command)
+app.command("import", cls=Grouped)(bring.bring)

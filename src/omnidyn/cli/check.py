@@ -51,6 +51,8 @@ def check(
     save_map: str = log_options.SAVE_MAP,
     no_header: bool = log_options.NO_HEADER,
     skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
+    max_bytes: int = log_options.MAX_BYTES,
+    var: list[str] = log_options.VARIABLE,
     current_unsigned: bool = log_options.CURRENT_UNSIGNED,
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="The verdicts for machines."),
@@ -67,7 +69,9 @@ def check(
     log_options.keep_inputs(log, [robot], [map_file], picture, save_map)
     if len(log) == 1:
         log_options.refuse_missing(log)
-    options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
+    options = log_options.log_options(
+        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var
+    )
     maps = log_options.Maps(save_map, force)
     with progress("reading") as now:
         files = log_options.log_files(log)

@@ -24,6 +24,7 @@ MOST_ROBOTS = 2
 def compare(
     log: list[str] = log_options.LOGS,
     robot: list[str] = typer.Option(..., "--robot", metavar="ROBOT", help="A preset or a robot file; at most twice."),
+    with_: str = log_options.WITH,
     fail_if: list[str] = typer.Option(
         [], "--fail-if", metavar="RULE", help='Exit 5 where it holds for the first robot: "vx.rmse>0.05". Repeatable.'
     ),
@@ -41,6 +42,8 @@ def compare(
     sort: bool = log_options.SORT,
     no_header: bool = log_options.NO_HEADER,
     skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
+    max_bytes: int = log_options.MAX_BYTES,
+    var: list[str] = log_options.VARIABLE,
     current_unsigned: bool = typer.Option(False, "--current-unsigned", help="Currents are |i|: compare by size."),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="The comparison for machines."),
@@ -59,10 +62,11 @@ def compare(
     from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
 
     rules = [parse_threshold(text) for text in fail_if]
-    options = log_options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows)
+    how = (map_file, column, assume, latency, no_header, skip_bad_rows, False, max_bytes, var)
+    options = log_options.log_options(*how)
     maps = log_options.Maps(save_map, force)
     with progress("reading") as now:
-        files, robots = log_options.log_files(log), _robots(robot)
+        files, robots = log_options.log_files(log), _robots(robot, with_)
         runs, hashes = _runs(files, robots[0], options, sort, maps, now)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
         found = _compared(robots, runs, apply, hold, current_unsigned, band, now)
@@ -75,10 +79,11 @@ def compare(
         end_failed(found.verdict)
 
 
-def _robots(names: Sequence[str]) -> list[Robot]:
+def _robots(names: Sequence[str], with_: str) -> list[Robot]:
     from omnidyn.model.robot_file import load_robot
+    from omnidyn.model.varied.vary import vary_as
 
-    return [load_robot(name) for name in names]
+    return [vary_as(load_robot(name), with_) for name in names]
 
 
 def _runs(

@@ -63,6 +63,8 @@ def identify(
     sort: bool = options.SORT,
     no_header: bool = options.NO_HEADER,
     skip_bad_rows: bool = options.SKIP_BAD_ROWS,
+    max_bytes: int = options.MAX_BYTES,
+    var: list[str] = options.VARIABLE,
     current_unsigned: bool = options.CURRENT_UNSIGNED,
     **asked: Any,
 ) -> None:
@@ -96,7 +98,9 @@ def identify(
 
         tell_motor_table(logs[0], robot, question, to)
         return
-    how = options.log_options(map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned)
+    how = options.log_options(
+        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var
+    )
     _identify(logs, robot, question, Reading(how, sort, options.Maps(save_map, force)), to)
 
 
@@ -113,7 +117,7 @@ def _question(asked: dict[str, Any]) -> Question:
 def _identify(arguments: list[str], robot: str, question: Question, reading: Any, to: Any) -> None:
     """Read, choose the method, identify, tell."""
     from omnidyn.cli.identify_logs import load_runs
-    from omnidyn.cli.identify_show import tell
+    from omnidyn.cli.identify_show import load_meanwhile, tell
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.identification.identify import Identification, settle_method
     from omnidyn.model.robot_file import load_robot
@@ -137,6 +141,7 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
             question = replace(question, group=loaded.folders)
         elif loaded.folders:
             told("all folders are fitted together; `per` NAME=GLOB makes groups of them")
+        load_meanwhile(to)
         found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
         now("writing")
         tell(found, record, to)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -49,6 +51,19 @@ class Out:
         for error in self.failed:
             say("omnidyn: the report could not be made; everything else is written")
             raise error
+
+
+def load_meanwhile(to: Out) -> None:
+    """Load what comes after a fit while it simulates, which leaves the interpreter free. What fails is told later."""
+
+    def load() -> None:
+        with contextlib.suppress(Exception):
+            import omnidyn.identification.structure.diagnosis
+
+            if to.report:
+                import omnidyn.report.fit_page  # noqa: F401
+
+    threading.Thread(target=load).start()
 
 
 def tell(found: Identification, record: dict[str, Any], to: Out) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli import log_options as logs
+from omnidyn.cli import log_options
 from omnidyn.cli.init_answers import LEAST_WHEELS, MOST_WHEELS, Answers, complete
 from omnidyn.cli.init_logs import as_seen, from_logs
 from omnidyn.cli.terminal.numbers import number_words
@@ -52,10 +52,12 @@ def init(
     speed_loop: str = typer.Option(
         "", metavar="[KP,KI,]HZ", help="The firmware holds wheel speeds: V s/rad, V/rad, ticks a second."
     ),
-    map_file: str = logs.MAP,
-    column: list[str] = logs.COLUMN,
-    assume: list[str] = logs.ASSUME,
-    no_header: bool = logs.NO_HEADER,
+    map_file: str = log_options.MAP,
+    column: list[str] = log_options.COLUMN,
+    assume: list[str] = log_options.ASSUME,
+    no_header: bool = log_options.NO_HEADER,
+    max_bytes: int = log_options.MAX_BYTES,
+    var: list[str] = log_options.VARIABLE,
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File to write instead; - is stdout."),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="What was written and guessed, for machines."),
@@ -68,21 +70,19 @@ def init(
     given = {
         "wheels": wheels, "azimuth": _listed("azimuth", azimuth), "wheel_radius": _radii("wheel_radius", wheel_radius),
         "robot_radius": _radii("robot_radius", robot_radius), "mass": mass, "voltage_limit": voltage_limit,
-        "speed_loop": _listed("speed_loop", speed_loop),
-        "gear_ratio": gear_ratio, "rotor_inertia": rotor_inertia,
+        "speed_loop": _listed("speed_loop", speed_loop), "gear_ratio": gear_ratio, "rotor_inertia": rotor_inertia,
     }  # fmt: skip
     _refuse_words(given, mecanum, friction, like, out, json)
     _refuse_numbers(given)
-    name = name.removesuffix(".toml")
-    path = _checked_path(name, out, force)
-    logs.keep_inputs(log, [like], [map_file], "" if path == "-" else path)
-    logs.refuse_missing(log)
+    path = _checked_path(name := name.removesuffix(".toml"), out, force)
+    log_options.keep_inputs(log, [like], [map_file], "" if path == "-" else path)
+    log_options.refuse_missing(log)
     preset = _preset(like)
     told = {key for key, value in given.items() if value is not None}
-    if not log and (map_file or column or assume or no_header):
-        raise typer.BadParameter("--map, --column, --assume and --no-header are for --log.")
-    options = logs.log_options(map_file, column, assume, no_header=no_header)
-    seen = from_logs(given, log, options, mecanum) if log else None
+    how = (map_file, column, assume, (), no_header, False, False, max_bytes, var)
+    if not log and any(how):
+        raise typer.BadParameter("--map, --column, --assume, --no-header, --max-bytes and --var are for --log.")
+    seen = from_logs(given, log, log_options.log_options(*how), mecanum) if log else None
     found = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
     answers = complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
     robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from omnidyn.cli import log_options as logs
+from omnidyn.cli import log_options
 from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.cli.terminal.streams import say
 
@@ -20,8 +20,8 @@ def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanu
     """Azimuths, and the radius of the robot where it turned, from logs; what is given on the command line stays."""
     from omnidyn.logs.geometry import as_mecanum, wheel_geometry
 
-    runs, maps = [], logs.Maps()
-    for path, each in logs.load_logs(logs.log_files(log), None, options):
+    runs, maps = [], log_options.Maps()
+    for path, each in log_options.load_logs(log_options.log_files(log), None, options):
         maps.show(path, each.columns)
         runs.append(each.to_run())
     seen = wheel_geometry(runs, "--robot-radius" if mecanum else "`azimuth`")

@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
 
-ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".parquet", ".pq", ".log")  # what is taken from a folder
+ENDINGS = (
+    ".csv", ".txt", ".tsv", ".dat", ".parquet", ".pq", ".log", ".mcap", ".db3", ".bag", ".wpilog", ".mat",
+)  # fmt: skip  # what is taken from a folder
 MAX_FILES = 100_000
 
-LOGS = typer.Argument(metavar="LOG...", help="Logs (CSV, Parquet), or folders of them.")
+LOGS = typer.Argument(metavar="LOG...", help="Logs (CSV, Parquet, bags of ROS, ..), or folders of them.")
 MAP = typer.Option(
     "", "--map", metavar="FILE", help="Which column is what (TOML), instead of a guess.", rich_help_panel=MORE
 )
@@ -49,11 +51,22 @@ NO_HEADER = typer.Option(
 SKIP_BAD_ROWS = typer.Option(
     False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.", rich_help_panel=MORE
 )
+MAX_BYTES = typer.Option(
+    0, "--max-bytes", min=0, metavar="N", help="Most bytes held at once; default: a quarter of the memory.",
+    rich_help_panel=MORE,
+)  # fmt: skip
+VARIABLE = typer.Option(
+    [], "--var", metavar="NAME", help="Read this variable of a MATLAB file alone, with all in it. Repeatable.",
+    rich_help_panel=MORE,
+)  # fmt: skip
 CURRENT_UNSIGNED = typer.Option(
     False,
     "--current-unsigned",
     help="Currents are |i|: they get the sign of the commanded speed.",
     rich_help_panel=MORE,
+)
+WITH = typer.Option(
+    "", "--with", metavar="KIND=NAME,..", help="Vary the robot: payload, floor, tilt, battery by name of its file."
 )
 
 
@@ -65,6 +78,8 @@ def log_options(
     no_header: bool = False,
     skip_bad_rows: bool = False,
     current_unsigned: bool = False,
+    max_bytes: int = 0,
+    variables: Sequence[str] = (),
 ) -> LogOptions:
     """The options as the readers take them. Raises InputError for what cannot be read."""
     from omnidyn.logs.columns.mapping import load_map
@@ -78,6 +93,8 @@ def log_options(
         header=not no_header,
         skip_bad_rows=skip_bad_rows,
         current_unsigned=current_unsigned,
+        max_bytes=max_bytes or None,
+        variables=tuple(variables),
     )
 
 
@@ -105,16 +122,23 @@ def log_files(arguments: Sequence[str]) -> list[str]:
     Numbers in names count as numbers (exp2 before exp10). Raises InputError for a folder without logs.
     """
     from omnidyn.errors import InputError
+    from omnidyn.logs.readers.folders import METADATA, is_bag_folder, natural
 
     files: list[str] = []
     for argument in arguments:
-        if not os.path.isdir(argument):
+        if not os.path.isdir(argument) or is_bag_folder(argument):
             files.append(argument)
             continue
-        found = [str(path) for path in Path(argument).rglob("*") if path.suffix.lower() in ENDINGS and path.is_file()]
+        bags = [path.parent for path in Path(argument).rglob(METADATA) if is_bag_folder(path.parent)]
+        found = [
+            str(path)
+            for path in Path(argument).rglob("*")
+            if path.suffix.lower() in ENDINGS and path.is_file() and path.parent not in bags
+        ]
+        found += map(str, bags)
         if not found:
             raise InputError("no log in the folder", expected=f"files that end in {' '.join(ENDINGS)}", where=argument)
-        files += sorted(found, key=_natural)
+        files += sorted(found, key=natural)
     if len(files) > MAX_FILES:
         raise InputError("too many files", got=len(files), expected=f"at most {MAX_FILES}")
     once = list(dict.fromkeys(files))
@@ -141,16 +165,12 @@ def keep_inputs(logs: Sequence[str], robots: Sequence[str], others: Sequence[str
 def refuse_missing(logs: Sequence[str]) -> None:
     """Logs that are not there, before anything slow is loaded. Raises InputError."""
     from omnidyn.files import open_regular
+    from omnidyn.logs.readers.folders import files_of
 
     for path in log_files(logs):
-        with open_regular(path):
-            pass
-
-
-def _natural(path: str) -> list[Any]:
-    import re
-
-    return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", path)]
+        for file in files_of(path):
+            with open_regular(file):
+                pass
 
 
 def load_logs(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from omnidyn.cli.log_options import WITH
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
@@ -35,6 +36,7 @@ def simulate(
     twist: str = typer.Option("0,0,0", metavar="VX,VY,W", help="Where it starts [m/s, m/s, rad/s]."),
     pose: str = typer.Option("0,0,0", metavar="X,Y,HEADING", help="Where it starts [m, m, rad]."),
     tol: float = typer.Option(1e-6, help="Error of the implicit engine [m/s]; 0 takes one fixed step a row."),
+    with_: str = WITH,
     band: bool = typer.Option(
         False, "--band", help="How far it may be off by the std of the robot file; two files more."
     ),
@@ -57,7 +59,7 @@ def simulate(
     files = _ends_of(out) if band and out else []
     _refuse_early(robot, voltages, ["" if path == "-" else path for path in (out, *files)], force)
     with progress("simulating (the first run of an engine compiles it)") as now:
-        job = _Job.read(robot, voltages, duration, max_steps)
+        job = _Job.read(robot, voltages, duration, max_steps, with_)
         run = job.run(twist=start_twist, pose=start_pose, tol=tol or None)
         ends = None
         if band:
@@ -103,13 +105,14 @@ class _Job:
     record: dict[str, Any]
 
     @classmethod
-    def read(cls, robot: str, voltages: str, duration: float | None, max_steps: int) -> _Job:
+    def read(cls, robot: str, voltages: str, duration: float | None, max_steps: int, with_: str) -> _Job:
         """From the files that the command names."""
         from omnidyn.cli.terminal.session import provenance, robot_input
         from omnidyn.logs.command_file import read_commands
         from omnidyn.model.robot_file import load_robot
+        from omnidyn.model.varied.vary import vary_as
 
-        loaded = load_robot(robot)
+        loaded = vary_as(load_robot(robot), with_)
         held = read_commands(voltages, loaded.wheels.count, duration, max_steps)
         record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": held.sha256}])
         return cls(loaded, held, record)

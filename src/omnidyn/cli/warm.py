@@ -17,8 +17,8 @@ from omnidyn.compiled.hearing import Compiling, heard
 def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
     """Compile all that first runs need, once.
 
-    Small runs and fits of every kind are made; what is compiled for them stays on disk. Takes about a minute, and
-    a second where all is there. After an update only what has changed is compiled.
+    Small runs, fits and closed loops of every kind are made; what is compiled for them stays on disk. Takes about a
+    minute, and a second where all is there. After an update only what has changed is compiled.
     """
     started = time.monotonic()
     with progress("loading", hint="") as now, heard() as compiling:
@@ -44,9 +44,10 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
 def _make(now: Callable[[str], None], compiling: Compiling) -> list[Any]:
     """Every run and fit, in turn; says which of them had to wait, for what and how long. Returns their kernels."""
     from omnidyn.compiled.kernel import kept
-    from omnidyn.identification.first_runs import first_runs
+    from omnidyn.control import first_runs as of_control
+    from omnidyn.identification import first_runs as of_identification
 
-    every = first_runs()
+    every = [*of_identification.first_runs(), *of_control.first_runs()]
     for k, (what, make) in enumerate(every):
         done, step = len(compiling.done), f"{k + 1} of {len(every)}, {what}"
         now(step)

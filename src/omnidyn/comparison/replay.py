@@ -87,6 +87,8 @@ def effects_of(robot: Robot, run: Run) -> tuple[LogEffects | None, list[str]]:
     log = robot.log
     if log is None or log.is_of(run):
         return log, []
+    if not log.words:
+        return None, []
     return None, [
         f"{robot.name} was fitted with what its own logs did beside the robot ({log.words}); this is another log, and "
         "gets none of it"

@@ -18,7 +18,7 @@ from omnidyn.document import Document, Part, Points, Words
 from omnidyn.logs.channels import place
 from omnidyn.model.first_guess import guess_line
 from omnidyn.run import Run
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import FIGURE, FRAME, Shown, make
 from omnidyn.simulation.band import Band
 
 if TYPE_CHECKING:
@@ -81,6 +81,13 @@ class Comparison(Shown):
         three by default. Raises InputError for one that was not compared.
         """
         return make(FIGURE, self, log=log, channels=channels)
+
+    def to_dataframe(self, library: str = "pandas") -> Any:
+        """A DataFrame with a row for each robot and component: rmse, fit, vaf and so on, with their unit.
+
+        library: "pandas" or "polars". Raises MissingExtraError where it is not installed.
+        """
+        return make(FRAME, self, library=library)
 
     @property
     def rmse(self) -> dict[str, float]:

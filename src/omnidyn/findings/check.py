@@ -31,7 +31,7 @@ from omnidyn.findings.values.values import check_values
 from omnidyn.findings.wiring.wheels import check_wiring
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
-from omnidyn.run import Run
+from omnidyn.run import Run, as_run
 
 __all__ = ["check", "check_blocks", "check_log"]
 
@@ -58,6 +58,7 @@ def check(log: Log | Run, robot: Robot | None = None) -> Verdict:
     Never raises for what the log holds; InputError for what is neither, or where log and robot are swapped.
     """
     check_order("check(log) or check(log, robot)", (log, (Log, Run)), (robot, (Robot, type(None))))
+    log = as_run(log)
     recorded = Log.of_run(log) if isinstance(log, Run) else log
     return replace(check_log(recorded, robot), log=recorded)
 

@@ -10,6 +10,8 @@ from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import products, slope, smooth
 from omnidyn.logs.channels import components
+from omnidyn.model.motor import settled_current, traction
+from omnidyn.simulation.slip.plant import grips
 from omnidyn.statistics import robust_std
 
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
@@ -38,7 +40,7 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             "slip", WARN, names,
             f"from t = {work.t[rows[0]]:.5g} to {work.t[rows[-1]]:.5g} s the robot covers {inside / outside:.3g} "
             f"(+-{error:.2g}) of the path its wheels roll, measured by the rest of the log ({inside:.3g} there, "
-            f"{outside:.3g} elsewhere): it slips, or was pushed",
+            f"{outside:.3g} elsewhere): it slips, or was pushed{_against_the_limit(work, bad)}",
             "leave those rows out of fits of wheel speed against ground speed", work.lines(bad), int(bad.sum()),
             {"ratio": inside / outside, "error": error, "from_s": float(work.t[rows[0]]),
              "to_s": float(work.t[rows[-1]])},
@@ -47,6 +49,24 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         values[bad] = np.nan
         work = work.replace(**{seen.name: values})
     return found, work
+
+
+def _against_the_limit(work: LogUnderCheck, bad: BoolArray) -> str:
+    """What the motors push with in those rows, beside what the floor of the robot file takes, in words."""
+    robot = work.robot
+    if robot is None or robot.wheels.traction_mu is None:
+        return ""
+    current, voltage, speed = (work.full(name) for name in ("current", "voltage", "wheel_speed"))
+    if current is None and voltage is not None and speed is not None:
+        current = settled_current(robot.motor, voltage, speed)
+    limit = grips(robot)
+    said = ", ".join(f"{each:.3g}" for each in sorted(set(np.round(limit, 6).tolist())))
+    floor = f"the floor of the robot file takes {said} N of a wheel (traction_mu)"
+    if current is None or not np.isfinite(pushes := np.abs(traction(robot.motor, robot.wheels, current[bad]))).any():
+        return f"; {floor}"
+    beyond = pushes > limit
+    return f"; the motors push with up to {np.nanmax(pushes):.3g} N a wheel there, beyond the limit in " \
+           f"{100.0 * beyond.any(axis=1).mean():.2g} % of the rows: {floor}"  # fmt: skip
 
 
 def _worst(work: LogUnderCheck) -> tuple[BoolArray, float, float, float] | None:

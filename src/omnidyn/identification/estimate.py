@@ -14,7 +14,7 @@ from omnidyn.model.first_guess import rests_on, rests_on_guesses
 from omnidyn.model.keys import in_words, unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import FIGURE, FRAME, Shown, make
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,6 +73,13 @@ class Estimate(Shown):
     def plot(self) -> Figure:
         """Friction against speed along x, along y and about yaw, with its 95 % band, as a matplotlib Figure."""
         return make(FIGURE, self)
+
+    def to_dataframe(self, library: str = "pandas") -> Any:
+        """A DataFrame with a row for each number: value, std, 95 % interval, unit.
+
+        library: "pandas" or "polars". Raises MissingExtraError where it is not installed.
+        """
+        return make(FRAME, self, library=library)
 
     @property
     def verdict(self) -> str:

@@ -29,9 +29,9 @@ from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STE
 from omnidyn.identification.recordings import fingerprint
 from omnidyn.identification.steady.axis_lines import identify_lines
 from omnidyn.identification.steady.settling import why_no_transient
-from omnidyn.identification.steady.study import SteadyStudy, identify_steady
+from omnidyn.identification.steady.study import identify_steady
 from omnidyn.identification.steady.study_parts import Difference
-from omnidyn.identification.steady.study_table import study_document
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.identification.verdict import fit_failure, fits_verdict, lines_verdict, steady_failure, steady_verdict
 from omnidyn.identification.whole_logs import fit_output_error, solved
@@ -211,7 +211,7 @@ class Identification(Shown):
 
     def _told(self) -> Document:
         if self.study is not None:
-            told = study_document(self.study)
+            told = self.study.document()
             return replace(told, data={"ok": not self.failures, **told.data, "check": checked(self.verdicts)})
         if self.method == OUTPUT_ERROR:
             told = fit_document(self.fits, self.validations or {}, self.differences, self.verdicts, self.advice)

@@ -18,7 +18,6 @@ UNOFFERED = {
     "friction one way": "friction that is another one backward than forward",
     "friction over speed": "friction that falls with the speed",
     "drag": "drag that grows with the square of the speed",
-    "force in the room": "a force that stays in the room, as of a cable or a slope",
     "turns of the wheels": "something that comes back with the turns of the wheels",
     "sag": "a supply that sags under load",
     "heat": "motors that weaken as they warm up",

@@ -69,10 +69,10 @@ class Question:
         (), "Leave this as the robot file has it.", of=(FIT,), metavar="KEY", flag="fix", first=True,
     )  # fmt: skip
     nuisances: tuple[str, ...] | None = _option(
-        None, "Fit what the log does: latency, gain, dead_band, fade, tilt, none; default: auto.",
-        '"latency.twist" is that of one channel, "tilt.x" of one axis. None or "auto": latency and dead band, and the '
-        "gain where the supply is only nominal, as far as the logs determine them; a warning says what else would fit "
-        'the logs better. () or "none": none.',
+        None, "Fit what the log does: latency, gain, dead_band, fade, tilt, push, none; default: auto.",
+        '"latency.twist" is that of one channel, "push.x" of one axis; a tilt stays in the room. None or "auto": '
+        "latency and dead band, and the gain where the supply is only nominal, as far as the logs determine them; a "
+        'warning says what else would fit the logs better. () or "none": none.',
         of=(FIT, MOTOR_FIT), metavar="NAME", flag="nuisance",
     )  # fmt: skip
     loss: str = _option(

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.comparison.aligned import PATH, errors_for_whiteness
 from omnidyn.comparison.compare import compare
@@ -21,7 +22,7 @@ from omnidyn.comparison.verdict import is_missed
 from omnidyn.document import Document, Table, cell, chance_cell
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
-from omnidyn.run import Run
+from omnidyn.run import Run, as_list
 from omnidyn.statistics import difference_noise, find_tick, robust_std
 
 STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
@@ -162,6 +163,8 @@ def validate(
 
     Raises InputError and InsufficientDataError as `compare` does.
     """
+    runs, held_out = as_list(runs), as_list(held_out)
+    check_order("validate(fit, runs)", (fit, OutputErrorEstimate), (runs, Run), (held_out, Run))
     fitted = _compared(fit, runs, progress)
     other = _compared(fit, held_out, progress) if held_out else None
     scores = {FITTED: _scores(fit, fitted, runs)} | ({HELD_OUT: _scores(fit, other, held_out)} if other else {})
@@ -169,7 +172,7 @@ def validate(
 
 
 def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[[str], object] | None) -> Comparison:
-    return compare(fit.robot, [run.as_measured() for run in runs], progress=progress, log=fit.robot.log)
+    return compare(fit.robot, list(runs), progress=progress, log=fit.robot.log)
 
 
 def _scores(fit: OutputErrorEstimate, found: Comparison, logged: Sequence[Run]) -> dict[str, Score]:

@@ -13,7 +13,7 @@ from omnidyn.findings.finding import FATAL, Verdict
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.steady.choice import ShapeScore
-from omnidyn.identification.steady.study import SteadyStudy
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name
 
 NAMED = 4  # shapes that are named

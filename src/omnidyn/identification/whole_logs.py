@@ -52,6 +52,7 @@ def identify_groups(
     has too few runs for a bootstrap, UnsupportedError for robots and logs that output error does not take.
     """
     check_order("identify_groups(runs, robot, groups)", (runs, Run), (robot, Robot))
+    runs = as_list(runs)
     progress = Progress.of(watch)
     fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
     return solved(fit, runs, progress)
@@ -67,7 +68,7 @@ def solved(fit: Fit, runs: Sequence[Run], progress: Progress) -> Answer:
             remedy="climb it with the logs of one group, and fit the groups with the robot that it writes",
             where="ladder",
         )  # fmt: skip
-    from omnidyn.identification.structure.climb import climb  # here, for it takes time to load
+    from omnidyn.identification.structure.ladder.climb import climb  # here, for it takes time to load
 
     best, solution, ladder = climb(fit, fit.solve(progress), runs, progress)
     answer = answered(best, solution, progress)

@@ -1,28 +1,108 @@
-"""A Run as a pandas DataFrame: the columns of a run file, over time."""
+"""Runs, estimates and comparisons as data frames of pandas or polars, with their units.
+
+pandas holds source, warnings and units in `attrs`; polars has no place for them: there units are a column of a table,
+and the ends of the names of a Run.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import importlib
+from collections.abc import Mapping
+from typing import Any
 
-from omnidyn.errors import MissingExtraError
-from omnidyn.logs.run_file import run_columns
+import numpy as np
+
+from omnidyn.comparison.result import Comparison
+from omnidyn.comparison.traces import unit as component_unit
+from omnidyn.errors import InputError, MissingExtraError
+from omnidyn.identification.estimate import Estimate
+from omnidyn.logs.run_file import run_columns, unit_of_column
+from omnidyn.model.keys import unit
 from omnidyn.run import Run
 
-if TYPE_CHECKING:
-    from pandas import DataFrame  # pyright: ignore[reportMissingImports]
+PANDAS, POLARS = "pandas", "polars"
+LIBRARIES = (PANDAS, POLARS)
+INSTALL = 'pip install "omnidyn[arrays]"'
+METRICS = ("samples", "rmse", "max", "bias", "fit_percent", "vaf", "whiteness", "lag")
 
 
-def to_dataframe(run: Run) -> DataFrame:
-    """Columns u1_V, w1_rad_s, vx_m_s, ... over the index t_s; NaN where a value is missing.
+def to_dataframe(value: Run | Estimate | Comparison, library: str = PANDAS) -> Any:
+    """A data frame. Of a Run: columns u1_V, w1_rad_s, vx_m_s, ... over t_s; NaN where a value is missing.
 
-    Source and warnings of the run stand in `attrs`. Raises MissingExtraError where pandas is not installed.
+    Of an Estimate: a row for each number, with value, std, its 95 % interval and unit. Of a Comparison: a row for each
+    robot and component. library: "pandas" or "polars". In pandas source, warnings and units stand in `attrs`.
+    Raises MissingExtraError where the library is not installed, InputError for another one.
     """
-    try:
-        import pandas  # pyright: ignore[reportMissingImports]
-    except ImportError:
-        raise MissingExtraError("a data frame needs pandas", remedy='pip install "omnidyn[arrays]"') from None
-    columns = run_columns(run)
-    index = pandas.Index(columns.pop("t_s"), name="t_s")
-    frame = pandas.DataFrame(columns, index=index)
-    frame.attrs |= {"source": run.source, "warnings": list(run.warnings)}
+    if library not in LIBRARIES:
+        raise InputError(
+            "no such library of data frames", got=library, expected=" or ".join(LIBRARIES), where="library"
+        )
+    made = _library(library)
+    if isinstance(value, Run):
+        return _of_run(value, made, library)
+    if isinstance(value, Estimate):
+        columns, attributes = _of_estimate(value)
+    else:
+        columns, attributes = _of_comparison(value)
+    frame = made.DataFrame(columns)
+    if library == PANDAS:
+        frame.attrs |= attributes
     return frame
+
+
+def _library(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise MissingExtraError(f"a data frame needs {name}", remedy=INSTALL) from None
+
+
+def _of_run(run: Run, made: Any, library: str) -> Any:
+    columns = run_columns(run)
+    if library == POLARS:
+        return made.DataFrame({name: np.ascontiguousarray(values) for name, values in columns.items()})
+    units = {name: unit_of_column(name) for name in columns}
+    index = made.Index(columns.pop("t_s"), name="t_s")
+    frame = made.DataFrame(columns, index=index)
+    frame.attrs |= {"source": run.source, "warnings": list(run.warnings), "units": units}
+    return frame
+
+
+def _of_estimate(estimate: Estimate) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
+    names = list(estimate.value)
+    unknown = set(estimate.unidentifiable)
+    known = [name not in unknown for name in names]
+    columns = {
+        "parameter": names,
+        "value": [float(estimate.value[name]) for name in names],
+        "std": [float(estimate.std[name]) if k else np.nan for name, k in zip(names, known, strict=True)],
+        "low": [float(estimate.ci95[name][0]) if k else np.nan for name, k in zip(names, known, strict=True)],
+        "high": [float(estimate.ci95[name][1]) if k else np.nan for name, k in zip(names, known, strict=True)],
+        "unit": [unit(name) for name in names],
+    }
+    attributes = {
+        "robot": estimate.robot.name, "method": estimate.method, "data": estimate.data,
+        "warnings": list(estimate.warnings), "units": dict(zip(names, columns["unit"], strict=True)),
+    }  # fmt: skip
+    return columns, attributes
+
+
+def _of_comparison(found: Comparison) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
+    rows = [(robot, name, each) for robot in found.robots for name, each in found.overall[robot].items()]
+    columns: dict[str, list[Any]] = {
+        "robot": [robot for robot, _, _ in rows], "component": [name for _, name, _ in rows],
+        "unit": [component_unit(name) for _, name, _ in rows],
+    }  # fmt: skip
+    for metric in METRICS:
+        values = [getattr(each, metric) for _, _, each in rows]
+        columns[metric] = values if metric == "samples" else [np.nan if v is None else float(v) for v in values]
+    units = {
+        "fit_percent": "%",
+        "vaf": "%",
+        "whiteness": "1",
+        "lag": "s",
+        "rmse": "unit",
+        "max": "unit",
+        "bias": "unit",
+    }
+    return columns, {"warnings": list(found.warnings), "units": units}

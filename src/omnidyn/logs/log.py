@@ -20,8 +20,9 @@ from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share is recorded on change
+NEAR = 1e-6  # of a row: times that are no farther apart are one
 HELD = ("voltage", "duty", "wheel_speed_command", "twist_command")  # what is commanded holds until the next value
-NEVER_MADE_UP = (*HELD, "supply")  # a battery between two measurements is an input like any other
+NEVER_MADE_UP = (*HELD, "supply")  # a battery is an input like any other: it holds too
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,8 @@ class Log:
     as in Run; NaN where missing, and all NaN for a component that was not recorded. lines: line of each row in the
     file, shape (rows,). columns: which column each component came from, and how. source, sha256: of the file.
     current_unsigned: the sensor gives |i|; the sign in `channels` is that of the commanded speed.
-    notes: what the readers had to decide, in words.
+    notes: what the readers had to decide, in words. own_clocks: topics with clocks of their own; a blank is no missing
+    value.
     """
 
     t: FloatArray
@@ -43,12 +45,12 @@ class Log:
     sha256: str = ""
     current_unsigned: bool = False
     notes: tuple[str, ...] = ()
+    own_clocks: bool = False
 
     @classmethod
     def of_run(cls, run: Run) -> Log:
-        """A Run as a log of its measured values: what was interpolated is blank, lines count its samples from 0."""
-        measured = run.as_measured()
-        return cls(measured.t, measured.channels, np.arange(len(run)), source=run.source, notes=run.warnings)
+        """A Run as a log; lines count its samples from 0."""
+        return cls(run.t, run.channels, np.arange(len(run)), source=run.source, notes=run.warnings)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -85,10 +87,44 @@ class Log:
                 "time stands still", got=f"t = {log.t[0]:.9g} s in all {len(log)} rows", expected="times that increase",
                 where=self.source,
             )  # fmt: skip
-        log = log._without(repeated, "repeat the time of the row before", warnings, bound=1.0)
+        log = log._without(repeated, "repeat the time of the row before", warnings, bound=1.0)._moved(warnings)
         channels = {name: log.aligned(name, values, warnings) for name, values in log.channels.items()}
-        made_up = {name: mask for name in channels if (mask := log.interpolated(name)).any()}
-        return Run(t=log.t, **channels, source=self.source, warnings=tuple(warnings), interpolated=made_up)
+        channels = {name: np.where(log.between(name), np.nan, values) for name, values in channels.items()}
+        return Run(t=log.t, **channels, source=self.source, warnings=tuple(warnings))
+
+    def _moved(self, warnings: list[str]) -> Log:
+        """What was recorded late, at the times when it happened: in rows of its own where no row has such a time.
+
+        No number is changed, and none stands between two rows. Times increase. What happened before the first row goes.
+        """
+        late = {key: each.latency for key, each in self.columns.columns.items() if each.latency and place(key)}
+        if not late or len(self) < 2:
+            return self
+        near = NEAR * float(np.median(np.diff(self.t)))
+        at = {key: self.t - seconds for key, seconds in late.items()}
+        new = np.unique(np.concatenate([each for each in at.values()]))
+        new = new[(new > self.t[0]) & (new < self.t[-1]) & (_distance(new, self.t) > near)]
+        t = np.sort(np.concatenate([self.t, new[np.append(True, np.diff(new) > near)]])) if new.size else self.t
+        own = np.searchsorted(t, self.t)
+        channels = {}
+        for name, values in self.channels.items():
+            columns = values.reshape(len(self), -1)
+            table = np.full((len(t), columns.shape[1]), np.nan)
+            for k, key in enumerate(components(name, columns.shape[1])):
+                rows = _nearest(at[key], t) if key in late else own
+                there = np.abs(t[rows] - at[key]) <= near if key in late else np.ones(len(own), dtype=bool)
+                table[rows[there], k] = columns[there, k]
+            channels[name] = table[:, 0] if CHANNELS[name] == SCALAR else table
+        warnings += [f"{key} was moved back by its latency of {seconds:g} s" for key, seconds in late.items()]
+        settled = {key: replace(each, latency=0.0) for key, each in self.columns.columns.items()}
+        lines = self.lines[np.searchsorted(self.t, t, side="right") - 1]
+        log = replace(
+            self, t=t, channels=channels, lines=lines, columns=replace(self.columns, columns=settled),
+            own_clocks=self.own_clocks or len(t) > len(self),
+        )  # fmt: skip
+        empty = log.empty_rows()
+        empty[own] = False
+        return log.rows(~empty)
 
     def joined(self) -> Log:
         """Rows of one time that fill each other's blanks are one row, as where every topic writes a row of its own."""
@@ -114,34 +150,40 @@ class Log:
         return replace(self, t=self.t[keep], channels=channels, lines=self.lines[keep], notes=(*self.notes, note))
 
     def aligned(self, channel: str, values: FloatArray, warnings: list[str]) -> FloatArray:
-        """A channel on the times of the log, once these can be trusted; what was done goes to `warnings`.
+        """A channel in every row of the log, once its times can be trusted; what was done goes to `warnings`.
 
-        What was recorded on change: commands held, measurements interpolated, never matched by row. And the latency of
-        each component taken out. `values` has the shape of the channel, and so has the result.
+        What was recorded on change, or by a topic with a clock of its own: commands held, measurements on the line
+        between two of them, which `between` tells from what was measured. And the latency of each component taken out.
+        `values` has the shape of the channel, and so has the result.
         """
         columns = values.reshape(len(self), -1)
         changed = columns.copy()
         for k, component in enumerate(components(channel, columns.shape[1])):
             blank = np.isnan(columns[:, k])
             share = float(blank.mean())
-            if ON_CHANGE < share < 1.0:
-                hold = channel in HELD
+            if self._is_sparse(share):
+                hold = channel in NEVER_MADE_UP
                 changed[:, k] = _held(columns[:, k]) if hold else _interpolated(self.t, columns[:, k])
-                how = "held" if hold else "interpolated"
-                warnings.append(f"{component} is recorded on change ({share:.0%} of its cells are blank): {how}")
+                how = "held" if hold else "nothing is made up between"
+                if not self.own_clocks:
+                    warnings.append(f"{component} is recorded on change ({share:.0%} of its cells are blank): {how}")
             late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
             if late:
                 changed[:, k] = np.interp(self.t + late, self.t, changed[:, k], right=np.nan)
                 warnings.append(f"{component} was moved back by its latency of {late:g} s")
         return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
 
-    def interpolated(self, channel: str) -> BoolArray:
+    def _is_sparse(self, share: float) -> bool:
+        """Whether a component with such a share of blanks was recorded when it changed, or at times of its own."""
+        return 0.0 < share < 1.0 if self.own_clocks else ON_CHANGE < share < 1.0
+
+    def between(self, channel: str) -> BoolArray:
         """Which values of `aligned` lie between measurements, where no sensor gave any. Shape as in the channel."""
         columns = self.channels[channel].reshape(len(self), -1)
         made_up = np.zeros(columns.shape, dtype=bool)
         for k, component in enumerate(components(channel, columns.shape[1])):
             blank = np.isnan(columns[:, k])
-            if channel in NEVER_MADE_UP or not ON_CHANGE < blank.mean() < 1.0:
+            if channel in NEVER_MADE_UP or not self._is_sparse(float(blank.mean())):
                 continue
             late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
             made_up[:, k] = _far_from(self.t + late, self.t[~blank], self.t) if late else blank
@@ -213,6 +255,17 @@ def _interpolated(t: FloatArray, values: FloatArray) -> FloatArray:
     """Each blank between two values on the line between them; outside there is none."""
     known = np.isfinite(values)
     return np.interp(t, t[known], values[known], left=np.nan, right=np.nan)
+
+
+def _nearest(at: FloatArray, t: FloatArray) -> IntArray:
+    """The row of `t`, which increases, whose time is nearest to each of `at`."""
+    after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
+    return np.where(at - t[after - 1] <= t[after] - at, after - 1, after)
+
+
+def _distance(at: FloatArray, t: FloatArray) -> FloatArray:
+    """How far each of `at` is from the nearest of `t`."""
+    return np.abs(at - t[_nearest(at, t)])
 
 
 def _far_from(at: FloatArray, known: FloatArray, t: FloatArray) -> BoolArray:

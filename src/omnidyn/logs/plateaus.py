@@ -16,7 +16,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
-from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.segments import segments
 from omnidyn.model.frames import world_to_body
@@ -120,19 +120,20 @@ def _error(parts: Sequence[Mapping[str, FloatArray]], weight: FloatArray) -> dic
 
 def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
     mean, std, t = {}, {}, run.t[rows]
-    middle = 0.5 * (t[1:] + t[:-1])
     speeds = {name: (t, values[rows]) for name, values in run.channels.items() if name in ("wheel_speed", "twist")}
     for name, values in run.channels.items():
         if name not in ("wheel_angle", "pose"):
             mean[name], std[name] = robust_mean(values[rows])
     speed_from = SPEED if "wheel_speed" in mean else ""
-    if angle is not None and np.isfinite(angle[rows]).all():
-        mean["wheel_speed"], std["wheel_speed"] = _rate(t, angle[rows])
-        speeds["wheel_speed"] = middle, np.diff(angle[rows], axis=0) / np.diff(t)[:, None]
+    if angle is not None and len(seen := _seen(angle[rows])) > 1:
+        at, turned = t[seen], angle[rows][seen]
+        mean["wheel_speed"], std["wheel_speed"] = _rate(at, turned)
+        speeds["wheel_speed"] = _middle(at), np.diff(turned, axis=0) / np.diff(at)[:, None]
         speed_from = ANGLE
-    if run.twist is None and run.pose is not None and np.isfinite(run.pose[rows]).all():
-        mean["twist"], std["twist"] = _body_rate(t, run.pose[rows])
-        speeds["twist"] = middle, _body_steps(run.pose[rows]) / np.diff(t)[:, None]
+    if run.twist is None and run.pose is not None and len(seen := _seen(run.pose[rows])) > 1:
+        at, pose = t[seen], run.pose[rows][seen]
+        mean["twist"], std["twist"] = _body_rate(at, pose)
+        speeds["twist"] = _middle(at), _body_steps(pose) / np.diff(at)[:, None]
     rates = {name: _rate_of_change(*each) for name, each in speeds.items()}
     return Plateau(
         rows, float(t[0]), float(t[-1]), mean, std, speed_from, count=rows.stop - rows.start,
@@ -144,10 +145,21 @@ def live_angle(run: Run) -> FloatArray | None:
     """The angles of the wheels, None where none were logged or where one stands still while its wheel turns."""
     if run.wheel_angle is None or run.wheel_speed is None:
         return run.wheel_angle
-    steps = np.diff(run.t)[:, None]
-    turned = np.nansum(np.abs(np.diff(run.wheel_angle, axis=0)), axis=0)
-    told = np.nansum(np.abs(run.wheel_speed[:-1]) * steps, axis=0)
-    return None if (turned < DEAD_SHARE * told).any() else run.wheel_angle
+    for angle, speed in zip(run.wheel_angle.T, run.wheel_speed.T, strict=True):
+        known = np.isfinite(speed)
+        told = np.sum(np.abs(speed[known][:-1]) * np.diff(run.t[known]))
+        if np.sum(np.abs(np.diff(angle[np.isfinite(angle)]))) < DEAD_SHARE * told:
+            return None
+    return run.wheel_angle
+
+
+def _seen(values: FloatArray) -> IntArray:
+    """The rows in which all columns were measured."""
+    return np.flatnonzero(np.isfinite(values).all(axis=1))
+
+
+def _middle(t: FloatArray) -> FloatArray:
+    return 0.5 * (t[1:] + t[:-1])
 
 
 def holds(run: Run) -> list[slice]:
@@ -213,9 +225,9 @@ def _long_enough(run: Run, rows: slice) -> bool:
 def _responses(run: Run, rows: slice, angle: FloatArray | None) -> FloatArray:
     """What shows whether the robot has settled: speeds, else currents; robust z-scores, spikes clipped. (n, k)."""
     speed = run.wheel_speed if run.wheel_speed is not None else run.twist
-    parts = [part[rows] for part in (speed, run.current) if part is not None]
+    parts = [_in_every_row(run.t[rows], part[rows]) for part in (speed, run.current) if part is not None]
     if angle is not None:
-        rates = np.diff(angle[rows], axis=0) / np.diff(run.t[rows])[:, None]
+        rates = np.diff(_in_every_row(run.t[rows], angle[rows]), axis=0) / np.diff(run.t[rows])[:, None]
         parts = [np.concatenate([rates[:1], rates]), *parts[0 if speed is None else 1 :]]
     if not parts:
         return np.zeros((rows.stop - rows.start, 0))
@@ -226,6 +238,21 @@ def _responses(run: Run, rows: slice, angle: FloatArray | None) -> FloatArray:
     spread = np.where(spread > 0.0, spread, np.std(table, axis=0))
     moving = spread > 0.0
     return np.clip((table[:, moving] - middle[moving]) / spread[moving], -5.0, 5.0)
+
+
+def _in_every_row(t: FloatArray, values: FloatArray) -> FloatArray:
+    """What a sensor with a clock of its own says in the rows between: only to look for the end of a transient.
+
+    A column that was measured too seldom stays blank, as does one that ends early.
+    """
+    if np.isfinite(values).all():
+        return values
+    filled = values.copy()
+    for column, own in zip(filled.T, values.T, strict=True):
+        known = np.isfinite(own)
+        if known.sum() >= MIN_ROWS:
+            column[:] = np.interp(t, t[known], own[known])
+    return filled
 
 
 def _settled(run: Run, hold: slice, angle: FloatArray | None) -> slice | None:
@@ -256,7 +283,10 @@ def _is_steady(run: Run, rows: slice, angle: FloatArray | None) -> bool:
     half = (rows.start + rows.stop) // 2
     halves = slice(rows.start, half), slice(half, rows.stop)
     if angle is not None:
-        pairs = [_rate(run.t[part], angle[part]) for part in halves]
+        seen = [part.start + _seen(angle[part]) for part in halves]
+        if min(map(len, seen)) < 2:
+            return False
+        pairs = [_rate(run.t[part], angle[part]) for part in seen]
     elif speed is not None:
         pairs = [robust_mean(speed[part]) for part in halves]
     else:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
@@ -20,8 +22,10 @@ from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, load_map, parse_column
 from omnidyn.logs.log import Log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
+from omnidyn.logs.readers.reader import Options
 from omnidyn.logs.table.table import ROWS, Table
 from omnidyn.logs.table.text_file import Progress
+from omnidyn.logs.together import joined_table
 from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
@@ -37,7 +41,9 @@ class LogOptions:
     columns: a map, used instead of a guess. overrides: component -> "COLUMN:UNIT[@motor]", on top of either.
     assume: column or letter of a component -> unit, where the file gives none. latency: component, or its letter, ->
     how late it was recorded [s]. header: whether there is one. skip_bad_rows: leave out rows that cannot be read.
-    current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage.
+    current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage. max_bytes: of what
+    is held at once; None: a quarter of the memory. variables: of a MATLAB file, those to read; none: all.
+    beside: other files of the same experiment, of one clock: joined by their stamps.
     """
 
     columns: ColumnMap | None = None
@@ -47,6 +53,17 @@ class LogOptions:
     header: bool = True
     skip_bad_rows: bool = False
     current_unsigned: bool = False
+    max_bytes: int | None = None
+    variables: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+
+    @property
+    def of_tables(self) -> dict[str, Any]:
+        """What the readers of tables are told."""
+        return {
+            "header": self.header, "skip_bad_rows": self.skip_bad_rows, "max_bytes": self.max_bytes,
+            "variables": self.variables,
+        }  # fmt: skip
 
 
 def read_log(
@@ -60,6 +77,9 @@ def read_log(
     header: bool = True,
     skip_bad_rows: bool = False,
     current_unsigned: bool = False,
+    max_bytes: int | None = None,
+    variables: Sequence[str] = (),
+    beside: Sequence[str | os.PathLike] = (),
 ) -> Run:
     """Read a log as a Run, to fit, simulate and compare with; `load_log` reads it as recorded, faults and all.
 
@@ -71,6 +91,8 @@ def read_log(
     assume: unit by column or letter of a component, where the file gives none, such as {"d": "duty/255"}. latency: how
     late components were recorded, by their letter [s]. header: whether there is one. skip_bad_rows: leave out rows that
     cannot be read. current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage.
+    max_bytes: of what is held at once; None: a quarter of the memory. variables: of a MATLAB file, those to read.
+    beside: other files of the same experiment, stamped by one clock: their topics and columns are joined by time.
     Raises InputError for what cannot be read or is doubtful, with file, line and remedy.
     """
     given = columns if isinstance(columns, ColumnMap) else None
@@ -79,7 +101,10 @@ def read_log(
         overrides = tuple(f"{component}={text}" for component, text in columns.items())
     elif columns is not None and given is None:
         given = load_map(columns)  # type: ignore[arg-type]
-    options = LogOptions(given, overrides, assume or {}, latency or {}, header, skip_bad_rows, current_unsigned)
+    options = LogOptions(
+        given, overrides, assume or {}, latency or {}, header, skip_bad_rows, current_unsigned, max_bytes,
+        tuple(variables), tuple(str(each) for each in beside),
+    )  # fmt: skip
     log = load_log(path, robot, options)
     run = log.to_run(sort=sort)
     return run.replace(warnings=(*run.warnings, *log.columns.doubts))
@@ -90,8 +115,14 @@ def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOp
 
     In SI and by channel; its time may repeat, go back or be missing. Raises InputError.
     """
+    check_order("read_log(path, robot)", (path, (str, os.PathLike)), (robot, (Robot, type(None))))
     options = options or LogOptions()
-    table = with_joined_stamp(read_table(path, header=options.header, skip_bad_rows=options.skip_bad_rows))
+    if options.beside:
+        how = Options(options.header, options.skip_bad_rows, options.max_bytes, None, options.variables)
+        alone = replace(options, overrides=())  # columns of the whole, which one file alone need not have
+        table = joined_table([path, *options.beside], how, lambda part: map_columns(part, None, alone))
+    else:
+        table = with_joined_stamp(read_table(path, **options.of_tables))
     return log_from_table(table, map_columns(table, robot, options), robot, options)
 
 
@@ -166,7 +197,11 @@ def log_from_table(
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
     t = (clock or Clock()).times(table, columns.columns[TIME], notes)
-    log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes)).joined()
+    log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes), table.own_clocks)
+    empty = log.empty_rows() if table.own_clocks else np.zeros(len(log), dtype=bool)
+    if empty.any() and not empty.all():  # messages of topics that nobody took
+        log = log.rows(~empty)
+    log = log.joined()
     return _signed(log, robot) if options.current_unsigned else log
 
 
@@ -227,7 +262,6 @@ def iter_logs(
     progress(bytes_done, bytes_total) is called now and then. Time counts from the first block. Raises InputError.
     """
     options, columns, clock = options or LogOptions(), None, Clock()
-    how = {"header": options.header, "skip_bad_rows": options.skip_bad_rows}
-    for table in map(with_joined_stamp, iter_tables(path, rows, progress=progress, **how)):
+    for table in map(with_joined_stamp, iter_tables(path, rows, progress=progress, **options.of_tables)):
         columns = columns or map_columns(table, robot, options)
         yield log_from_table(table, columns, robot, options, clock)

@@ -5,14 +5,14 @@
 
 A channel that was not measured has no columns. In CSV a missing value is an empty cell, and numbers are written with
 the shortest digits that read back as the same float. In Parquet a missing value is NaN, and each column has its unit.
-Source and warnings of a Run, and which of its values were interpolated, are not in the file.
+Source and warnings of a Run are not in the file.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import starmap
 from pathlib import Path
 from typing import Any
@@ -27,15 +27,18 @@ from omnidyn.logs.channels import components, si_suffix
 from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
-from omnidyn.run import CHANNELS, SCALAR, Run
+from omnidyn.logs.writers.mat_run import columns_to_mat
+from omnidyn.logs.writers.mcap_run import import_mcap, run_to_mcap
+from omnidyn.run import CHANNELS, SCALAR, Run, as_run
 from omnidyn.units import DUTY, known_unit, parse_unit
 
 _SUFFIXES = ("rad_s", "m_s", "duty", "rad", "V", "A", "m", "s")  # as channels.si_suffix gives them, long before short
 _SHEETS = frozenset((".xlsx", ".xls", ".xlsm", ".ods"))
 _OTHERS = _SHEETS | frozenset(
-    (".mat", ".npz", ".npy", ".h5", ".hdf5", ".hdf", ".mcap", ".bag", ".db3", ".wpilog", ".ulg", ".json", ".toml",
+    (".npz", ".npy", ".h5", ".hdf5", ".hdf", ".bag", ".db3", ".wpilog", ".ulg", ".json", ".toml",
      ".html", ".pdf", ".png", ".svg", ".pkl", ".pickle", ".feather", ".arrow", ".zip", ".gz", ".bz2", ".xz", ".zst")
 )  # fmt: skip
+MCAP, MAT = ".mcap", ".mat"
 _UNIT_OF_DUTY = ("duty", "-", "1")
 
 
@@ -45,25 +48,43 @@ def columns_of(channel: str, wheels: int) -> list[str]:
 
 
 def write_run(run: Run, path: str | os.PathLike, force: bool = False) -> Path:
-    """Write a run, whole or not at all: as Parquet where the name ends in .parquet or .pq, else as CSV.
+    """Write a run, whole or not at all: as its name ends: .parquet, .mcap (ROS 2), .mat, else CSV.
 
     Raises InputError when the file exists (unless `force`) or cannot be written, or when a value is infinite, and
-    MissingExtraError for Parquet without pyarrow.
+    MissingExtraError for Parquet without pyarrow, for MCAP without mcap.
     """
     check_order("write_run(run, path)", (run, Run), (path, (str, os.PathLike)))
+    run = as_run(run)
     check_format(path)
     check_output(path, force)
-    return write_atomic(path, run_to_parquet(run) if _is_parquet(path) else run_to_csv(run), force)
+    return write_atomic(path, _content(run, Path(path).suffix.lower()), force)
+
+
+def _content(run: Run, suffix: str) -> str | bytes:
+    """The run in the format of a name that ends so."""
+    if suffix == MCAP:
+        return run_to_mcap(_finite(run))
+    if suffix == MAT:
+        return columns_to_mat(run_columns(_finite(run)))
+    return run_to_parquet(run) if suffix in SUFFIXES else run_to_csv(run)
+
+
+def _finite(run: Run) -> Run:
+    for name, values in run_columns(run).items():
+        _refuse_infinite(name, values)
+    return run
 
 
 def check_format(path: str | os.PathLike) -> None:
     """Raises InputError for the name of another format, and MissingExtraError for a Parquet file without pyarrow."""
     if _is_parquet(path):
         import_pyarrow(str(path))
+    if Path(path).suffix.lower() == MCAP:
+        import_mcap(str(path))
     suffix = Path(path).suffix.lower()
     if suffix in _OTHERS:
         raise InputError(
-            "a run is not written in this format", got=suffix, expected=".csv or .parquet",
+            "a run is not written in this format", got=suffix, expected=".csv, .parquet, .mcap or .mat",
             remedy="spreadsheets open CSV" if suffix in _SHEETS else "", where=str(path),
         )  # fmt: skip
 
@@ -77,7 +98,7 @@ def run_to_parquet(run: Run) -> bytes:
     columns = run_columns(run)
     for name, values in columns.items():
         _refuse_infinite(name, values)
-    return parquet_bytes(columns, {name: _unit(name) for name in columns})
+    return parquet_bytes(columns, {name: unit_of_column(name) for name in columns})
 
 
 def run_to_csv(run: Run) -> str:
@@ -139,10 +160,49 @@ def read_run(path: str | os.PathLike) -> Run:
     return Run(t=time, **channels, source=str(path), warnings=table.notes)
 
 
+def run_of_columns(
+    columns: Mapping[str, FloatArray], source: str, warnings: tuple[str, ...] = (), remedy: str = ""
+) -> Run:
+    """The Run of columns in memory that are named as in a run file. Shape (samples,) each, NaN where missing.
+
+    Raises InputError for another column, a channel that is not complete, and a time that does not increase.
+    """
+    wheels = _wheel_count(tuple(columns))
+    known = {channel: columns_of(channel, wheels) for channel in CHANNELS}
+    every = {"t_s", *(name for names in known.values() for name in names)}
+    strange = [name for name in columns if name not in every]
+    if strange or "t_s" not in columns:
+        raise InputError(
+            "not the columns of a run", got=", ".join(strange[:5]) or "no column t_s",
+            expected="t_s, u1_V, w1_rad_s, vx_m_s, ...", remedy=remedy, where=source,
+        )  # fmt: skip
+    channels: dict[str, Any] = {channel: _complete(columns, channel, names, source) for channel, names in known.items()}
+    return Run(t=columns["t_s"], source=source, warnings=warnings, **channels)
+
+
+def _complete(columns: Mapping[str, FloatArray], channel: str, names: list[str], source: str) -> FloatArray | None:
+    """A channel from its columns, None where there are none of them. Raises InputError where some are missing."""
+    there = [name for name in names if name in columns]
+    if not there:
+        return None
+    if len(there) < len(names):
+        raise _not_complete(channel, names, there, source)
+    values = np.stack([columns[name] for name in names], axis=1)
+    return values[:, 0] if CHANNELS[channel] == SCALAR else values
+
+
+def _not_complete(channel: str, names: list[str], there: list[str], source: str) -> InputError:
+    absent = [name for name in names if name not in there]
+    return InputError(
+        f"the channel {channel} is not complete", got=", ".join(there), expected=", ".join(names),
+        remedy=f"add {', '.join(absent)}", where=source,
+    )  # fmt: skip
+
+
 def refuse_other_units(table: Table) -> None:
     """Raises InputError where a unit given in a row or a bracket is not the one in the name of the column."""
     for name, text in table.units.items():
-        own, given = parse_unit(_unit(name)), known_unit(text)
+        own, given = parse_unit(unit_of_column(name)), known_unit(text)
         if text not in _UNIT_OF_DUTY if own.quantity == DUTY else given is None or given[1:] != own[1:]:
             raise InputError(
                 "the row of units contradicts the name",
@@ -153,7 +213,7 @@ def refuse_other_units(table: Table) -> None:
             )
 
 
-def _unit(name: str) -> str:
+def unit_of_column(name: str) -> str:
     """The unit in the name of a column: "rad/s" of w1_rad_s, w1_cmd_rad_s."""
     return next(suffix for suffix in _SUFFIXES if name.endswith(f"_{suffix}")).replace("_", "/")
 
@@ -169,14 +229,7 @@ def _channel(table: Table, channel: str, names: list[str]) -> FloatArray | None:
     there = [name for name in names if name in table.names]
     if not there:
         return None
-    absent = [name for name in names if name not in there]
-    if absent:
-        raise InputError(
-            f"the channel {channel} is not complete",
-            got=", ".join(there),
-            expected=", ".join(names),
-            remedy=f"add {', '.join(absent)}",
-            where=table.source,
-        )
+    if len(there) < len(names):
+        raise _not_complete(channel, names, there, table.source)
     values = np.stack([table.numbers(name, missing=True) for name in names], axis=1)
     return values[:, 0] if CHANNELS[channel] == SCALAR else values

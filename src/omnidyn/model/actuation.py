@@ -59,6 +59,11 @@ def reaching(robot: Robot, voltage: FloatArray) -> FloatArray:
     return np.sign(voltage) * np.maximum(np.abs(voltage) - band, 0.0)
 
 
+def asked_for(robot: Robot, voltage: FloatArray) -> FloatArray:
+    """What to ask of the driver for a voltage at the motors [V]: `reaching` backward. Shape (*batch, wheels)."""
+    return voltage + robot.drive.dead_band * np.sign(voltage)
+
+
 @part
 def at_motor(u, share, driver):
     """(u_motor, its derivatives by gain, dead band and fade) of a voltage u, `share` of the run gone by."""

@@ -19,6 +19,8 @@ from omnidyn.model.dynamics import (
 )
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
+from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.wheels import refuse_slip
 
 HIGHEST = 1e6  # [V] beyond which a pattern counts as one that never moves the robot
 BISECTIONS = 60
@@ -114,6 +116,8 @@ def _scaled(patterns: FloatArray) -> FloatArray:
 
 
 def _patterns(robot: Robot, pattern: ArrayLike) -> FloatArray:
+    refuse_slope(robot.floor, "dead zones know")
+    refuse_slip(robot.wheels, "dead zones know")
     pattern = np.asarray(pattern, dtype=float)
     if pattern.ndim == 0 or pattern.shape[-1] != robot.wheels.count:
         raise InputError(

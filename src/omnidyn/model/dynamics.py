@@ -25,7 +25,8 @@ from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import accelerations, moving_states
-from omnidyn.model.wheels import wheel_speed, wrench_from_traction
+from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.wheels import refuse_slip, wheel_speed, wrench_from_traction
 
 
 def settled_currents(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
@@ -59,7 +60,7 @@ def linear_part(robot: Robot) -> Robot:
 
 def frame_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
     """Apparent wrench M omega (v_y, -v_x, 0) of the turning body frame; zero where the robot leaves it out."""
-    twist = np.asarray(twist, dtype=float)
+    twist = np.asanyarray(twist, dtype=float)
     if not robot.body.rotating_frame:
         return np.zeros_like(twist)
     x, y, omega = np.moveaxis(twist, -1, 0)
@@ -69,11 +70,14 @@ def frame_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
 def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
     """Acceleration of the twist [m/s^2, m/s^2, rad/s^2], eqs (4)-(6), currents settled.
 
-    Friction at rest balances what drives it; where several parts hold at once, stick_slip/inclusion.py decides.
+    Friction at rest balances what drives it; where several parts hold at once, stick_slip/inclusion.py decides. What
+    bends (Dahl, LuGre) counts as it has settled at that speed.
     `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
-    Raises InputError for other shapes.
+    Raises InputError for other shapes, UnsupportedError on a slope, whose pull depends on the heading.
     """
     check_order("acceleration(robot, twist, voltage)", (robot, Robot), (twist, object), (voltage, object))
+    refuse_slope(robot.floor, "accelerations know")
+    refuse_slip(robot.wheels, "accelerations know")
     twist, voltage = _vectors("twist", twist, N_AXES), _vectors("voltage", voltage, robot.wheels.count)
     batch, n = _batch(twist, voltage), robot.wheels.count
     if axes_move_alone(robot):
@@ -81,7 +85,7 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
         return per_mass(robot, applied + robot.friction.axes.wrench(twist, applied))
     twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
     volts = np.ascontiguousarray(np.broadcast_to(voltage, (*batch, n)).reshape(-1, n))
-    numbers = plant(robot.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
+    numbers = plant(robot.rigid.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
     return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(
         *batch, 3
     )
@@ -96,7 +100,9 @@ def holds_under(robot: Robot) -> Callable[[FloatArray], BoolArray]:
         return lambda voltage: np.all(
             robot.friction.axes.holds(drive_wrench(robot, np.zeros((len(voltage), 3)), voltage)), axis=-1
         )
-    numbers = plant(robot.model_copy(update={"motor": robot.motor.model_copy(update={"electrical": QUASI_STATIC})}))
+    numbers = plant(
+        robot.rigid.model_copy(update={"motor": robot.motor.model_copy(update={"electrical": QUASI_STATIC})})
+    )
     at_rest = moving_states(numbers, np.zeros((1, N_AXES)))
 
     def holds(voltage: FloatArray) -> BoolArray:

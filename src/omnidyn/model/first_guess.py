@@ -14,21 +14,21 @@ it is large.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from omnidyn.model.drive import SPEED, Drive
-from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, VISCOUS, Key, all_keys
 from omnidyn.model.motor import Motor
 from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Origin, Prior, Robot
+from omnidyn.model.surroundings.floor import GRAVITY as GRAVITY
 from omnidyn.model.wheels import PerWheel, Wheels
 
 DIRECTION, BODY_AXES = "direction", "axes"
 GEAR, RATE = "motor.gear_ratio", "drive.rate_Hz"
-GRAVITY = 9.81  # [m/s^2]
 
 TOP_SPEED = 1.0  # [m/s] that the robot reaches at the voltage limit, friction included
 STALL_ACCELERATION = 8.0  # [m/s^2] stall force over mass: between a gentle robot (4) and a Robotino (15)
@@ -261,22 +261,27 @@ def _scaled(friction: Friction, heavier: float, wider: float, wheels: float) -> 
     """Friction of a robot `heavier` and `wider` times as much, with 1/`wheels` times as many wheels."""
     turning, turning_viscous = heavier * wider, heavier * wider**2
     axes, along, rim = friction.axes, friction.direction, friction.wheels
+    about_yaw = {field: turning_viscous if field in PER_SPEED else turning for field in SCALED}
     return Friction(
-        axes=AxesFriction(
-            viscous=_times(axes.viscous, (heavier, heavier, turning_viscous)),
-            coulomb=_times(axes.coulomb, (heavier, heavier, turning)),
-            breakaway=_times(axes.breakaway, (heavier, heavier, turning)),
+        axes=_changed(axes, {field: (heavier, heavier, each) for field, each in about_yaw.items()}),
+        direction=_changed(
+            along, dict.fromkeys(SCALED, heavier) | {f"yaw_{field}": each for field, each in about_yaw.items()}
         ),
-        direction=DirectionFriction(
-            coulomb=_times(along.coulomb, heavier), breakaway=_times(along.breakaway, heavier),
-            viscous=_times(along.viscous, heavier), yaw_coulomb=_times(along.yaw_coulomb, turning),
-            yaw_breakaway=_times(along.yaw_breakaway, turning),
-            yaw_viscous=_times(along.yaw_viscous, turning_viscous),
-        ),
-        wheels=WheelFriction(
-            **{field: _times(getattr(rim, field), heavier * wheels) for field in WheelFriction.model_fields}
-        ),
-    )  # fmt: skip
+        wheels=_changed(rim, dict.fromkeys(SCALED, heavier * wheels)),
+    )
+
+
+# What of friction grows with the robot: levels, and what there is per speed or per way. Speeds and exponents stay.
+PER_SPEED = ("viscous", "damping", "stiffness")
+SCALED = ("coulomb", "coulomb_backward", "breakaway", "breakaway_backward", *PER_SPEED)
+
+
+def _changed(law: Any, factors: Mapping[str, Any]) -> Any:
+    """A law with some of its numbers times factors."""
+    return law.replace(**{
+        field: _times(getattr(law, field), factor)
+        for field, factor in factors.items() if field in type(law).model_fields
+    })  # fmt: skip
 
 
 def _times(value: Any, factor: float | tuple[float, ...]) -> Any:

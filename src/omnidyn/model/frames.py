@@ -20,9 +20,9 @@ def body_to_world(heading: ArrayLike) -> FloatArray:
 
     Inverse of eq (2). `heading` [rad], shape (*batch,). Returns shape (*batch, 3, 3).
     """
-    heading = np.asarray(heading, dtype=float)
+    heading = np.asanyarray(heading, dtype=float)
     cos, sin = np.cos(heading), np.sin(heading)
-    rotation = np.zeros((*heading.shape, 3, 3))
+    rotation = np.zeros_like(heading, shape=(*heading.shape, 3, 3))
     rotation[..., 0, 0], rotation[..., 0, 1] = cos, -sin
     rotation[..., 1, 0], rotation[..., 1, 1] = sin, cos
     rotation[..., 2, 2] = 1.0

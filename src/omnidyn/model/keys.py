@@ -21,7 +21,7 @@ from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.value import keys_of
 
-TABLES = ("body", "wheels", "motor", "drive", "friction")
+TABLES = ("body", "wheels", "motor", "drive", "friction", "floor")
 FRICTION = "friction"  # stands for all friction that a robot has
 BODY_AXES, DIRECTION, WHEELS = "friction.axes", "friction.direction", "friction.wheels"
 VISCOUS, COULOMB, BREAKAWAY = "viscous", "coulomb", "breakaway"
@@ -84,7 +84,7 @@ class Key:
         """Of friction: VISCOUS, COULOMB or BREAKAWAY, which may be 0. Of any other number: ""."""
         if self.part != FRICTION:
             return ""
-        return next(level for level in (VISCOUS, COULOMB, BREAKAWAY) if level in self.field)
+        return next((level for level in (VISCOUS, COULOMB, BREAKAWAY) if level in self.field), "")
 
     @property
     def axis(self) -> int | None:
@@ -107,8 +107,21 @@ class Key:
         if self.level:
             yaw = self.axis == YAW
             return ("N m s" if yaw else "N s/m") if self.level == VISCOUS else "N m" if yaw else "N"
+        if self.part == FRICTION:
+            return self._unit_of_law()
         endings = [ending for ending in _UNITS if self.field.endswith(ending)]
         return _UNITS[max(endings, key=len)] if endings else ""
+
+    def _unit_of_law(self) -> str:
+        """The unit of what a law beyond Coulomb's takes."""
+        yaw = self.axis == YAW
+        if self.field.endswith("exponent"):
+            return ""
+        if self.field.endswith("speed"):
+            return "rad/s" if yaw else "m/s"
+        if self.field.endswith("stiffness"):
+            return "N m/rad" if yaw else "N/m"
+        return "N m s" if yaw else "N s/m"
 
     @property
     def words(self) -> str:
@@ -116,6 +129,8 @@ class Key:
         if self.level:
             return f"{_FRICTIONS[self.level]}{self._acts()}"
         name = _places()[self.name].path[-1].removesuffix("_deg").replace("_", " ")
+        if self.part == FRICTION:
+            return f"{name.removeprefix('yaw ').replace('stribeck', 'Stribeck').replace('dahl', 'Dahl')}{self._acts()}"
         name = f"{name} of the speed loop" if self.name in GAINS else name
         if self.wheel is None:
             return name

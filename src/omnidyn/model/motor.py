@@ -74,7 +74,7 @@ class Motor(Value):
 
 def back_emf(motor: Motor, wheel_speed: ArrayLike) -> FloatArray:
     """Back-EMF K_v l w [V] of motors whose wheels turn at `wheel_speed` [rad/s], eq (11). Shape (*batch, wheels)."""
-    speed = np.asarray(wheel_speed, dtype=float)
+    speed = np.asanyarray(wheel_speed, dtype=float)
     count = speed.shape[-1]
     return per_wheel(motor.emf_constant, count) * per_wheel(motor.gear_ratio, count) * speed
 
@@ -95,6 +95,18 @@ def settled_current(motor: Motor, voltage: ArrayLike, wheel_speed: ArrayLike) ->
         return current
     limit = per_wheel(motor.current_limit, count)
     return np.clip(current, -limit, limit)
+
+
+def voltage_of_current(motor: Motor, current: ArrayLike, wheel_speed: ArrayLike) -> FloatArray:
+    """Voltage R i + K_v l w + V_d sgn i [V] under which a settled current flows, eq (11): `settled_current` backward.
+
+    `current` [A] and `wheel_speed` [rad/s], shape (*batch, wheels). Returns the same shape; the current limit is not
+    looked at, and of the voltages under which no current flows the back-EMF is given.
+    """
+    current = np.asanyarray(current, dtype=float)
+    count = current.shape[-1]
+    drop = per_wheel(motor.voltage_drop, count) * np.sign(current)
+    return per_wheel(motor.resistance, count) * current + back_emf(motor, wheel_speed) + drop
 
 
 def wheel_torque(motor: Motor, current: ArrayLike) -> FloatArray:

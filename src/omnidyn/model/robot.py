@@ -14,6 +14,8 @@ from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor, mass_at_rim
 from omnidyn.model.robot_table import robot_table
+from omnidyn.model.surroundings.floor import Floor
+from omnidyn.model.surroundings.variations import Variations
 from omnidyn.model.value import Flag, Text, Value, number
 from omnidyn.model.wheels import Wheels, check_count
 from omnidyn.shown import FIGURE, Shown, make
@@ -31,6 +33,7 @@ class Body(Value):
     Of all there is, wheels and motors included, as if no wheel turned about its axle: what their spin adds is the
     motor's rotor_inertia and the wheels' wheel_inertia.
     rotating_frame: keep the terms M omega v of a turning body frame, which eqs (4) (5) leave out.
+    centre_height: of the centre of mass above the floor [m]; it shifts the loads of wheels that may slip.
     """
 
     mass: Annotated[float, number(1e-4, 1e5), Field(alias="mass_kg", description="M")]
@@ -38,6 +41,10 @@ class Body(Value):
         float, number(1e-9, 1e6), Field(alias="inertia_kg_m2", description="I_n, about the vertical axis")
     ]
     rotating_frame: Annotated[Flag, Field(description="terms M omega v of a turning body")] = False
+    centre_height: Annotated[
+        Annotated[float, number(0.0, 100.0)],
+        Field(alias="centre_height_m", description="of the centre of mass, for wheels that slip"),
+    ] = 0.0
 
 
 Origin = Literal["guess", "given", "datasheet", "measured", "identified", "imported"]
@@ -86,6 +93,8 @@ class Robot(Shown, Value):
     motor: Motor
     drive: Drive = Drive()
     friction: Friction = Friction()
+    floor: Floor = Floor()
+    variations: Annotated[Variations, Field(description="what it can be varied by, by name")] = Variations()
     correlation: Annotated[KeyCorrelation | None, Field(description="which numbers are off together")] = None
     log: Annotated[LogEffects | None, Field(description="what the logs of its fit did beside the robot")] = None
     priors: Annotated[dict[str, Prior], Field(exclude=True, default_factory=dict)]
@@ -109,6 +118,12 @@ class Robot(Shown, Value):
             )
         return self
 
+    @property
+    def rigid(self) -> Robot:
+        """The robot with friction that neither bends nor has a band: what holds it, and what it slides with."""
+        rigid = self.friction.rigid
+        return self if rigid is self.friction else self.model_copy(update={"friction": rigid})
+
     def __repr__(self) -> str:
         return f"<Robot {self.name}: {self.wheels.count} wheels, {self.body.mass:.6g} kg>"
 
@@ -120,7 +135,11 @@ class Robot(Shown, Value):
         keys = ("key", "value", "std", "origin")
         numbers = [dict(zip(keys, row, strict=False)) for row in table.rows]
         head = [f"{self.name}: {self.wheels.count} wheels", *([self.source] if self.source else []), ""]
-        return Document([*head, table], {"name": self.name, "source": self.source, "numbers": numbers})
+        named = self.variations.names
+        told = [f"can be varied by {kind}: {', '.join(names)}" for kind, names in named.items()]
+        data = {"name": self.name, "source": self.source, "numbers": numbers}
+        data |= {"variations": {kind: list(names) for kind, names in named.items()}} if named else {}
+        return Document([*head, table, *(["", *told] if told else [])], data)
 
     def plot(self, what: Literal["layout", "dead zone", "friction"] = "layout") -> Figure:
         """A picture of it, as a matplotlib Figure.

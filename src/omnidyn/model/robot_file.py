@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from omnidyn.arguments import check_order
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
 from omnidyn.model.keys import TABLES, is_told
 from omnidyn.model.known.told import correlation_of, refuse_strange_keys
@@ -21,22 +21,13 @@ from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, SCHEMA, Origin, Prior,
 from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 
 TOGETHER = "correlation"
-# Keys of the schema for which no law exists yet. They are refused by name: never ignored, never "unknown".
-PENDING = frozenset(
-    {"wheels.traction_mu"}
-    | {
-        f"friction.{table}.{key}"
-        for table in ("axes", "direction", "wheels")
-        for key in ("law", "stribeck_speed", "stribeck_exponent", "stiffness", "damping")
-    }
-)
 
 
 def load_robot(robot: str | os.PathLike) -> Robot:
     """A robot by the name of a preset, such as "axebot", or by the path of its TOML file.
 
     Raises InputError when there is no such preset or file, or when the file breaks the schema (the path of the key,
-    what was got, what is expected), and UnsupportedError for a key for which there is no law yet.
+    what was got, what is expected).
     """
     name = os.fspath(robot)
     if not isinstance(name, str):
@@ -80,14 +71,6 @@ def robot_from_dict(document: dict[str, Any]) -> Robot:
 
 def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Prior]) -> Any:
     """The same tree with every { value, std, source, origin } replaced by its value; its rest goes to `priors`."""
-    dotted = ".".join(str(part) for part in path if not isinstance(part, int))
-    if dotted in PENDING:
-        raise UnsupportedError(
-            "this key has no law yet",
-            got=str(path[-1]),
-            remedy="remove it, or use a later version",
-            where=key_path(path),
-        )
     known_of = isinstance(node, dict) and "value" in node and table_at(Robot, path) is None
     if known_of and path[0] != TOGETHER:  # nothing is known of a correlation
         known = {key: value for key, value in node.items() if key != "value"}
@@ -131,7 +114,7 @@ def robot_to_toml(robot: Robot) -> str:
     if robot.source:
         head.append(f"source = {toml_literal(robot.source)}")
     tables = [_table(name, getattr(robot, name), robot.priors) for name in TABLES]
-    return "\n".join(head) + "\n" + "".join(tables) + _of_logs(robot) + _together(robot)
+    return "\n".join(head) + "\n" + "".join(tables) + _by_name(robot) + _of_logs(robot) + _together(robot)
 
 
 def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
@@ -148,6 +131,15 @@ def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
             note = type(value).model_fields[field].description
             lines.append(f"{key} = {_with_prior(content, path, priors)}" + (f"  # {note}" if note else ""))
     return ("\n[" + name + "]\n" + "\n".join(lines) + "\n" if lines else "") + inner
+
+
+def _by_name(robot: Robot) -> str:
+    """The tables of what the robot can be varied by."""
+    found = robot.variations
+    every = (
+        (f"variations.{kind}.{name}", getattr(found, kind)[name]) for kind in found.names for name in found.names[kind]
+    )
+    return "".join(_table(path, value, robot.priors) or f"\n[{path}]\n" for path, value in every)
 
 
 def _of_logs(robot: Robot) -> str:

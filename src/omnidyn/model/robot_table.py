@@ -11,7 +11,7 @@ from omnidyn.document import Table
 from omnidyn.model.value import keys_of
 
 HEAD = ("key", "value", "std", "origin", "what it is")
-TABLES = ("body", "wheels", "motor", "drive", "friction")
+TABLES = ("body", "wheels", "motor", "drive", "friction", "floor")
 
 
 class Known(Protocol):

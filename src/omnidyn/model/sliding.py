@@ -2,16 +2,77 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.layout import BODY_SIZE, ELEMENT_SIZE, N_AXES, SLIDE, SLIDE_X, SLIDE_Y, VISCOUS
+from omnidyn.model.friction.stribeck import fallen
+from omnidyn.model.layout import (
+    BODY_SIZE,
+    ELEMENT_SIZE,
+    EXPONENT,
+    EXPONENT_XY,
+    FALL,
+    FALL_XY,
+    HOLD,
+    HOLD_X,
+    HOLD_Y,
+    N_AXES,
+    SLIDE,
+    SLIDE_X,
+    SLIDE_Y,
+    VISCOUS,
+)
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 
 ROUNDING = 1e-12  # of the fastest element: slower is at rest
+
+
+class Levels(NamedTuple):
+    """All dry friction of a robot, element by element: three body axes, then the wheels; and the ellipse.
+
+    directions: of each element, its speed is direction . twist, shape (3 + wheels, 3). viscous: shape (3 + wheels,).
+    slide, hold: against forward and backward motion, while sliding and from rest, shape (2, 3 + wheels).
+    ellipse_slide, ellipse_hold: along x and y [N], shape (2,). falls, exponent: of levels that fall with the speed,
+    1 over the Stribeck speed, 0 where they do not, shape (3 + wheels + 1,): the ellipse last.
+    """
+
+    directions: FloatArray
+    viscous: FloatArray
+    slide: FloatArray
+    hold: FloatArray
+    ellipse_slide: FloatArray
+    ellipse_hold: FloatArray
+    falls: FloatArray
+    exponent: FloatArray
+
+    def sliding(self, speed: FloatArray, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(slide, ellipse_slide) at the speeds of elements (*batch, 3 + wheels) and of a twist (*batch, 3)."""
+        if not self.falls.any():
+            return self.slide, self.ellipse_slide
+        left = np.where(self.falls[:-1] > 0.0, fallen(speed, self.falls[:-1], self.exponent[:-1]), 0.0)
+        slide = np.stack([low + (high - low) * left for low, high in zip(self.slide, self.hold, strict=True)])
+        if self.falls[-1] == 0.0:
+            return slide, self.ellipse_slide
+        way = fallen(np.hypot(twist[..., 0], twist[..., 1]), self.falls[-1], self.exponent[-1])[..., None]
+        return slide, self.ellipse_slide + (self.ellipse_hold - self.ellipse_slide) * way
+
+
+def levels_of(robot: Robot) -> Levels:
+    """The friction of a robot, all its parts put together, yaw in radians. Bristles as they are once they have bent."""
+    body, element = np.zeros(BODY_SIZE), np.zeros((N_AXES + robot.wheels.count, ELEMENT_SIZE))
+    for law in robot.friction.rigid.laws:
+        law.add_to(body, element, 1.0)
+    directions = np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
+    return Levels(
+        directions, element[:, VISCOUS], element[:, SLIDE : SLIDE + 2].T, element[:, HOLD : HOLD + 2].T,
+        body[[SLIDE_X, SLIDE_Y]], body[[HOLD_X, HOLD_Y]], np.append(element[:, FALL], body[FALL_XY]),
+        np.append(element[:, EXPONENT], body[EXPONENT_XY]),
+    )  # fmt: skip
 
 
 def sliding_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
@@ -21,19 +82,43 @@ def sliding_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
     axes and wheels) with the speed s_e = g_e . twist. An element at rest counts as nothing: what it holds balances
     what drives it. `twist` [m/s, m/s, rad/s], shape (*batch, 3); returns the same shape.
     """
-    twist = np.asarray(twist, dtype=float)
-    body, element = np.zeros(BODY_SIZE), np.zeros((N_AXES + robot.wheels.count, ELEMENT_SIZE))
-    for law in robot.friction.laws:
-        law.add_to(body, element, 1.0)
-    directions = np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
-    speed = twist @ directions.T
-    speed = np.where(np.abs(speed) <= ROUNDING * np.abs(speed).max(axis=-1, keepdims=True), 0.0, speed)
-    coulomb = np.where(speed > 0.0, element[:, SLIDE], element[:, SLIDE + 1])
-    wrench = -(element[:, VISCOUS] * speed + coulomb * np.sign(speed)) @ directions
-    levels = body[[SLIDE_X, SLIDE_Y]]
-    dissipated = np.linalg.norm(levels * twist[..., :2], axis=-1, keepdims=True)
-    wrench[..., :2] -= levels**2 * twist[..., :2] / np.where(dissipated > 0.0, dissipated, 1.0)
+    own, twist = levels_of(robot), np.asarray(twist, dtype=float)
+    speed = speeds(own, twist)
+    slide, ellipse = own.sliding(speed, twist)
+    return resisting(own, twist, speed, np.sign(speed), slide, twist[..., :2], ellipse)
+
+
+def speeds(own: Levels, twist: FloatArray, rounding: float = ROUNDING) -> FloatArray:
+    """Speed of each element, exactly 0 where it is that but for rounding. Shape (*batch, 3 + wheels)."""
+    speed = twist @ own.directions.T
+    return np.where(np.abs(speed) <= rounding * np.abs(speed).max(axis=-1, keepdims=True), 0.0, speed)
+
+
+def resisting(
+    own: Levels, twist: FloatArray, speed: FloatArray, side: FloatArray, slide: FloatArray, way: FloatArray,
+    ellipse: FloatArray, least: float = 0.0,
+) -> FloatArray:  # fmt: skip
+    """The formula of `sliding_wrench`, of elements that move, or are about to, to a side. Shape (*batch, 3).
+
+    side: sgn s_e of each element, or a part of it, shape (*batch, 3 + wheels); slide: levels against either side,
+    shape (2, ..). way: in which the ellipse slides, shape (*batch, 2), and its levels, shape (2,) or (*batch, 2);
+    least [N m/s]: what counts as its dissipation where it moves more slowly.
+    """
+    coulomb = np.where(side > 0.0, slide[0], slide[1])
+    wrench = -(own.viscous * speed + coulomb * side) @ own.directions
+    dissipated = np.sqrt(np.sum((ellipse * way) ** 2, axis=-1, keepdims=True))
+    dissipated = np.maximum(dissipated, least)
+    wrench[..., :2] -= ellipse**2 * way / np.where(dissipated > 0.0, dissipated, 1.0)
     return wrench
+
+
+def coulomb_along(robot: Robot) -> FloatArray:
+    """Coulomb friction of all shapes while the robot slides along one axis alone [N, N, N m]. Shape (3,).
+
+    The part of `sliding_wrench` that does not grow with the speed.
+    """
+    at_1, at_2 = -sliding_wrench(robot, np.eye(3)), -sliding_wrench(robot, 2.0 * np.eye(3))
+    return np.maximum(np.diag(2.0 * at_1 - at_2), 0.0)
 
 
 def top_speeds(robot: Robot) -> FloatArray:

@@ -122,7 +122,7 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> InputErro
         return InputError(f"a key is missing{more}", expected=str(path[-1]), remedy="add it", where=where)
     if kind == "value_error":  # one of our own checks: its words are complete
         return InputError(first["msg"].removeprefix("Value error, ") + more, where=where)
-    expected = first["msg"].removeprefix("Input should be ")
+    expected = "a list" if kind == "tuple_type" else first["msg"].removeprefix("Input should be ")
     return InputError(f"cannot use this value{more}", got=first["input"], expected=expected, where=where)
 
 
@@ -145,15 +145,20 @@ def _nearest(path: list[Any], model: type[BaseModel]) -> str:
 
 def table_at(model: type[BaseModel], path: Sequence[Any]) -> type[BaseModel] | None:
     """The model of the table at `path` below `model`, None where there stands no table."""
+    any_name = False  # of the next part: what stands in the values of a dict has a name of its own
     for part in path:
+        if any_name:
+            any_name = False
+            continue
         inner: list[type[BaseModel]] = []
         for name, field in model.model_fields.items():
             if part in (name, field.alias):
                 inner = [t for t in _types_in(field.annotation) if issubclass(t, BaseModel)]
+                any_name = getattr(field.annotation, "__origin__", None) is dict
         if not inner:
             return None
         model = inner[0]
-    return model
+    return None if any_name else model
 
 
 def keys_of(model: type[BaseModel], path: Sequence[Any]) -> Mapping[str, str]:

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field, model_validator
 
 from omnidyn.arrays import FloatArray
+from omnidyn.errors import UnsupportedError
 from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, to_list
 
 MIN_WHEELS, MAX_WHEELS = 3, 16
@@ -34,7 +35,7 @@ class Wheels(Value):
     azimuth_deg: where each wheel stands, seen from the centre, counter-clockwise from forward [degree].
     robot_radius: distance b from the centre to the wheels [m]. wheel_radius: r [m].
     roller_angle_deg: 0 for omni wheels, +-45 for mecanum wheels [degree]. wheel_inertia: of a wheel about its axle
-    [kg m^2].
+    [kg m^2]. traction_mu: of what a wheel carries, the share beyond which it slips; None: it never does.
     """
 
     azimuth_deg: Annotated[
@@ -54,10 +55,14 @@ class Wheels(Value):
         per_wheel_number(0.0, 1e4),
         Field(alias="inertia_kg_m2", description="J_w, of one wheel about its axle"),
     ] = 0.0
+    traction_mu: Annotated[
+        Annotated[PerWheel, per_wheel_number(1e-3, 100.0)] | None,
+        Field(description="mu, what the floor takes over the load"),
+    ] = None
 
     @model_validator(mode="after")
     def _moves_in_every_direction(self) -> Wheels:
-        for name in ("robot_radius", "wheel_radius", "roller_angle_deg", "wheel_inertia"):
+        for name in ("robot_radius", "wheel_radius", "roller_angle_deg", "wheel_inertia", "traction_mu"):
             check_count(name, getattr(self, name), self.count)
         scaled = self.wrench_matrix / np.array([[1.0], [1.0], [np.mean(self.robot_radius)]])
         if np.linalg.cond(scaled) > MAX_CONDITION:
@@ -133,7 +138,7 @@ def rim_speed(wheels: Wheels, twist: ArrayLike) -> FloatArray:
 
     `twist` [m/s, m/s, rad/s], shape (*batch, 3). Returns shape (*batch, wheels).
     """
-    return _product(np.asarray(twist, dtype=float), wheels.wrench_matrix.T)
+    return _product(np.asanyarray(twist, dtype=float), wheels.wrench_matrix.T)
 
 
 def wheel_speed(wheels: Wheels, twist: ArrayLike) -> FloatArray:
@@ -164,7 +169,16 @@ def wrench_from_traction(wheels: Wheels, traction: ArrayLike) -> FloatArray:
 
 def _product(vectors: FloatArray, matrix: FloatArray) -> FloatArray:
     """matrix @ vector for each vector of a batch, summed in a fixed order: equal inputs give equal zeros anywhere."""
-    total = np.zeros((*vectors.shape[:-1], matrix.shape[0]))
+    total = np.zeros_like(vectors, shape=(*vectors.shape[:-1], matrix.shape[0]))
     for column in range(matrix.shape[1]):
         total += vectors[..., column, None] * matrix[:, column]
     return total
+
+
+def refuse_slip(wheels: Wheels, who: str) -> None:
+    """Raises UnsupportedError where wheels may slip, for `who` knows only wheels that roll."""
+    if wheels.traction_mu is not None:
+        raise UnsupportedError(
+            f"{who} no wheels that slip", got=f"traction_mu = {wheels.traction_mu}", expected="wheels that roll",
+            remedy="take the robot without it", where="[wheels] traction_mu",
+        )  # fmt: skip

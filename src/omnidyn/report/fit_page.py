@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validatio
 from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.path import Path, body_twist, driven, path_of
 from omnidyn.model.known.uncertainty import DRAWS
-from omnidyn.model.robot import Robot
 from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.misfit import draw_misfit
@@ -34,11 +33,22 @@ from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
 
 Fits = Mapping[str, OutputErrorEstimate]
+Bands = tuple[Comparison, Comparison | None]
 
 
 def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     """The page of an identification by output error, as HTML."""
     fits, validations = found.fits, found.validations or {}
+    with ThreadPoolExecutor(1) as pool:  # bands take many runs, which leave the interpreter to whoever draws
+        banded = {group: pool.submit(_with_bands, fits, group, each) for group, each in validations.items()}
+        return _page(found, fits, validations, banded, provenance)
+
+
+def _page(
+    found: Identification, fits: Fits, validations: Mapping[str, Validation], banded: Mapping[str, Future[Bands]],
+    provenance: Mapping[str, Any],
+) -> str:  # fmt: skip
+    """All of it. banded: group -> its comparisons with the band of the model, which are on their way."""
     first = found.estimate
     robot = first.robot.name
     introduction = (
@@ -57,7 +67,6 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     sections = [
         section("warnings", "Warnings", Points(warnings), none="None."),
         section("next", "What to measure next", Points(advice), none="Nothing: every number is well determined."),
-        Section("runs", "Measured and model", _each(validations, partial(_runs, fits))),
         Section("misfit", "What the model leaves out", _each(fits, _misfit)),
         *([Section("ladder", "What was switched on, step by step", climbed)] if climbed else []),
         section("friction", "Friction against speed", friction),
@@ -73,6 +82,8 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
         Section("scores", "How near the model comes", _each(validations, lambda group, each: content(each.table()))),
         Section("data", "The logs, and what check says of them", checked),
     ]
+    runs = Section("runs", "Measured and model", _each(banded, _runs))  # the last to be drawn: bands take longest
+    sections.insert(2, runs)
     return page(f"{robot}: identified from whole logs", introduction, sections, provenance, verdict=found.verdict)
 
 
@@ -98,11 +109,24 @@ def _each(parts: Mapping[str, Any], content: Callable[[str, Any], str]) -> str:
     return "".join(paragraph(f"{group}:") + content(group, each) for group, each in parts.items())
 
 
-def _runs(fits: Fits, group: str, validation: Validation) -> str:
+def _with_bands(fits: Fits, group: str, validation: Validation) -> Bands:
+    """The comparison with fitted logs, and that with logs held out, each with the band of the model in its first log;
+    fewer draws where the engine is slow."""
     robot = (fits.get(group) or next(iter(fits.values()))).robot
-    pictures = [_renamed(_overlay(robot, validation.fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
-    if validation.held_out is not None:
-        pictures.append(_renamed(_overlay(robot, validation.held_out), f"overlay-held-out{group}", "on a log held out"))
+    draws = FEW if why_not_exact(robot) else DRAWS
+    fitted, held_out = (
+        None if each is None else with_bands(each, [robot], logs=(0,), draws=draws)
+        for each in (validation.fitted, validation.held_out)
+    )
+    assert fitted is not None
+    return fitted, held_out
+
+
+def _runs(group: str, banded: Future[Bands]) -> str:
+    fitted, held_out = banded.result()
+    pictures = [_renamed(draw_overlay(fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
+    if held_out is not None:
+        pictures.append(_renamed(draw_overlay(held_out), f"overlay-held-out{group}", "on a log held out"))
     return content(*pictures)
 
 
@@ -154,12 +178,6 @@ def _driven(fits: Fits, validations: Mapping[str, Validation]) -> list[tuple[flo
 def _paths(fits: Fits, validations: Mapping[str, Validation]) -> list[Path]:
     every = (path_of(run, fits[group].robot) for group, run in _measured(validations))
     return [path for path in every if path is not None]
-
-
-def _overlay(robot: Robot, found: Comparison) -> Picture:
-    """The first log, with the band of the model; fewer draws where the engine is slow."""
-    draws = FEW if why_not_exact(robot) else DRAWS
-    return draw_overlay(with_bands(found, [robot], logs=(0,), draws=draws))
 
 
 def _renamed(drawn: Picture, name: str, words: str) -> Picture:

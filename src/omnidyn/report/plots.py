@@ -9,12 +9,14 @@ from matplotlib.figure import Figure
 
 from omnidyn.comparison.drift import Drift
 from omnidyn.comparison.result import Comparison
+from omnidyn.control.tracking import Tracking
 from omnidyn.errors import InputError
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.friction_curve import FrictionCurve, friction_curve, sliding_force
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.motors.study import MotorStudy
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.logs.path import path_of
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
@@ -28,7 +30,9 @@ from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
 from omnidyn.report.figures.raw_log import draw_raw_log
 from omnidyn.report.figures.robot import draw_robot
+from omnidyn.report.figures.shapes import draw_polar
 from omnidyn.report.style import Picture
+from omnidyn.report.tracking.pictures import draw_tracking
 from omnidyn.run import Run
 
 WHOLE = "all"  # the name of the one group where there are no groups
@@ -109,4 +113,6 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     Estimate: lambda estimate: draw_estimates({WHOLE: estimate}),
     Identification: lambda found: draw_estimates(found.estimates),
     MotorStudy: _motors,
+    SteadyStudy: draw_polar,
+    Tracking: draw_tracking,
 }

@@ -8,8 +8,7 @@ from typing import Any
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.fit_document import verdict_table
 from omnidyn.identification.steady.operating_points import SPEEDS
-from omnidyn.identification.steady.study import SteadyStudy
-from omnidyn.identification.steady.study_table import study_document
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.steady.study_words import FORCES
 from omnidyn.identification.verdict import steady_verdict
 from omnidyn.logs.path import driven
@@ -24,7 +23,7 @@ def render_study(
 ) -> str:
     """The page of a steady-state study, as HTML. verdict: what it came to; "" is the study's own word. verdicts: of
     `check` on each log."""
-    points, told = study.points, study_document(study)
+    points, told = study.points, study.document()
     introduction = (
         f"Friction of {study.robot.name} from stretches of constant speed: there it balances what the motors push. "
         f"Forces are from {FORCES[points.force_from]}; the motion is the {SPEEDS[points.speed_from]}."

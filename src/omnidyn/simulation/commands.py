@@ -156,3 +156,12 @@ def _clipped(name: str, wanted: FloatArray, applied: FloatArray) -> tuple[str, .
     if not rows.size:
         return ()
     return (f"{name} beyond the limit was clipped in {rows.size} of {len(wanted)} rows, first in row {rows[0]}",)
+
+
+def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
+    """What the current of each motor may not exceed [A]: its limit, or 0 while it coasts. Shape (rows, wheels)."""
+    limit, n = robot.motor.current_limit, robot.wheels.count
+    bound = np.tile(per_wheel(np.inf if limit is None else limit, n), (rows, 1))
+    if given.open_circuit is not None:
+        bound[given.open_circuit] = 0.0
+    return bound

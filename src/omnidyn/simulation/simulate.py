@@ -13,18 +13,21 @@ from omnidyn.errors import InputError
 from omnidyn.model.actuation import reaching
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.fitted.log_effects import LogEffects
-from omnidyn.model.layout import LENGTH, N_AXES
-from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.layout import LENGTH, N_AXES, ROOM
+from omnidyn.model.motor import DYNAMIC, settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.model.stick_slip.release import SIGNS, start_state
-from omnidyn.model.wheels import per_wheel, wheel_speed
+from omnidyn.model.stick_slip.release import SIGNS, current_entry, start_state
+from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
-from omnidyn.simulation.commands import Commands, as_floats, commands, on_ticks
+from omnidyn.simulation.commands import Commands, as_floats, commands, current_bounds, on_ticks
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import simulate_exact, why_not_exact
 from omnidyn.simulation.implicit.march import Outcome, capped, run_implicit
-from omnidyn.simulation.speed_loop import loop_of, no_loop
+from omnidyn.simulation.slip.loads import wheel_loads
+from omnidyn.simulation.slip.march import SlipOutcome, rolling, run_slipping
+from omnidyn.simulation.slip.plant import slip_plant
+from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
 from omnidyn.simulation.view import PLAIN, View, seen_at_once, seen_through
 
 TOLERANCE = 1e-6
@@ -78,7 +81,8 @@ def simulate_seen(
     amperes = as_start("current", np.zeros(robot.wheels.count) if current is None else current, robot.wheels.count)
     tolerance = as_tolerance(tol)  # refused for either engine: which one runs is not what the caller chose
     acting = view.acting(robot, given)
-    if given.set_point is None and given.open_circuit is None and not why_not_exact(robot):
+    exact = given.set_point is None and given.open_circuit is None and view.room is None
+    if exact and not why_not_exact(robot):
         assert acting.voltage is not None
         if robot.motor.electrical == DYNAMIC:
             twists, poses, currents = simulate_exact_inductance(robot, acting.voltage, acting.dt, *start, amperes)
@@ -124,21 +128,64 @@ def _implicit(
     robot: Robot, given: Commands, acting: Commands, twist: FloatArray, pose: FloatArray, current: FloatArray,
     tol: float, view: View,
 ) -> Run:  # fmt: skip
-    """Run the implicit engine, on the grid of the speed loop where there is one, and keep the rows asked for."""
-    numbers, n = plant(robot), robot.wheels.count
-    if acting.set_point is None:
-        assert acting.voltage is not None
-        dt, loop, keep, voltage = acting.dt, no_loop(n), np.arange(len(acting.dt) + 1), acting.voltage.copy()
-    else:
-        dt, set_point, tick, keep = on_ticks(robot, acting)
-        voltage = np.zeros_like(set_point)
-        loop = loop_of(robot, set_point, tick)
+    """Run the implicit engine, on the grid of the speed loop where there is one, and keep the rows asked for.
+
+    Of wheels that slip: theirs.
+    """
+    if robot.wheels.traction_mu is not None:
+        return _slipping(robot, given, acting, (twist, pose), tol, view)
+    numbers = plant(robot)
+    numbers.body[ROOM : ROOM + 2] += (0.0, 0.0) if view.room is None else view.room
+    dt, voltage, loop, keep = _on_grid(robot, acting)
     bound = current_bounds(robot, acting, len(dt))
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
     kept = Outcome(outcome.pose[keep], outcome.state[keep], outcome.iterations, outcome.steps)
     asked = voltage[keep[:-1]]
     motors = asked if acting.set_point is None else reaching(robot, asked)
     return implicit_run(robot, given, motors, kept, tol, acting, view, asked)
+
+
+def _on_grid(robot: Robot, acting: Commands) -> tuple[FloatArray, FloatArray, Loop, NDArray[np.intp]]:
+    """(dt, voltages to fill or as given, the speed loop, where the rows asked for begin) of what acts."""
+    if acting.set_point is None:
+        assert acting.voltage is not None
+        return acting.dt, acting.voltage.copy(), no_loop(robot.wheels.count), np.arange(len(acting.dt) + 1)
+    dt, set_point, tick, keep = on_ticks(robot, acting)
+    return dt, np.zeros_like(set_point), loop_of(robot, set_point, tick), keep
+
+
+def _slipping(
+    robot: Robot, given: Commands, acting: Commands, start: tuple[FloatArray, FloatArray], tol: float, view: View
+) -> Run:
+    """Run the engine of wheels that slip, and say which did."""
+    numbers = slip_plant(robot)
+    numbers.room[:] += (0.0, 0.0) if view.room is None else view.room
+    dt, voltage, loop, keep = _on_grid(robot, acting)
+    out = run_slipping(
+        numbers, voltage, current_bounds(robot, acting, len(dt)), dt, rolling(numbers, start[0]), start[1], loop, tol
+    )
+    asked, state = voltage[keep[:-1]], out.state[keep]
+    motors = asked if acting.set_point is None else reaching(robot, asked)
+    turning = state[:, N_AXES:] / robot.wheels.radii
+    push = 0.0 if view.push is None else view.push
+    current = settled_current(robot.motor, _with_last(motors - push), turning)
+    done = Done(motors, state[:, :N_AXES], out.pose[keep], None, current, asked, turning)
+    how = f"engine of wheels that slip, tol {tol:g} m/s" if tol else "engine of wheels that slip, fixed step"
+    return as_run(robot, given, acting, done, how, _slip_words(robot, out, len(dt)), view)
+
+
+def _slip_words(robot: Robot, out: SlipOutcome, rows: int) -> tuple[str, ...]:
+    """Which wheels lost their grip, and which have none."""
+    shares = 100.0 * (out.contact != 0.0).mean(axis=0)
+    spins = [f"wheel {w + 1} in {share:.2g} %" for w, share in enumerate(shares.tolist()) if share > 0.0]
+    words = [f"wheels slip: {', '.join(spins)} of the samples"] if spins else []
+    words += [f"the friction solver hit its cap in {out.capped} of {rows} rows: look there"] if out.capped else []
+    words += [
+        f"wheel {w + 1} lifts off in {100.0 * count / rows:.2g} % of the rows: it has no grip then, and that the robot "
+        "tips is not in the model"
+        for w, count in enumerate(out.lifted.tolist()) if count
+    ]  # fmt: skip
+    return (*wheel_loads(robot).words, *words)
 
 
 def implicit_run(
@@ -158,19 +205,11 @@ def implicit_run(
     return as_run(robot, given, acting or given, done, how, warnings, view)
 
 
-def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
-    """What the current of each motor may not exceed [A]: its limit, or 0 while it coasts. Shape (rows, wheels)."""
-    limit, n = robot.motor.current_limit, robot.wheels.count
-    bound = np.tile(per_wheel(np.inf if limit is None else limit, n), (rows, 1))
-    if given.open_circuit is not None:
-        bound[given.open_circuit] = 0.0
-    return bound
-
-
 class Done(NamedTuple):
     """What a simulation found: voltage [V] at the motors over each step; twist, pose and current at each sample.
 
     outcome: of the implicit engine. current: of the exact engine with winding inductance. asked: by a speed loop.
+    wheel_speed: where it does not follow from the twist.
     """
 
     voltage: FloatArray
@@ -179,6 +218,7 @@ class Done(NamedTuple):
     outcome: Outcome | None = None
     current: FloatArray | None = None
     asked: FloatArray | None = None
+    wheel_speed: FloatArray | None = None
 
 
 def as_run(
@@ -189,12 +229,14 @@ def as_run(
     dt, n = given.dt, robot.wheels.count
     t = np.arange(len(dt) + 1) * dt[0] if np.all(dt == dt[0]) else np.concatenate([[0.0], np.cumsum(dt)])
     turning, outcome = wheel_speed(robot.wheels, done.twist), done.outcome
+    turning = turning if done.wheel_speed is None else done.wheel_speed
     if outcome is not None:  # a wheel that sticks is at rest, to the last bit
         turning[outcome.state[:, SIGNS + N_AXES : SIGNS + N_AXES + n] == 0.0] = 0.0
     if done.current is not None:
         current = done.current
     elif outcome is not None and robot.motor.electrical == DYNAMIC:
-        current = outcome.state[:, -n:]
+        first = current_entry(N_AXES, N_AXES + n)
+        current = outcome.state[:, first : first + n]
     else:
         push = 0.0 if view.push is None else view.push  # of the floor, not of the motors
         current = settled_currents(robot, done.twist, _with_last(done.voltage - push))

@@ -1,8 +1,9 @@
 """View: how commands reach the motors, and how a log shows what the robot does. From both a simulation is seen.
 
-    u = left gain (|u| - dead)+ sgn u + what pushes as hard as the tilt
+    u = left gain (|u| - dead)+ sgn u + what pushes as hard as a push of the body
 
-A robot has a dead band and a latency of its own; a log may add a gain, a fade, a tilt, and channels that are late.
+A robot has a dead band and a latency of its own; a log may add a gain, a fade, a push, channels that are late, and a
+tilt: a force that stays in the room.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class View:
     """clock: None, where nothing is late. late: channel -> which of the latenesses of the clock it has.
 
     driver, share (rows,), push (wheels,) [V]: what becomes of voltages. held: whether the first command acted before it
-    was given, as in a log that begins in motion; else nothing did.
+    was given, as in a log that begins in motion; else nothing did. room: a constant force there [N].
     """
 
     clock: Clock | None = None
@@ -38,6 +39,7 @@ class View:
     share: FloatArray | None = None
     push: FloatArray | None = None
     held: bool = False
+    room: tuple[float, float] | None = None
 
     def acting(self, robot: Robot, given: Commands) -> Commands:
         """The commands as they reach the motors, or the speed loop, over each step of the simulation.
@@ -104,13 +106,13 @@ def seen_through(
     apart = sorted({0.0, *late.values()})
     time = clock(dt, main, apart) if main or any(apart) else None
     at = {"voltage": apart.index(0.0)} | {name: apart.index(each) for name, each in late.items()}
-    driver = Driver(log.gain, robot.drive.dead_band, log.fade)
-    return View(time, at, driver, share, pushing(robot, log.tilt), start is not None)
+    driver, room = Driver(log.gain, robot.drive.dead_band, log.fade), log.tilt if any(log.tilt) else None
+    return View(time, at, driver, share, pushing(robot, log.push), start is not None, room)
 
 
-def pushing(robot: Robot, tilt: tuple[float, float, float]) -> FloatArray | None:
-    """The least volts that push the body at rest as hard as a tilt (3,) [N, N, N m]; None without one. (wheels,)."""
-    if not any(tilt):
+def pushing(robot: Robot, push: tuple[float, float, float]) -> FloatArray | None:
+    """The least volts that push the body at rest as hard as a wrench (3,) [N, N, N m]; None without one. (wheels,)."""
+    if not any(push):
         return None
     per_volt = drive_wrench(linear_part(robot), np.zeros(3), np.eye(robot.wheels.count)).T
-    return np.asarray(np.linalg.lstsq(per_volt, np.array(tilt), rcond=None)[0], dtype=float)
+    return np.asarray(np.linalg.lstsq(per_volt, np.array(push), rcond=None)[0], dtype=float)

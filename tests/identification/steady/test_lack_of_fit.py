@@ -7,7 +7,6 @@ import pytest
 
 from omnidyn.identification.steady.lack_of_fit import REPEATS
 from omnidyn.identification.steady.study import identify_steady
-from omnidyn.identification.steady.study_table import study_document
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from tests.support.plain_world import World, at_wheels, fan, on_rollers, spoiled, steady_logs, turned_box
@@ -90,7 +89,7 @@ def test_too_few_directions_are_not_tested_and_it_says_so():
 
 def test_it_is_part_of_the_answer_in_text_and_for_machines():
     found = study("rollers", 0)
-    told = study_document(found)
+    told = found.document()
     assert "no offered shape fits" in told.to_text()
     record = json.loads(json.dumps(told.data))
     assert record["lack_of_fit"] is True

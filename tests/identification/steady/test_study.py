@@ -9,7 +9,6 @@ from omnidyn.identification.steady.operating_points import force_points
 from omnidyn.identification.steady.shape_fit import fit_shape
 from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.identification.steady.study import identify_steady
-from omnidyn.identification.steady.study_table import study_document
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
@@ -160,7 +159,7 @@ def test_groups_of_which_only_one_turns_are_compared_in_what_both_tell(turns):
     assert [each.key for each in study.differences] == list(straight)
     for each in study.differences:
         assert each.values == (study.estimates["first"].value[each.key], study.estimates["second"].value[each.key])
-    study_document(study).to_text()
+    study.document().to_text()
 
 
 def test_internal_forces_of_four_wheels_are_told():
@@ -204,14 +203,14 @@ def test_the_speed_that_was_used_is_stated():
     for speed, words in (("set", "set speed"), ("wheel", "speed of the wheels")):
         study = identify_steady(noisy("disc"), AXEBOT, speed=speed)
         assert words in study.estimate.method
-        assert words in study_document(study).to_text()
+        assert words in study.document().to_text()
 
 
 def test_the_summary_and_the_dictionary_hold_all_of_it():
     import json
 
     study = identify_steady(noisy("disc"), AXEBOT)
-    told = study_document(study)
+    told = study.document()
     text, record = told.to_text(), told.data
     json.dumps(record)
     assert text.isascii()

@@ -5,7 +5,6 @@ import pytest
 
 from omnidyn.identification.steady.operating_points import force_points
 from omnidyn.identification.steady.study import identify_steady
-from omnidyn.identification.steady.study_table import study_document
 from omnidyn.logs.plateaus import find_plateaus
 from omnidyn.model.robot import GUESS, Prior
 from omnidyn.model.robot_file import load_robot
@@ -151,7 +150,7 @@ def test_viscous_friction_beside_a_guessed_motor_constant_is_the_sum_that_it_is(
     assert level.back_emf == pytest.approx(brake)
     assert level.value + level.back_emf == pytest.approx(3.0 + brake, rel=0.02)
     assert level.std > 0.35 * brake
-    text = " ".join(study_document(found).to_text().split())
+    text = " ".join(found.document().to_text().split())
     assert "viscous friction cannot be told from back-EMF, for motor.torque_constant_Nm_A is a guess" in text
     assert "friction.direction.viscous: right together with the back-EMF of this file only" in text
     low, high = found.estimate.ci95["friction.direction.viscous"]

@@ -15,8 +15,8 @@ from omnidyn.identification.ladder import Ladder, Rung
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.climb import offered
-from omnidyn.identification.structure.held_out import Errors, errors, margins_of
+from omnidyn.identification.structure.ladder.climb import offered
+from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot, save_robot
 from omnidyn.report.fit_page import render_fit
@@ -109,9 +109,14 @@ def test_what_the_log_cannot_tell_apart_is_said_and_each_is_fitted():
     assert any("would be the same" in words for words in estimate.warnings)
 
 
-@pytest.mark.parametrize("name, size", [("umbilical", 2.3), ("sag", 0.4)])
-def test_what_no_robot_file_holds_is_said_and_not_taken(name, size):
-    estimate, _ = climbed(name, size)
+def test_a_pull_in_the_room_is_taken_as_one_of_these_logs():
+    estimate, _ = climbed("umbilical", 2.3)
+    assert [rung.key for rung in estimate.ladder.taken] == ["tilt"]
+    assert estimate.robot.log.tilt == pytest.approx((2.3, 0.0), abs=0.1)
+
+
+def test_what_no_robot_file_holds_is_said_and_not_taken():
+    estimate, _ = climbed("sag", 0.4)
     assert estimate.ladder.taken == ()
     assert "no law that is known here holds" in estimate.ladder.end
     assert estimate.lack_of_fit.found

@@ -55,3 +55,22 @@ def test_a_log_says_that_its_counter_starts_over(tmp_path):
     run = read_log(path, assume={"a": "ticks/32768"})
     np.testing.assert_allclose(np.ptp(run.wheel_angle), np.ptp(TURNS) * 2.0 * np.pi, rtol=1e-3)
     assert any("enc1_ticks starts over after 65536 ticks: it is taken to go on" in words for words in run.warnings)
+
+
+@pytest.mark.parametrize(("bits", "kind"), [(16, float), (16, np.float32), (32, float)])
+def test_counts_that_a_driver_made_radians_go_on_too(bits, kind):
+    """JointState.position of a driver that multiplies the integer of its encoder."""
+    tick, half = 2.0 * np.pi / 4096.0, 2.0 ** (bits - 1)
+    counts = np.round(TURNS * 4096.0) + half - 5000.0
+    seen = (tick * (np.mod(counts + half, 2.0 * half) - half)).astype(kind).astype(float)
+    again, found = unrolled(seen, "rad", "log.csv")
+    assert found == pytest.approx(tick * 2.0 * half, rel=1e-5)
+    np.testing.assert_allclose(again - again[0], (counts - counts[0]) * tick, atol=tick)
+
+
+def test_an_encoder_that_was_set_to_0_has_not_started_over():
+    """It fell by nearly all that two bytes hold, but a wheel that moves by 20 a row does not jump by 3000."""
+    counts = np.concatenate([np.arange(0.0, 62_500.0, 20.0), np.arange(0.0, 5000.0, 20.0)])
+    again, found = unrolled(counts, "ticks/2000", "log.csv")
+    assert found is None
+    np.testing.assert_array_equal(again, counts)

@@ -7,8 +7,9 @@ from functools import cache
 
 # Options beside those of a Question, and those whose flag is not their name.
 OTHERS = (
-    "assume", "azimuth", "column", "current_unsigned", "duration", "fail_if", "force", "map", "max_bytes", "max_steps",
-    "no_header", "pose", "skip_bad_rows", "sort", "tol", "twist",
+    "assume", "azimuth", "column", "controller", "current_unsigned", "delay", "draws", "dt", "duration", "evaluations",
+    "fail_if", "force", "horizon", "map", "max_bytes", "max_steps", "no_header", "no_observer", "noise", "path",
+    "plant", "pose", "skip", "skip_bad_rows", "sort", "tol", "twist", "with",
 )  # fmt: skip
 _NAMED = re.compile(r"`([a-z_]+)`")
 
@@ -19,6 +20,8 @@ def flags() -> dict[str, str]:
     from omnidyn.identification.question import options
 
     asked = {each.name: each.metadata["flag"] or each.name for each in options() if each.metadata["flag"] is not None}
+    asked["beside"] = "with"
+    asked["variables"] = "var"  # of a file of MATLAB
     return {name: f"--{word.replace('_', '-')}" for name, word in {**{name: name for name in OTHERS}, **asked}.items()}
 
 

@@ -92,7 +92,4 @@ def _folds(runs: Sequence[Run]) -> Iterator[tuple[list[Run], Run]]:
 
 
 def _rows(run: Run, rows: slice) -> Run:
-    made_up = {name: mask[rows] for name, mask in run.interpolated.items()}
-    return run.replace(
-        t=run.t[rows], interpolated=made_up, **{name: values[rows] for name, values in run.channels.items()}
-    )
+    return run.replace(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()})

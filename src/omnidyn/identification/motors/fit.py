@@ -76,8 +76,8 @@ def fit_motor(
 
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
-    """Runs as a free run takes them: what was interpolated in between does not count."""
-    return motor_logs([run.as_measured() for run in as_list(runs)], kind, kinds=FREE_RUN_INPUTS)
+    """Runs as a free run takes them."""
+    return motor_logs(as_list(runs), kind, kinds=FREE_RUN_INPUTS)
 
 
 def _with_bend(fit: MotorEstimate, bent: Bend | None) -> MotorEstimate:

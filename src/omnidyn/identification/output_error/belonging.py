@@ -1,8 +1,8 @@
 """What was fitted beside the numbers of the robot file: what belongs to the robot goes into it, the rest to its logs.
 
 The dead band of a driver is the robot's, and so is what all channels are late by together: to whatever commands the
-robot it is one delay, wherever on the way it arises. A gain, a fade, a tilt, and what one channel is later than another
-belong to the logs, and stand in the table [log] with the marks of these.
+robot it is one delay, wherever on the way it arises. A gain, a fade, a tilt, a push, and what one channel is later than
+another belong to the logs, and stand in the table [log] with the marks of these.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import identified, printable
 from omnidyn.identification.output_error.engines.actuation import late_by
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model import keys
@@ -75,10 +75,10 @@ def _effects(
         **{name: each for name, each in late.items() if each != own},
         averaged=any(_added_up(run, late) for run in runs),
     )
-    tilt = [found.get(f"{TILT}.{axis}", 0.0) for axis in AXES]
+    tilt, push = ([found.get(f"{kind}.{axis}", 0.0) for axis in AXES] for kind in (TILT, PUSH))
     effects = LogEffects(
         gain=found.get(GAIN, 1.0), fade=found.get(FADE, 0.0), latency=latency,
-        tilt=(tilt[0], tilt[1], tilt[2]),
+        tilt=(tilt[0], tilt[1]), push=(push[0], push[1], push[2]),
     )  # fmt: skip
     return None if effects == LogEffects() else effects.replace(of=tuple(log_mark(run) for run in runs))
 

@@ -17,7 +17,7 @@ from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.belonging import key_of, with_nuisances
 from omnidyn.identification.output_error.combinations import combinations
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT, TRAVELS, implausible
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
@@ -28,7 +28,7 @@ from omnidyn.identification.output_error.trust.breakaway import Breakaway
 from omnidyn.identification.output_error.trust.cures import Blind, blind_in_words
 from omnidyn.identification.output_error.trust.ends import at_the_end, end_words
 from omnidyn.identification.output_error.trust.support import too_early
-from omnidyn.identification.output_error.trust.uncertainty import Trust
+from omnidyn.identification.output_error.trust.uncertainty import Trust, widened
 from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, unit, with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
@@ -339,7 +339,7 @@ def _warnings(
         by = f" by the scatter from run to run ({known.runs} runs)" if known.runs else ""
         words.append(
             f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
-            f"intervals allow for it{by}, up to {max(known.widening, 1.0):.2g} times as wide as for white noise"
+            f"intervals allow for it{by}; {widened(known)}"
         )
     return words
 
@@ -361,7 +361,7 @@ def _column(column: tuple[str, int]) -> str:
 
 
 def _unit(name: str) -> str:
-    if name.startswith(TILT):
+    if name.startswith((TILT, PUSH)):
         return "N m" if name.endswith("yaw") else "N"
     return {LATENCY: "s", "dead_band": "V"}.get(name.partition(".")[0], "")
 

@@ -38,7 +38,7 @@ from omnidyn.identification.output_error.solve.first_point import coarse_point, 
 from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, Progress
-from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver
+from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
@@ -214,9 +214,11 @@ class Fit:
             solver = Solver(problem, engine, self.nu)
             return solver.minimise(first_point(solver, group.records), watch=progress)
         start = coarse_point(problem, self.nu, progress)
-        halfway = Solver(problem, make_engine(group.engine, problem, HALFWAY), self.nu, CLOSE)
-        nearer = halfway.minimise(start, watch=progress).state.point
-        return Solver(problem, engine, self.nu, CLOSE).minimise(nearer, watch=progress)
+        halfway = Solver(problem, make_engine(group.engine, problem, HALFWAY), self.nu, ENOUGH)
+        nearer = halfway.minimise(start, watch=progress)
+        return Solver(problem, engine, self.nu, CLOSE).minimise(
+            nearer.state.point, watch=progress, blocked=nearer.blocked
+        )
 
     def _settled_alone(self, progress: Progress) -> tuple[str, ...] | None:
         """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""
@@ -291,7 +293,8 @@ class Fit:
         if group.engine != EXACT:
             raise UnsupportedError(
                 "breakaway is profiled with the exact engine only", got=group.robot.name,
-                expected="friction on the body axes", where="free",
+                expected="friction on the body axes, as in the paper", where="free",
+                remedy="hold it: enter the force at which slow ramps first move the robot",
             )  # fmt: skip
         kind = self.question.covariance
         known = trust(solution.solver, solution, SANDWICH if kind == AUTOREGRESSIVE else kind)

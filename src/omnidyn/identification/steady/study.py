@@ -7,7 +7,7 @@ levels   of each group, with 95 % intervals; what differs between groups, and wh
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Unpack
@@ -24,12 +24,13 @@ from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import STEADY, STEADY_STATE, Question
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
-from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
-from omnidyn.identification.steady.moment import Moment, moments
+from omnidyn.identification.steady.lack_of_fit import lack_of_fit
+from omnidyn.identification.steady.moment import moments
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, force_points
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
 from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
@@ -41,37 +42,6 @@ from omnidyn.run import Run, as_list
 from omnidyn.statistics import t_quantile
 
 MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
-
-
-@dataclass(frozen=True, eq=False)
-class SteadyStudy:
-    """All that steady windows say about friction.
-
-    points: what was used. choice: shapes compared. estimates: group -> Estimate, whose robot holds that group's
-    friction. travel: group -> force along travel. viscous: group -> what is known of the viscous levels. differences
-    between groups. internal: group -> rms of the forces with which the wheels work against each other [N], where there
-    are more than three. lack_of_fit: group -> whether any offered shape fits, and what would. moments: changes
-    inside a run. statements, warnings, advice: in words.
-    """
-
-    robot: Robot
-    points: ForcePoints
-    choice: ShapeChoice
-    estimates: Mapping[str, Estimate]
-    travel: Mapping[str, Travel]
-    viscous: Mapping[str, tuple[Viscous, ...]]
-    differences: tuple[Difference, ...]
-    internal: Mapping[str, float]
-    lack_of_fit: Mapping[str, LackOfFit]
-    statements: tuple[str, ...]
-    warnings: tuple[str, ...]
-    advice: tuple[str, ...]
-    moments: tuple[Moment, ...] = ()
-
-    @property
-    def estimate(self) -> Estimate:
-        """The estimate of the first group; the only one where there are no groups."""
-        return next(iter(self.estimates.values()))
 
 
 @shows_options(STEADY)
@@ -88,6 +58,7 @@ def identify_steady(
     without the channels needed, or for a wrong option.
     """
     check_order("identify_steady(runs, robot)", (runs, Run), (robot, Robot))
+    runs = as_list(runs)
     asked = Question.for_method(STEADY_STATE, question, options)
     robust = asked.robust
     points = force_points(
@@ -105,7 +76,7 @@ def identify_steady(
     estimates = {group: _estimate(robot, own, choice, group, robust) for group, own in parts.items()}
     differences = _differences(choice)
     internal = {group: _internal(robot, own) for group, own in parts.items()} if robot.wheels.count > 3 else {}
-    changed = moments(as_list(runs), robot, points.speed_from, points.force_from, asked.window)
+    changed = moments(runs, robot, points.speed_from, points.force_from, asked.window)
     lack = {group: lack_of_fit(robot, own, choice.fits[choice.chosen][group]) for group, own in parts.items()}
     turning = any(is_turning(robot, own) for own in parts.values())
     return SteadyStudy(

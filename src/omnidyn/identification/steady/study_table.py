@@ -1,18 +1,70 @@
-"""What a steady-state study says: its tables and words, and its values for machines."""
+"""A steady-state study: what was found, its tables and words, and its values for machines."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
-from omnidyn.document import Document, Points, Table, interval_cell
-from omnidyn.identification.steady.operating_points import SPEEDS
-from omnidyn.identification.steady.study import SteadyStudy
+from omnidyn.document import Document, Points, Table, all_of, interval_cell
+from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.steady.choice import ShapeChoice
+from omnidyn.identification.steady.lack_of_fit import LackOfFit
+from omnidyn.identification.steady.moment import Moment
+from omnidyn.identification.steady.operating_points import SPEEDS, ForcePoints
+from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
 from omnidyn.identification.steady.study_words import FORCES
 from omnidyn.model.keys import Key
+from omnidyn.model.robot import Robot
+from omnidyn.shown import FIGURE, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-def study_document(study: SteadyStudy) -> Document:
+@dataclass(frozen=True, eq=False, repr=False)
+class SteadyStudy(Shown):
+    """All that steady windows say about friction.
+
+    points: what was used. choice: shapes compared. estimates: group -> Estimate, whose robot holds that group's
+    friction. travel: group -> force along travel. viscous: group -> what is known of the viscous levels. differences
+    between groups. internal: group -> rms of the forces with which the wheels work against each other [N], where there
+    are more than three. lack_of_fit: group -> whether any offered shape fits, and what would. moments: changes
+    inside a run. statements, warnings, advice: in words.
+    """
+
+    robot: Robot
+    points: ForcePoints
+    choice: ShapeChoice
+    estimates: Mapping[str, Estimate]
+    travel: Mapping[str, Travel]
+    viscous: Mapping[str, tuple[Viscous, ...]]
+    differences: tuple[Difference, ...]
+    internal: Mapping[str, float]
+    lack_of_fit: Mapping[str, LackOfFit]
+    statements: tuple[str, ...]
+    warnings: tuple[str, ...]
+    advice: tuple[str, ...]
+    moments: tuple[Moment, ...] = ()
+
+    @property
+    def estimate(self) -> Estimate:
+        """The estimate of the first group; the only one where there are no groups."""
+        return next(iter(self.estimates.values()))
+
+    def __repr__(self) -> str:
+        return f"<SteadyStudy {self.robot.name}, {self.choice.chosen}: {all_of(list(self.estimates))}>"
+
+    def document(self) -> Document:
+        """What was used, the shapes, the levels, what it says and what it warns of."""
+        return _document(self)
+
+    def plot(self) -> Figure:
+        """The force of friction over the direction of travel. Needs matplotlib."""
+        return make(FIGURE, self)
+
+
+def _document(study: SteadyStudy) -> Document:
     """The study: what was used, the shapes, the levels, what it says and what it warns of."""
     points = study.points
     of_fits = [

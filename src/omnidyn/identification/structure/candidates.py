@@ -6,7 +6,7 @@ several where none is small (a limit, a time). A new law comes in here with one 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +14,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.prepare import LOOP
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
-from omnidyn.identification.structure.motion import Motion
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
+from omnidyn.identification.structure.motion import Motion, in_the_room
 from omnidyn.identification.structure.workbench import Workbench, scaled
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
 from omnidyn.model.dynamics import drive_wrench
@@ -29,13 +29,23 @@ CHANGE = "change"  # friction that is another one from some time of the log on
 WHEN = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
 
 
+@dataclass(frozen=True)
+class Fitted:
+    """A candidate that was fitted: in words, how many numbers it took, number -> (before, with it)."""
+
+    words: str
+    numbers: int
+    changes: Mapping[str, tuple[float, float]]
+
+
 @dataclass(frozen=True, eq=False)
 class Trial:
     """What a change by 1 would change in the log, of each piece (C, rows, K), K numbers. at: where it is tried, such as
-    the level of a limit."""
+    the level of a limit. fitted: of one that was, and is shown whole by its one column."""
 
     shown: list[FloatArray]
     at: float = 0.0
+    fitted: Fitted | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +107,8 @@ def of_the_log(bench: Workbench) -> Iterator[Candidate]:
         yield Candidate(
             DEAD_BAND, _driver(DEAD_BAND, Driver(dead_band=0.1), 0.1), lambda by, _: f"dead band {by:.2g} V", 0.0
         )
-    yield Candidate(TILT, _tilt, as_it_is("a constant force, as of a floor that is not level"))
+    yield Candidate(TILT, _by(in_the_room), as_it_is("a force that stays in the room, as of a floor that is not level"))
+    yield Candidate(PUSH, _by(_on_the_body), as_it_is("a constant push in the body, as of a brush that drags"))
     for channel in dict.fromkeys(name for name, _ in bench.problem.columns):
         words = channel.replace("_", " ")
         yield Candidate(
@@ -115,8 +126,13 @@ def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], lis
     return lambda bench: [Trial([own / size for own in bench.change(driver=driver)])]
 
 
-def _tilt(bench: Workbench) -> list[Trial]:
-    return [Trial(bench.by_force(lambda motion: np.tile(np.eye(N_AXES), (len(motion.t), 1, 1))))]
+def _by(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[Trial]]:
+    return lambda bench: [Trial(bench.by_force(force))]
+
+
+def _on_the_body(motion: Motion) -> FloatArray:
+    """A constant push along each axis. Shape (n, 3, 3)."""
+    return np.tile(np.eye(N_AXES), (len(motion.t), 1, 1))
 
 
 def _late(channel: str) -> Callable[[Workbench], list[Trial]]:

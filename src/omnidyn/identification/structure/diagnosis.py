@@ -3,23 +3,26 @@ the same throughout the logs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import fdtrc
 
-from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.arrays import FloatArray
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
-from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.output_error.problem.problem import Parts, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
+from omnidyn.identification.structure.candidates import Candidate, Trial
 from omnidyn.identification.structure.laws import candidates
 from omnidyn.identification.structure.linear import Rows
-from omnidyn.identification.structure.misfit import FALSE, Misfit, misfit
+from omnidyn.identification.structure.misfit import FALSE, Misfit, misfit, with_cause
 from omnidyn.identification.structure.motion import motions
+from omnidyn.identification.structure.refits import refits
 from omnidyn.identification.structure.remedies import remedies
 from omnidyn.identification.structure.rests_on import rests_on
 from omnidyn.identification.structure.shifts import stability
@@ -50,17 +53,20 @@ def examine(solution: Solution) -> Examined:
     solver, point = solution.solver, solution.state.point
     problem = with_levels(solver.problem, levels_of(solution)).shortened(MOST_ROWS)
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
-    rows, moved = Rows.of(problem, point, engine.residuals(point)), motions(problem, point)
+    parts = engine.residuals(point)
+    rows, moved = Rows.of(problem, point, parts), motions(problem, point)
     seen = misfit(rows, moved)
     stable = stability(seen.linear)
     bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
     tried = [(one, one.tried(bench)) for one in (*candidates(bench), *unoffered(bench))]
-    ranked = remedies(seen.linear, [each for each in tried if each[1]], seen.shown)
+    tried = [each for each in tried if each[1]]
+    ranked = remedies(seen.linear, tried, seen.shown)
     count = int(sum(there.sum() for there in rows.there))
     degrees = min(seen.linear.degrees, float(count))
     strong = [r for r in ranked if fdtrc(r.numbers, degrees, r.chi2 / r.numbers) * len(tried) < FALSE]
     found = bool(seen.found or strong)
-    told = ranked if found else ()
+    told, cause = _fitted(solution, problem, parts, seen, tried, ranked) if found else ((), None)
+    seen = with_cause(seen, cause) if cause else seen
     names = [f"{name}[{i}]" for name, i in problem.columns]
     pictures = binned(rows, moved, int(np.argmax(seen.shares))) if found else ()
     lack = LackOfFit(
@@ -69,6 +75,34 @@ def examine(solution: Solution) -> Examined:
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
     return Examined(diagnosis, seen.linear.memory, len(tried), count)
+
+
+def _fitted(
+    solution: Solution, problem: Problem, parts: Sequence[Parts], seen: Misfit,
+    tried: Sequence[tuple[Candidate, list[Trial]]], ranked: Sequence[Remedy],
+) -> tuple[tuple[Remedy, ...], list[FloatArray] | None]:  # fmt: skip
+    """(the remedies, the best of them and other shapes as fits find them; what the first shows of each piece).
+
+    A size stays that of the first step.
+    """
+    near = {one.key: one for one in ranked}
+    anew = refits(solution, problem, parts, ranked, [one for one, _ in tried])
+    tried = [anew.get(one.key, (one, trials)) for one, trials in tried]
+    again = remedies(seen.linear, tried, seen.shown)
+    shown = [
+        trial.shown for one, trials in tried for trial in trials
+        if again and one.key == again[0].key and (trial.fitted or trial.at == again[0].at)
+    ]  # fmt: skip
+    told = tuple(_with_first_step(one, near[one.key], anew) if one.key in near else one for one in again)
+    return told, shown[0] if shown else None
+
+
+def _with_first_step(again: Remedy, near: Remedy, fitted: Container[str]) -> Remedy:
+    """A remedy with what its first step says of it: its size, and what is the same, of which not both were fitted."""
+    if again.key in fitted:  # a fit makes more of it, but not of its rivals, of which there are columns only
+        again = replace(again, size=near.size, at=near.at, share=min(again.share, near.share))
+    same = [key for key in near.same_as if not (key in fitted and again.key in fitted)]
+    return replace(again, same_as=tuple(dict.fromkeys((*again.same_as, *same))))
 
 
 def with_levels(problem: Problem, levels: Sequence[float] | None) -> Problem:

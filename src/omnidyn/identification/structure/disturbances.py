@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.structure.motion import Motion
+from omnidyn.identification.structure.motion import Motion, in_the_room
 from omnidyn.model.layout import N_AXES, YAW
 
 Directions = Callable[[Motion, FloatArray], FloatArray]  # of a motion and its fastest twist (3,)
@@ -123,10 +123,7 @@ def _time(motion: Motion, top: FloatArray) -> FloatArray:
 
 def _heading(motion: Motion, top: FloatArray) -> FloatArray:
     """A force that stays in the room: a slope under a robot that turns, a cable."""
-    c, s = np.cos(motion.pose[:, 2]), np.sin(motion.pose[:, 2])
-    out = np.zeros((len(c), 2, N_AXES))
-    out[:, 0, 0], out[:, 0, 1], out[:, 1, 0], out[:, 1, 1] = c, -s, s, c
-    return out
+    return in_the_room(motion)
 
 
 def _angles(motion: Motion, top: FloatArray) -> FloatArray:

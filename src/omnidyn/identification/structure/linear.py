@@ -19,9 +19,11 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.memory.innovations import innovations
 from omnidyn.identification.output_error.memory.whitened import known_rows
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
+from omnidyn.identification.structure.rounding import anew, of_rounding
 
 TINY = 1e-300
 SAME = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
+BARE = 0.32  # of a tick: rounding alone has 1/sqrt(12)
 Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 
 
@@ -49,7 +51,7 @@ class Rows:
         scale = [p.slope(float(v)) for p, v in zip(problem.parameters, point.values, strict=True)]
         rows = cls(problem, point, [], [], [], [], [], [])
         for piece, (every_residual, slopes, at) in zip(problem.pieces, parts, strict=True):
-            residual = _anew(piece, every_residual)
+            residual = anew(piece, every_residual)
             wide = np.zeros((*residual.shape, count))
             mine = at < count
             wide[:, :, at[mine]] = slopes[:, :, mine]
@@ -61,6 +63,13 @@ class Rows:
             rows.steps.append([steps for _, steps in known])
             rows.column.append([every.index(column) for column in piece.record.columns])
         return rows
+
+    def is_rounding(self, c: int, variance: float) -> bool:
+        """Whether errors of this variance in column c of the problem are little more than what its encoder rounds."""
+        ticks = [
+            piece.record.ticks[own.index(c)] for piece, own in zip(self.pieces, self.column, strict=True) if c in own
+        ]
+        return bool(ticks) and variance < (BARE * min(ticks)) ** 2
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
@@ -106,6 +115,50 @@ class Linear:
             _new(self.memory[c], values[j], rows.there[k][j], rows.steps[k][j]) for j, c in enumerate(rows.column[k])
         ]
         return np.concatenate(parts) if parts else np.zeros((0, values.shape[2]))
+
+    def without_starts(self, shown: Shown) -> list[FloatArray]:
+        """What is shown, in rows as they are, without what the starts of pieces explain of it. (C, rows, K) each."""
+        found = []
+        for k, values in enumerate(shown):
+            own = self.rows.own[k]
+            if own.shape[2]:
+                white_own = self.of_piece(k, own)
+                values = values - own @ solved(white_own, self.of_piece(k, values))
+            found.append(values)
+        return found
+
+    def known(self, shown: Shown) -> FloatArray:
+        """Degrees of freedom with which the noise along some directions is known, by how well the memory is. (K,).
+
+        shown: of each piece (C, rows, K), as it is, of length 1 once white. The variance that a memory gives to a
+        direction is off by dV = -dw_k g' g(k rows on)/s^2, see AutoRegression.scatter; 2/var V: Satterthwaite's.
+        """
+        scatter = np.zeros(shown[0].shape[2])
+        for c, memory in enumerate(self.memory):
+            reach = np.zeros((memory.order + 1, len(scatter)))
+            for k, columns in enumerate(self.rows.column):
+                for j in (j for j, column in enumerate(columns) if column == c):
+                    reach += memory.products(shown[k][j][self.rows.there[k][j]])
+            scatter += memory.scatter(reach / max(memory.variance, TINY))
+        return 2.0 / np.maximum(scatter, TINY)
+
+    def rounded(self, shown: Shown) -> FloatArray:
+        """By how much rounding makes the variance along some directions larger than white noise does, 1 or more. (K,).
+
+        shown: as in `known`. Columns with a memory have it in their memory.
+        """
+        more = np.zeros(shown[0].shape[2])
+        for k, (piece, columns) in enumerate(zip(self.rows.pieces, self.rows.column, strict=True)):
+            for j, (c, tick) in enumerate(zip(columns, piece.record.ticks, strict=True)):
+                variance = max(self.memory[c].variance, TINY)
+                if tick <= 0.0 or self.memory[c].order:
+                    continue
+                there = self.rows.there[k][j]
+                angle = (piece.record.outputs[piece.first : piece.last + 1, j] - self.rows.residual[k][j])[there]
+                share = tick**2 / 12.0 / variance
+                beside = max(1.0 / share - 1.0, 0.0) / 12.0
+                more += share * of_rounding(angle, tick, shown[k][j][there] / np.sqrt(variance), beside**0.5)
+        return np.maximum(1.0 + more, 1.0)
 
     def whole(self) -> tuple[FloatArray, FloatArray]:
         """(e (N,), J (N, P)) of the fit itself, its priors as rows."""
@@ -156,28 +209,19 @@ class Gram:
         half = (vectors[:, kept] / np.sqrt(values[kept])).T @ self.matrix[known]
         return replace(self, matrix=self.matrix - half.T @ half, rows=self.rows - int(kept.sum())), int(kept.sum())
 
-    def explained(self, by: IntArray, least: float) -> tuple[float, int]:
-        """(the part of the sum of e^2 that columns explain, in how many directions longer than sqrt(least))."""
-        if not len(by):
-            return 0.0, 0
-        values, vectors = np.linalg.eigh(self.matrix[np.ix_(by, by)])
+    def directions(self, known: IntArray, by: IntArray, least: float) -> tuple[FloatArray, FloatArray]:
+        """(what each direction of columns `by` explains of e once those `known` do, (k,); its weights, (P + K, k)).
+
+        Directions longer than sqrt(least), each of length 1 with all columns of [J, Z] weighed so.
+        """
+        rest, _ = self.left(known)
+        values, vectors = np.linalg.eigh(rest.matrix[np.ix_(by, by)])
         kept = values > least
-        return float(((vectors[:, kept].T @ self.matrix[by, 0]) ** 2 / values[kept]).sum()), int(kept.sum())
-
-
-def _anew(piece: Piece, residual: FloatArray) -> FloatArray:
-    """Residuals (C, rows) without rows in which an encoder shows what it showed before, within a tick of the model.
-
-    What is left of rounding is spread evenly over a tick, and one such row knows nothing of the next.
-    """
-    out = residual.copy()
-    for c, tick in enumerate(piece.record.ticks):
-        if tick <= 0.0:
-            continue
-        model = piece.record.outputs[piece.first : piece.last + 1, c] - residual[c]
-        turned = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.nan_to_num(model))))]) // tick
-        out[c, 1:][turned[1:] == turned[:-1]] = np.nan
-    return out
+        ways = vectors[:, kept] / np.sqrt(values[kept])
+        weights = np.zeros((len(self.size), ways.shape[1]))
+        weights[by] = ways
+        weights[known] = -solved_by(self.matrix[np.ix_(known, known)], self.matrix[np.ix_(known, by)] @ ways)
+        return (ways.T @ rest.matrix[by, 0]) ** 2, (weights / self.size[:, None])[1:]
 
 
 def _new(memory: AutoRegression, values: FloatArray, there: BoolArray, steps: IntArray) -> FloatArray:
@@ -188,13 +232,18 @@ def _new(memory: AutoRegression, values: FloatArray, there: BoolArray, steps: In
 
 
 def solved(columns: FloatArray, right: FloatArray) -> FloatArray:
-    """The least squares solution of columns (N, K) for right (N,); directions that are one get the shortest."""
+    """The least squares solution of columns (N, K) for right (N,) or (N, M), the shortest where directions are one."""
     size = np.linalg.norm(columns, axis=0)
     size[size == 0.0] = 1.0
     columns = columns / size
-    values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = values > SAME * max(float(values.max(initial=0.0)), 1e-300)
-    return (vectors[:, kept] @ ((vectors[:, kept].T @ (columns.T @ right)) / values[kept])) / size
+    return (solved_by(columns.T @ columns, columns.T @ right).T / size).T
+
+
+def solved_by(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """The shortest x with matrix x = right, the matrix (K, K) one of scalar products of columns of length 1."""
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > SAME * max(float(values.max(initial=0.0)), TINY)
+    return vectors[:, kept] @ ((vectors[:, kept].T @ right).T / values[kept]).T
 
 
 def root_of_covariance(columns: FloatArray) -> FloatArray:

@@ -7,8 +7,8 @@ the residuals, and the rest is asked again with the memory of what is left, so t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import fdtrc
@@ -23,6 +23,7 @@ from omnidyn.identification.structure.motion import Motion
 
 FALSE = 0.02  # of right models for which something is found, all tests together
 ROUNDS = 2  # of memory and fit in turn
+TOLD = 10.0  # degrees of freedom with which the noise along a direction must be known for it to be tested
 NEW = 1e-4  # share of a direction that no parameter explains, from which it is one to test
 
 
@@ -54,14 +55,15 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
     taken = np.zeros(0, dtype=int)
     while True:
         linear, left = _whitened(rows, [each[:, :, taken] for each in shown])
-        gram = Gram.of(linear, shown)
-        offset = 1 + gram.count
-        rest, _ = gram.left(np.concatenate([gram.fitted, offset + taken]))
+        asked = _Asked.of(linear, shown, taken)
         names = {each.theme for each in found}
-        degrees = min(linear.degrees, float(max(rest.rows, 1)))
-        scores = {name: _score(rest, offset + own, degrees) for name, own in at.items() if name not in names}
+        scores = {name: asked.score(own) for name, own in at.items() if name not in names}
         first = first or {name: p for name, (_, p, _) in scores.items()}
-        best = min(scores, key=lambda name: scores[name][1], default="")
+        best = _likeliest(scores)
+        if best and not found and scores[best][1] > FALSE / len(themes) and linear.degrees < TOLD:
+            # A memory as long as the log may be the misfit itself: once more, with that of what each theme would leave.
+            scores = {name: _beside(rows, shown, taken, at[name]) for name in scores}
+            best = _likeliest(scores)
         if not best or scores[best][1] > FALSE / len(themes):
             kept = [each[:, :, taken] for each in shown]
             return Misfit(tuple(found), first, linear, kept, *_shares(rows, left, bool(found)))
@@ -69,14 +71,62 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
         taken = np.concatenate([taken, at[best]])
 
 
-def _score(rest: Gram, at: IntArray, degrees: float) -> tuple[float, float, int]:
-    """(F, p, directions) of what columns explain of what is left. degrees: with which its noise is known."""
-    explained, k = rest.explained(at, NEW)
-    if not k:
-        return 0.0, 1.0, 0
-    noise = max(float(rest.matrix[0, 0]) - explained, 1e-300) / max(rest.rows - k, 1)
-    f = explained / k / noise
-    return f, float(fdtrc(k, max(min(degrees, rest.rows - k), 1.0), f)), k
+def with_cause(seen: Misfit, cause: Sequence[FloatArray]) -> Misfit:
+    """The same with what a cause shows (C, rows, K) of each piece beside what was found: it may explain far more."""
+    rows = seen.linear.rows
+    left, _ = _left(rows, seen.linear, [np.concatenate(both, axis=2) for both in zip(seen.shown, cause, strict=True)])
+    shares, explained = _shares(rows, left, True)
+    return replace(seen, shares=shares, explained=explained) if shares.sum() > seen.shares.sum() else seen
+
+
+def _likeliest(scores: Mapping[str, tuple[float, float, int]]) -> str:
+    """The theme with the least chance of being noise, which is 0 to a float of more than one; "" of none."""
+    return min(scores, key=lambda name: (scores[name][1], -scores[name][0]), default="")
+
+
+def _beside(rows: Rows, shown: Sequence[FloatArray], taken: IntArray, own: IntArray) -> tuple[float, float, int]:
+    """The score of some columns, by the memory of what is left where they are taken, too."""
+    linear, _ = _whitened(rows, [each[:, :, np.concatenate([taken, own])] for each in shown])
+    return _Asked.of(linear, shown, taken).score(own)
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is left of a fit, and of the columns that may explain it. known: which columns explain already; bare: all
+    columns in the rows as they are, without what the starts of pieces explain."""
+
+    linear: Linear
+    gram: Gram
+    known: IntArray
+    bare: Sequence[FloatArray]
+
+    @classmethod
+    def of(cls, linear: Linear, shown: Sequence[FloatArray], taken: IntArray) -> _Asked:
+        gram = Gram.of(linear, shown)
+        both = [np.concatenate(each, axis=2) for each in zip(linear.rows.slopes, shown, strict=True)]
+        known = np.concatenate([gram.fitted, 1 + gram.count + taken])
+        return cls(linear, gram, known, linear.without_starts(both))
+
+    def score(self, own: IntArray) -> tuple[float, float, int]:
+        """(F, p, directions) of what some columns of what is shown explain of what is left.
+
+        Along directions in which the noise is known to TOLD degrees of freedom: slow errors may be anything in a log
+        that is not many times as long as they remember, and what follows them is no evidence.
+        """
+        explained, weights = self.gram.directions(self.known, 1 + self.gram.count + own, NEW)
+        if not len(explained):
+            return 0.0, 1.0, 0
+        rest, _ = self.gram.left(self.known)
+        rows = max(rest.rows - len(explained), 1)
+        noise = max(float(rest.matrix[0, 0]) - float(explained.sum()), 1e-300) / rows
+        ways = [each @ weights for each in self.bare]
+        degrees, explained = self.linear.known(ways), explained / self.linear.rounded(ways)
+        told = degrees >= TOLD
+        if not told.any():
+            return 0.0, 1.0, 0
+        k, f = int(told.sum()), float(explained[told].mean() / noise)
+        together = float(np.mean(degrees[told] ** -0.5) ** -2.0)  # all may be off the same way
+        return f, float(fdtrc(k, min(together, rows), f)), k
 
 
 def _whitened(rows: Rows, kept: Sequence[FloatArray]) -> tuple[Linear, list[FloatArray]]:
@@ -102,7 +152,8 @@ def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray
                     there = rows.there[k][j]
                     more = [] if taken is None else [taken[k][j][there]]
                     series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
-        found.append(autoregression(series))
+        plain = autoregression(series, 0)
+        found.append(plain if rows.is_rounding(c, plain.variance) else autoregression(series))
     return found
 
 
@@ -111,18 +162,13 @@ def _left(rows: Rows, linear: Linear, kept: Sequence[FloatArray]) -> tuple[list[
     e, j = linear.whole()
     z = np.hstack([j, linear.white(kept)]) if kept[0].shape[2] else j
     by, root = solved(z, e), root_of_covariance(z)
-    found, taken = [], []
-    for k in range(len(rows.pieces)):
-        shown = np.concatenate([rows.slopes[k], kept[k]], axis=2)
-        rest, off, own = rows.residual[k] - shown @ by, shown @ root, rows.own[k]
+    both = [np.concatenate(each, axis=2) for each in zip(rows.slopes, kept, strict=True)]
+    left = [r[:, :, None] - each @ by[:, None] for r, each in zip(rows.residual, both, strict=True)]
+    found = [each[:, :, 0] for each in linear.without_starts(left)]
+    taken = linear.without_starts([each @ root for each in both])
+    for k, own in enumerate(rows.own):
         if own.shape[2]:
-            white_own = linear.of_piece(k, own)
-            both = linear.of_piece(k, np.concatenate([rest[:, :, None], off], axis=2))
-            lift = np.column_stack([solved(white_own, each) for each in both.T])
-            rest, off = rest - own @ lift[:, 0], off - own @ lift[:, 1:]
-            off = np.concatenate([off, own @ root_of_covariance(white_own)], axis=2)
-        found.append(rest)
-        taken.append(off)
+            taken[k] = np.concatenate([taken[k], own @ root_of_covariance(linear.of_piece(k, own))], axis=2)
     return found, taken
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.engines.actuation import driver_of
+from omnidyn.identification.output_error.problem.heading import HEADING, facing_at_start
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.drive import SPEED
@@ -86,6 +87,13 @@ class Motion:
         return np.concatenate([np.zeros_like(both[:1]), np.cumsum(0.5 * (both[1:] + both[:-1]) * step, axis=0)])
 
 
+def in_the_room(motion: Motion) -> FloatArray:
+    """Forces along x and along y of the room, as the body feels them. Shape (n, 2, 3)."""
+    c, s = np.cos(motion.pose[:, YAW]), np.sin(motion.pose[:, YAW])
+    zero = np.zeros_like(c)
+    return np.stack([np.stack([c, -s, zero], axis=1), np.stack([s, c, zero], axis=1)], axis=1)
+
+
 def motions(problem: Problem, point: Point) -> list[Motion]:
     """The motion of every piece at a point."""
     robot, (driver, _) = problem.robot_at(point.values), driver_of(problem, point.values)
@@ -94,12 +102,14 @@ def motions(problem: Problem, point: Point) -> list[Motion]:
 
 def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Motion:
     record, rows = piece.record, slice(piece.first, piece.last)
-    t = record.t[piece.first : piece.last + 1]
+    t, faces = record.t[piece.first : piece.last + 1], facing_at_start(piece, robot)
+    if HEADING in record.columns:
+        faces = float(state[N_AXES + record.columns.index(HEADING)])
     if record.set_point is None:
         asked, _ = at_motors(record.voltage[rows], record.share[rows], driver)
-        run = simulate(_ideal(robot), asked, np.diff(t), twist=state[:N_AXES])
+        run = simulate(_ideal(robot), asked, np.diff(t), twist=state[:N_AXES], pose=(0.0, 0.0, faces))
     else:
-        run = simulate(robot, dt=np.diff(t), wheel_speed_command=record.set_point[rows])
+        run = simulate(robot, dt=np.diff(t), wheel_speed_command=record.set_point[rows], pose=(0.0, 0.0, faces))
     assert run.twist is not None
     assert run.pose is not None
     assert run.voltage is not None

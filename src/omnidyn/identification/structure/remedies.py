@@ -37,6 +37,11 @@ class Tried:
     size: FloatArray
     step: FloatArray
 
+    @property
+    def numbers(self) -> int:
+        """How many it fits."""
+        return self.trial.fitted.numbers if self.trial.fitted else len(self.at)
+
 
 class Blocks:
     """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n)."""
@@ -115,23 +120,25 @@ def remedies(
         size, step = fitted[len(known) :], fitted[: len(known)]
         if k == 1 and size[0] < one.least:
             continue
-        if one.key not in best or chi2 - penalty * k > best[one.key].chi2 - penalty * len(best[one.key].at):
-            best[one.key] = Tried(one, trial, at, float(chi2), size, step)
-    ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * len(t.at), reverse=True)
-    worth = [t for t in ranked if t.chi2 > penalty * len(t.at) + 2.0 * np.log(max(len(best), 1))][: 2 * most]
+        own = Tried(one, trial, at, float(chi2), size, step)
+        if one.key not in best or chi2 - penalty * own.numbers > best[one.key].chi2 - penalty * best[one.key].numbers:
+            best[one.key] = own
+    ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * t.numbers, reverse=True)
+    worth = [t for t in ranked if t.chi2 > penalty * t.numbers + 2.0 * np.log(max(len(best), 1))][: 2 * most]
     ranking = []
     for t in worth:
         after = blocks.held_out(np.concatenate([known, t.at]))
         change = (before - after) / max(float(before.sum()), 1e-300)
         gain, std = float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
         same = tuple(o.candidate.key for o in worth if o is not t and _same(blocks, known, base, noise, t, o))
-        words = t.candidate.told(float(t.size[0]), t.trial.at)
+        fitted = t.trial.fitted
+        words = fitted.words if fitted else t.candidate.told(float(t.size[0]), t.trial.at)
         every = (base - blocks.left(np.concatenate([known, t.at, themes]))) / noise
-        share = (t.chi2 - len(t.at)) / max(every - len(t.at) - len(themes), t.chi2 - len(t.at), 1e-300)
+        share = (t.chi2 - t.numbers) / max(every - t.numbers - len(themes), t.chi2 - t.numbers, 1e-300)
         ranking.append(
             Remedy(
-                t.candidate.key, words, gain, std, same, share, t.candidate.offered, t.chi2, len(t.at),
-                tuple(t.size.tolist()), t.trial.at, _changes(linear.rows, t),
+                t.candidate.key, words, gain, std, same, share, t.candidate.offered, t.chi2, t.numbers,
+                tuple(t.size.tolist()), t.trial.at, fitted.changes if fitted else _changes(linear.rows, t),
             )
         )  # fmt: skip
     kept = [r for r in ranking if r.gain > -CLEAR * r.gain_std and r.chi2 > RIVAL * worth[0].chi2]

@@ -17,7 +17,7 @@ from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
-from omnidyn.identification.output_error.problem.nuisances import NUISANCES
+from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, levels_of
@@ -65,7 +65,7 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
 def told(words: str, before: Mapping[str, float], after: Mapping[str, float]) -> str:
     """What was switched on, with its values where they are numbers of their own: before, after: what was fitted."""
     new = [name for name in after if name not in before and not name.startswith(FRICTION)]
-    if not new or len(new) > N_AXES:
+    if not new or len(new) > N_AXES or any(name.partition(".")[0] in (TILT, PUSH) for name in new):
         return words
     return all_of([f"{in_words(name)} {after[name]:.3g} {unit(name)}".rstrip() for name in new])
 

@@ -27,7 +27,6 @@ def unoffered(bench: Workbench) -> Iterator[Candidate]:
         ("friction one way", _one_way, (0.0,)),
         ("friction over speed", _falling, WIDTHS),
         ("drag", _drag, (0.0,)),
-        ("force in the room", _in_the_room, (0.0,)),
         ("turns of the wheels", _waves, WAVES),
         ("sag", _sag, (0.0,)),
         ("heat", _heat, (0.0,)),
@@ -57,12 +56,6 @@ def _falling(motion: Motion, width: float) -> FloatArray:
 
 def _drag(motion: Motion, _: float) -> FloatArray:
     return _along_axes(-motion.twist * np.abs(motion.twist))
-
-
-def _in_the_room(motion: Motion, _: float) -> FloatArray:
-    c, s = np.cos(motion.pose[:, 2]), np.sin(motion.pose[:, 2])
-    zero = np.zeros_like(c)
-    return np.stack([np.stack([c, -s, zero], axis=1), np.stack([s, c, zero], axis=1)], axis=1)
 
 
 def _waves(motion: Motion, count: float) -> FloatArray:

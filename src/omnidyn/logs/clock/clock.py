@@ -65,6 +65,12 @@ class Clock:
             return (counts - self._start) * column.factor
         return counts * column.factor
 
+    def start(self, column: Column) -> float:
+        """What was taken off the times [s], since 1970 where they are dates; 0 where nothing was."""
+        if isinstance(self._start, datetime):
+            return self._start.timestamp()
+        return (self._start or 0.0) * column.factor
+
     def _summed(self, steps: FloatArray, column: Column, notes: list[str]) -> FloatArray:
         """Times from steps of time: the first row is at 0, each further one its step later than the row before."""
         notes.append(f"{column.name} holds the time since the row before: it is summed up")
@@ -87,7 +93,9 @@ class Clock:
         usual = float(np.median(steps[steps > 0.0]))
         for period in (*COUNTERS, DAY / abs(column.factor)):
             over = np.abs(steps + period) < NEAR * usual
-            if read.min() >= 0.0 and read.max() < period and (over == (steps < 0.0)).all() and LONG * usual < period:
+            low = 0.0 if read.min() >= 0.0 else -0.5 * period  # counters of some have a sign
+            within = read.min() >= low and read.max() < low + period and (low == 0.0 or period in COUNTERS)
+            if within and (over == (steps < 0.0)).all() and LONG * usual < period:
                 notes.append(f"{column.name} starts over after {period:.6g} {column.unit}: it is taken to go on")
                 passed = self._passed + period * np.cumsum(np.concatenate([[0], over]))
                 self._passed, counts = float(passed[-1]), counts.copy()

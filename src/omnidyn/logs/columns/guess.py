@@ -18,6 +18,7 @@ from omnidyn.logs.columns.guess_unit import unit_of
 from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, is_numeric, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import NameParts, read_name
+from omnidyn.logs.columns.propose import proposed_wheels
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MAX_WHEELS
@@ -59,15 +60,17 @@ def guess_columns(
     told = {name: unit_and_side(text) for name, text in (assume or {}).items()}
     assumed = {name: unit.text for name, (unit, _) in told.items()}
     found = Guess(robot=robot)
-    names = [name for name in table.names if is_numeric(table.columns[name])]
+    names = [name for name in table.names if is_numeric(table.columns[name]) and name not in table.says]
     table = replace(table, units={**_units_of_letters(names, assumed, table.units), **table.units})
+    _take_said(table, found)
     numbers = _wheel_numbers(table, names, found)
     for name in names:
         _take(table, name, numbers, assumed, robot, found)
     _doubt_words(table, _wheel_numbers(table, table.names, Guess()), found)
     _doubt_letters(names, found)
-    take_time(table, assumed, found)
-    if not numbers:
+    if TIME not in found.columns:
+        take_time(table, assumed, found)
+    if not numbers and not any(each.component[1:2].isdigit() for each in table.says.values()):
         _take_bench(table, names, assumed, found)
     settle_side(table, robot, found)
     take_sides({name: side for name, (_, side) in told.items() if side}, found)
@@ -83,6 +86,16 @@ def guess_columns(
         )
     )
     return ColumnMap(ordered, unused, (*found.doubt_words(), *idle), found.note_words(), found.doubted())
+
+
+def _take_said(table: Table, found: Guess) -> None:
+    """Columns of which the format itself says what they are: the first of a kind is taken."""
+    for name, said in table.says.items():
+        if said.why:
+            found.doubts.append(Doubt(name, said.component, said.why, ()))
+        elif said.component and said.component not in found.columns:
+            unit = table.units.get(name) or si_suffix(said.component).replace("_", "/")
+            found.columns[said.component] = Column(name, unit)
 
 
 def _is_used(name: str, table: Table, components: Iterable[str]) -> bool:
@@ -302,15 +315,18 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
     Several columns of one kind, such as left_speed and right_speed, are wheels, and nobody knows which is which.
     """
     alike: dict[str, list[str]] = {}
+    body = {component for component in found.columns if component not in (TIME, "supply")} - {"omega", "heading"}
+    turning = {column.name for key, column in found.columns.items() if body and key in ("omega", "heading")}
     for name in names:
         component = _bench_component(table, name)
-        if component:
+        if component and name not in turning:
             alike.setdefault(component, []).append(name)
-    body = {component for component in found.columns if component not in (TIME, "supply")} - {"omega", "heading"}
     for component, mine in alike.items():
         if len(mine) > 1:
             _forget(mine, found)
-            why = f"but no number says which wheel each is (say `column` {component}={mine[0]} and so on)"
+            order = proposed_wheels(table, mine, found) if component == "w1" else ""
+            say = f"the motion says `column` {order}" if order else f"say `column` {component}={mine[0]} and so on"
+            why = f"but no number says which wheel each is ({say})"
             found.doubts += [Doubt(name, component, why, ()) for name in mine]
         elif not body:
             _forget(mine, found)

@@ -1,4 +1,6 @@
-"""One file per format: text, parquet (with parquet_pages). read_table tells them by content, reader is the contract.
+"""One file or room per format: text, listed (a row for every value), parquet (with parquet_pages), ros (bags, MCAP),
+wpilib, matlab. read_table tells them by content, reader is the contract. Where topics have clocks of their own:
+recording (what a file holds, to Tables) and claims (which topic gives a component); folders: bags that are folders.
 
 The contract of a reader, the value `Reader` of its file, entered in `READERS` of read_table:
 
@@ -10,8 +12,9 @@ The contract of a reader, the value `Reader` of its file, entered in `READERS` o
    refused with its place, or left out and counted where `options.skip_bad_rows`.
 5. Units and long names go to `Table.units` and `Table.titles` where the file has them; nothing is converted but to
    seconds. What was decided is said in the notes, what is doubtful refused: nothing is guessed.
-6. Where topics have clocks of their own, each message is a row, blank in the columns of all others, in the order of
-   time: rows of one time are joined later (`Log.joined`), what is recorded on change is held or interpolated.
+6. Where topics have clocks of their own, a row is a stamp, blank in the columns of topics that have nothing there, in
+   the order of time, and `Table.own_clocks` is set: commands are held, measurements stay where they were taken.
+   `Recording` makes such tables; what a format itself says of a column stands in `Table.says`.
 7. A file that is cut short, hostile or not what its name says is an InputError with the remedy, never more memory
    than `options.max_bytes` and never a crash; a missing library is a MissingExtraError with the line that installs it.
 """

@@ -17,7 +17,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, MissingExtraError
-from omnidyn.files import open_regular, too_large
+from omnidyn.files import growth, open_regular, pieces, too_large
 from omnidyn.logs.readers.parquet_pages import declared_bytes
 from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.table.header import MAX_COLUMNS, check_name, split_units
@@ -77,7 +77,8 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: Options) -> Iter
     source = str(path)
     pyarrow, parquet = import_pyarrow(source)
     with open_regular(path) as stream:
-        size, digest = os.fstat(stream.fileno()).st_size, _sha256(stream)
+        size = os.fstat(stream.fileno()).st_size
+        digest = _sha256(stream, size)
         with _damage(pyarrow, source):
             file, columns = _opened(pyarrow, parquet, stream, source)
             pages = declared_bytes(stream)
@@ -85,7 +86,8 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: Options) -> Iter
         reader = _Rows(columns, source, options.skip_bad_rows)
 
         def table(values: dict[str, Column], lines: Any, sha256: str = "") -> Table:
-            return Table(columns.names, values, lines, columns.units, source, sha256, reader.notes, columns.titles)
+            notes = (*reader.notes, *(growth(stream, size) if sha256 else ()))
+            return Table(columns.names, values, lines, columns.units, source, sha256, notes, columns.titles)
 
         for done, batch in _batches(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
             with _damage(pyarrow, source):
@@ -93,7 +95,7 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: Options) -> Iter
             if options.progress is not None:
                 options.progress(size * (done + batch.num_rows) // max(1, file.metadata.num_rows), size)
             yield table(values, lines)
-    yield table({}, np.zeros(0, dtype=np.int64), digest)
+        yield table({}, np.zeros(0, dtype=np.int64), digest)
 
 
 PARQUET = Reader("parquet", "Parquet", SUFFIXES, parquet_tables)
@@ -158,9 +160,9 @@ def _damage(pyarrow: Any, source: str) -> Iterator[None]:
         ) from None
 
 
-def _sha256(stream: BinaryIO) -> str:
+def _sha256(stream: BinaryIO, size: int) -> str:
     digest = hashlib.sha256()
-    while block := stream.read(BLOCK_BYTES):
+    for block in pieces(stream, size):
         digest.update(block)
     stream.seek(0)
     return digest.hexdigest()

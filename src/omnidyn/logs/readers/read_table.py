@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, format_of
+from omnidyn.logs.readers.folders import files_of, is_bag_folder
+from omnidyn.logs.readers.matlab.mat import HDF5, MAT
 from omnidyn.logs.readers.parquet import PARQUET
 from omnidyn.logs.readers.reader import Options, Reader, completed
+from omnidyn.logs.readers.ros.bags import MCAP, ROS1, ROS2
 from omnidyn.logs.readers.text import TEXT
+from omnidyn.logs.readers.wpilib.wpilog import WPILOG
 from omnidyn.logs.table.table import ROWS, Table, join
 from omnidyn.logs.table.text_file import Progress
 
-READERS: tuple[Reader, ...] = (TEXT, PARQUET)  # what no other reads is text, or refused by name
+READERS: tuple[Reader, ...] = (
+    TEXT,
+    PARQUET,
+    MCAP,
+    ROS2,
+    ROS1,
+    WPILOG,
+    MAT,
+    HDF5,
+)  # what no other reads is text, or refused by name
+ROW_BYTES = 2**10  # what a row takes that is at hand, its text and its numbers
 
 
 def read_table(
@@ -25,18 +39,19 @@ def read_table(
     skip_bad_rows: bool = False,
     max_bytes: int | None = None,
     progress: Progress | None = None,
+    variables: Sequence[str] = (),
 ) -> Table:
     """Read a table whole, whatever its format. A name that promises another format is noted.
 
     header: False where a text file has none; the columns are then called c1, c2, ... skip_bad_rows: leave out rows
     with another number of cells, a broken quote, an infinite number, or text where the column holds numbers; they are
     counted in `notes`. max_bytes: of the file, and of its numbers; a quarter of the memory where it is not given.
-    progress(bytes_done, bytes_total) is called now and then.
+    progress(bytes_done, bytes_total) is called now and then. variables: of a MATLAB file, those to read; none: all.
     Raises InputError for what cannot be read: `file:line, column NAME: what; got ...; expected ...; remedy`; other
     formats are refused by name.
     """
     limit = default_max_bytes() if max_bytes is None else max_bytes
-    return join(_tables(path, ROWS, Options(header, skip_bad_rows, limit, progress)), limit)
+    return join(_tables(path, ROWS, Options(header, skip_bad_rows, limit, progress, tuple(variables))), limit)
 
 
 def iter_tables(
@@ -45,21 +60,42 @@ def iter_tables(
     *,
     header: bool = True,
     skip_bad_rows: bool = False,
+    max_bytes: int | None = None,
     progress: Progress | None = None,
+    variables: Sequence[str] = (),
 ) -> Iterator[Table]:
     """The tables of a file of any length, at most `rows` rows each; joined they are what `read_table` reads.
 
     Only the last has the sha256 and all notes. A column that begins with numbers and goes on with words is numbers in
-    the first tables. Options and errors as those of `read_table`.
+    the first tables. Options and errors as those of `read_table`, but that `max_bytes` bounds what is held at once: a
+    text or a Parquet file may be of any length.
     """
-    return _tables(path, rows, Options(header, skip_bad_rows, None, progress))
+    limit = default_max_bytes() if max_bytes is None else max_bytes
+    if not reader_of(path).whole:
+        rows, limit = min(rows, max(1, limit // ROW_BYTES)), None
+    return _tables(path, rows, Options(header, skip_bad_rows, limit, progress, tuple(variables)))
+
+
+def reader_of(path: str | os.PathLike) -> Reader:
+    """The reader of a file, by its content; of a folder that holds one recording, by its first file."""
+    files = files_of(path)
+    kind = format_of(files[0])
+    if is_bag_folder(path):
+        return ROS2 if kind is not None and kind.name in ("sqlite", "zstd") else MCAP
+    return next((each for each in READERS if kind is not None and each.kind == kind.name), TEXT)
 
 
 def _tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
     if rows < 1:
         raise InputError("no rows in a piece", got=rows, expected="1 or more")
-    kind, suffix = format_of(path), Path(path).suffix
-    reader = next((each for each in READERS if kind is not None and each.kind == kind.name), TEXT)
+    reader, suffix = reader_of(path), Path(path).suffix
+    if options.variables and not reader.variables:
+        raise InputError(
+            "there are no variables to choose from", got=reader.word, expected="a MATLAB or HDF5 file", where=str(path),
+            remedy="leave `variables` out; `column` chooses columns and topics",
+        )  # fmt: skip
+    if is_bag_folder(path):
+        suffix = ""
     promised = next((each for each in READERS if suffix.lower() in each.suffixes), TEXT)
     tables = completed(reader.tables(path, rows, options), reader.least)
     if promised is reader or not suffix:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from omnidyn.errors import InputError
+from omnidyn.logs.readers.recording import Recording
 from omnidyn.logs.table.table import Table
 from omnidyn.logs.table.text_file import Progress
 
@@ -17,18 +18,22 @@ class Options(NamedTuple):
 
     header: False where the first row of a text file is a row already. skip_bad_rows: leave out rows that cannot be
     read, and count them in the notes. max_bytes: refuse a file that takes more; None for any length.
-    progress(bytes_done, bytes_total) is called now and then.
+    progress(bytes_done, bytes_total) is called now and then. variables: of a file that holds variables (MATLAB), those
+    to read, with all that is in them; none: all.
     """
 
     header: bool = True
     skip_bad_rows: bool = False
     max_bytes: int | None = None
     progress: Progress | None = None
+    variables: tuple[str, ...] = ()
 
 
 class Reader(NamedTuple):
     """kind: of `files.Format` that it reads, "" for text. word: of such files, in messages. suffixes: of their names,
     lower case. tables(path, rows, options): see the contract. least: what a file must hold, in messages.
+    recording(path, options): where topics have clocks of their own, all that a file holds. whole: it holds the numbers
+    of a file at once, and streams them no more. variables: whether a file is made of some, to choose from.
     """
 
     kind: str
@@ -36,6 +41,9 @@ class Reader(NamedTuple):
     suffixes: tuple[str, ...]
     tables: Callable[[str | os.PathLike, int, Options], Iterator[Table]]
     least: str = "at least one row"
+    recording: Callable[[str | os.PathLike, Options], Recording] | None = None
+    whole: bool = False
+    variables: bool = False
 
 
 def completed(tables: Iterable[Table], least: str) -> Iterator[Table]:

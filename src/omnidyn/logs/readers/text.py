@@ -20,6 +20,8 @@ import numpy as np
 
 from omnidyn.arrays import IntArray
 from omnidyn.errors import InputError
+from omnidyn.files import default_max_bytes
+from omnidyn.logs.readers.listed import is_listed, recording_of
 from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.header import TABS_NOTE, FileLine, Layout, find_layout
@@ -33,7 +35,21 @@ KEPT_COMMENTS = 2  # right above a row: names, and perhaps their units
 
 
 def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
-    """The tables of a text file; see the head of this file for what is taken and refused, and the contract."""
+    """The tables of a text file; see the head of this file for what is taken and refused, and the contract.
+
+    A list with a row for every value (listed) becomes a table of topics, and is held whole.
+    """
+    tables = _as_they_stand(path, rows, options)
+    first = next(tables)
+    if not is_listed(first.names):
+        yield from chain([first], tables)
+        return
+    limit = default_max_bytes() if options.max_bytes is None else options.max_bytes
+    yield from recording_of(chain([first], tables), limit).tables(rows)
+
+
+def _as_they_stand(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+    """The rows as they stand in the file."""
     file = TextFile(path, options.progress, options.max_bytes)
     head, blocks = _head(file.blocks(rows))
     spaced = is_spaced([line.text for line in head])

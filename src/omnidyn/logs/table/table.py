@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,17 @@ MAX_CELLS = 2**24  # in one block: 128 MiB of floats
 MIN_HELD_BYTES = 64 * 2**20
 
 
+class Said(NamedTuple):
+    """What a format itself says of a column: a message of ROS names what its fields are.
+
+    component: such as "vx", "t"; "" for a column that is nothing by itself and is taken only by `column`.
+    why: why it is not taken though it looks like the component; "" where it is taken.
+    """
+
+    component: str = ""
+    why: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """A table as it stands in a file.
@@ -30,6 +42,8 @@ class Table:
     lines: line of each row in the file, counted from 1; number of each row, in a Parquet file. Shape (rows,).
     units: name -> unit, where a row or the header gave them. titles: name -> long name, where a line gave them.
     source: the path. sha256: of the file's bytes. notes: what the reader had to decide, in words.
+    says: name -> what the format says it is; no other column of these is guessed by its name. own_clocks: topics with
+    clocks of their own, a row per stamp: a blank cell is no missing value.
     """
 
     names: tuple[str, ...]
@@ -40,6 +54,8 @@ class Table:
     sha256: str
     notes: tuple[str, ...] = ()
     titles: Mapping[str, str] = field(default_factory=dict)
+    says: Mapping[str, Said] = field(default_factory=dict)
+    own_clocks: bool = False
 
     def __post_init__(self) -> None:
         shown = {name: printable(name) for name in self.names if not name.isprintable()}
@@ -57,7 +73,7 @@ class Table:
             taken[name] = told if told not in taken.values() else f"{told} ({len(taken) + 1})"
         object.__setattr__(self, "names", tuple(taken.values()))
         object.__setattr__(self, "source", printable(self.source))
-        for field_name in ("columns", "units", "titles"):
+        for field_name in ("columns", "units", "titles", "says"):
             old = getattr(self, field_name)
             object.__setattr__(self, field_name, {taken.get(name, name): value for name, value in old.items()})
 

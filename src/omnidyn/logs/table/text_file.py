@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from omnidyn.errors import InputError
-from omnidyn.files import file_format, open_regular, text_format, too_large
+from omnidyn.files import file_format, growth, open_regular, text_format, too_large
 
 BLOCK_BYTES = 2**20
 SHOWN_BYTES = 8  # of a file that is no text
@@ -91,7 +91,7 @@ class TextFile:
             done = 0
             if self._max_bytes is not None and total > self._max_bytes:
                 raise too_large(self.path, self._max_bytes, TOO_LARGE_REMEDY)
-            while block := stream.read(BLOCK_BYTES if done else max(BLOCK_BYTES, START_BYTES)):
+            while block := stream.read(min(total - done, BLOCK_BYTES if done else max(BLOCK_BYTES, START_BYTES))):
                 if not done:
                     self._refuse_format(block)
                     self._start = block[:SHOWN_BYTES]
@@ -100,6 +100,7 @@ class TextFile:
                 yield block
                 if self._progress is not None:
                     self._progress(done, total)
+            self.notes += growth(stream, total)
         if not done:
             raise InputError("the file is empty", got="0 bytes", where=self.source)
 

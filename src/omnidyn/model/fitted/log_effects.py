@@ -7,7 +7,7 @@ level. What a fit finds of the robot itself, such as the dead band of its driver
 from __future__ import annotations
 
 import hashlib
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -16,6 +16,7 @@ from omnidyn.model.value import Flag, Levels, Text, Value, number, per_axis_numb
 from omnidyn.run import Run
 
 SAME_TIME = 9  # decimals of a second to which times since the first row are compared
+TOLD = 1e-4  # [s] below which what is late is not worth a word
 MOST_LATE, HARDEST, MOST_FADE = 10.0, 1e6, 1.0  # [s], [N, N m], -
 
 Seconds = Annotated[float, number(-MOST_LATE, MOST_LATE)]
@@ -43,9 +44,21 @@ class Lateness(Value):
         return drive if own is None else float(own)
 
 
+Force = Annotated[float, number(-HARDEST, HARDEST)]
+
+
+def _in_the_room(value: Any) -> Any:
+    """Refuses the three numbers that a tilt had while it was a force on the body."""
+    value = to_list(value)
+    if isinstance(value, list | tuple) and len(value) == 3:
+        raise ValueError(f"tilt {list(value)} has three entries, those of a constant force on the body: call it push")
+    return value
+
+
 class LogEffects(Value):
-    """gain: of the voltage. fade: share of it lost from the start of a run to its end, evenly. tilt: constant force on
-    the body along x and y [N] and about yaw [N m]. latency: of the channels. of: marks of the logs, see `log_mark`.
+    """gain: of the voltage. fade: share of it lost from the start of a run to its end, evenly. tilt: constant force
+    along x and y of the room [N]: of the headings of the log, or as the robot stood when it began. push: constant force
+    along x and y of the body [N] and about yaw [N m]. latency: of the channels. of: marks of the logs, see `log_mark`.
     """
 
     gain: Annotated[Annotated[float, number(0.01, 100.0)], Field(description="of the voltage, a battery")] = 1.0
@@ -53,7 +66,12 @@ class LogEffects(Value):
         Annotated[float, number(-MOST_FADE, MOST_FADE)], Field(description="of the voltage, from start to end")
     ] = 0.0
     tilt: Annotated[
-        Annotated[Levels, per_axis_number(-HARDEST, HARDEST)], Field(description="force of the floor, N, N, N m")
+        tuple[Force, Force],
+        BeforeValidator(_in_the_room),
+        Field(description="force of the floor, along x and y of the room, N"),
+    ] = (0.0, 0.0)
+    push: Annotated[
+        Annotated[Levels, per_axis_number(-HARDEST, HARDEST)], Field(description="force on the body, N, N, N m")
     ] = (0.0, 0.0, 0.0)
     latency: Lateness = Lateness()
     of: Annotated[Annotated[tuple[Text, ...], BeforeValidator(to_list)], Field(description="marks of these logs")] = ()
@@ -67,8 +85,10 @@ class LogEffects(Value):
         """Its numbers in words: "gain 0.94, heading 0.038 s late"."""
         told = [f"gain {self.gain:.3g}"] if self.gain != 1.0 else []
         told += [f"fade {self.fade:.3g}"] if self.fade else []
-        told += ["a tilt of " + ", ".join(f"{each:.3g}" for each in self.tilt)] if any(self.tilt) else []
+        for name, force in (("tilt", self.tilt), ("push", self.push)):
+            told += [f"a {name} of " + ", ".join(f"{each:.3g}" for each in force)] if any(force) else []
         late = [(n.replace("_", " "), v) for n, v in dict(self.latency).items() if n != "averaged" and v is not None]
+        late = [(name, value) for name, value in late if abs(value) >= TOLD]
         told += [f"{name} {abs(value):.3g} s {'late' if value >= 0.0 else 'early'}" for name, value in late]
         return ", ".join(told + (["speeds that are means over a row"] if self.latency.averaged else []))
 
@@ -78,9 +98,8 @@ def log_mark(run: Run) -> str:
 
     Of currents alone the size counts: one reader may have given them a sign, and another not.
     """
-    measured = run.as_measured()
     found = hashlib.sha256(np.round(run.t - run.t[0], SAME_TIME).tobytes())
-    for name, values in measured.channels.items():
+    for name, values in run.channels.items():
         found.update(name.encode())
         found.update((np.abs(values) if name == "current" else np.ascontiguousarray(values) + 0.0).tobytes())
     return found.hexdigest()[:32]

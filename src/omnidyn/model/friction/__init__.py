@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from omnidyn.model.friction.axes import AxesFriction
 from omnidyn.model.friction.direction import DirectionFriction
@@ -33,5 +33,30 @@ class Friction(Value):
 
     @property
     def only_axes(self) -> bool:
-        """Whether all friction acts on the body axes, as in the paper."""
-        return all(law == type(law)() for law in self.laws[1:])
+        """Whether all friction is the paper's: on the body axes, the same both ways, with levels that never fall."""
+        return all(law == type(law)() for law in self.laws[1:]) and self.axes.is_plain
+
+    @property
+    def rigid(self) -> Friction:
+        """The same levels without bristles or Karnopp's band: what these laws are where they are stiff or narrow."""
+        bends = {name: law for name in type(self).model_fields if (law := getattr(self, name)).law != "coulomb"}
+        if not bends:
+            return self
+        return self.model_copy(update={n: law.model_copy(update={"law": "coulomb"}) for n, law in bends.items()})
+
+    @model_validator(mode="after")
+    def _one_law_about_yaw(self) -> Friction:
+        axes, way = self.axes, self.direction
+        both = axes.coulomb[2] > 0.0 and way.yaw_coulomb > 0.0
+        falls = axes.stribeck_speed is not None or way.yaw_stribeck_speed is not None
+        if both and (falls or axes.law != "coulomb" or way.law != "coulomb"):
+            raise ValueError(
+                "friction about yaw stands in [friction.axes] and in [friction.direction], and one of them has another "
+                "law than coulomb: put all of it into one table"
+            )
+        if axes.law == "karnopp" and any(law != type(law)() for law in self.laws[1:]):
+            raise ValueError(
+                'law = "karnopp" knows friction on the body axes only, where each axis gathers momentum for itself; '
+                "leave [friction.direction] and [friction.wheels] out, or the law"
+            )
+        return self

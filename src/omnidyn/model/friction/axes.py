@@ -1,7 +1,7 @@
-"""Coulomb and viscous friction on the body axes, eqs (4)-(6): the paper's box, with breakaway.
+"""Friction on the body axes, eqs (4)-(6): the paper's box, with breakaway, and any law of kinds.py.
 
-sliding:  F = -(B v + C sgn v)      per axis
-at rest:  F = -applied while |applied| <= S,  S >= C the breakaway level
+sliding:  F = -(B v + C sgn v)      per axis; C may differ forward and backward
+at rest:  F = -applied while -S_backward <= applied <= S,  S >= C the breakaway level
 """
 
 from __future__ import annotations
@@ -13,31 +13,70 @@ from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.model.layout import HOLD, N_AXES, SLIDE, VISCOUS
-from omnidyn.model.value import Levels, Value, per_axis_number
+from omnidyn.model.friction.kinds import Kind, Numbers, Spread, refuse_mixtures, spread_on
+from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
+from omnidyn.model.layout import BAND, N_AXES, VISCOUS
+from omnidyn.model.value import Levels, Value, number, per_axis_number
+
+Level = Annotated[Levels, per_axis_number(0.0, 1e6)]
+Speeds = Annotated[Levels, per_axis_number(1e-7, 1e3)]
+Stiffness = Annotated[Levels, per_axis_number(1e-3, 1e12)]
 
 
 class AxesFriction(Value):
     """Friction along x [N], along y [N] and about yaw [N m], each axis for itself.
 
-    viscous: B [N s/m, N s/m, N m s]. coulomb: C [N, N, N m]. breakaway: S >= C, None means S = C.
+    viscous: B [N s/m, N s/m, N m s]. coulomb: C [N, N, N m], of motion forward (to the left, counter-clockwise), and
+    backward too unless coulomb_backward says otherwise. breakaway, breakaway_backward: S >= C, None means S = C. law
+    and the numbers that it takes: kinds.py.
     """
 
-    viscous: Annotated[Levels, per_axis_number(0.0, 1e6), Field(description="B [N s/m, N s/m, N m s]")]
-    coulomb: Annotated[Levels, per_axis_number(0.0, 1e6), Field(description="C [N, N, N m]")]
-    breakaway: Annotated[
-        Annotated[Levels, per_axis_number(0.0, 1e6)] | None, Field(description="S >= C [N, N, N m]")
-    ] = None
+    viscous: Annotated[Level, Field(description="B [N s/m, N s/m, N m s]")]
+    coulomb: Annotated[Level, Field(description="C [N, N, N m]")]
+    breakaway: Annotated[Level | None, Field(description="S >= C [N, N, N m]")] = None
+    coulomb_backward: Annotated[Level | None, Field(description="C backward [N, N, N m]")] = None
+    breakaway_backward: Annotated[Level | None, Field(description="S backward [N, N, N m]")] = None
+    law: Annotated[Kind, Field(description="what kind of law")] = "coulomb"
+    stribeck_speed: Annotated[Speeds | None, Field(description="v_s [m/s, m/s, rad/s]")] = None
+    stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    karnopp_speed: Annotated[Speeds, Field(description="Dv [m/s, m/s, rad/s]")] = (1e-4, 1e-4, 1e-4)
+    stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m, N/m, N m/rad]")] = None
+    damping: Annotated[Level | None, Field(description="sigma1 [N s/m, N s/m, N m s]")] = None
+    damping_speed: Annotated[Speeds | None, Field(description="v_d [m/s, m/s, rad/s]")] = None
+    dahl_exponent: Annotated[Annotated[float, number(0.5, 4.0)], Field(description="a")] = 1.0
 
     @model_validator(mode="after")
-    def _breakaway_at_least_coulomb(self) -> AxesFriction:
+    def _levels_in_order(self) -> AxesFriction:
         if self.breakaway is not None and any(s < c for s, c in zip(self.breakaway, self.coulomb, strict=True)):
             raise ValueError(f"breakaway {list(self.breakaway)} is below coulomb {list(self.coulomb)}")
+        if any(s < c for s, c in zip(self.hold_backward, self.backward, strict=True)):
+            raise ValueError(f"breakaway_backward {list(self.hold_backward)} is below coulomb {list(self.backward)}")
+        refuse_mixtures(self)
         return self
 
     @property
+    def backward(self) -> Levels:
+        """Coulomb level of motion backward."""
+        return self.coulomb if self.coulomb_backward is None else self.coulomb_backward
+
+    @property
+    def hold_backward(self) -> Levels:
+        """Level up to which an axis at rest resists being moved backward."""
+        if self.breakaway_backward is not None:
+            return self.breakaway_backward
+        return self.backward if self.breakaway is None or self.coulomb_backward is not None else self.breakaway
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the paper's: Coulomb, breakaway and viscous, the same both ways, falling with no speed."""
+        if self.law != "coulomb" or self.hold_backward != (self.breakaway or self.coulomb):
+            return False
+        falls = self.stribeck_speed is not None and self.breakaway not in (None, self.coulomb)
+        return self.backward == self.coulomb and not falls
+
+    @property
     def levels(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(viscous, coulomb, breakaway) as arrays. Shape (3,) each; breakaway = coulomb where none is given."""
+        """(viscous, coulomb, breakaway) forward. Shape (3,) each; breakaway = coulomb where none is given."""
         coulomb = np.array(self.coulomb)
         return np.array(self.viscous), coulomb, coulomb if self.breakaway is None else np.array(self.breakaway)
 
@@ -45,10 +84,23 @@ class AxesFriction(Value):
         """Add the levels of the three axes; see FrictionLaw."""
         viscous, coulomb, breakaway = self.levels
         units = np.array([1.0, 1.0, length])
-        element[:N_AXES, VISCOUS] += viscous / units**2
-        for side in range(2):
-            element[:N_AXES, SLIDE + side] += coulomb / units
-            element[:N_AXES, HOLD + side] += breakaway / units
+        rows = element[:N_AXES]
+        rows[:, VISCOUS] += viscous / units**2
+        slide, hold = np.stack([coulomb, self.backward], 1), np.stack([breakaway, self.hold_backward], 1)
+        spread_on(body, rows, self._spread(units), slide / units[:, None], hold / units[:, None])
+        if self.law == "karnopp":
+            rows[:, BAND] = np.array(self.karnopp_speed) * units
+
+    def _spread(self, units: FloatArray) -> Spread:
+        """The numbers of its law as rows of the table count them."""
+
+        def over(value: Levels | None, power: int) -> Numbers:
+            return None if value is None else np.array(value) / units**power
+
+        return Spread(
+            self.law, over(self.stribeck_speed, -1), self.stribeck_exponent, over(self.stiffness, 2),
+            over(self.damping, 2), over(self.damping_speed, -1), self.dahl_exponent,
+        )  # fmt: skip
 
     def sliding_wrench(self, twist: ArrayLike) -> FloatArray:
         """-(B v + C sgn v) of the axes that move; 0 for an axis at rest. Shape (*batch, 3)."""
@@ -57,12 +109,12 @@ class AxesFriction(Value):
         return -(viscous * twist + coulomb * np.sign(twist))
 
     def wrench(self, twist: ArrayLike, applied: ArrayLike) -> FloatArray:
-        """Friction under an applied wrench: slides, holds, or gives way to C against what drives it."""
+        """Friction under an applied wrench: slides, holds, or gives way to C against the drive; where it is plain."""
         _, coulomb, _ = self.levels
         twist, applied = np.asarray(twist, dtype=float), np.asarray(applied, dtype=float)
         at_rest = np.where(self.holds(applied), -applied, -coulomb * np.sign(applied))
         return np.where(twist == 0.0, at_rest, self.sliding_wrench(twist))
 
     def holds(self, applied: ArrayLike) -> BoolArray:
-        """|applied| <= S, per axis. Shape (*batch, 3)."""
+        """|applied| <= S, per axis; where it is plain. Shape (*batch, 3)."""
         return np.abs(np.asarray(applied, dtype=float)) <= self.levels[2]

@@ -1,8 +1,10 @@
-"""Friction along the direction of travel: a disc or an ellipse in (v_x, v_y), and a torque about yaw.
+"""Friction along the direction of travel: a disc or an ellipse in (v_x, v_y), and a torque about yaw. Laws: kinds.py.
 
     potential  D(v) = sqrt(Cx^2 vx^2 + Cy^2 vy^2)      maximum dissipation; Cx = Cy is a disc, C v/|v|
     sliding    F = -(Cx^2 vx, Cy^2 vy)/D - B v
     at rest    F anywhere in the ellipse (Fx/Sx)^2 + (Fy/Sy)^2 <= 1
+    Stribeck   Cx and Cy fall with |v| from Sx and Sy
+    bristle    z_a' = v_a - sigma0 D z_a/C_a^2, F = -(sigma0 z + sigma1 z') - B v: a vector that turns with the body
 
 On real floors the force is collinear with the velocity and of constant size (252 runs of a Robotino): the shape the
 box of eqs (4)-(6) misses.
@@ -10,23 +12,45 @@ box of eqs (4)-(6) misses.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.layout import HOLD, HOLD_X, HOLD_Y, N_AXES, SLIDE, SLIDE_X, SLIDE_Y, VISCOUS, YAW
+from omnidyn.model.friction.kinds import BENDING, DAHL, LUGRE, Spread, refuse_mixtures, spread_on
+from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
+from omnidyn.model.layout import (
+    BEND_HOLD_XY,
+    BEND_SLIDE_XY,
+    DAMP_XY,
+    EXPONENT_XY,
+    FADE_XY,
+    FALL_XY,
+    HOLD_X,
+    HOLD_Y,
+    MASS,
+    N_AXES,
+    SLIDE_X,
+    SLIDE_Y,
+    STIFF_XY,
+    VISCOUS,
+    YAW,
+)
 from omnidyn.model.value import Value, number, to_list
 
 Level = Annotated[float, number(0.0, 1e6)]
 Pair = Annotated[tuple[Level, Level], BeforeValidator(to_list)]
+Speed = Annotated[float, number(1e-7, 1e3)]
+Stiffness = Annotated[float, number(1e-3, 1e12)]
 
 
 class DirectionFriction(Value):
     """Friction that follows the direction of travel.
 
     coulomb: (Cx, Cy) [N]; viscous: B [N s/m], the same in every direction; breakaway: (Sx, Sy) >= coulomb [N].
-    yaw_coulomb [N m], yaw_viscous [N m s], yaw_breakaway >= yaw_coulomb [N m]: about the vertical axis.
+    yaw_coulomb [N m], yaw_viscous [N m s], yaw_breakaway >= yaw_coulomb [N m]: about the vertical axis. law and the
+    numbers that it takes: kinds.py; yaw_...: those about the vertical axis.
     """
 
     coulomb: Annotated[Pair, Field(description="(Cx, Cy) [N]; equal = a disc")] = (0.0, 0.0)
@@ -35,15 +59,56 @@ class DirectionFriction(Value):
     yaw_coulomb: Annotated[Level, Field(description="[N m]")] = 0.0
     yaw_breakaway: Annotated[Level | None, Field(description=">= yaw_coulomb [N m]")] = None
     yaw_viscous: Annotated[Level, Field(description="[N m s]")] = 0.0
+    law: Annotated[Literal["coulomb", "dahl", "lugre"], Field(description="what kind of law")] = "coulomb"
+    stribeck_speed: Annotated[Speed | None, Field(description="v_s [m/s]")] = None
+    yaw_stribeck_speed: Annotated[Speed | None, Field(description="v_s [rad/s]")] = None
+    stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m]")] = None
+    yaw_stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N m/rad]")] = None
+    damping: Annotated[Level | None, Field(description="sigma1 [N s/m]")] = None
+    yaw_damping: Annotated[Level | None, Field(description="sigma1 [N m s]")] = None
+    damping_speed: Annotated[Speed | None, Field(description="v_d [m/s]")] = None
+    yaw_damping_speed: Annotated[Speed | None, Field(description="v_d [rad/s]")] = None
 
     def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
         """Add the ellipse, the same damping in every direction, and what resists turning; see FrictionLaw."""
-        body[[SLIDE_X, SLIDE_Y]] += self.coulomb
-        body[[HOLD_X, HOLD_Y]] += self.coulomb if self.breakaway is None else self.breakaway
-        yaw_hold = self.yaw_coulomb if self.yaw_breakaway is None else self.yaw_breakaway
         element[:N_AXES, VISCOUS] += [self.viscous, self.viscous, self.yaw_viscous / length**2]
-        element[YAW, SLIDE : SLIDE + 2] += self.yaw_coulomb / length
-        element[YAW, HOLD : HOLD + 2] += yaw_hold / length
+        self._add_plane(body)
+        yaw_hold = self.yaw_coulomb if self.yaw_breakaway is None else self.yaw_breakaway
+        slide, hold = np.full((1, 2), self.yaw_coulomb / length), np.full((1, 2), yaw_hold / length)
+        spread_on(body, element[YAW : YAW + 1], self._turning(length), slide, hold)
+
+    def _add_plane(self, body: FloatArray) -> None:
+        hold = self.coulomb if self.breakaway is None else self.breakaway
+        if self.law in BENDING:
+            body[BEND_SLIDE_XY : BEND_SLIDE_XY + 2] += self.coulomb
+            body[BEND_HOLD_XY : BEND_HOLD_XY + 2] += hold
+            if any(self.coulomb):
+                self._add_bristle(body)
+        else:
+            body[[SLIDE_X, SLIDE_Y]] += self.coulomb
+            body[[HOLD_X, HOLD_Y]] += hold
+        if self.stribeck_speed is not None and hold != self.coulomb:
+            body[FALL_XY], body[EXPONENT_XY] = 1.0 / self.stribeck_speed, self.stribeck_exponent
+
+    def _add_bristle(self, body: FloatArray) -> None:
+        assert self.stiffness is not None
+        body[STIFF_XY] = self.stiffness
+        if self.law == LUGRE:
+            critical = max(2.0 * float(np.sqrt(self.stiffness * body[MASS])) - self.viscous, 0.0)
+            body[DAMP_XY] = critical if self.damping is None else self.damping
+            body[FADE_XY] = 0.0 if self.damping_speed is None else 1.0 / self.damping_speed
+
+    def _turning(self, length: float) -> Spread:
+        """The law about yaw in the units of the table."""
+
+        def over(value: float | None, power: int) -> float | None:
+            return None if value is None else value / length**power
+
+        return Spread(
+            self.law, over(self.yaw_stribeck_speed, -1), self.stribeck_exponent, over(self.yaw_stiffness, 2),
+            over(self.yaw_damping, 2), over(self.yaw_damping_speed, -1), 1.0,
+        )  # fmt: skip
 
     @model_validator(mode="after")
     def _levels_in_order(self) -> DirectionFriction:
@@ -54,4 +119,12 @@ class DirectionFriction(Value):
             raise ValueError(f"breakaway {list(self.breakaway)} is below coulomb {list(self.coulomb)}")
         if self.yaw_breakaway is not None and self.yaw_breakaway < self.yaw_coulomb:
             raise ValueError(f"yaw_breakaway {self.yaw_breakaway} is below yaw_coulomb {self.yaw_coulomb}")
+        refuse_mixtures(self)
+        turns = self.yaw_coulomb > 0.0
+        if self.law in BENDING and turns and self.yaw_stiffness is None:
+            raise ValueError(f'law = "{self.law}" needs yaw_stiffness [N m/rad] beside yaw_coulomb')
+        if self.law == DAHL and self.yaw_breakaway is not None:
+            raise ValueError('law = "dahl" has one level, yaw_coulomb: no yaw_breakaway')
+        if self.law == LUGRE and self.yaw_breakaway is not None and self.yaw_stribeck_speed is None:
+            raise ValueError('law = "lugre" with yaw_breakaway needs yaw_stribeck_speed')
         return self

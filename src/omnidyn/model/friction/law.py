@@ -2,15 +2,21 @@
 
 A law acts between body and floor. It must:
 
-1. oppose motion: its power is never positive;
-2. be set-valued at rest: it exerts whatever balances the drive, up to a breakaway level. sgn(0) = 0, as printed in the
-   paper, would let a robot creep inside its dead zone;
-3. hold at least as much as it slides with: breakaway >= coulomb >= 0, element by element;
-4. never smooth sgn: no tanh, no small speed below which it changes;
-5. derive from a convex potential of the velocity (maximum dissipation), so that the inclusion of
-   stick_slip/inclusion.py has one solution and says by itself what sticks;
-6. say so in two tables: `add_to` adds its levels to those of the elements on which it acts. That is all the solvers,
-   the dead zone and the derivatives need.
+1. balance energy: with a storage W(z) >= 0 of what it remembers, W(0) = 0, the power that it takes from the body is at
+   least dW/dt. Without memory W = 0: it opposes motion. Dahl keeps to it; LuGre does where sigma1 fades with the speed
+   (`damping_speed`), and may not where sigma1 is constant and large: the one exception, known (Olsson 1996) and said;
+2. say how it rests. Set-valued (coulomb, Stribeck): at rest it exerts whatever balances the drive, up to a breakaway
+   level, and rest is exact. With bristles it is a function of its state and never quite rests. With Karnopp's band it
+   is at rest below a speed. sgn(0) = 0, as printed in the paper, would let a robot creep inside its dead zone;
+3. hold at least as much as it slides with: breakaway >= coulomb >= 0, element by element, forward and backward apart;
+4. never smooth sgn: no tanh, no small speed below which it changes, but where the law itself is that (Karnopp);
+5. derive at rest and at constant level from a convex potential of the velocity (maximum dissipation), so that the
+   inclusion of stick_slip/inclusion.py has one solution and says by itself what sticks. Where its force falls with the
+   speed it is not convex: it then bounds the fall (`steepest`), and steps are so short that inertia outweighs it
+   (stick_slip/step_bound.py). What it remembers is eliminated from a stage: its force is a function of the speed there;
+6. say so in two tables: `add_to` adds its levels, and the numbers of its kind, to those of the elements on which it
+   acts (model/layout.py). Solvers, step control, dead zone, feed-forward and derivatives take them from there; what has
+   a memory has no derivatives, and is refused by name.
 """
 
 from __future__ import annotations
@@ -26,7 +32,8 @@ class FrictionLaw(Protocol):
     def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
         """Add the levels to the tables of a plant, in place.
 
-        body: shape (BODY_SIZE,), element: shape (3 + wheels, ELEMENT_SIZE), entries named in layout.py. `length` is
-        rho [m] by which yaw is measured: a torque T counts as T/rho [N], a damping D [N m s] as D/rho^2 [N s/m].
+        body: shape (BODY_SIZE,), element: shape (3 + wheels, ELEMENT_SIZE), entries named in layout.py; the mass and
+        the directions of the elements stand there already. `length` is rho [m] by which yaw is measured: a torque T
+        counts as T/rho [N], a damping D [N m s] as D/rho^2 [N s/m], a speed omega as rho omega [m/s].
         """
         ...

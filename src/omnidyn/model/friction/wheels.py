@@ -1,4 +1,4 @@
-"""Friction at the wheels: each resists along its own rolling direction, at the rim.
+"""Friction at the wheels: each resists along its own rolling direction, at the rim. Any law of kinds.py but Karnopp's.
 
 sliding    f_i = -(b_i s_i + c_i sgn s_i),  s_i = g_i . twist the rim speed;  c_i may differ forward and backward
 at rest    -S_forward <= f_i <= S_backward
@@ -6,22 +6,28 @@ at rest    -S_forward <= f_i <= S_backward
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.layout import HOLD, N_AXES, SLIDE, VISCOUS
-from omnidyn.model.value import PerWheel, Value, per_wheel_number
+from omnidyn.model.friction.kinds import Spread, refuse_mixtures, spread_on
+from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
+from omnidyn.model.layout import N_AXES, VISCOUS
+from omnidyn.model.value import PerWheel, Value, number, per_wheel_number
 
 Level = Annotated[PerWheel, per_wheel_number(0.0, 1e6)]
+Speed = Annotated[PerWheel, per_wheel_number(1e-7, 1e3)]
+Stiffness = Annotated[PerWheel, per_wheel_number(1e-3, 1e12)]
 
 
 class WheelFriction(Value):
     """Friction of wheels, bearings and gears, seen at the rim; a tuple means one value per wheel.
 
     coulomb: c [N] while the wheel turns forward, and backward too unless coulomb_backward says otherwise.
-    breakaway, breakaway_backward: what holds a wheel at rest [N], at least as large. viscous: b [N s/m].
+    breakaway, breakaway_backward: what holds a wheel at rest [N], at least as large. viscous: b [N s/m]. law and the
+    numbers that it takes: kinds.py.
     """
 
     coulomb: Annotated[Level, Field(description="c [N] at the rim")] = 0.0
@@ -29,6 +35,13 @@ class WheelFriction(Value):
     breakaway: Annotated[Level | None, Field(description=">= coulomb [N]")] = None
     breakaway_backward: Annotated[Level | None, Field(description=">= coulomb_backward [N]")] = None
     viscous: Annotated[Level, Field(description="b [N s/m] at the rim")] = 0.0
+    law: Annotated[Literal["coulomb", "dahl", "lugre"], Field(description="what kind of law")] = "coulomb"
+    stribeck_speed: Annotated[Speed | None, Field(description="v_s [m/s] of the rim")] = None
+    stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m] at the rim")] = None
+    damping: Annotated[Level | None, Field(description="sigma1 [N s/m] at the rim")] = None
+    damping_speed: Annotated[Speed | None, Field(description="v_d [m/s] of the rim")] = None
+    dahl_exponent: Annotated[Annotated[float, number(0.5, 4.0)], Field(description="a")] = 1.0
 
     @property
     def backward(self) -> float | tuple[float, ...]:
@@ -50,15 +63,16 @@ class WheelFriction(Value):
     def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
         """Add the levels of each wheel, forward and backward; see FrictionLaw."""
         wheels = element[N_AXES:]
-        levels = {
-            VISCOUS: self.viscous,
-            SLIDE: self.coulomb,
-            SLIDE + 1: self.backward,
-            HOLD: self.hold_forward,
-            HOLD + 1: self.hold_backward,
-        }
-        for column, level in levels.items():
-            wheels[:, column] += level
+        wheels[:, VISCOUS] += self.viscous
+        slide, hold = np.empty((len(wheels), 2)), np.empty((len(wheels), 2))
+        slide[:, 0], slide[:, 1], hold[:, 0], hold[:, 1] = (
+            self.coulomb, self.backward, self.hold_forward, self.hold_backward,
+        )  # fmt: skip
+        law = Spread(
+            self.law, self.stribeck_speed, self.stribeck_exponent, self.stiffness, self.damping, self.damping_speed,
+            self.dahl_exponent,
+        )  # fmt: skip
+        spread_on(body, wheels, law, slide, hold)
 
     @model_validator(mode="after")
     def _breakaway_at_least_coulomb(self) -> WheelFriction:
@@ -67,6 +81,7 @@ class WheelFriction(Value):
         for hold, slide, name in (forward, backward):
             if any(s < c for s, c in _pairs(hold, slide)):
                 raise ValueError(f"{name} {hold} is below coulomb {slide}")
+        refuse_mixtures(self)
         return self
 
 

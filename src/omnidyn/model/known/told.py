@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.fitted.correlation import KeyCorrelation, key_correlation
-from omnidyn.model.keys import DEAD_BAND, LATENCY, Key, expand, find_key
+from omnidyn.model.keys import BREAKAWAY, COULOMB, DEAD_BAND, LATENCY, VISCOUS, Key, expand, find_key
 from omnidyn.model.robot import Prior, Robot
 
 NEAR = 0.5  # std over value, from which on a friction may be 0
@@ -76,7 +76,8 @@ def _has(robot: Robot, name: str) -> bool:
     if not key.level:
         return True
     law = getattr(robot.friction, key.table.rpartition(".")[2])
-    return any(level is not None and np.any(level) for level in dict(law).values())
+    levels = [each for field, each in dict(law).items() if any(word in field for word in (VISCOUS, COULOMB, BREAKAWAY))]
+    return any(level is not None and np.any(level) for level in levels)
 
 
 def is_log(name: str, value: float, std: float) -> bool:

@@ -11,11 +11,13 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
     BOUND,
     BRANCH,
+    BRISTLES,
     CURRENT,
     DROP,
     EFFICIENCY,
     ELLIPSE,
     EMF,
+    FALL_XY,
     GOAL,
     GX,
     GY,
@@ -24,6 +26,7 @@ from omnidyn.model.layout import (
     HOLD_X,
     HOLD_Y,
     INDUCTANCE,
+    LAWS,
     LOSS,
     MASS,
     N_AXES,
@@ -42,6 +45,7 @@ from omnidyn.model.layout import (
     VISCOUS,
     VOLTAGE,
 )
+from omnidyn.model.stick_slip.laws import add_laws
 from omnidyn.model.stick_slip.workspace import JACOBIAN, RESIDUAL
 
 NONE = 3.0  # the branch on which no current flows against a voltage drop
@@ -129,7 +133,7 @@ def set_losses(body, element):
 @part
 def forces_at_work(body, element):
     """The sum of all force levels [N]: motors at standstill, friction, push. No force in the problem is larger."""
-    total = abs(body[PUSH]) + abs(body[PUSH + 1]) + abs(body[PUSH + 2]) + body[HOLD_X] + body[HOLD_Y]
+    total = abs(body[PUSH]) + abs(body[PUSH + 1]) + abs(body[PUSH + 2]) + body[HOLD_X] + body[HOLD_Y] + body[BRISTLES]
     for e in range(len(element)):
         total += max(element[e, HOLD], element[e, HOLD + 1])
         if e >= N_AXES:
@@ -174,7 +178,7 @@ def residual(body, element, x, s):
         r0, r1, r2 = r0 - force * g0, r1 - force * g1, r2 - force * g2
         j00, j11, j22 = j00 - slope * g0 * g0, j11 - slope * g1 * g1, j22 - slope * g2 * g2
         j01, j02, j12 = j01 - slope * g0 * g1, j02 - slope * g0 * g2, j12 - slope * g1 * g2
-    if body[ELLIPSE] == 1.0:  # gradient and Hessian of sqrt(Cx^2 vx^2 + Cy^2 vy^2)
+    if body[ELLIPSE] == 1.0 and body[FALL_XY] == 0.0:  # gradient and Hessian of sqrt(Cx^2 vx^2 + Cy^2 vy^2)
         cx, cy = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2
         size = max(math.sqrt(cx * x[0] * x[0] + cy * x[1] * x[1]), 1e-300)
         px, py = cx * x[0] / size, cy * x[1] / size
@@ -185,3 +189,5 @@ def residual(body, element, x, s):
     s[JACOBIAN, 0], s[JACOBIAN, 1], s[JACOBIAN, 2] = j00, j01 - t2, j02 - t1
     s[JACOBIAN + 1, 0], s[JACOBIAN + 1, 1], s[JACOBIAN + 1, 2] = j01 + t2, j11, j12 + t0
     s[JACOBIAN + 2, 0], s[JACOBIAN + 2, 1], s[JACOBIAN + 2, 2] = j02, j12, j22
+    if body[LAWS] != 0.0:
+        add_laws(body, element, x, s)

@@ -24,6 +24,8 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
     BEFORE,
     ELLIPSE,
+    FALL,
+    FALL_XY,
     FOUND,
     GOAL,
     GX,
@@ -32,6 +34,7 @@ from omnidyn.model.layout import (
     HOLD,
     HOLD_X,
     HOLD_Y,
+    LAWS,
     LOSS,
     MASS,
     SIGN,
@@ -117,10 +120,12 @@ def _jump(body, element, s, met):
         if element[e, FOUND] == 1.0:
             dw = element[e, GX] * s[NEWTON, 0] + element[e, GY] * s[NEWTON, 1] + element[e, GZ] * s[NEWTON, 2]
             behind, ahead = (1, 0) if dw > 0.0 else (0, 1)
-            total += (element[e, SLIDE + behind] + element[e, HOLD + ahead]) * abs(dw)
+            slide = HOLD if element[e, FALL] > 0.0 else SLIDE  # what falls with the speed has not fallen yet
+            total += (element[e, slide + behind] + element[e, HOLD + ahead]) * abs(dw)
             total += (element[e, LOSS] + element[e, LOSS + 1]) * abs(dw)
     if met:
-        total += math.hypot(body[SLIDE_X] * s[NEWTON, 0], body[SLIDE_Y] * s[NEWTON, 1])
+        x, y = (HOLD_X, HOLD_Y) if body[FALL_XY] > 0.0 else (SLIDE_X, SLIDE_Y)
+        total += math.hypot(body[x] * s[NEWTON, 0], body[y] * s[NEWTON, 1])
         total += math.hypot(body[HOLD_X] * s[NEWTON, 0], body[HOLD_Y] * s[NEWTON, 1])
     return total
 
@@ -131,8 +136,10 @@ def _holds_more(element):
     the way: passing would skip its breakaway. If it cannot hold, it is released from rest.
     """
     for e in range(len(element)):
-        if element[e, FOUND] == 1.0 and (
-            element[e, HOLD] > element[e, SLIDE] or element[e, HOLD + 1] > element[e, SLIDE + 1]
+        if (
+            element[e, FOUND] == 1.0
+            and element[e, FALL] == 0.0
+            and (element[e, HOLD] > element[e, SLIDE] or element[e, HOLD + 1] > element[e, SLIDE + 1])
         ):
             return True
     return False
@@ -147,7 +154,7 @@ def _at(x, s, t):
 
 @part
 def _not_too_far(body, element, x, s, t, below):
-    """1, or less where a full step past a sharp bend of the ellipse would climb again: secants on the slope.
+    """1, or less where a full step past a sharp bend, of the ellipse or of a bristle, would climb again: secants.
 
     below: the slope at t. The residual that is left is that at the point found, except after the last secant.
     Returns (step, whether it is).
@@ -174,7 +181,7 @@ def _walk(body, element, x, s):
     for _ in range(2 * len(element)):
         kink, met = _next_kink(body, element, x, s, t)
         if kink > 1.0:
-            if body[ELLIPSE] == 1.0:
+            if body[ELLIPSE] == 1.0 or body[LAWS] != 0.0:
                 if passed:  # signs have changed: the residual is that of the other side
                     _at(x, s, t)
                     residual(body, element, s[TRIAL], s)

@@ -13,20 +13,31 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import (
     BOUND,
+    BRISTLES,
     DROP,
     ELLIPSE,
     EMF,
+    FALL,
+    FALL_XY,
+    GATHERS,
     GOAL,
     GX,
     GY,
     GZ,
+    HOLD,
+    HOLD_X,
+    HOLD_Y,
     INDUCTANCE,
+    LAWS,
     LENGTH,
     N_AXES,
     NOW,
     PUSH,
     RESISTANCE,
     SIGN,
+    SLIDE,
+    SLIDE_X,
+    SLIDE_Y,
     TAU,
     TURNING,
     VISCOUS,
@@ -34,6 +45,7 @@ from omnidyn.model.layout import (
 )
 from omnidyn.model.stick_slip.forces import residual, winding
 from omnidyn.model.stick_slip.inclusion import solve
+from omnidyn.model.stick_slip.laws import aim_bristles, push_of_laws
 from omnidyn.model.stick_slip.plant import Plant
 from omnidyn.model.stick_slip.workspace import RESIDUAL, workspace
 
@@ -42,7 +54,8 @@ SIGNS = 3  # where the signs begin in a state
 
 def new_state(plant: Plant) -> FloatArray:
     """A state of rest without currents: every element that can stick is stuck."""
-    return np.concatenate([np.zeros(3), plant.element[:, SIGN], plant.body[[ELLIPSE]], np.zeros(plant.wheels)])
+    bends = np.zeros(len(plant.element) + 2 if plant.body[BRISTLES] + plant.body[GATHERS] > 0.0 else 0)
+    return np.concatenate([np.zeros(3), plant.element[:, SIGN], plant.body[[ELLIPSE]], np.zeros(plant.wheels), bends])
 
 
 def with_given_currents(plant: Plant) -> Plant:
@@ -51,6 +64,11 @@ def with_given_currents(plant: Plant) -> Plant:
     bare.body[TAU], bare.body[TURNING] = 1.0, 0.0
     bare.element[:, [VISCOUS, EMF, RESISTANCE, DROP, VOLTAGE]] = 0.0
     bare.element[:, INDUCTANCE], bare.element[:, BOUND] = 1.0, np.inf
+    falls = bare.element[:, FALL] > 0.0  # what falls with the speed starts at the level that holds
+    bare.element[falls, SLIDE : SLIDE + 2] = bare.element[falls, HOLD : HOLD + 2]
+    if bare.body[FALL_XY] > 0.0:
+        bare.body[[SLIDE_X, SLIDE_Y]] = bare.body[[HOLD_X, HOLD_Y]]
+    bare.body[[LAWS, FALL_XY]] = 0.0
     return bare
 
 
@@ -88,7 +106,8 @@ def sticks(state, m):
 def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> FloatArray:
     """The state of a robot that moves with `twist` [m/s, m/s, rad/s] under `current` [A]."""
     state = moving_states(plant, twist[None])[0]
-    state[len(state) - plant.wheels :] = current
+    first = current_entry(N_AXES, len(plant.element))
+    state[first : first + plant.wheels] = current
     return state
 
 
@@ -132,6 +151,10 @@ def _smooth_force(body, element, bare_body, bare_element, s, state):
     for a in range(3):
         bare_body[GOAL + a], bare_body[PUSH + a] = state[a], body[PUSH + a]
     put(bare_body, bare_element, state)
+    if body[LAWS] != 0.0:
+        put(body, element, state)
+        aim_bristles(body, element, state, current_entry(m, m), 0.0)
+        push_of_laws(body, element, state, bare_body)
     residual(bare_body, bare_element, state, s)
     for a in range(3):
         bare_body[PUSH + a] = -s[RESIDUAL, a]
@@ -145,6 +168,8 @@ def settle(body, element, bare_body, bare_element, s, state, acceleration):
     """
     m = len(element)
     settle_currents(element, state)
+    if body[GATHERS] > 0.0:  # who leaves his band is told by what has gathered there
+        return 0
     _smooth_force(body, element, bare_body, bare_element, s, state)
     bare_body[TURNING] = 0.0
     for e in range(m):

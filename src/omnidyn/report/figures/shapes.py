@@ -12,7 +12,7 @@ from matplotlib.projections.polar import PolarAxes
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.steady.operating_points import SPEEDS, ForcePoints
 from omnidyn.identification.steady.shapes import SHAPES
-from omnidyn.identification.steady.study import SteadyStudy
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.model.keys import Key
 from omnidyn.model.layout import YAW
 from omnidyn.report.style import (

@@ -140,11 +140,11 @@ def _step(v, f, g, dt, kick, phi, gone, swings, law):
         dips = (s * first < 0.0) & (s * last > 0.0)
         if (s * v1 >= 0.0) & (not dips):
             return v1, f1, 0
-    return _step_by_segments(v, f, g, dt, law)
+    return step_by_segments(v, f, g, dt, law)
 
 
 @part
-def _step_by_segments(v, f, g, dt, law):
+def step_by_segments(v, f, g, dt, law):
     """`_step`, from event to event. To leave rest at the very start counts as one."""
     t, events = 0.0, 1 if v == 0.0 else 0
     while events <= MAX_EVENTS:

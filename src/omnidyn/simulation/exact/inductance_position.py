@@ -192,7 +192,7 @@ def step_poses(twists, accelerations, eventful, drive, dt, laws, start, gauss):
             dx, dy = rotated(turn, twists[k + 1, 0], twists[k + 1, 1])
             x, y = x + (length - planned) * dx, y + (length - planned) * dy
         else:
-            x, y, turn = _travel(piece, twists[k], accelerations[k], drive[k], dt[k], spin, axes, laws, rates, gauss)
+            x, y, turn = travel(piece, twists[k], accelerations[k], drive[k], dt[k], spin, axes, laws, rates, gauss)
         lost = put_next_pose(poses, k, x, y, turn, lost)
     return poses
 
@@ -223,7 +223,7 @@ def _slide_all(axes, twist, acceleration, drive, laws):
 
 
 @part
-def _travel(nodes, twist, acceleration, drive, dt, spin, axes, laws, rates, gauss):
+def travel(nodes, twist, acceleration, drive, dt, spin, axes, laws, rates, gauss):
     """(displacement in the body frame at the start of the step [m, m], angle turned [rad]): pieces between events."""
     yaw = law_of(laws, 2)
     for axis in range(3):

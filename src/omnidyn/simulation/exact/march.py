@@ -36,10 +36,16 @@ def why_not_exact(robot: Robot) -> list[str]:
         reasons.append("current limit ([motor] current_limit_A)")
     if robot.body.rotating_frame:
         reasons.append("rotating frame ([body] rotating_frame = true)")
-    if not robot.friction.only_axes:
+    if robot.wheels.traction_mu is not None:
+        reasons.append("wheels that may slip ([wheels] traction_mu)")
+    if robot.floor.tilt:
+        reasons.append("a floor that is not level ([floor] tilt_deg)")
+    if any(law != type(law)() for law in robot.friction.laws[1:]):
         reasons.append(
             "friction along the direction of travel or at the wheels ([friction.direction], [friction.wheels])"
         )
+    if not robot.friction.axes.is_plain:
+        reasons.append("another law than the paper's ([friction.axes] law, stribeck_speed, coulomb_backward)")
     if np.any(np.asarray(motor.voltage_drop) != 0.0):
         reasons.append("voltage drop ([motor] voltage_drop_V)")
     if np.any(np.asarray(motor.gear_efficiency) != 1.0):
@@ -73,6 +79,31 @@ def simulate_exact(
     refuse_spin(np.abs(twists[:-1, 2]) * dt)
     poses = _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, pose, NODES, WEIGHTS)
     return twists, poses
+
+
+class ExactMarch:
+    """`simulate_exact`, a row at a time: what does not change between rows is made once."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._system = state_space(robot)
+        self._levels = axis_levels(robot, self._system)
+        self._phi: dict[float, FloatArray] = {}
+        self._first = np.zeros(1, np.intp)
+
+    def step(
+        self, voltage: FloatArray, dt: float, twist: FloatArray, pose: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Twist and pose after `voltage` [V], shape (wheels,), was held for dt [s]. Shape (3,) each."""
+        phi = self._phi.get(dt)
+        if phi is None:
+            phi = self._phi[dt] = discretise(self._system, np.array([dt]))
+        rate, coulomb, breakaway = self._levels
+        drive = drive_acceleration(self._system, voltage[None])
+        twists = _twists(drive, phi, self._first, rate, coulomb, breakaway, twist)
+        steps = np.array([dt])
+        refuse_spin(np.abs(twists[:-1, 2]) * dt)
+        poses = _poses(twists, drive, phi, self._first, steps, rate, coulomb, breakaway, pose, NODES, WEIGHTS)
+        return twists[1], poses[1]
 
 
 def axis_levels(robot: Robot, system: StateSpace) -> tuple[FloatArray, FloatArray, FloatArray]:

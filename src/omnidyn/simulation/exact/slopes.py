@@ -11,10 +11,8 @@ The instant of a stop or of a reversal moves too; that is in these formulas, for
 
 from __future__ import annotations
 
-import math
-
 from omnidyn.compiled.kernel import part
-from omnidyn.simulation.exact.step import course, crossing_time
+from omnidyn.simulation.exact.step import course, crossing_time, held
 
 SHORT = 1e-2  # a h below which the closed forms lose digits to cancellation and a series takes over
 
@@ -26,7 +24,7 @@ def hold_slopes(rate, dt):
     rate a > 0 [1/s], dt [s]. d phi/da = (e^(-a h) h - phi)/a; d psi/da = -(d phi/da + psi)/a.
     """
     x = rate * dt
-    phi = -math.expm1(-x) / rate
+    phi = held(rate, dt)
     if x < SHORT:  # term by term; the first one left out is below 1e-16
         dphi = -dt * dt * (0.5 - x / 3.0 + x**2 / 8.0 - x**3 / 30.0 + x**4 / 144.0 - x**5 / 840.0)
         psi = dt * dt * (0.5 - x / 6.0 + x**2 / 24.0 - x**3 / 120.0 + x**4 / 720.0 - x**5 / 5040.0)

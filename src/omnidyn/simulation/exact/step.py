@@ -54,6 +54,12 @@ def exact_step(speed, drive, coulomb, breakaway, rate, phi, zero):
 
 
 @part
+def held(rate, dt):
+    """phi [s] of a voltage held for dt [s]: (1 - e^(-a dt))/a; expm1 keeps every digit of a short step."""
+    return -math.expm1(-rate * dt) / rate
+
+
+@part
 def crossing_time(x, q, coulomb, rate, dt):
     """t* [s] of a step of length dt that crosses 0."""
     return min(dt, math.log1p(rate * x / (coulomb - q)) / rate)

@@ -17,23 +17,32 @@ from omnidyn.compiled.kernel import kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import (
     BOUND,
+    BRISTLES,
     DROP,
     EFFICIENCY,
+    FACING,
+    GATHERS,
     INDUCTANCE,
+    LAWS,
     LENGTH,
     MASS,
     MEMORY,
     N_AXES,
     NOW,
+    PUSH,
     RESISTANCE,
+    ROOM,
+    STEEP,
     TAU,
     THRUST,
     VOLTAGE,
 )
+from omnidyn.model.stick_slip.band import band_error, cross_band, crosses
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
 from omnidyn.model.stick_slip.plant import Plant
 from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, settle, sticks, with_given_currents
+from omnidyn.model.stick_slip.step_bound import MONOTONE, bristle_error, bristle_turns, growth, longest_step
 from omnidyn.model.stick_slip.workspace import copy_row, workspace
 from omnidyn.simulation.implicit.step import GAMMA, step
 from omnidyn.simulation.speed_loop import Loop, close_loop, passed
@@ -117,6 +126,21 @@ def advance_pose(pose, x0, xm, x1, length, h, rule):
 
 
 @part
+def pull(body, ahead):
+    """Turn the force of the room into the axes of a body that has turned by `ahead` [rad] since the step began."""
+    if body[ROOM] != 0.0 or body[ROOM + 1] != 0.0:
+        cos, sin = math.cos(body[FACING] + ahead), math.sin(body[FACING] + ahead)
+        body[PUSH] = cos * body[ROOM] + sin * body[ROOM + 1]
+        body[PUSH + 1] = cos * body[ROOM + 1] - sin * body[ROOM]
+
+
+@part
+def _turned(body, state, h):
+    """How far a body turns [rad] in h [s] at the rate of a state."""
+    return h / body[LENGTH] * state[2]
+
+
+@part
 def _event(a, b, m):
     """Whether two states differ in what sticks or in a direction of sliding; for the ellipse, by more than 0.5 rad."""
     for e in range(SIGNS, SIGNS + m + 1):
@@ -137,6 +161,10 @@ def _error(body, element, one, two):
     for e in range(N_AXES, len(element)):
         if element[e, INDUCTANCE] > 0.0:
             worst = max(worst, CURRENT_SHARE * abs(two[first + e - N_AXES] - one[first + e - N_AXES]))
+    if body[BRISTLES] > 0.0:
+        worst = max(worst, bristle_error(body, element, one, two, current_entry(len(element), len(element))))
+    if body[GATHERS] > 0.0:
+        worst = max(worst, band_error(one, two, current_entry(len(element), len(element))))
     return worst / 3.0
 
 
@@ -182,6 +210,23 @@ def _share(body, element, state, tol):
 
 
 @part
+def _beyond(body, element, state, end, h, tol, ratio):
+    """The ratio of the error of a step to what it may be, where friction falls with the speed or bends."""
+    m = len(element)
+    if body[STEEP] > 0.0:
+        ratio *= growth(body, element, state, end, h)
+    if body[BRISTLES] > 0.0:
+        ratio = max(ratio, bristle_turns(body, element, state, end, current_entry(m, m), h) / tol)
+    return ratio
+
+
+@part
+def in_one_row(body, dt):
+    """Into how many fixed steps a row is cut: one, but where friction falls so fast that a stage had two solutions."""
+    return max(1, math.ceil(dt * body[STEEP] / MONOTONE))
+
+
+@part
 def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
     """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
 
@@ -192,16 +237,28 @@ def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
     """
     one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(element)
     rate = _share(body, element, state, tol)
+    if body[STEEP] > 0.0:
+        _unresolved(body, element, state, h)  # poses the problem whose forces bound the speeds of the step
+        h = longest_step(body, element, state, h)
     while True:
         if left - h < 1e-9 * dt:
             h = left
+        pull(body, _turned(body, state, 0.5 * h))  # as in the middle of the step: second order, as the step is
         first = step(body, element, s, state, one, inner, h)
+        pull(body, _turned(body, state, 0.25 * h))
         second = step(body, element, s, state, middle, inner, 0.5 * h)
+        pull(body, _turned(body, state, 0.25 * h) + _turned(body, middle, 0.5 * h))
         third = step(body, element, s, middle, two, inner, 0.5 * h)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
         ratio = _error(body, element, one, two) / max(rate * max(h, SHORT), ROUNDING)
+        if body[LAWS] != 0.0:
+            ratio = _beyond(body, element, state, two, h, tol, ratio)
         astray = max(_reverses(body, element, state, middle, h), _reverses(body, element, middle, two, h))
         if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
+            astray = max(astray, _unresolved(body, element, state, h))
+        if body[GATHERS] > 0.0 and (
+            crosses(element, middle, current_entry(m, m)) or crosses(element, two, current_entry(m, m))
+        ):
             astray = max(astray, _unresolved(body, element, state, h))
         counts[2] += 1
         if astray > 0.0:
@@ -223,12 +280,20 @@ def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, most,
     Returns the step length to begin the next row with.
     """
     middle, two, inner, m, left = spare[1], spare[2], spare[3], len(element), dt
+    body[FACING] = pose[2]
+    pull(body, 0.0)
+    if body[GATHERS] > 0.0:
+        cross_band(element, state, current_entry(m, m))
     counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
     while left > 0.0 and counts[1] <= most:
         taken, h = find_step(body, element, s, spare, state, h, left, dt, tol, counts)
         advance_pose(pose, state, middle, two, body[LENGTH], taken, SIMPSON)
         copy_row(state, two)
+        body[FACING] = pose[2]
+        if body[GATHERS] > 0.0:
+            cross_band(element, state, current_entry(m, m))
         if sticks(state, m):  # a step so short sees no release within its rounding
+            pull(body, 0.0)
             counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
         left = left - taken if taken < left else 0.0
     return h
@@ -254,9 +319,16 @@ def _march(
             if most < 0.0:
                 return k
         else:
-            counts[0], counts[1] = step(body, element, s, state, spare[2], spare[3], dt[k]), 1
-            advance_pose(pose, state, spare[3], spare[2], body[LENGTH], dt[k], STAGES)
-            copy_row(state, spare[2])
+            pieces = in_one_row(body, dt[k])
+            for _ in range(pieces):
+                body[FACING] = pose[2]
+                pull(body, _turned(body, state, 0.5 * dt[k] / pieces))
+                count = step(body, element, s, state, spare[2], spare[3], dt[k] / pieces)
+                counts[0], counts[1] = max(counts[0], count), pieces
+                advance_pose(pose, state, spare[3], spare[2], body[LENGTH], dt[k] / pieces, STAGES)
+                copy_row(state, spare[2])
+                if body[GATHERS] > 0.0:
+                    cross_band(element, state, current_entry(len(element), len(element)))
         iterations[k], steps[k] = counts[0], counts[1]
         copy_row(states[k + 1], state)
         copy_row(poses[k + 1], pose)

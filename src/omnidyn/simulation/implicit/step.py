@@ -14,8 +14,12 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
+    BRISTLES,
     CURRENT,
     ELLIPSE,
+    FALL,
+    FALL_XY,
+    GATHERS,
     GOAL,
     HOLD,
     HOLD_X,
@@ -31,8 +35,10 @@ from omnidyn.model.layout import (
     SLIDE_Y,
     TAU,
 )
+from omnidyn.model.stick_slip.band import aim_band, gather, hold_in_band, keep_band
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import solve
+from omnidyn.model.stick_slip.laws import aim_bristles, keep_bristles
 from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, take
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
@@ -49,6 +55,10 @@ def _aim(body, element, start, end, back):
     for e in range(N_AXES, m):
         i = start[current_entry(e, m)]
         element[e, NOW] = i + back * (element[e, CURRENT] - i) if back != 0.0 else i
+    if body[BRISTLES] > 0.0:
+        aim_bristles(body, element, start, current_entry(m, m), back)
+    if body[GATHERS] > 0.0:
+        aim_band(element, start, current_entry(m, m), back)
 
 
 @part
@@ -69,15 +79,20 @@ def _stop_ellipse(body, state):
 def _stage(body, element, s, start, end):
     """Solve one stage in place, from the guess `end`; `start` is the state before the step. Returns the iterations."""
     if body[ELLIPSE] != 1.0:
-        return solve(body, element, end, s)
-    # A body that slides meets the Coulomb level; only when it would go through rest can breakaway hold it.
-    x, y = _hold_as(body, body[SLIDE_X], body[SLIDE_Y])
+        count = solve(body, element, end, s)
+        if body[GATHERS] > 0.0:
+            gather(body, element, s, body[TAU])
+        return count
+    # A body that slides meets the Coulomb level; only when it would go through rest can breakaway hold it. What falls
+    # with the speed has no such gap.
+    falls = body[FALL_XY] > 0.0
+    x, y = _hold_as(body, body[HOLD_X if falls else SLIDE_X], body[HOLD_Y if falls else SLIDE_Y])
     reach = body[TAU] / body[MASS] * forces_at_work(body, element)
     if math.hypot(body[GOAL], body[GOAL + 1]) <= reach:
         _stop_ellipse(body, end)  # it could stop in this stage: a first guess, which solve takes back if wrong
     count = solve(body, element, end, s)
     _hold_as(body, x, y)
-    if body[ELLIPSE] == 1.0 and end[0] * start[0] + end[1] * start[1] < 0.0:
+    if not falls and body[ELLIPSE] == 1.0 and end[0] * start[0] + end[1] * start[1] < 0.0:
         _stop_ellipse(body, end)
         count = max(count, solve(body, element, end, s))
     return count
@@ -87,11 +102,14 @@ def _stage(body, element, s, start, end):
 def _slips_back(body, element, start):
     """Whether an element that holds more than it slides with has stopped or reversed since `start`."""
     for e in range(len(element)):
-        if element[e, HOLD] > element[e, SLIDE] or element[e, HOLD + 1] > element[e, SLIDE + 1]:
+        gap = element[e, HOLD] > element[e, SLIDE] or element[e, HOLD + 1] > element[e, SLIDE + 1]
+        if gap and element[e, FALL] == 0.0:
             before = start[SIGNS + e]
             if before != 0.0 and before != element[e, SIGN]:
                 return True
     before = start[SIGNS + len(element)]
+    if body[FALL_XY] > 0.0:
+        return False
     return (body[HOLD_X] > body[SLIDE_X] or body[HOLD_Y] > body[SLIDE_Y]) and before == 1.0 and body[ELLIPSE] == 0.0
 
 
@@ -114,6 +132,8 @@ def _begin(body, element, start, end, tau):
     put(body, element, start)
     body[TAU] = tau
     _aim(body, element, start, end, 0.0)
+    if body[GATHERS] > 0.0:
+        hold_in_band(body, element)
 
 
 @part
@@ -147,6 +167,10 @@ def last_stage(body, element, s, start, end, h):
     take(body, element, end)
     for e in range(N_AXES, m):
         end[current_entry(e, m)] = element[e, CURRENT]
+    if body[BRISTLES] > 0.0:
+        keep_bristles(body, element, end, current_entry(m, m))
+    if body[GATHERS] > 0.0:
+        keep_band(element, end, current_entry(m, m))
     return count, back
 
 

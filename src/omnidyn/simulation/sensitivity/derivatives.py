@@ -22,7 +22,7 @@ from omnidyn.model.stick_slip.plant import Plant
 from omnidyn.model.stick_slip.release import start_state, with_given_currents
 from omnidyn.model.stick_slip.workspace import workspace
 from omnidyn.run import Run
-from omnidyn.simulation.commands import Commands, commands
+from omnidyn.simulation.commands import Commands, commands, current_bounds
 from omnidyn.simulation.implicit.march import Outcome, begun, room
 from omnidyn.simulation.sensitivity.directions import (
     Directions,
@@ -35,7 +35,7 @@ from omnidyn.simulation.sensitivity.directions import (
 from omnidyn.simulation.sensitivity.loop import run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.march import march_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
-from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, current_bounds, implicit_run
+from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, implicit_run
 from omnidyn.simulation.view import seen_at_once
 
 RATE = "drive.rate_Hz"

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.keys import ROTOR, WHEEL, Key
 from omnidyn.model.layout import ACTIVE, EFFICIENCY, ELLIPSE, GX, GZ, HOLD, N_AXES, SLIDE, SLIDE_X, SLIDE_Y
@@ -17,6 +17,8 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant, plant
 from omnidyn.model.stick_slip.release import new_state
 from omnidyn.model.stick_slip.workspace import workspace
+from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.wheels import refuse_slip
 
 EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10; all kinks are on their branch
 
@@ -54,7 +56,11 @@ class Prepared:
 
 
 def prepared(robot: Robot, keys: Sequence[str]) -> Prepared:
-    """Raises InputError for an unknown key, and for friction or a gear loss that is off."""
+    """Raises InputError for an unknown key, for friction or a gear loss that is off, UnsupportedError on a slope, or of
+    wheels that slip."""
+    refuse_slope(robot.floor, "derivatives of a run know")
+    refuse_bristles(robot)
+    refuse_slip(robot.wheels, "derivatives of a run know")
     scale = np.array([_scale(robot, key) for key in keys])
     robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
     numbers, plants = plant(robot), [plant(r) for r in robots]
@@ -93,6 +99,18 @@ def current_derivatives(
     sides = zip(ends, (EPS, -EPS), strict=True)
     values = [settled_currents(robot, twist + eps * dtwist, voltage + eps * dvoltage) for robot, eps in sides]
     return difference(np.array(values))[0]
+
+
+def refuse_bristles(robot: Robot) -> None:
+    """Raises UnsupportedError for a law whose memory has no derivatives: one that bends, or Karnopp's band."""
+    for name in type(robot.friction).model_fields:
+        law = getattr(robot.friction, name).law
+        if law != "coulomb":
+            raise UnsupportedError(
+                f'no derivatives of a run with law = "{law}"', got=law, expected='law = "coulomb", with stribeck_speed',
+                remedy="identify the levels as coulomb with breakaway and stribeck_speed: they are those of the "
+                "bristle once it slips; then write law and stiffness back into the file", where=f"friction.{name}.law",
+            )  # fmt: skip
 
 
 def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:

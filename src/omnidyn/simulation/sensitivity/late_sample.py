@@ -19,18 +19,19 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant, plant
 from omnidyn.model.wheels import wheel_speed
-from omnidyn.simulation.commands import Commands
+from omnidyn.simulation.commands import Commands, current_bounds
 from omnidyn.simulation.implicit.march import capped
 from omnidyn.simulation.sensitivity.derivatives import refuse_rate, run_with_derivatives
 from omnidyn.simulation.sensitivity.directions import (
     current_derivatives,
     difference,
     directions_of,
+    refuse_bristles,
     refuse_switched_off,
 )
 from omnidyn.simulation.sensitivity.loop import LoopRun, run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.sample import MEET, PATH, TURN, Samples, empty_samples
-from omnidyn.simulation.simulate import as_tolerance, current_bounds
+from omnidyn.simulation.simulate import as_tolerance
 
 PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
 
@@ -197,6 +198,7 @@ def _in_force(found: LoopRun) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _plants(robot: Robot, directions: Sequence[Direction]) -> tuple[Plant, list[Plant]]:
     """(the plant of the robot, those up and down each direction)."""
+    refuse_bristles(robot)
     numbers = plant(robot)
     plants = [numbers if r is None else plant(r) for one in directions for r in (one.up, one.down)]
     for k, one in enumerate(directions):

@@ -19,12 +19,11 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant
 from omnidyn.model.stick_slip.release import SIGNS, start_state, with_given_currents
 from omnidyn.model.stick_slip.workspace import copy_row, copy_table, workspace
-from omnidyn.simulation.commands import Commands, loop_gains, on_ticks
+from omnidyn.simulation.commands import Commands, current_bounds, loop_gains, on_ticks
 from omnidyn.simulation.implicit.march import SIMPSON, Outcome, advance_pose, begun, room
 from omnidyn.simulation.sensitivity.directions import EPS, Directions
 from omnidyn.simulation.sensitivity.march import apply_row, pose_derivatives, row_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples, take_samples
-from omnidyn.simulation.simulate import current_bounds
 from omnidyn.simulation.speed_loop import close_loop, loop_of, passed, seen_speed, tick_answer, tick_branch
 
 

@@ -10,7 +10,7 @@ from omnidyn.compiled.kernel import kernel, part
 from omnidyn.model.layout import BOUND, LENGTH, LIMIT, N_AXES, VOLTAGE
 from omnidyn.model.stick_slip.release import current_entry, settle, sticks
 from omnidyn.model.stick_slip.workspace import copy_row, copy_table
-from omnidyn.simulation.implicit.march import SIMPSON, STAGES, advance_pose, find_step
+from omnidyn.simulation.implicit.march import SIMPSON, STAGES, advance_pose, find_step, in_one_row
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
 from omnidyn.simulation.sensitivity.events import bends, differ, half_derivatives
@@ -77,8 +77,11 @@ def row_with_derivatives(
             body, element, bare_body, bare_element, s, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts,
             kept, seen, begin + dt,
         )  # fmt: skip
-    counts[0] = _fixed(body, element, s, spare, along, state, dt, pose, d, dnext, dpose, kept, seen, begin)
-    counts[1] = 1
+    pieces = in_one_row(body, dt)
+    for j in range(pieces):
+        h, at = dt / pieces, begin + j * dt / pieces
+        count = _fixed(body, element, s, spare, along, state, h, pose, d, dnext, dpose, kept, seen, at)
+        counts[0], counts[1] = max(counts[0], count), pieces
     return h
 
 

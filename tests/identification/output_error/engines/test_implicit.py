@@ -1,5 +1,6 @@
 """Robots that only the implicit engine simulates: an ellipse of friction in a turning frame, seen late."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from scipy.integrate import cumulative_simpson
 from scipy.optimize import least_squares
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, LastPoints
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Point
@@ -286,3 +287,16 @@ def test_many_logs_take_as_many_runs_as_one(turning, monkeypatch):
     assert rows < 15 * sum(len(log) for log in logs)
     for key, value in fit.value.items():
         assert abs(value - float(Key.parse(key).get(turning))) < 4.5 * fit.std[key]
+
+
+def test_last_points_may_be_asked_by_several_threads():
+    """Every thread gets what belongs to its point, and two points are kept."""
+    points = [Point(np.array([float(k)]), ()) for k in range(6)]
+    last = LastPoints()
+
+    def asked(k):
+        return last.at(points[k % 6], lambda point: [(point.values, point.values, np.zeros(0, int))])[0][0][0]
+
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(asked, range(3000))) == [float(k % 6) for k in range(3000)]
+    assert len(last._found) == LastPoints.KEPT

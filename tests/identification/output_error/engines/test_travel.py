@@ -7,14 +7,17 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.question import Question
+from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.keys import Key
 from omnidyn.model.statespace import state_space
 from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
 from tests.support.march_cases import FACING, ROBOT_KEYS, a_case, truth
 
 OUTPUTS = ("heading", "position", "wheel_angle")
 LATE = {"latency.heading": 0.0137, "latency.position": 0.0071, "latency.wheel_angle": 0.0113}
-TILT = {"tilt.x": 0.31, "tilt.y": -0.22, "tilt.yaw": 0.013}
+PUSH = {"push.x": 0.31, "push.y": -0.22, "push.yaw": 0.013}
+TILT = {"tilt.x": 0.81, "tilt.y": -0.52}
 
 
 def problem_of(robot, voltage, dt, values, nuisances=(), free=ROBOT_KEYS):
@@ -96,32 +99,92 @@ def test_each_channel_has_its_latency(seed):
 
 @pytest.mark.parametrize("seed", [1, 2, 4])
 def test_a_constant_force_is_that_of_volts_that_push_as_hard(seed):
-    """Force is linear in volts: simulate under the volts that make up for the tilt."""
+    """Force is linear in volts: simulate under the volts that make up for the push."""
     robot, _, voltage, dt, start = a_case(seed)
     robot = robot.replace(motor=robot.motor.replace(voltage_limit=100.0))
 
-    def tilted(robot, force):
+    def pushed(robot, force):
         mass = np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
         volts = np.linalg.lstsq(state_space(robot).B, force / mass, rcond=None)[0]
         return truth(robot, voltage + volts, dt, start)
 
-    force = np.array(list(TILT.values()))
-    expected = tilted(robot, force)
-    problem = problem_of(robot, voltage, dt, expected, nuisances=("tilt",))
-    ((outputs, slopes),) = ExactEngine(problem).outputs(at_truth(problem, start, TILT))
+    force = np.array(list(PUSH.values()))
+    expected = pushed(robot, force)
+    problem = problem_of(robot, voltage, dt, expected, nuisances=("push",))
+    ((outputs, slopes),) = ExactEngine(problem).outputs(at_truth(problem, start, PUSH))
     np.testing.assert_allclose(outputs, expected, atol=1e-10 * np.abs(expected).max())
     good, total = 0, 0
     for axis in range(3):
         step = 1e-6 * np.eye(3)[axis]
-        sides = [tilted(robot, force + sign * step) for sign in (1.0, -1.0)]
+        sides = [pushed(robot, force + sign * step) for sign in (1.0, -1.0)]
         well, many = share_within(slopes[:, :, len(ROBOT_KEYS) + axis], (sides[0] - sides[1]) / 2e-6)
         good, total = good + well, total + many
     for key in ("body.mass_kg", "body.inertia_kg_m2"):
         step = 1e-6 * Key.parse(key).get(robot)
         sides = [
-            tilted(Key.parse(key).set(robot, Key.parse(key).get(robot) + sign * step), force) for sign in (1.0, -1.0)
+            pushed(Key.parse(key).set(robot, Key.parse(key).get(robot) + sign * step), force) for sign in (1.0, -1.0)
         ]
         at = slopes[:, :, ROBOT_KEYS.index(key)]
         well, many = share_within(at, (sides[0] - sides[1]) / (2.0 * step))
         good, total = good + well, total + many
+    assert good >= 0.99 * total
+
+
+def on_a_slope(robot, voltage, dt, start, fine=1):
+    """What simulate says of a robot that faces FACING at first and is pulled by TILT."""
+    log = LogEffects(tilt=tuple(TILT.values()))
+    many, short = np.repeat(voltage, fine, axis=0), np.repeat(dt / fine, fine)
+    run = simulate(robot, many, short, twist=start, pose=(0.0, 0.0, FACING), log=log, tol=1e-9)
+    return run.pose[::fine], run.twist[::fine]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_a_force_in_the_room_is_that_of_the_implicit_engine(seed):
+    """The engine of a fit turns it once a row: to second order in the row what `simulate` does exactly."""
+    robot, _, voltage, dt, start = a_case(seed)
+    start[2] += 2.0
+    off = []
+    for parts in (1, 2, 4):
+        volts, steps = np.repeat(voltage, parts, axis=0), np.repeat(dt / parts, parts)
+        pose, _ = on_a_slope(robot, volts, steps, start)
+        values = np.column_stack([pose[:, 2], pose[:, :2], np.zeros((len(pose), robot.wheels.count))])
+        problem = problem_of(robot, volts, steps, values, nuisances=("tilt",))
+        ((outputs, _),) = ExactEngine(problem).outputs(at_truth(problem, start, TILT))
+        off.append(np.abs(outputs[:, :3] - values[:, :3]).max())
+    level, _ = simulate_level(robot, voltage, dt, start)
+    assert np.abs(level - on_a_slope(robot, voltage, dt, start)[0]).max() > 1e3 * off[0]
+    assert off[2] < off[0] / 4.0
+
+
+def simulate_level(robot, voltage, dt, start):
+    run = simulate(robot, voltage, dt, twist=start, pose=(0.0, 0.0, FACING))
+    return run.pose, run.twist
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_the_slopes_by_a_force_in_the_room_are_those_of_differences(seed):
+    """By the force, by numbers of the robot, by the start and by the heading at first, which all turn the force."""
+    robot, _, voltage, dt, start = a_case(seed)
+    start[2] += 2.0
+    problem = problem_of(robot, voltage, dt, truth(robot, voltage, dt, start), nuisances=("tilt",))
+    point = at_truth(problem, start, TILT)
+    engine = ExactEngine(problem)
+    ((_, slopes),) = engine.outputs(point)
+    count = len(point.values)
+    good, total = 0, 0
+    for k in range(slopes.shape[2]):
+        if k < count:
+            size = 1e-5 * max(abs(point.values[k]), 1e-3)
+            moved = [Point(point.values + side * size * np.eye(count)[k], point.states) for side in (1.0, -1.0)]
+        else:
+            if not problem.pieces[0].free[k - count]:
+                continue
+            size, state = 1e-6, point.states[0]
+            moved = [
+                Point(point.values, (state + side * size * np.eye(len(state))[k - count],)) for side in (1.0, -1.0)
+            ]
+        up, down = (engine.outputs(each)[0][0] for each in moved)
+        well, many = share_within(slopes[:, :, k], (up - down) / (2.0 * size), 1e-5)
+        good, total = good + well, total + many
+    print(good / total)
     assert good >= 0.99 * total

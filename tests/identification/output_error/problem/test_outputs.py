@@ -5,11 +5,12 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, voltages
 
-TILTED = np.array([1.5 * 9.81 * np.sin(np.radians(1.0)), -0.1, 0.004])  # [N, N, N m]
+PUSHED = np.array([1.5 * 9.81 * np.sin(np.radians(1.0)), -0.1, 0.004])  # [N, N, N m]
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +79,8 @@ def test_an_unknown_output_is_refused(axebot, clean):
         fit_output_error(captured(clean, 1), axebot, outputs=["place"])
 
 
-def tilted(robot, voltage, force, dt=0.01, **more):
-    """simulate on a floor that pulls: the volts that push as hard are added, the log does not hold them."""
+def pushed(robot, voltage, force, dt=0.01, **more):
+    """simulate with a push on the body: the volts that push as hard are added, the log does not hold them."""
     mass = np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
     from omnidyn.model.statespace import state_space
 
@@ -88,41 +89,81 @@ def tilted(robot, voltage, force, dt=0.01, **more):
     return run.replace(voltage=np.vstack([voltage, voltage[-1:]]))
 
 
-def test_a_tilted_floor_is_found_and_friction_with_it(axebot, clean):
-    run = tilted(axebot, clean.voltage[:-1], TILTED)
+def test_a_push_is_found_and_friction_with_it(axebot, clean):
+    run = pushed(axebot, clean.voltage[:-1], PUSHED)
     log = Run(
         t=run.t, voltage=run.voltage, twist=run.twist + np.random.default_rng(6).normal(size=run.twist.shape) * NOISE
     )
-    fit = fit_output_error(log, axebot, nuisances=("tilt",))
+    fit = fit_output_error(log, axebot, nuisances=("push",))
     assert holds(fit)
-    for axis, true in zip(("x", "y", "yaw"), TILTED, strict=True):
-        own = fit.nuisances[f"tilt.{axis}"]
+    for axis, true in zip(("x", "y", "yaw"), PUSHED, strict=True):
+        own = fit.nuisances[f"push.{axis}"]
         assert abs(own.value - true) <= 4.5 * own.std
         assert own.unit == ("N m" if axis == "yaw" else "N")
-    assert fit.nuisances["tilt.x"].value > 10.0 * fit.nuisances["tilt.x"].std
+    assert fit.nuisances["push.x"].value > 10.0 * fit.nuisances["push.x"].std
     again = simulate(fit.robot.replace(motor=fit.robot.motor.replace(voltage_limit=100.0)),
                      log.voltage[:-1], 0.01, log=fit.robot.log)  # fmt: skip
     assert np.sqrt(np.mean((again.twist - run.twist) ** 2, axis=0)) == pytest.approx(np.zeros(3), abs=0.005)
 
 
-def test_the_diagnosis_names_a_tilted_floor(axebot, clean):
-    run = tilted(axebot, clean.voltage[:-1], TILTED * [1.0, 0.0, 0.0])
+SLOPE = (0.26, -0.35)  # [N] along x and y of the room: 1.7 degrees
+
+
+def on_a_slope(robot, clean, seed):
+    """A log of speeds and heading of a robot that turns on a slope."""
+    run = simulate(robot, clean.voltage[:-1], 0.01, log=LogEffects(tilt=SLOPE))
+    rng = np.random.default_rng(seed)
+    pose = np.full_like(run.pose, np.nan)
+    pose[:, 2] = run.pose[:, 2] + 0.002 * rng.normal(size=len(run))
+    twist = run.twist + rng.normal(size=run.twist.shape) * NOISE
+    return run, Run(t=run.t, voltage=run.voltage, twist=twist, pose=pose, source="on a slope")
+
+
+@pytest.mark.parametrize("heading", [True, False], ids=["heading logged", "speeds alone"])
+def test_a_slope_is_found_and_friction_with_it(axebot, clean, heading):
+    run, log = on_a_slope(axebot, clean, 6)
+    assert np.ptp(run.pose[:, 2]) > 2.0  # it turns
+    fit = fit_output_error(log if heading else log.replace(pose=None), axebot, nuisances=("tilt",))
+    assert holds(fit)
+    for axis, true in zip("xy", SLOPE, strict=True):
+        own = fit.nuisances[f"tilt.{axis}"]
+        assert abs(own.value - true) <= 4.0 * own.std
+        assert own.unit == "N"
+        assert abs(own.value) > 10.0 * own.std
+    again = simulate(fit.robot, log.voltage[:-1], 0.01, log=fit.robot.log)
+    assert np.sqrt(np.mean((again.twist - run.twist) ** 2, axis=0)) == pytest.approx(np.zeros(3), abs=0.005)
+
+
+def test_the_diagnosis_names_a_slope_of_a_robot_that_turns(axebot, clean):
+    _, log = on_a_slope(axebot, clean, 7)
+    fit = fit_output_error(log, axebot)
+    assert fit.lack_of_fit is not None
+    first = fit.lack_of_fit.remedies[0]
+    assert (first.key, first.same_as) == ("tilt", ())
+    assert "floor that is not level" in fit.lack_of_fit.words()
+    assert "tilt.x" not in fit.nuisances
+
+
+def test_the_diagnosis_names_a_push_in_the_body(axebot, clean):
+    run = pushed(axebot, clean.voltage[:-1], PUSHED * [1.0, 0.0, 0.0])
     log = Run(
         t=run.t, voltage=run.voltage, twist=run.twist + np.random.default_rng(7).normal(size=run.twist.shape) * NOISE
     )
     fit = fit_output_error(log, axebot)
     assert fit.lack_of_fit is not None
     first = fit.lack_of_fit.remedies[0]
-    assert "tilt" in {first.key, *first.same_as}
-    assert "floor that is not level" in fit.lack_of_fit.words()
-    assert "tilt.x" not in fit.nuisances
+    assert "push" in {first.key, *first.same_as}
+    assert "constant push in the body" in fit.lack_of_fit.words()
+    assert "push.x" not in fit.nuisances
     level = Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + (log.twist - run.twist))
     assert not fit_output_error(level, axebot).lack_of_fit.remedies
 
 
 def test_an_axis_that_is_none_is_refused(axebot, clean):
     with pytest.raises(InputError, match="no such axis"):
-        fit_output_error(captured(clean, 1), axebot, nuisances=("tilt.z",))
+        fit_output_error(captured(clean, 1), axebot, nuisances=("tilt.yaw",))
+    with pytest.raises(InputError, match="no such axis"):
+        fit_output_error(captured(clean, 1), axebot, nuisances=("push.z",))
 
 
 def test_the_noise_of_a_student_t_fit_is_a_standard_deviation(axebot, clean):

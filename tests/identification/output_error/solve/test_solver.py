@@ -77,11 +77,12 @@ class Downhill:
 
     def __init__(self, solver, state):
         self.held, self.point = np.zeros(len(solver.problem.parameters), bool), state.point
+        self.inner, self.gradient, self.information = (0.0 * self.held, 0.0 * self.held, np.eye(len(self.held)))
 
     def distance_without(self, still):
         return 100.0
 
-    def moved(self, damping, still):
+    def moved(self, damping, still, bend, onto):
         return self.point
 
 

@@ -34,6 +34,8 @@ from omnidyn.identification.output_error.kernel.march_axis import (
     march_axis,
     spread,
 )
+from omnidyn.identification.output_error.kernel.pull import Room
+from omnidyn.identification.output_error.problem.heading import facing_at_start, headings
 from omnidyn.identification.output_error.problem.primitives import Mapping, Primitives
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import at_motors
@@ -44,7 +46,8 @@ from omnidyn.simulation.exact.position import PLACE_SIZE
 
 VECTOR = 4  # rows of slopes are padded to a multiple
 POSITION, HEADING = "position", ("heading", 0)
-TILT = ("tilt.x", "tilt.y", "tilt.yaw")
+PUSH = ("push.x", "push.y", "push.yaw")  # constant in the body
+TILT = ("tilt.x", "tilt.y")  # constant in the room
 
 
 @dataclass(frozen=True)
@@ -99,12 +102,13 @@ class ExactEngine:
         for piece in self.problem.pieces:
             rows = slice(piece.first, piece.last)
             applied, _ = at_motors(piece.record.voltage[rows], piece.record.share[rows], driver)
-            found.append(applied @ matrix.T + self._tilt(point.values))
+            pull = in_the_body(headings(piece, robot)[:-1], self._forces(TILT, point.values))
+            found.append(applied @ matrix.T + self._forces(PUSH, point.values) + pull)
         return found
 
-    def _tilt(self, values: FloatArray) -> FloatArray:
-        """The constant force on the axes [N, N, N m]."""
-        return np.array([values[k] if (k := self.problem.where(name)) >= 0 else 0.0 for name in TILT])
+    def _forces(self, names: Sequence[str], values: FloatArray) -> FloatArray:
+        """Constant forces [N, N, N m], 0 for those that are not free. Shape (names,)."""
+        return np.array([values[k] if (k := self.problem.where(name)) >= 0 else 0.0 for name in names])
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the march over every piece adds up."""
@@ -168,7 +172,25 @@ class ExactEngine:
     ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:
         count, used = len(self.problem.parameters), used_by(piece, len(self.problem.parameters))
         physics, slopes, groups = self._numbers(piece, state, values, now, by, padded(used))
-        return march_piece(piece, state, self._columns, count, (physics, slopes, groups), weighting)
+        room = self._room(piece, state, values, now, by, padded(used))
+        return march_piece(piece, state, self._columns, count, (physics, slopes, groups), weighting, room)
+
+    def _room(
+        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, space: int
+    ) -> Room | None:
+        """The force in the room, where one is free."""
+        problem, columns = self.problem, piece.record.columns
+        where = np.array([problem.where(name) for name in TILT])
+        if (where < 0).all():
+            return None
+        facing, at = facing_at_start(piece, problem.robot), -1
+        if HEADING in columns:
+            own = N_AXES + columns.index(HEADING)
+            facing = float(state[own])
+            at = len(problem.parameters) + int(np.cumsum(piece.free)[own]) - 1 if piece.free[own] else -1
+        slopes = np.zeros((N_AXES, space))
+        slopes[:, : problem.robot_count] = by.per_force
+        return Room(self._forces(TILT, values), now.per_force, slopes, facing, where, at)
 
     def _numbers(
         self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, room: int
@@ -185,15 +207,16 @@ class ExactEngine:
         facing = state[N_AXES + columns.index(HEADING)] if HEADING in columns else 0.0
         maps, slopes = _maps(columns, now, facing), _maps(columns, by, facing, (robot_count,))
         seconds, late = late_by(problem, values, columns)
-        (driver, at_driver), tilt = driver_of(problem, values), self._tilt(values)
+        (driver, at_driver), force = driver_of(problem, values), self._forces(PUSH, values)
+        turned = any(problem.where(name) >= 0 for name in TILT)
         physics = Physics(
-            np.stack([now.rate, now.coulomb, now.hold]), now.drive, now.per_force * tilt, maps[0], maps[1], maps[2],
+            np.stack([now.rate, now.coulomb, now.hold]), now.drive, now.per_force * force, maps[0], maps[1], maps[2],
             _wheel_of(columns), np.array(seconds),
-            driver, bool(maps[1].any()),
+            driver, bool(maps[1].any()) or turned,
         )  # fmt: skip
         at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
-        push, travel = wide(by.per_force * tilt[:, None]), wide(slopes[1])
-        for axis, name in enumerate(TILT):
+        push, travel = wide(by.per_force * force[:, None]), wide(slopes[1])
+        for axis, name in enumerate(PUSH):
             if (k := problem.where(name)) >= 0:
                 push[axis, k] = now.per_force[axis]
         for c, (name, i) in enumerate(columns):
@@ -220,7 +243,7 @@ def padded(used: IntArray) -> int:
 
 def march_piece(
     piece: Piece, state: FloatArray, every: Sequence[Column], count: int,
-    numbers: tuple[Physics, PhysicsSlopes, IntArray], weighting: Weighting,
+    numbers: tuple[Physics, PhysicsSlopes, IntArray], weighting: Weighting, room: Room | None = None,
 ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:  # fmt: skip
     """The sums of a piece, and its (outputs, slopes) where the weighting keeps them. every: the columns of the problem.
 
@@ -240,7 +263,7 @@ def march_piece(
         piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
         float(piece.record.t[0]), piece.record.span, piece.margin, state[:N_AXES], state[N_AXES:], groups,
         physics, slopes, loss, sums, tick, np.zeros((2, PLACE_SIZE)) if moves else None,
-        np.zeros((3, 3)) if moves else None,
+        np.zeros((3, 3)) if moves else None, room,
     )  # fmt: skip
     grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
     info = np.zeros((len(columns), total, total))
@@ -271,6 +294,12 @@ def _maps(columns: Sequence[Column], now: Primitives, facing: float, more: tuple
         else:
             (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
     return [speed, travel, volts]
+
+
+def in_the_body(heading: FloatArray, force: FloatArray) -> FloatArray:
+    """What a body that faces so [rad] feels of a force (2,) in the room, as a wrench. Shape (rows, 3)."""
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack([cos * force[0] + sin * force[1], cos * force[1] - sin * force[0], np.zeros_like(cos)], axis=-1)
 
 
 def turned_by(facing: float) -> FloatArray:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
+from threading import Lock
 from typing import Self
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.beside import side_by_side
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, Weighting
@@ -30,20 +32,23 @@ Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time d
 
 class LastPoints:
     """What was found at the last KEPT points: a fit ends where it was, or at its last trial, and is then asked again
-    with other weights."""
+    with other weights. Several threads may ask."""
 
     KEPT = 2
 
     def __init__(self) -> None:
         self._found: dict[tuple[bytes, ...], list[Parts]] = {}
+        self._changing = Lock()
 
     def at(self, point: Point, find: Callable[[Point], list[Parts]]) -> list[Parts]:
         """What `find` says at a point, found anew unless it is one of the last."""
         key = (point.values.tobytes(), *(state.tobytes() for state in point.states))
-        found = self._found.pop(key, None) or find(point)
-        while len(self._found) >= self.KEPT:
-            del self._found[next(iter(self._found))]
-        self._found[key] = found
+        found = self._found.get(key) or find(point)
+        with self._changing:
+            self._found.pop(key, None)
+            while len(self._found) >= self.KEPT:
+                del self._found[next(iter(self._found))]
+            self._found[key] = found
         return found
 
 
@@ -90,10 +95,10 @@ class ImplicitEngine:
             tuple(p.on(robot, float(value) + side * EPS * scale) for side in (1.0, -1.0))
             for p, value, scale in zip(self.problem.robot_parameters, values, scales, strict=False)
         ]
-        return [
-            self._piece(robot, moved, scales, piece, state, values)
-            for piece, state in zip(self.problem.pieces, point.states, strict=True)
-        ]
+        return side_by_side(
+            lambda own: self._piece(robot, moved, scales, own[0], own[1], values),
+            zip(self.problem.pieces, point.states, strict=True),
+        )
 
     def _piece(
         self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
-from omnidyn.identification.output_error.kernel.march import FINAL, WAVES, add_waves, terms_of
+from omnidyn.identification.output_error.kernel.march import FINAL, WAVES
+from omnidyn.identification.output_error.kernel.of_rows import row_squares, row_terms, row_waves
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums
 from omnidyn.model.layout import N_AXES
 
@@ -27,10 +27,10 @@ def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weig
     variance, final = weighting.variance[known], bool(weighting.mode & FINAL)
     tick = np.array(piece.record.ticks) if weighting.counted and any(piece.record.ticks) else None
     share = np.ones(len(known)) if tick is None else information(variance, tick)[0]
-    pull, square, curvature, rho = _terms(r, variance, weighting.nu, tick, share, final)
+    pull, square, curvature, rho = row_terms(r, variance, weighting.nu, tick, share, final)
     grad, info = np.zeros((len(r), width)), np.zeros((len(r), width, width))
     grad[:, at] = np.einsum("ck,cku->cu", pull, j)
-    info[:, at[:, None], at] = _squares(j, curvature)
+    info[:, at[:, None], at] = row_squares(j, curvature)
     score, drift = np.zeros((0, width)), np.zeros((0, len(r)))
     if final:
         starts = np.arange(0, r.shape[1], weighting.block)
@@ -42,51 +42,9 @@ def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weig
         waves = np.zeros((len(r), HARMONICS, 2, width))
         if tick is not None:
             shown = piece.record.outputs[piece.first : piece.last + 1].T - r
-            waves[..., at] = _waves(j, shown / np.where(tick > 0.0, tick, np.nan)[:, None], HARMONICS)
+            waves[..., at] = row_waves(j, shown / np.where(tick > 0.0, tick, np.nan)[:, None], HARMONICS)
     lag = (pull[:, 1:] * pull[:, :-1]).sum(axis=1)
     return PieceSums(
         known, there.sum(axis=1).astype(float), square.sum(axis=1), rho.sum(axis=1), lag, grad, info, score, drift,
         waves,
     )  # fmt: skip
-
-
-@kernel
-def _terms(residual, variance, nu, tick, share, final):
-    """(w r, w r^2, curvature, rho) of every residual (C, rows), see kernel/march.py; 0 where it is NaN."""
-    columns, rows = residual.shape
-    out = np.zeros((4, columns, rows))
-    for c in range(columns):
-        for k in range(rows):
-            if residual[c, k] == residual[c, k]:
-                pull, square, curvature, rho = terms_of(residual[c, k], variance, nu, c, tick, share, final)
-                out[0, c, k], out[1, c, k], out[2, c, k], out[3, c, k] = pull, square, curvature, rho
-    return out
-
-
-@kernel
-def _waves(slopes, turns, count):
-    """Sum over the rows of (cos, sin)(2 pi m turns) J, m = 1 to `count`; turns (C, rows), NaN where there is none."""
-    columns, rows, width = slopes.shape
-    out = np.zeros((columns, count, 2, width))
-    for c in range(columns):
-        for k in range(rows):
-            if turns[c, k] == turns[c, k]:
-                add_waves(out[c], slopes[c, k], turns[c, k])
-    return out
-
-
-@kernel
-def _squares(slopes, weight):
-    """Sum over the rows of weight J J'. Shapes (C, rows, U), (C, rows) -> (C, U, U)."""
-    columns, rows, count = slopes.shape
-    out = np.zeros((columns, count, count))
-    for c in range(columns):
-        for k in range(rows):
-            for a in range(count):
-                pulled = weight[c, k] * slopes[c, k, a]
-                for b in range(a + 1):
-                    out[c, a, b] += pulled * slopes[c, k, b]
-        for a in range(count):
-            for b in range(a):
-                out[c, b, a] = out[c, a, b]
-    return out

@@ -23,6 +23,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.identification.output_error.kernel.counts import count_terms
+from omnidyn.identification.output_error.kernel.pull import add_pull
 from omnidyn.model.actuation import Driver, at_motor
 from omnidyn.simulation.exact.position import move_on, put_displacement
 from omnidyn.simulation.exact.slopes import acceleration_at_end, hold_slopes, step_slopes, travel_slopes
@@ -298,16 +299,17 @@ def add_input(row, volts, wheel, e, d_input, c, at_driver):
 
 @kernel
 def march(
-    t, u, y, first, last, origin, span, margin, start, offset, groups, physics, slopes, loss, sums, tick, place, pieces
-):
+    t, u, y, first, last, origin, span, margin, start, offset, groups, physics, slopes, loss, sums, tick, place, pieces,
+    room,
+):  # fmt: skip
     """March from row `first` to row `last`, both of one piece without a gap, and add to `sums`.
 
     t (rows,), u (rows, W) voltages before the driver, y (rows, C) outputs, NaN where not measured. origin, span: of
     the whole run, for the fade. margin (C,): time after `first` before which outputs are not used. start (3,) twist;
     offset (C,). groups: first column of each group of one latency, and C.
 
-    tick (C,): of columns that are counts [rad], 0 for the others; place, pieces: room for `put_displacement`. Each of
-    these is None where there is no need: such a kernel is another one, and faster.
+    tick (C,): of columns that are counts [rad], 0 for the others; place, pieces: space for `put_displacement`; room: a
+    force there, where physics.travels. None where there is no need: such a kernel is another one, and faster.
     """
     law, dlaw, size = physics.law, slopes.law, slopes.law.shape[2]
     speed_map, travel_map, d_speed, vary = physics.speed_map, physics.travel_map, slopes.speed_map, slopes.maps_vary
@@ -331,6 +333,8 @@ def march(
         put_volts(volts, u, k, (t[k] - origin) / span, driver)
         put_drive(g, dg, volts, drive, physics.push, d_drive, slopes.push, at_driver, vary)
         dt = t[k + 1] - t[k] if k < last else math.inf
+        if room is not None:
+            add_pull(g, dg, room, v, s, dv, ds, dt if k < last else 0.0)
         for group in range(len(groups) - 1):
             late = lates[groups[group]]
             while pointer[group] <= last and t[pointer[group]] - late - t[k] < dt:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.kernel import kernel
 
 ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tried
 SHARE = 0.1  # of the rows that may be coefficients
@@ -83,6 +84,32 @@ class AutoRegression:
         slowest = min(float(np.abs(np.roots([1.0, *-self.coefficients])).max()), 1.0 - 1.0 / FOLLOWED)
         return (1.0 + slowest) / (1.0 - slowest)
 
+    def products(self, ways: FloatArray) -> FloatArray:
+        """Sums of a series times itself k rows on, for k from 0 to p, both ways. ways (n, K): K series. (p + 1, K)."""
+        found = np.zeros((self.order + 1, ways.shape[1]))
+        for k in range(min(len(found), len(ways))):
+            found[k] = (1.0 if k == 0 else 2.0) * (ways[k:] * ways[: len(ways) - k]).sum(axis=0)
+        return found
+
+    def scatter(self, reach: FloatArray) -> FloatArray:
+        """Variance that the uncertainty of this memory itself gives to each variance V = (J~' J~/s^2)^-1. Shape (K,).
+
+        J~' J~ = sum over k of w_k J' J(k rows on), w_k = sum of a_i a_(i+k), a = (1, -phi), so that with g = J V
+        dV = -dw_k g' g(k rows on)/s^2; reach (p + 1, K): these `products` of g over s^2.
+        """
+        p, a = self.order, np.concatenate([[1.0], -self.coefficients])
+        wide = np.concatenate([np.zeros(p + 1), a, np.zeros(p + 1)])
+        weights = np.array([a[: p + 1 - k] @ a[k:] for k in range(p + 1)])
+        total = 2.0 / self.rows * (weights @ reach) ** 2
+        if not p:
+            return total
+        at = np.arange(1, p + 1)[:, None] + p + 1
+        lag = np.arange(p + 1)
+        slope = -(wide[at + lag] + wide[at - lag])  # of w_k by phi_i
+        slope[:, 0] = -2.0 * a[1:]
+        by_phi = slope @ reach
+        return total + (by_phi * np.linalg.solve(self.covariance, by_phi)).sum(axis=0) / self.rows
+
 
 def _steps(partial: FloatArray) -> list[FloatArray]:
     """Coefficients of the orders 0 to p that these partial correlations make."""
@@ -100,22 +127,54 @@ def autoregression(stretches: Sequence[FloatArray], most: int | None = None) -> 
     """
     rows = sum(len(each) for each in stretches)
     limit = int(min(ORDERS * np.log10(max(rows, 1)), SHARE * rows)) if most is None else most
-    ahead = behind = [np.ascontiguousarray(each) for each in stretches]
-    variance = sum(float(np.vdot(each, each)) for each in ahead) / max(rows, 1)
-    partial: list[float] = []
-    best, cost, least = (0, variance), 0.0, 0.0
-    for _ in range(limit):
-        pairs = [(f[1:], b[:-1]) for f, b in zip(ahead, behind, strict=True) if len(f) > 1]
-        power = sum(float(np.vdot(f, f) + np.vdot(b, b)) for f, b in pairs)
-        k = 2.0 * sum(float(np.vdot(f, b)) for f, b in pairs) / power if power > 0.0 else 1.0
+    ends = np.cumsum([0, *map(len, stretches)])
+    ahead = np.ascontiguousarray(np.concatenate(stretches), dtype=float)
+    partial, order, variance = _burg(ahead, ahead.copy(), ends, limit, PATIENCE)
+    return AutoRegression(partial[:order], variance, rows)
+
+
+@kernel
+def _burg(ahead, behind, ends, limit, patience):
+    """(partial correlations, the order with the least BIC, its variance) by Burg's recursion, in place.
+
+    ahead, behind (rows, K): the series, twice: errors of the predictions from the rows before and from those after.
+    ends (stretches + 1,): where each stretch ends. With m orders done, row t of a stretch that begins at s is one of
+    ahead from t = s + m on, and what stands beside it in the next order is row t - 1 of behind.
+    """
+    rows, count = ahead.shape
+    power, both = np.zeros(count), np.zeros(count)
+    partial, variance = np.zeros(max(limit, 0)), 0.0
+    for t in range(rows):
+        for j in range(count):
+            variance += ahead[t, j] * ahead[t, j]
+    variance /= max(rows, 1)
+    best, least, found, cost, k = 0, 0.0, variance, 0.0, 0.0
+    for order in range(limit):
+        pairs = 0
+        power[:] = 0.0
+        both[:] = 0.0
+        for s in range(len(ends) - 1):
+            last, first = ends[s + 1] - 1, ends[s] + order
+            for t in range(last, first - 1, -1):  # from behind, for a row takes what stood in the one before
+                if order > 0:
+                    for j in range(count):
+                        before, own = behind[t - 1, j], ahead[t, j]
+                        behind[t, j] = before - k * own
+                        ahead[t, j] = own - k * before
+                if t < last:
+                    for j in range(count):
+                        power[j] += ahead[t + 1, j] * ahead[t + 1, j] + behind[t, j] * behind[t, j]
+                        both[j] += ahead[t + 1, j] * behind[t, j]
+            pairs += max(last - first, 0)
+        total = power.sum()
+        k = 2.0 * both.sum() / total if total > 0.0 else 1.0
         if abs(k) >= 1.0:
             break
-        ahead, behind = [f - k * b for f, b in pairs], [b - k * f for f, b in pairs]
-        partial.append(k)
+        partial[order] = k
         variance *= 1.0 - k * k
-        cost += sum(len(f) for f, _ in pairs) * math.log1p(-k * k) + math.log(rows)  # rows that reach so far back
+        cost += pairs * math.log1p(-k * k) + math.log(rows)  # rows that reach so far back
         if cost < least:
-            best, least = (len(partial), variance), cost
-        elif len(partial) >= best[0] + PATIENCE:
+            best, least, found = order + 1, cost, variance
+        elif order + 1 >= best + patience:
             break
-    return AutoRegression(np.array(partial[: best[0]]), best[1], rows)
+    return partial, best, found

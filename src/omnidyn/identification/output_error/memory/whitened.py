@@ -71,8 +71,9 @@ class WhitenedEngine(OfRows):
             if column not in self._filters:
                 continue
             rows, steps = known_rows(piece, residual[c], slopes[c])
-            left = np.setdiff1d(np.arange(residual.shape[1]), rows)
-            residual[c, left], slopes[c, left] = np.nan, 0.0
+            if rows.size < residual.shape[1]:
+                left = np.setdiff1d(np.arange(residual.shape[1]), rows)
+                residual[c, left], slopes[c, left] = np.nan, 0.0
             series = np.column_stack([residual[c, rows], slopes[c, rows]])
             new = innovations(series, steps, *self._filters[column])
             residual[c, rows], slopes[c, rows] = new[:, 0], new[:, 1:]

@@ -10,7 +10,7 @@ where the restricted likelihood is largest: its memory is not too short because 
 (D. A. Harville, J. Am. Stat. Assoc. 72, 320 (1977)).
 
 Simulations are dear and memories are not: between two simulations memory and numbers settle in turn on rows that are
-taken as straight, by the residuals and slopes of the last one.
+taken as straight, by the residuals and slopes of the last one. Far from the end, simulations are coarse: near.py.
 
 The covariance is (J~' J~ / s^2)^-1, ~ the filtered rows, and as much wider or narrower as the change of the score
 between the ends of the intervals says: of slow errors only what is fast counts, and there a robot that stops or sets
@@ -31,7 +31,9 @@ from typing import cast
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.compiled.beside import side_by_side
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
+from omnidyn.identification.output_error.memory.near import near
 from omnidyn.identification.output_error.memory.whitened import (
     TangentEngine,
     WhitenedEngine,
@@ -41,11 +43,14 @@ from omnidyn.identification.output_error.memory.whitened import (
 )
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
-from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
+from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust, widened
 from omnidyn.statistics import t_quantile
 
 ROUNDS, TURNS = 6, 20  # of simulations; of memory and numbers in turn between them
 FEW_STEPS = 4  # of one: what the next memory moves is near
+NEARBY = 10.0  # standard errors: after a round that has moved a number further, the next one is no last one either
+# Squared distance to the best point, in standard errors, at which a round ends: far from the last one, and near it.
+FAR_OFF, CLOSE_BY = 1.0, 1e-2
 SETTLED = 0.1  # standard errors: a round that moves no number further is the last one
 LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the sandwich
 ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
@@ -97,17 +102,19 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
     solver, models = solution.solver, _memory(solution, None)
     if not any(model.order for model in models.values()):
         return None
-    now = solution.state.point
+    now, moved, blocked = solution.state.point, np.inf, None
     for each in range(ROUNDS):
         doing(f"errors with a memory, round {each + 1}")
-        models = _straight(solver, now, models)
-        found = _filtered(solver, below(solver), models).minimise(now, FEW_STEPS)
-        moved, now = _moved(found, now), found.state.point
+        models, far = _straight(solver, now, models), moved > NEARBY
+        engine = near(below(solver), now) if far else below(solver)
+        close = CLOSE_BY if engine is below(solver) else FAR_OFF
+        found = _filtered(solver, engine, models, close).minimise(now, FEW_STEPS, blocked=None if far else blocked)
+        moved, now, blocked = _moved(found, now), found.state.point, found.blocked
         models = _memory(found, _inverse(Normal(found.solver, found.state).information))
-        if each and moved <= SETTLED:
+        if not far and moved <= SETTLED:
             break
-    filtered = _filtered(solver, below(solver), models)
-    found = replace(filtered.minimise(now), notes=solution.notes)
+    filtered = _filtered(solver, below(solver), models, solver.close)
+    found = replace(filtered.minimise(now, blocked=blocked), notes=solution.notes)
     left = trust(filtered, found)
     if left.kind == SANDWICH and solver.counted:
         return None
@@ -124,7 +131,7 @@ def _straight(
     """The memory that rows straight near a point settle at, memory and numbers in turn: nothing is simulated for it."""
     tangent, now = TangentEngine(below(solver), start), start
     for _ in range(TURNS):
-        found = _filtered(solver, tangent, models).minimise(now, FEW_STEPS)
+        found = _filtered(solver, tangent, models, solver.close).minimise(now, FEW_STEPS)
         models = _memory(found, _inverse(Normal(found.solver, found.state).information))
         moved, now = _moved(found, now), found.state.point
         if moved <= SETTLED:
@@ -133,10 +140,10 @@ def _straight(
 
 
 def _filtered(
-    solver: Solver[Problem], engine: RowEngine[Problem], models: Mapping[Column, AutoRegression]
+    solver: Solver[Problem], engine: RowEngine[Problem], models: Mapping[Column, AutoRegression], close: float
 ) -> Solver[Problem]:
-    """The solver for errors of these memories."""
-    return Solver(solver.problem, WhitenedEngine(engine, models), 0.0, solver.close, solver.counted)
+    """The solver for errors of these memories, which ends `close` to the best point."""
+    return Solver(solver.problem, WhitenedEngine(engine, models), 0.0, close, solver.counted)
 
 
 def _moved(found: Solution, before: Point) -> float:
@@ -242,13 +249,15 @@ def _observed(found: Solution, known: Trust) -> FloatArray:
     if (known.open | known.held | ~(known.std > 0.0)).any():
         return known.covariance
     axes = _root(known.covariance / np.outer(known.std, known.std)) * known.std[:, None]
-    inner, curved = solver.inner(point.values), np.zeros((axes.shape[1], axes.shape[1]))
-    for k, way in enumerate(axes.T):
-        ends = [solver.clipped(inner + side * known.quantile * way) for side in (1.0, -1.0)]
-        states = (solver.state(Point(solver.outer(end), point.states)) for end in ends)
-        high, low = (Normal(solver, state).gradient for state in states)
-        apart = float(np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(way))
-        curved[k] = axes.T @ (low - high) / apart
+    inner = solver.inner(point.values)
+
+    def gradient(end: FloatArray) -> FloatArray:
+        return Normal(solver, solver.state(Point(solver.outer(end), point.states))).gradient
+
+    ends = [solver.clipped(inner + side * known.quantile * way) for way in axes.T for side in (1.0, -1.0)]
+    gradients = np.array(side_by_side(gradient, ends))
+    apart = np.linalg.norm(np.array(ends[0::2]) - np.array(ends[1::2]), axis=1) / np.linalg.norm(axes, axis=0)
+    curved = (gradients[1::2] - gradients[0::2]) @ axes / apart[:, None]
     values, vectors = np.linalg.eigh(0.5 * (curved + curved.T))
     stretched = (axes @ vectors) / np.sqrt(np.clip(values, BENT, 1.0 / BENT))
     return stretched @ stretched.T
@@ -269,34 +278,12 @@ def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegressi
         for column, _, slopes, _ in _columns(piece, parts):
             if column not in reach:
                 continue
-            pulls = slopes @ ways[parts[2]]
-            for k in range(min(len(reach[column]), len(pulls))):
-                reach[column][k] += (1.0 if k == 0 else 2.0) * (pulls[k:] * pulls[: len(pulls) - k]).sum(axis=0)
+            reach[column] += models[column].products(slopes @ ways[parts[2]])
     variance, scatter = np.diag(known.plain)[told], np.zeros(int(told.sum()))
     for column, model in models.items():
-        scatter += _scatter(model, reach[column] / found.state.variance[solver.problem.columns.index(column)])
+        scatter += model.scatter(reach[column] / found.state.variance[solver.problem.columns.index(column)])
     degrees = 2.0 * variance**2 / np.maximum(scatter, 1e-300)
     return float(np.clip(degrees.min(), 3.0, max(known.degrees, 3)))
-
-
-def _scatter(model: AutoRegression, reach: FloatArray) -> FloatArray:
-    """Variance that a model's own uncertainty gives each of the variances V = (J~' J~/s^2)^-1. Shape (P,).
-
-    J~' J~ = sum over k of w_k J' J(k rows on), w_k = sum of a_i a_(i+k), a = (1, -phi), so that with g = J V
-    dV = -dw_k g' g(k rows on)/s^2; reach (p + 1, P): these products, both ways for k > 0.
-    """
-    p, a = model.order, np.concatenate([[1.0], -model.coefficients])
-    wide = np.concatenate([np.zeros(p + 1), a, np.zeros(p + 1)])
-    weights = np.array([a[: p + 1 - k] @ a[k:] for k in range(p + 1)])
-    total = 2.0 / model.rows * (weights @ reach) ** 2
-    if not p:
-        return total
-    at = np.arange(1, p + 1)[:, None] + p + 1
-    lag = np.arange(p + 1)
-    slope = -(wide[at + lag] + wide[at - lag])  # of w_k by phi_i
-    slope[:, 0] = -2.0 * a[1:]
-    by_phi = slope @ reach
-    return total + (by_phi * np.linalg.solve(model.covariance, by_phi)).sum(axis=0) / model.rows
 
 
 def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trust) -> Iterator[str]:
@@ -309,7 +296,7 @@ def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trus
     yield (
         f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
         f"errors of each output are fitted as an autoregression of order {order}, with a memory of up to "
-        f"{lasts:.2g} s; the intervals are up to {known.widening:.2g} times as wide as for white noise"
+        f"{lasts:.2g} s; {widened(known)}"
     )
     if model.rows < FEW * model.memory:
         yield (

@@ -56,7 +56,7 @@ def differences(runs: Sequence[Run]) -> Differences | None:
 
     All logs are looked at together: what is too short or too slow to tell goes with the others.
     """
-    logs = [run.as_measured() for run in runs if _known(run.wheel_speed)]
+    logs = [run for run in runs if _known(run.wheel_speed)]
     if not logs or len({run.wheels for run in logs}) > 1 or any(_known(run.wheel_angle) for run in logs):
         return None
     for stamped in (False, True):

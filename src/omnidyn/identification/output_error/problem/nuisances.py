@@ -3,7 +3,8 @@
 latency.CHANNEL   the channel shows what was t ago [s]; exact, by steps that end within a row
 gain              voltage at the motor = gain x logged; with a supply that is only nominal, a prior of 10 %
 dead_band         of the driver: (|u| - dead_band)+ sgn u reaches the motor [V]; at most what is seen to have driven it
-tilt.AXIS         constant force on x, y [N], yaw [N m] of the body: a floor that is not level, while the heading stays
+tilt.x, tilt.y    constant force along x and y of the room [N]: a floor that is not level, whichever way the robot faces
+push.AXIS         constant force on x, y [N], yaw [N m] of the body: a cable, a brush, wheels that toe in
 fade              share of the voltage lost from the start of a run to its end, evenly: a battery that sags
 start             twist at the start of each piece of the log; pose and angles of the wheels too
 """
@@ -28,10 +29,11 @@ from omnidyn.model.first_guess import GRAVITY
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import DEAD_BAND as KEY_DEAD
 from omnidyn.model.keys import LATENCY as KEY_LATE
+from omnidyn.model.layout import YAW
 from omnidyn.model.robot import IDENTIFIED, Robot
 
-LATENCY, TILT = "latency", "tilt"
-NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT)
+LATENCY, TILT, PUSH = "latency", "tilt", "push"
+NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT, PUSH)
 TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an unknown start
 EARLIEST, LATEST = -0.1, 0.3  # [s]
 FILTER = (
@@ -86,8 +88,8 @@ def nuisance_parameters(
             own, seen = robot.drive.dead_band, least_that_drove(records, robot)
             high = max(seen if np.isfinite(seen) else 0.5 * most, own)
             found.append(Parameter(DEAD_BAND, own, 0.0, high, prior=_of_file(robot, KEY_DEAD, own)))
-        elif name.partition(".")[0] == TILT:
-            found += _tilts(name, robot)
+        elif name.partition(".")[0] in (TILT, PUSH):
+            found += _forces(name, robot)
         else:
             found.append(Parameter(FADE, 0.0, -MOST_FADE, MOST_FADE))
     return list({p.name: p for p in found}.values())
@@ -122,12 +124,13 @@ def measured_channels(records: Sequence[Record]) -> list[str]:
     )  # fmt: skip
 
 
-def _tilts(name: str, robot: Robot) -> list[Parameter]:
-    """The force on one axis, or on all; at most what the robot weighs, at its wheels for yaw."""
-    weight = GRAVITY * robot.body.mass
+def _forces(name: str, robot: Robot) -> list[Parameter]:
+    """The force on one axis, or on all that it has; at most what the robot weighs, at its wheels for yaw."""
+    weight, kind = GRAVITY * robot.body.mass, name.partition(".")[0]
     most = (weight, weight, weight * float(np.max(robot.wheels.robot_radius)))
-    every = [Parameter(f"{TILT}.{axis}", 0.0, -own, own) for axis, own in zip(AXES, most, strict=True)]
-    found = [p for p in every if name in (TILT, p.name)]
+    every = [Parameter(f"{kind}.{axis}", 0.0, -own, own) for axis, own in zip(AXES, most, strict=True)]
+    every = every[:YAW] if kind == TILT else every
+    found = [p for p in every if name in (kind, p.name)]
     if not found:
         raise InputError("no such axis", got=name, expected=", ".join(p.name for p in every), where="nuisances")
     return found

@@ -85,7 +85,7 @@ def _without_doubles(
     run: Run, robot: Robot, found: dict[str, FloatArray], asked: bool
 ) -> tuple[dict[str, FloatArray], list[str]]:
     """Without outputs that are computed from another one; where they were asked for, with a warning instead."""
-    if not found.keys() & set(TRAVEL):
+    if not found.keys() & set(TRAVEL) and not {"twist", "wheel_speed"} <= found.keys():
         return found, []
     notes = []
     for name, source in redundant(run, robot).items():
@@ -93,6 +93,7 @@ def _without_doubles(
             continue
         same = (
             "its wheel speeds are differences of its wheel angles" if name == "wheel_speed"
+            else "its twist is computed from its wheels" if name == "twist"
             else f"its {name} is the integral of its own {source.replace('_', ' ')}"
         )  # fmt: skip
         if asked:

@@ -17,7 +17,8 @@ from omnidyn.logs.segments import segments
 from omnidyn.model.actuation import asked_voltage, clip_voltage
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import wheel_speed
+from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.wheels import refuse_slip, wheel_speed
 from omnidyn.run import Run
 from omnidyn.statistics import sensor_step, stretches
 
@@ -82,8 +83,8 @@ def record(
     loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad,
     counted: as in outputs.py.
     """
-    made_up = [name.replace("_", " ") for name, mask in run.interpolated.items() if mask.any()]
-    run = run.as_measured()
+    refuse_slope(robot.floor, "a fit starts from")
+    refuse_slip(robot.wheels, "a fit starts from")
     set_point = _set_point(run, robot, loop)
     voltage, supplied, notes = _voltage(run, robot) if set_point is None else (np.zeros_like(set_point), False, [])
     clipped = clip_voltage(robot.motor, voltage)
@@ -93,8 +94,6 @@ def record(
             f"{int(beyond.any(axis=1).sum())} rows ask for more than the voltage limit: they are clipped to it"
         )
         voltage = clipped
-    if made_up:
-        notes.append(f"{', '.join(made_up)}: only what was measured is fitted, not what was interpolated in between")
     found = outputs_of(run, robot, outputs, tick_rad, counted)
     inputs = voltage if set_point is None else set_point
     finite = np.isfinite(inputs)

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from omnidyn.arrays import FloatArray
+from omnidyn.compiled.beside import side_by_side
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.rates import RateEngine
@@ -58,14 +60,16 @@ def _with_latencies(solver: Solver, begun: State) -> State:
         return begun
     row = float(np.median(np.diff(problem.pieces[0].record.t[: 2 * LATENCIES + 1])))
     tried = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
-    costs = []
-    for late in tried:
+
+    def cost(late: float) -> FloatArray:
         values = point.values.copy()
         values[own] = late
         state = solver.state(Point(values, point.states), np.ones(len(problem.columns)) if solver.nu else None)
         square = per_column(state.sums, len(problem.columns), "square")
         number = np.maximum(per_column(state.sums, len(problem.columns), "number"), 1.0)
-        costs.append(np.log(np.maximum(square / number, solver.floor)))
+        return np.log(np.maximum(square / number, solver.floor))
+
+    costs = side_by_side(cost, tried)
     values = point.values.copy()
     for j in own:
         mine = [k for k, (channel, _) in enumerate(problem.columns) if f"{LATENCY}.{channel}" == problem.names[j]]
@@ -136,7 +140,8 @@ def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
     solver = Solver(short, ImplicitEngine(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
-    best = min(points, key=lambda point: solver.state(point).objective)
+    costs = side_by_side(lambda point: solver.state(point).objective, points)
+    best = points[int(np.argmin(costs))]
     begun = [best]
     if any(name in TRAVELS for name, _ in short.columns):
         begun.append(_by_rates(short, best, nu, watch))

@@ -15,17 +15,19 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.exact import LATE, Weighting
+from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.problem.problem import Fitted, Parts, PieceSums, Point, per_column
+from omnidyn.identification.output_error.solve.bend import Bend
+from omnidyn.identification.output_error.solve.edges import Edges
 
 MAX_ITERATIONS = 60
 CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
 ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
+FAR = 100.0  # squared distance to the best point, in standard errors, beyond which a bend is not that of the end
 DAMPING, LEAST_DAMPING = 1e-4, 1e-10
 FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked at an edge
-CURRENT = f"{LATE}current"
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
 UNSEEN = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
@@ -74,7 +76,7 @@ class State:
 class Solution:
     """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short.
 
-    solver: which found it. notes: what is to be said of the way there.
+    solver: which found it. blocked: latencies that stand at an edge. notes: what is to be said of the way there.
     """
 
     state: State
@@ -82,6 +84,7 @@ class Solution:
     iterations: int
     converged: bool
     solver: Solver[Any]
+    blocked: BoolArray | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -97,10 +100,7 @@ class Solver(Generic[P]):
         self.creep = CREEP * close if close > CLOSE else 0.0  # a speed loop may creep for long, and yet find its way
         self.tick = problem.tick if counted else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
-        # A current follows the voltage at once: its latency meets a jump at every row, which no step should cross. What
-        # follows the current meets a kink there, the floor of a valley where the log has no latency.
-        late = [p.name.partition("@")[0] for p in problem.parameters]
-        self._edges = [np.array([each.startswith(own) for each in late], bool) for own in (CURRENT, LATE)]
+        self._edges = Edges(problem)
         self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
         self._high = np.array([p.inner(p.high) for p in problem.parameters])
 
@@ -125,36 +125,53 @@ class Solver(Generic[P]):
         return np.full(len(self.tick), True) if self.nu else self.tick > 0.0
 
     def minimise(
-        self, start: Point | State, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None
-    ) -> Solution:
+        self, start: Point | State, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None,
+        blocked: BoolArray | None = None,
+    ) -> Solution:  # fmt: skip
         """The best point from `start`; `watch` sees every better one on the way.
 
-        Where the start is a state that this engine found, the logs are not marched through for it again.
+        Where the start is a state that this engine found, the logs are not marched through for it again. blocked (P,):
+        latencies that a solution near by has found to stand at an edge.
         """
         if not self.scaled.any():
-            return self._descend(self._begun(start), limit, watch)
+            return self._descend(self._begun(start), limit, watch, blocked)
         start = start.point if isinstance(start, State) else start
         plain = Solver(self.problem, self.engine, close=self.close, counted=False).minimise(start, limit)
         now = self.state(plain.state.point, np.maximum(plain.state.variance - self.tick**2 / 12.0, self.floor))
-        return self._descend(self._rescaled(now)[0], limit, watch)
+        return self._descend(self._rescaled(now)[0], limit, watch, blocked)
 
-    def _descend(self, now: State, limit: int, watch: Callable[[State], None] | None) -> Solution:
+    def _descend(
+        self, now: State, limit: int, watch: Callable[[State], None] | None, blocked: BoolArray | None
+    ) -> Solution:
         damping, change = DAMPING, 0.0
-        held = blocked = np.zeros(len(self.problem.parameters), bool)
+        held = np.zeros(len(self.problem.parameters), bool)
+        blocked, bend = held if blocked is None else blocked, Bend(len(held))
         released, creeping = False, 0
         for iteration in range(limit):
             normal, before = Normal(self, now), now.objective
             held, better = normal.held, False
-            still = held | blocked
-            while not better and normal.distance_without(still) / (1.0 + damping) > (
+            if not self.scaled.any():  # a scale that is held meanwhile would be taken for a bend
+                bend.learn(normal.inner, normal.gradient, normal.information)
+            still, onto = held | blocked, np.zeros(len(held))
+            while not better and (away := normal.distance_without(still)) / (1.0 + damping) > (
                 self.close if damping < FIRM else max(ENOUGH, self.close)
             ):
-                trial = self.state(normal.moved(damping, still), now.variance if self.scaled.any() else None)
+                if away > FAR:
+                    bend.forget()
+                moved = normal.moved(damping, still, bend.beside(normal.information, still), onto)
+                trial = self.state(moved, now.variance if self.scaled.any() else None)
                 better = trial.objective < now.objective
-                edge = None if better else next((e for e in self._edges if (e & ~still).any()), None)
+                edge = None if better else self._edges.not_yet(still)
                 if edge is not None:  # once more, and from here on, without what may stand at a jump or a kink
+                    onto = self._edges.onto(normal.inner, self.inner(moved.values), still | ~edge)
                     blocked = blocked | edge
                     still = still | blocked
+                    continue
+                if not better and onto.any():  # what was a guess is dropped before steps get shorter
+                    onto = np.zeros(len(held))
+                    continue
+                if not better and bend.known:
+                    bend.forget()
                     continue
                 damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
                 now = trial if better else now
@@ -164,12 +181,12 @@ class Solver(Generic[P]):
             if better and watch:
                 watch(now)
             if creeping >= STEPS and change < SCALE_CHANGE:
-                return Solution(now, held, iteration + 1, True, self)
+                return Solution(now, held, iteration + 1, True, self, blocked)
             if not better and blocked.any() and not released:  # a shorter step may stay this side of the edge
                 blocked, released, damping = np.zeros_like(blocked), True, SHORT
             elif not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
-                return Solution(now, held, iteration + 1, True, self)
-        return Solution(now, held, limit, False, self)
+                return Solution(now, held, iteration + 1, True, self, blocked)
+        return Solution(now, held, limit, False, self, blocked)
 
     def _rescaled(self, now: State) -> tuple[State, float]:
         """The same point at better scales of Student's t and counts, and the largest relative change.
@@ -287,12 +304,15 @@ class Normal:
             found.append(own)
         return np.concatenate(found)
 
-    def moved(self, damping: float, still: BoolArray) -> Point:
-        """The point of the damped step, within the bounds, without the parameters that are `still`."""
+    def moved(self, damping: float, still: BoolArray, bend: FloatArray, onto: FloatArray) -> Point:
+        """The point of the damped step, within the bounds, without the parameters that are `still`.
+
+        bend (P, P): what the information lacks, see bend.py. onto (P,): the step of these, see edges.py.
+        """
         gradient, information = self._reduced(damping)
-        free = ~still
-        step = np.zeros(self._count)
-        step[free] = _solve(information[np.ix_(free, free)], gradient[free])
+        information, free = information + bend, ~still
+        step = np.where(still, onto, 0.0)
+        step[free] = _solve(information[np.ix_(free, free)], (gradient - information @ step)[free])
         inner = self.solver.clipped(self.inner + step)
         step = inner - self.inner
         k, states = self._count, []

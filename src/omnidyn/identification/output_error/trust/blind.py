@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, TILT
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem
 from omnidyn.model.actuation import DEAD_BAND
@@ -79,7 +79,7 @@ def _size(p: Parameter, value: float, push: FloatArray, top: FloatArray) -> floa
         return LATE
     if p.part == DEAD_BAND:
         return max(abs(value), 0.1)
-    return max(SMALL * float(push.max()), 1e-9) if p.part == TILT else 1.0
+    return max(SMALL * float(push.max()), 1e-9) if p.part in (TILT, PUSH) else 1.0
 
 
 def _pushes(problem: Fitted, robot: Robot) -> FloatArray:

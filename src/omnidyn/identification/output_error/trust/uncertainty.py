@@ -37,6 +37,7 @@ BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below w
 UNTOLD = 3.0  # std of a logarithm beyond which a number is not told: 95 % of it lie between 1/360 and 360 times
 WEAK = 1e-4  # below it, is hardly seen
 SHARE = 0.05  # of a blind direction that a parameter must have to be named
+WIDER = 1.05  # times as wide, below which it is not worth a word
 WHITE, SANDWICH, AUTOREGRESSIVE = "white", "sandwich", "autoregressive"
 # Std over that of the prior from which on the logs say too little of a number. Of two guesses of which only the product
 # shows each keeps 0.71 of its own, of three 0.82, however long the log.
@@ -308,3 +309,10 @@ def _at_least(wide: FloatArray, least: FloatArray, beyond: float) -> FloatArray:
 def _free_step(plain: FloatArray, normal: Normal) -> FloatArray:
     """From where a bound holds a parameter to where the fit would be without the bound, to first order."""
     return np.where(normal.held, plain @ normal.gradient, 0.0)
+
+
+def widened(known: Trust) -> str:
+    """How much wider the intervals are than for white noise, in words."""
+    if known.widening < WIDER:
+        return "the intervals are no wider for it"
+    return f"the intervals are up to {known.widening:.2g} times as wide as for white noise"

@@ -27,7 +27,7 @@ from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.candidates import CHANGE
 from omnidyn.identification.structure.diagnosis import Examined, examine
-from omnidyn.identification.structure.held_out import Errors, errors, margins_of
+from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.switches import LIMIT, Switch, switches, told
 from omnidyn.model.friction import WheelFriction

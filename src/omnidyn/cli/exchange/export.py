@@ -1,0 +1,95 @@
+"""omnidyn export KIND ROBOT -o OUT: a robot in the files of other tools."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from omnidyn.cli import log_options
+from omnidyn.cli.terminal.streams import say, show
+from omnidyn.cli.terminal.telling import tell
+
+if TYPE_CHECKING:
+    from omnidyn.export.contract import Export
+    from omnidyn.model.robot import Robot
+    from omnidyn.run import Run
+
+
+def export(
+    kind: str = typer.Argument(metavar="KIND", help="What to write."),
+    robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
+    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File or folder to write; - is stdout."),
+    precision: str = typer.Option("", metavar="double|single", help="Of the numbers of c-model; double by default."),
+    height: float | None = typer.Option(
+        None, metavar="M", help="Of the body [m], for its inertia about the other axes (mjcf, urdf, sdf)."
+    ),
+    log: list[str] = typer.Option(
+        [], "--log", metavar="LOG", help="With wheel speeds and a measured twist, for covariances (ros2-control)."
+    ),
+    horizon: float | None = typer.Option(
+        None, metavar="S", help="For which the covariance of the pose is given [s] (ros2-control)."
+    ),
+    max_bytes: int = log_options.MAX_BYTES,
+    controller: str = typer.Option(
+        "", metavar="NAME|FILE", help="Controller by name or file (c-controller); pid by default."
+    ),
+    dt: float | None = typer.Option(None, metavar="S", help="Between two of its steps [s]; 0.02 by default."),
+    force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+    json: bool = typer.Option(False, "--json", help="What was written and left out, for machines."),
+) -> None:
+    """Write a robot in the files of another tool.
+
+    KIND is json, c-model, c-controller, fmu, wpilib, road-runner, gains, mjcf, urdf, sdf, ros2-control or ros2-node.
+    What the format cannot say stands in the file as comments, and is shown.
+    """
+    from omnidyn.cli.terminal.session import input_file, provenance, robot_input
+    from omnidyn.export.kinds import maker
+    from omnidyn.files import keep_apart
+    from omnidyn.model.presets import robot_path
+    from omnidyn.model.robot_file import load_robot
+
+    make = maker(kind)
+    if out == "-" and json:
+        raise typer.BadParameter("-o - and --json both want stdout.")
+    given = {"precision": precision or None, "height": height, "horizon": horizon, "dt": dt}
+    options = _options(kind, make, {**given, "controller": controller or None})
+    loaded = load_robot(robot)
+    if log:
+        options |= _options(kind, make, {"runs": [_run(path, loaded, max_bytes) for path in log]})
+    if out not in ("", "-"):
+        files = [*log, *([controller] if controller.endswith(".toml") else [])]
+        keep_apart([out], [robot_path(robot), *files])
+    made = make(loaded, **options)
+    record = provenance([robot_input(robot), *(input_file("log", path) for path in log)])
+    if out == "-":
+        show(made.text.rstrip("\n"))
+        _say_missing(made)
+        return
+    written = [str(path) for path in made.write(out, force)] if out else []
+    tell(made.document(), json, record, output=written or None)
+    if not json:
+        say(f"omnidyn: wrote {', '.join(written)}" if written else "omnidyn: nothing written; -o OUT writes it")
+
+
+def _options(kind: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """The options that were given. Ends as wrong usage where the kind has none of that name."""
+    known = inspect.signature(make).parameters
+    options = {name: value for name, value in given.items() if value is not None}
+    for name in options:
+        if name not in known:
+            flag = {"runs": "log"}.get(name, name)
+            raise typer.BadParameter(f"--{flag} is not for {kind}.")
+    return options
+
+
+def _run(path: str, robot: Robot, max_bytes: int) -> Run:
+    from omnidyn.logs.read_log import read_log
+
+    return read_log(path, robot=robot, max_bytes=max_bytes or None)
+
+
+def _say_missing(made: Export) -> None:
+    for words in made.missing:
+        say(f"omnidyn: not in it: {words}")

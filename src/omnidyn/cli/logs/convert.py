@@ -1,0 +1,59 @@
+"""omnidyn convert IN OUT: a log of any kind as a run file, MCAP or MAT."""
+
+from __future__ import annotations
+
+import typer
+
+from omnidyn.cli import log_options
+from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.streams import say
+
+
+def convert(
+    log: str = typer.Argument(metavar="IN", help="A log of any kind: a bag of ROS (its folder too), MCAP, CSV, .."),
+    out: str = typer.Argument(metavar="OUT", help="What to write: .csv, .parquet, .mcap (for ROS 2) or .mat."),
+    robot: str = typer.Option("", "--robot", metavar="ROBOT", help="The robot of the log: a preset or a robot file."),
+    map_file: str = log_options.MAP,
+    column: list[str] = log_options.COLUMN,
+    assume: list[str] = log_options.ASSUME,
+    latency: list[str] = log_options.LATENCY,
+    save_map: str = log_options.SAVE_MAP,
+    sort: bool = log_options.SORT,
+    no_header: bool = log_options.NO_HEADER,
+    skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
+    current_unsigned: bool = log_options.CURRENT_UNSIGNED,
+    beside: list[str] = typer.Option(
+        [], "--with", metavar="FILE", help="Another file of the same experiment and clock: joined by time. Repeatable."
+    ),
+    max_bytes: int = log_options.MAX_BYTES,
+    var: list[str] = log_options.VARIABLE,
+    force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+) -> None:
+    """Write a log in another format, in SI and by channel.
+
+    As MCAP it opens in Foxglove and PlotJuggler, a simulated run beside the real one.
+    """
+    from dataclasses import replace
+
+    from omnidyn.files import check_output
+
+    log_options.keep_inputs([log, *beside], [robot], [map_file], out, save_map)
+    check_output(out, force)
+    from omnidyn.logs.read_log import load_log
+    from omnidyn.logs.run_file import check_format, write_run
+    from omnidyn.model.robot_file import load_robot
+
+    check_format(out)
+    options = log_options.log_options(
+        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var
+    )
+    options = replace(options, beside=tuple(beside))
+    maps = log_options.Maps(save_map, force)
+    with progress("reading"):
+        read = load_log(log, load_robot(robot) if robot else None, options)
+        maps.show(log, read.columns)
+        run = read.to_run(sort=sort)
+    for warning in run.warnings:
+        say(f"omnidyn: warning: {warning}")
+    write_run(run, out, force)
+    say(f"omnidyn: wrote {out}")

@@ -1,0 +1,172 @@
+"""track: a controller drives a simulated robot along a path, step by step; Tracking says how near it came."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from omnidyn.arguments import check_order
+from omnidyn.arrays import FloatArray
+from omnidyn.control.controller import OK, Controller
+from omnidyn.control.controllers import controller_named
+from omnidyn.control.feedforward import DT, check_dt
+from omnidyn.control.paths.motion import Path
+from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.tracking import Tracking
+from omnidyn.errors import InputError
+from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+from omnidyn.simulation.live import LiveRobot, check_supply
+
+SKIP = 0.5  # [s] from the start that count as no error: the robot starts at rest
+MOST_STEPS = 1_000_000
+MOST_DELAY = 100
+# What a noise of 1 m/s on the speeds is on the others: x, y [m], heading [rad], v_x, v_y [m/s], omega [rad/s].
+NOISE = np.array([0.2, 0.2, 0.4, 1.0, 1.0, 4.0])
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """Under what a robot is driven. dt [s]; duration [s], None: that of the path; skip [s]: no errors before it.
+
+    noise [m/s]: std of the measured speeds; of omega 4 times as many rad/s, of x and y 0.2 s, of the heading 0.4 s
+    times. delay: steps until an output acts. push: constant wrench on the body [N, N, N m]. seed: of the noise.
+    supply [V]: behind a duty.
+    """
+
+    dt: float = DT
+    duration: float | None = None
+    skip: float = SKIP
+    noise: float = 0.0
+    delay: int = 0
+    seed: int = 0
+    push: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    supply: float | None = None
+
+    def __post_init__(self) -> None:
+        check_dt(self.dt)
+        for name, low, high in (("noise", 0.0, 100.0), ("delay", 0, MOST_DELAY), ("skip", 0.0, 1e6)):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise InputError("out of range", got=value, expected=f"{low:g} to {high:g}", where=name)
+        if self.duration is not None and not self.dt <= self.duration <= MOST_STEPS * self.dt:
+            raise InputError(
+                "cannot track for that long", got=self.duration,
+                expected=f"one step, {self.dt:g} s, to a million of them", where="duration",
+            )  # fmt: skip
+
+    def steps(self, path: Path) -> int:
+        """How many steps it takes. Raises InputError for a path of too many."""
+        wanted = path.duration if self.duration is None else self.duration
+        count = max(1, round(wanted / self.dt))
+        if count > MOST_STEPS:
+            raise InputError("too many steps", got=count, expected=f"at most {MOST_STEPS}", remedy="set a `duration`")
+        return count
+
+
+def track(
+    robot: Robot, path: Path | Run | str, controller: Controller | str = "pid", *, plant: Robot | None = None,
+    dt: float = DT, duration: float | None = None, skip: float = SKIP, noise: float = 0.0, delay: int = 0,
+    seed: int = 0, push: tuple[float, float, float] = (0.0, 0.0, 0.0), supply: float | None = None,
+) -> Tracking:  # fmt: skip
+    """Drive a simulated robot along a path with a controller, and see how near it comes.
+
+    robot: that the controller believes to drive. path: a Path, or what `path` takes. controller: a Controller, or the
+    name of one ("feedforward", "speed", "pid", ..), or a controller file. plant: the robot that is driven in truth; the
+    same by default. It starts on the path, at rest.
+    dt: time between two steps [s]. duration: that is tracked [s]; that of the path by default. skip: errors before it
+    count for nothing [s]: the start from rest is no error of tracking.
+    noise: std of the measured speeds [m/s]; on omega 4 times as many rad/s, on x and y 0.2 s, on the heading 0.4 s
+    times as much. seed: of the noise. delay: steps until an output acts; a controller that can take it into account is
+    told, and the loop begins as many steps before the path does: a path is known ahead, and who waits where it begins
+    can be in motion on time. push: a constant wrench on the body [N, N, N m] that no model knows. supply: behind a duty
+    [V].
+    Returns a Tracking. Raises InputError for what cannot be driven, or a number out of range.
+    """
+    check_order("track(robot, path, controller)", (robot, Robot), (path, (Path, Run, str)), (controller, object))
+    if not 0 <= delay <= MOST_DELAY or delay != int(delay):
+        raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
+    around = Circumstances(dt, duration, skip, noise, int(delay), seed, push, supply)
+    follow = path if isinstance(path, Path) else path_named(path)
+    if isinstance(controller, str):
+        controller = controller_named(controller, robot, supply=supply, **told_of_loop(robot, around))
+    return tracked(plant or robot, follow, controller, around)
+
+
+def told_of_loop(robot: Robot, around: Circumstances) -> dict[str, Any]:
+    """What a controller is told of the loop it is in: the time between steps, and by how many of them it is late."""
+    late = round(robot.drive.latency / around.dt) + around.delay
+    return {"dt": around.dt, **({"delay": late} if around.delay else {})}
+
+
+def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstances) -> Tracking:
+    """`track`, with all there is to it. Raises InputError where the robots take different outputs."""
+    _check_match(plant, controller, around.supply)
+    count, dt, n = around.steps(path), around.dt, plant.wheels.count
+    t: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
+    live = LiveRobot(
+        plant, dt, pose=path.at(0.0).pose, delay=around.delay, supply=around.supply, push=around.push
+    )  # fmt: skip
+    controller.reset()
+    early = round(plant.drive.latency / dt) + around.delay
+    draws = np.random.default_rng(around.seed).standard_normal((count + early, 6)) * (around.noise * NOISE)
+    sent, volts, state = np.empty((count, n)), np.empty((count, n)), np.empty((count + 1, 6 + n))
+    for k in range(-early, 0):  # it waits where the path begins; what is sent now acts when it does
+        seen = np.array([*live.pose, *live.twist]) + draws[k]
+        live.step(controller.step(k * dt, seen[:3], seen[3:], path))
+    state[0] = *live.pose, *live.twist, *live.wheel_speed
+    took, words = np.empty(count), dict[str, int]()
+    for k in range(count):
+        seen = state[k, :6] + draws[k]
+        begun = time.perf_counter()
+        sent[k] = controller.step(float(t[k]), seen[:3], seen[3:], path)
+        took[k] = time.perf_counter() - begun
+        live.step(sent[k])
+        volts[k] = live.voltage
+        state[k + 1] = *live.pose, *live.twist, *live.wheel_speed
+        status = controller.info.status
+        if status != OK:
+            words[status] = words.get(status, 0) + 1
+    limit = np.asarray(controller.limit)
+    run = _run(plant, controller, t, sent, volts, state, around)
+    full = float(np.mean((np.abs(sent) >= limit * (1.0 - 1e-9)).any(axis=1)))
+    return Tracking(
+        controller.name, plant.name, path.name, run, path.at(t).pose, around.skip, dt, full, took, words,
+    )  # fmt: skip
+
+
+def _check_match(plant: Robot, controller: Controller, supply: float | None) -> None:
+    """Raises InputError where plant and controller do not fit each other."""
+    check_supply(plant, supply)
+    believed = controller.robot
+    if believed.wheels.count != plant.wheels.count or believed.drive.kind != plant.drive.kind:
+        raise InputError(
+            "the controller is made for another drive",
+            got=f"{believed.wheels.count} wheels, {believed.drive.kind}",
+            expected=f"{plant.wheels.count} wheels, {plant.drive.kind}", where="plant",
+        )  # fmt: skip
+
+
+def _run(
+    plant: Robot, controller: Controller, t: FloatArray, sent: FloatArray, volts: FloatArray, state: FloatArray,
+    around: Circumstances,
+) -> Run:  # fmt: skip
+    """What the instruments of the robot would have recorded, without noise."""
+
+    def last(rows: FloatArray) -> FloatArray:
+        return np.concatenate([rows, rows[-1:]])
+
+    kind = plant.drive.kind
+    battery = around.supply if around.supply is not None else plant.drive.supply
+    return Run(
+        t=t, voltage=last(volts), duty=last(sent) if kind == DUTY else None,
+        wheel_speed=state[:, 6:],
+        wheel_speed_command=last(sent) if kind == SPEED else None,
+        twist=state[:, 3:6], pose=state[:, :3],
+        supply=np.full(len(t), battery) if kind == DUTY and battery is not None else None,
+        source=f"simulated: {plant.name} driven by {controller.name}",
+    )  # fmt: skip

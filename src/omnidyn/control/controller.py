@@ -1,0 +1,277 @@
+"""The contract of a controller. One file per controller; whatever runs one (track, tune, exports) knows only this.
+
+A controller must:
+
+1. take `step(t, pose, twist, path)`: time [s], pose (x, y, heading) in the world, twist (v_x, v_y, omega) in the body
+   frame, shapes (3,), and a Path (path.py); return what to send to the drive until the next step, shape (wheels,);
+2. say by `output` what that is: "voltage" [V], "duty" [1], or "wheel_speed" [rad/s] for a drive with a speed loop;
+3. keep |output| <= `limit`, shape (wheels,), in every step;
+4. never raise in `step`: what is missing, NaN, of a wrong shape or earlier than the step before gives zeros, and a
+   word in `info.status`. A time that stands still repeats the last output;
+5. go on where a path has ended: it holds the last pose of the path, and says so in `info.status`;
+6. tell by `info` what the last step did: status, iterations, time, predicted path, limits met;
+7. forget by `reset()` all it remembers of steps before;
+8. take another robot by `replace(robot=...)`: the same settings and the same memory, while it runs.
+
+`Guarded` keeps 1, 3, 4, 5, 7 and 8 for controllers whose step may cost microseconds more than that: they write
+`_output`. `Safe` is that without a path, for a loop that follows a command.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.motor import no_load_speed
+from omnidyn.model.robot import Robot
+from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.wheels import per_wheel, refuse_slip
+
+OK, WAITING, ENDED = "ok", "no step yet", "path ended: holding its last pose"
+BAD_TIME, BACKWARDS, STILL = "time is no finite number", "time went backwards", "time stands still"
+BAD_POSE, BAD_TWIST, BAD_COMMAND = "pose missing", "twist missing", "command missing"
+BAD_PATH, FAILED = "no path", "no output found"
+FARTHEST = 1e9  # of any number of a state: what is beyond is no place, and no speed
+VOLTAGE, WHEEL_SPEED = "voltage", "wheel_speed"
+
+
+@dataclass(frozen=True, eq=False)
+class Info:
+    """What the last step did.
+
+    status: "ok", or why the output is what it is, in words. iterations: of a solver. time: that the step took [s].
+    predicted: poses the controller expects to pass, shape (k, 3), None where it predicts nothing. limits: what the
+    output met, such as "voltage" or "current".
+    """
+
+    status: str = WAITING
+    iterations: int = 0
+    time: float = 0.0
+    predicted: FloatArray | None = None
+    limits: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether the output is what the controller wanted to send, a path at its end included."""
+        return self.status in (OK, ENDED)
+
+
+class Followed(Protocol):
+    """What a controller asks of a path; see Path of path.py."""
+
+    @property
+    def end(self) -> float:
+        """Time from which on the path stands still [s]; infinite where it goes on for ever."""
+        ...
+
+    def at(self, t: Any) -> Any:
+        """(pose, velocity, acceleration) in the world frame at times t [s], shapes (*t.shape, 3)."""
+        ...
+
+
+class Controller(Protocol):
+    """What every controller provides; the numbered list above says how."""
+
+    @property
+    def name(self) -> str:
+        """What it is called in tables: "pid", "mpc_no_friction"."""
+        ...
+
+    @property
+    def robot(self) -> Robot:
+        """The robot it believes to drive."""
+        ...
+
+    @property
+    def output(self) -> str:
+        """ "voltage" [V], "duty" [1] or "wheel_speed" [rad/s]."""
+        ...
+
+    @property
+    def limit(self) -> FloatArray:
+        """What no output exceeds in size, in the unit of the output. Shape (wheels,)."""
+        ...
+
+    @property
+    def info(self) -> Info:
+        """What the last step did."""
+        ...
+
+    def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:
+        """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
+        ...
+
+    def reset(self) -> None:
+        """Forget all steps."""
+        ...
+
+    def replace(self, *, robot: Robot) -> Self:
+        """The same controller, its memory included, for another robot."""
+        ...
+
+
+class Safe:
+    """Something that drives a robot, its steps checked before and after it sees them.
+
+    robot: that it believes to drive. supply [V]: behind a duty; the robot's own by default, else its voltage limit.
+    """
+
+    name = "controller"
+
+    def __init__(self, robot: Robot, supply: float | None = None) -> None:
+        self.supply = supply
+        self._take(robot)
+        self.reset()
+
+    def _take(self, robot: Robot) -> None:
+        """Make ready for a robot; settings and memory stay."""
+        refuse_slope(robot.floor, "controllers know")
+        refuse_slip(robot.wheels, "controllers know")
+        self.robot = robot
+        self.output = output_kind(robot)
+        self.limit = output_limit(robot)
+        self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == DUTY else 1.0
+        self._zeros = np.zeros(robot.wheels.count)
+
+    def reset(self) -> None:
+        """Forget all steps."""
+        self.info = Info()
+        self._t: float | None = None
+        self._last = self._zeros.copy()
+
+    def replace(self, *, robot: Robot) -> Self:
+        """The same controller, its memory included, for another robot."""
+        other = copy(self)
+        for key, value in vars(self).items():
+            if isinstance(value, np.ndarray):  # changed in place, some of them
+                setattr(other, key, value.copy())
+        other._take(robot)
+        if len(other._last) != robot.wheels.count:
+            other.reset()
+        return other
+
+    def _guarded(
+        self, t: Any, word: str, status: str, output: Callable[[float], tuple[FloatArray, tuple[str, ...]]] | None
+    ) -> FloatArray:
+        """The output of a step within its limits, or a safe one.
+
+        word: what is wrong already; status: where all goes well; output: from the time since the last step.
+        """
+        begun, now, before = time.perf_counter(), _number(t), self._t
+        if not math.isfinite(now):
+            return self._safe(BAD_TIME, begun)
+        dt = 0.0 if before is None else now - before
+        self._t = now
+        if before is not None and dt <= 0.0:
+            if dt < 0.0:
+                self._forget()
+                return self._safe(BACKWARDS, begun)
+            self.info = Info(STILL, time=time.perf_counter() - begun)
+            return self._last.copy()
+        if word or output is None:
+            return self._safe(word, begun)
+        try:
+            wanted, limits = output(dt)
+            sent = np.clip(wanted, -self.limit, self.limit)
+            fine = sent.shape == self.limit.shape and bool(np.isfinite(sent).all())
+        except Exception as error:  # the loop of a robot must not end here
+            return self._safe(f"{FAILED}: {type(error).__name__}", begun)
+        if not fine:
+            return self._safe(FAILED, begun)
+        self._last = sent
+        self.info = Info(status, time=time.perf_counter() - begun, limits=limits)
+        return sent.copy()
+
+    def _safe(self, word: str, begun: float) -> FloatArray:
+        """Zeros, and why."""
+        self._last = self._zeros.copy()
+        self.info = Info(word, time=time.perf_counter() - begun)
+        return self._last.copy()
+
+    def _forget(self) -> None:
+        """Forget what was summed up over steps; a clock that went back makes it worthless."""
+        last_t = self._t
+        self.reset()
+        self._t = last_t
+
+    def _sent(self, volts: FloatArray) -> FloatArray:
+        """Volts as the drive takes them: volts, or a duty."""
+        return volts * self._per_volt
+
+
+class Guarded(Safe, ABC):
+    """A controller whose steps are checked before and after it sees them; subclasses write `_output`."""
+
+    def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:
+        """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
+        place, speed = vector(pose), vector(twist)
+        if place is None or speed is None:
+            return self._guarded(t, BAD_POSE if place is None else BAD_TWIST, "", None)
+        if not callable(getattr(path, "at", None)):
+            return self._guarded(t, BAD_PATH, "", None)
+        status = ENDED if _ended(path, t) else OK
+        return self._guarded(t, "", status, lambda dt: self._output(float(t), dt, place, speed, path))
+
+    @abstractmethod
+    def _output(
+        self, t: float, dt: float, pose: FloatArray, twist: FloatArray, path: Any
+    ) -> tuple[FloatArray, tuple[str, ...]]:
+        """(the output wanted, shape (wheels,), and the limits it met). dt [s] since the last step, 0 in the first."""
+
+
+def output_kind(robot: Robot) -> str:
+    """What the drive of a robot takes: "voltage", "duty" or "wheel_speed"."""
+    return WHEEL_SPEED if robot.drive.kind == SPEED else robot.drive.kind
+
+
+def output_limit(robot: Robot) -> FloatArray:
+    """The largest output its drive takes: the voltage limit [V], a duty of 1, the no-load speed [rad/s]. (wheels,)."""
+    count = robot.wheels.count
+    volts = per_wheel(robot.motor.voltage_limit, count)
+    if robot.drive.kind == DUTY:
+        return np.ones(count)
+    return no_load_speed(robot.motor, volts) if robot.drive.kind == SPEED else volts
+
+
+def supply_of(robot: Robot, supply: float | None = None) -> float:
+    """The volts that a duty of 1 is: as given, as in the file, else the least voltage limit of its motors [V]."""
+    known = supply if supply is not None else robot.drive.supply
+    return float(known if known is not None else np.min(robot.motor.voltage_limit))
+
+
+def _number(value: Any) -> float:
+    """A number, or NaN."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def _ended(path: Any, t: Any) -> bool:
+    """Whether a path stands still at that time."""
+    try:
+        return bool(path.end < _number(t))
+    except Exception:  # a path that does not say when it ends goes on
+        return False
+
+
+def vector(value: Any) -> FloatArray | None:
+    """Three finite numbers, or None for what is none of a state. Shape (3,)."""
+    try:
+        array = np.asarray(value, dtype=float)
+        if array.shape != (3,):
+            return None
+        one, two, three = array.tolist()
+    except Exception:  # whatever stands in place of a state, it is none
+        return None
+    sane = -FARTHEST <= one <= FARTHEST and -FARTHEST <= two <= FARTHEST and -FARTHEST <= three <= FARTHEST
+    return array if sane else None

@@ -1,0 +1,134 @@
+"""What a path asks of a robot: speed, acceleration, volts, amperes; and whether the robot can follow it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from omnidyn.arguments import check_order
+from omnidyn.arrays import FloatArray
+from omnidyn.control.feedforward import effort_for
+from omnidyn.control.paths.motion import Path
+from omnidyn.control.paths.path import path as path_named
+from omnidyn.document import Document, Points, plain
+from omnidyn.model.inverse import inverse
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel
+from omnidyn.run import Run
+from omnidyn.shown import Shown
+
+SAMPLES = 4001  # times at which a path is asked
+JUMP = 1e-6  # [m/s, rad/s] less is rounding
+CORNER = 3.0  # times what the acceleration beside it makes of a sample: more is a jump
+
+
+@dataclass(frozen=True, eq=False)
+class Demand(Shown):
+    """What a path asks of a robot.
+
+    robot, path: names. speed [m/s], turn [rad/s], acceleration [m/s^2], turn_acceleration [rad/s^2]: the largest.
+    voltage, voltage_limit [V]: of the motor that comes nearest to its limit, or goes furthest beyond; the same for
+    current and current_limit [A], the limit None where there is none. share_beyond: of its time, that in which some
+    limit is exceeded. corners: places where its speed jumps, by `jump` [m/s] or `turn_jump` [rad/s] at the most.
+    """
+
+    robot: str
+    path: str
+    speed: float
+    turn: float
+    acceleration: float
+    turn_acceleration: float
+    voltage: float
+    voltage_limit: float
+    current: float
+    current_limit: float | None
+    share_beyond: float
+    corners: int
+    jump: float
+    turn_jump: float
+
+    @cached_property
+    def follows(self) -> bool:
+        """Whether the robot can follow it between its corners: no limit is exceeded."""
+        return self.share_beyond == 0.0
+
+    @property
+    def verdict(self) -> str:
+        """Whether it can, in a sentence."""
+        volts = f"up to {self.voltage:.3g} V of {self.voltage_limit:.3g} V"
+        if self.current_limit is not None:
+            volts += f" and {self.current:.3g} A of {self.current_limit:.3g} A"
+        if not self.follows:
+            return (
+                f"{self.robot} cannot follow {self.path} in {100.0 * self.share_beyond:.2g} % of its time: that takes "
+                f"{volts}."
+            )
+        corners = f"; at its {self.corners} corners no robot can" if self.corners else ""
+        return f"{self.robot} can follow {self.path}{' between its corners' if self.corners else ''}: {volts}{corners}."
+
+    def words(self) -> list[str]:
+        """What it asks for, in sentences."""
+        told = [
+            f"{self.path} asks for up to {self.speed:.3g} m/s and {self.acceleration:.3g} m/s2, "
+            f"{self.turn:.3g} rad/s and {self.turn_acceleration:.3g} rad/s2"
+        ]
+        if self.corners:
+            told.append(
+                f"its speed jumps at {self.corners} corners, by up to {self.jump:.3g} m/s and "
+                f"{self.turn_jump:.3g} rad/s"
+            )
+        return told
+
+    def document(self) -> Document:
+        """What it says."""
+        return Document([Points(self.words())], plain(vars(self) | {"follows": self.follows}), verdict=self.verdict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return dict(self.document().data)
+
+
+def demand(robot: Robot, path: Path | Run | str) -> Demand:
+    """What a path asks of a robot, and whether its motors can give that: by the inverse model, friction included.
+
+    path: a Path, or what `omnidyn.path` takes. The start from rest is not counted: a robot that begins at rest is late
+    by it. Corners are counted by themselves.
+    """
+    check_order("demand(robot, path)", (robot, Robot), (path, (Path, Run, str)))
+    follow = path if isinstance(path, Path) else path_named(path)
+    t = np.linspace(0.0, follow.duration, SAMPLES)
+    _, twist, change = follow.twist_at(t)
+    effort = effort_for(inverse(robot), twist, change)
+    count, motor = robot.wheels.count, robot.motor
+    limit = per_wheel(motor.voltage_limit, count)
+    most = per_wheel(np.inf if motor.current_limit is None else motor.current_limit, count)
+    volts, amperes = np.abs(effort.voltage), np.abs(effort.current)
+    beyond = (volts > limit * (1.0 + 1e-9)).any(axis=1) | (amperes > most * (1.0 + 1e-9)).any(axis=1)
+    worst = int(np.argmax(volts.max(axis=0) / limit))
+    hottest = int(np.argmax(amperes.max(axis=0) / (most if np.isfinite(most).all() else 1.0)))
+    corners, jump, turn_jump = _corners(t, follow.at(t).velocity, follow.at(t).acceleration)
+    return Demand(
+        robot.name, follow.name, _largest(twist[:, :2]), _largest(twist[:, 2:]), _largest(change[:, :2]),
+        _largest(change[:, 2:]), float(volts[:, worst].max()), float(limit[worst]), float(amperes[:, hottest].max()),
+        None if motor.current_limit is None else float(most[hottest]), float(beyond.mean()), corners, jump, turn_jump,
+    )  # fmt: skip
+
+
+def _largest(vectors: FloatArray) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max())
+
+
+def _corners(t: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> tuple[int, float, float]:
+    """(number of jumps of the velocity in the world, the largest in the plane [m/s], of the turning [rad/s])."""
+    step = np.diff(velocity, axis=0)
+    smooth = np.maximum(np.abs(acceleration[1:]), np.abs(acceleration[:-1])) * np.diff(t)[:, None]
+    sudden = np.abs(step) > CORNER * smooth + JUMP
+    rows = np.asarray(sudden.any(axis=1), dtype=bool)
+    rows[-1] = False  # where a path ends, it stops: that is no corner
+    if not rows.any():
+        return 0, 0.0, 0.0
+    plane = np.hypot(step[rows, 0], step[rows, 1])
+    return int(rows.sum()), float(plane.max()), float(np.abs(step[rows, 2]).max())

@@ -1,0 +1,212 @@
+"""Feed-forward: the volts that make a robot move as a path asks, were the model the robot. No measurement is used.
+
+    held over dt:  alpha = Phi^-1 (nu_1 - A_d nu_0),   a = alpha + A nu_0
+    volts:         of the motion (nu_0, a), by the inverse of all the forces (model/inverse.py)
+
+A_d = e^(A dt) and Phi = A^-1 (A_d - 1) belong to the sliding robot nu' = A nu + alpha; so one step takes it from nu_0
+to nu_1 exactly where nothing else bends its way. Dry friction counts with the direction of (nu_0 + nu_1)/2.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import expm
+
+from omnidyn.arguments import check_order
+from omnidyn.arrays import FloatArray
+from omnidyn.control.controller import WHEEL_SPEED, Guarded
+from omnidyn.control.paths.motion import Path
+from omnidyn.errors import InputError
+from omnidyn.model.inverse import Effort, Inverse, inverse
+from omnidyn.model.mass import per_mass
+from omnidyn.model.robot import Robot
+from omnidyn.model.statespace import motor_wrench
+from omnidyn.model.wheels import per_wheel, wheel_speed
+
+DT = 0.02  # [s] between two steps, where nobody says
+FADE = 0.25  # on paths and floors beside, errors no longer fall below it, while voltages grow restless
+MOST_DELAY = 100  # [steps]
+SHORTEST, LONGEST = 1e-5, 10.0  # [s] that may lie between two steps
+
+
+def voltage_for(robot: Robot, twist: ArrayLike, acceleration: ArrayLike) -> FloatArray:
+    """The volts under which a robot that moves with a twist speeds up as wanted: `acceleration` backward.
+
+    Friction of every shape, a turning frame, rotors, losses of gears, drops and the dead band of the driver count. At
+    rest friction is what holds until it gives way: the volts are those that just break it loose; without acceleration
+    they are 0. More than three wheels share the work by least heat in their windings.
+    twist [m/s, m/s, rad/s], acceleration of its entries [m/s^2, m/s^2, rad/s^2], shapes (*batch, 3). Returns volts to
+    ask of the drivers, shape (*batch, wheels), limits of voltage and current not applied.
+    Raises InputError for other shapes.
+    """
+    check_order("voltage_for(robot, twist, acceleration)", (robot, Robot), (twist, object), (acceleration, object))
+    return effort_for(inverse(robot), _vectors("twist", twist), _vectors("acceleration", acceleration)).voltage
+
+
+def effort_for(model: Inverse, twist: FloatArray, acceleration: FloatArray) -> Effort:
+    """Voltages and currents of a motion. Shapes (*batch, 3) -> (*batch, wheels)."""
+    twist, acceleration = np.broadcast_arrays(twist, acceleration)
+    wrench = model.wrench(twist, acceleration, model.friction(twist, acceleration))
+    return model.effort(twist, wrench, acceleration)
+
+
+def _vectors(name: str, value: ArrayLike) -> FloatArray:
+    array = np.asarray(value, dtype=float)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise InputError("wrong shape", got=array.shape, expected="(*batch, 3)", where=name)
+    return array
+
+
+class Held(NamedTuple):
+    """A sliding robot over one held step: nu' = A nu + alpha. A [1/s], decay A_d, gain Phi [s], shapes (3, 3)."""
+
+    A: FloatArray
+    decay: FloatArray
+    gain: FloatArray
+    back: FloatArray  # Phi^-1
+
+    @property
+    def rates(self) -> FloatArray:
+        """How fast each axis forgets [1/s]. Shape (3,)."""
+        return -np.diag(self.A).copy()
+
+
+def held(model: Inverse, dt: float) -> Held:
+    """What a step of dt [s] does, viscous friction of every shape included."""
+    own = model.levels
+    viscous = (own.directions.T * own.viscous) @ own.directions
+    matrix = per_mass(model.robot, motor_wrench(model.robot).braking - viscous).T
+    both = np.asarray(expm(np.block([[matrix, np.eye(3)], [np.zeros((3, 6))]]) * dt), dtype=float)
+    return Held(matrix, both[:3, :3], both[:3, 3:], np.asarray(np.linalg.inv(both[:3, 3:]), dtype=float))
+
+
+class Volts:
+    """Motions as volts, step by step: the inverse model of a robot, made ready for steps of dt [s].
+
+    friction: whether dry friction counts; without it the robot is taken to have none.
+    """
+
+    def __init__(self, robot: Robot, dt: float, friction: bool = True) -> None:
+        model = inverse(robot)
+        if not friction:
+            none = {name: 0.0 * getattr(model.levels, name) for name in model.levels._fields[2:]}
+            model = Inverse(robot, model.mass, model.levels._replace(**none), model.per_ampere, model.share)
+        self.model, self.dt = model, dt
+        self.held = held(model, dt)
+        self.fade = _fade(model, dt)
+        count, limit = robot.wheels.count, robot.motor.current_limit
+        self.limit = per_wheel(robot.motor.voltage_limit, count)
+        self.current_limit = per_wheel(np.inf if limit is None else limit, count)
+
+    def change(self, now: FloatArray, then: FloatArray) -> FloatArray:
+        """The acceleration at the start of a step that takes the twist from now to then. Shape (3,)."""
+        held = self.held
+        return held.back @ (then - held.decay @ now) + held.A @ now
+
+    def exactly(self, now: FloatArray, then: FloatArray) -> Effort:
+        """What takes the twist from now to then, friction as the model has it; from rest, what breaks it loose."""
+        return self.moving(now, then) if now.any() else self.starting(then)
+
+    def moving(self, now: FloatArray, then: FloatArray) -> Effort:
+        """What takes a robot in motion from now to then."""
+        change, middle = self.change(now, then), 0.5 * (now + then)
+        friction = self.model.friction(middle, then - now) - self._viscous(middle - now)
+        return self.model.effort(now, self.model.wrench(middle, change, friction), change)
+
+    def starting(self, then: FloatArray) -> Effort:
+        """What takes a robot from rest to then."""
+        now, change = np.zeros(3), self.change(np.zeros(3), then)
+        friction = self.model.friction(now, then)
+        return self.model.effort(now, self.model.wrench(0.5 * then, change, friction), change)
+
+    def softly(self, now: FloatArray, acceleration: FloatArray, way: FloatArray) -> Effort:
+        """What a motion takes, dry friction against `way` [m/s, m/s, rad/s], in proportion to it where that is slow."""
+        friction = self.model.soft_friction(way, self.fade) - self._viscous(way - now)
+        return self.model.effort(now, self.model.wrench(now, acceleration, friction))
+
+    def _viscous(self, off: FloatArray) -> FloatArray:
+        """Viscous friction of the difference of two twists."""
+        own = self.model.levels
+        return -(own.viscous * (own.directions @ off)) @ own.directions
+
+    def within(self, effort: Effort, together: bool = False) -> tuple[FloatArray, tuple[str, ...]]:
+        """The volts within the limit of each motor, and the limits met.
+
+        together: all of them smaller by one factor. That keeps the way of the push, right for a loop on the speed:
+        it never makes good what it lost beside its way. One on the pose does, and each motor for itself can do more:
+        on fast paths its errors are a half to a fifth.
+        """
+        share = float(np.max(np.abs(effort.voltage) / self.limit))
+        met = ("voltage",) if share >= 1.0 else ()
+        if bool((np.abs(effort.current) > self.current_limit).any()):
+            met = (*met, "current")
+        if together:
+            return effort.voltage / max(share, 1.0), met
+        return np.clip(effort.voltage, -self.limit, self.limit), met
+
+
+def _fade(model: Inverse, dt: float) -> FloatArray:
+    """The speed of each axis below which its dry friction is compensated in part [m/s, m/s, rad/s]. Shape (3,).
+
+    FADE of what friction takes away within a step: one that changed its side at every speed would push a robot at rest
+    to and fro with every bit of noise. Where nothing rubs, 1.
+    """
+    force = -model.friction(np.eye(3), np.zeros((3, 3)))[range(3), range(3)]
+    own = model.levels
+    dry = force - ((own.directions**2).T @ own.viscous)
+    fade = FADE * dry / np.diag(model.mass) * dt
+    return np.where(fade > 1e-12, fade, 1.0)
+
+
+def check_dt(dt: float) -> float:
+    """The time between two steps [s]. Raises InputError outside 1e-5..10 s."""
+    if not isinstance(dt, int | float) or not SHORTEST <= dt <= LONGEST:
+        raise InputError("step out of range", got=dt, expected=f"{SHORTEST:g} to {LONGEST:g} s", where="dt")
+    return float(dt)
+
+
+def check_delay(delay: int | None) -> int | None:
+    """Steps until an output acts. Raises InputError outside 0..100."""
+    if delay is not None and (isinstance(delay, bool) or delay != int(delay) or not 0 <= delay <= MOST_DELAY):
+        raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
+    return delay
+
+
+def lateness(robot: Robot, delay: int | None, dt: float) -> float:
+    """How long an output takes to act [s]: the delay in steps, else the latency of the drive."""
+    return robot.drive.latency if delay is None else delay * dt
+
+
+class Feedforward(Guarded):
+    """Open loop: what the path asks for, by the model alone. See Controller.
+
+    dt [s]: between two steps. friction: whether dry friction counts. delay: steps until an output acts, looked ahead
+    over; the latency of the drive by default.
+    """
+
+    name = "feedforward"
+
+    def __init__(
+        self, robot: Robot, *, dt: float = DT, friction: bool = True, delay: int | None = None,
+        supply: float | None = None,
+    ) -> None:  # fmt: skip
+        self.dt, self.friction, self.delay = check_dt(dt), friction, check_delay(delay)
+        self.name = type(self).name if friction else f"{type(self).name}_no_friction"
+        super().__init__(robot, supply)
+
+    def _take(self, robot: Robot) -> None:
+        super()._take(robot)
+        self.volts, self.late = Volts(robot, self.dt, self.friction), lateness(robot, self.delay, self.dt)
+
+    def _output(
+        self, t: float, dt: float, pose: FloatArray, twist: FloatArray, path: Path
+    ) -> tuple[FloatArray, tuple[str, ...]]:
+        ahead = t + self.late
+        _, twists, _ = path.twist_at(np.array([ahead, ahead + self.dt]))
+        if self.output == WHEEL_SPEED:
+            return wheel_speed(self.robot.wheels, 0.5 * (twists[0] + twists[1])), ()
+        volts, met = self.volts.within(self.volts.exactly(twists[0], twists[1]))
+        return self._sent(volts), met

@@ -1,0 +1,39 @@
+"""Short closed loops that need every kernel of the controllers: see identification/first_runs.py."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.control.closed_loop import track
+from omnidyn.control.mpc.controller import Mpc
+from omnidyn.control.paths.path import path
+from omnidyn.control.tracking import Tracking
+from omnidyn.model.robot import Robot
+from omnidyn.model.robot_file import load_robot
+
+PATH, SECONDS = "circle", 0.2  # [s]
+
+
+def first_runs() -> list[tuple[str, Callable[[], object]]]:
+    """(what it stands for, how to make it), in the order in which they are wanted. Compiled, each takes below 1 s."""
+    paper, other = load_robot("axebot"), load_robot("mecanum")
+    return [
+        ("predictive controller", partial(_tracked, paper)),
+        ("predictive controller, any friction", partial(_tracked, other)),
+        ("predictive controllers of many robots", partial(_many, paper)),
+    ]
+
+
+def _tracked(robot: Robot) -> Tracking:
+    """A few steps along a path."""
+    return track(robot, PATH, "mpc", duration=SECONDS)
+
+
+def _many(robot: Robot) -> FloatArray:
+    """One step of two robots."""
+    at = np.zeros((2, 3))
+    return Mpc(robot).batch(2).step_batch(0.0, at, at, path(PATH))

@@ -1,0 +1,254 @@
+"""Mpc: the model predictive controller of one robot, on the contract of control/controller.py.
+
+    min  sum over the horizon of 1/2 |pose - path|^2 + 1/2 |twist - path's|^2 + 1/2 |u - u of the path|^2, weighted
+    so that  the model of the robot holds,  |u| <= limit
+
+What happens in a step stands in loop.py.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from copy import copy
+from typing import Any, Self
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.control.controller import (
+    BACKWARDS,
+    BAD_PATH,
+    BAD_POSE,
+    BAD_TIME,
+    BAD_TWIST,
+    ENDED,
+    FAILED,
+    OK,
+    STILL,
+    WAITING,
+    WHEEL_SPEED,
+    Info,
+    output_kind,
+    output_limit,
+    supply_of,
+    vector,
+)
+from omnidyn.control.feedforward import DT, check_dt
+from omnidyn.control.mpc.batch import Batch
+from omnidyn.control.mpc.loop import control_step
+from omnidyn.control.mpc.model import numbers, volts
+from omnidyn.control.mpc.observer import PUSH, SCALE
+from omnidyn.control.mpc.preview import Preview
+from omnidyn.control.mpc.settings import Settings
+from omnidyn.control.mpc.tables import Memory, Room
+from omnidyn.errors import InputError
+from omnidyn.model.robot import Robot
+from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.wheels import refuse_slip, wheel_speed
+
+HORIZON, MOST_HORIZON, MOST_DELAY = 20, 500, 50
+MET = 1e-5  # [V] from a limit
+
+
+class Mpc:
+    """Model predictive control. See Controller.
+
+    dt [s]: between two steps. horizon: steps that it looks ahead. delay: steps until an output acts; by default what
+    the latency of the robot's drive says. friction: whether it knows dry friction. observer: whether it learns what
+    the model misses. settings: weights and noise. supply [V]: behind a duty.
+    """
+
+    name = "mpc"
+
+    def __init__(
+        self, robot: Robot, *, dt: float = DT, horizon: int = HORIZON, delay: int | None = None,
+        friction: bool = True, observer: bool = True, settings: Settings | None = None, supply: float | None = None,
+    ) -> None:  # fmt: skip
+        self.dt, self.horizon = check_dt(dt), _whole("horizon", horizon, 1, MOST_HORIZON)
+        self.delay = None if delay is None else _whole("delay", delay, 0, MOST_DELAY)
+        self.friction, self.observer, self.supply = friction, observer and friction, supply
+        self.settings = settings or Settings()
+        without = ("_no_observer", "", "_no_friction", "_no_friction")[2 * (not friction) + observer]
+        self.name = f"{type(self).name}{without}"
+        self._take(robot)
+        self.reset()
+
+    def _take(self, robot: Robot) -> None:
+        """Make ready for a robot; settings stay."""
+        refuse_slope(robot.floor, "controllers know")
+        refuse_slip(robot.wheels, "controllers know")
+        self.robot, self.output, self.limit = robot, output_kind(robot), output_limit(robot)
+        self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
+        latency = min(round(robot.drive.latency / self.dt), MOST_DELAY)
+        self.steps_late = latency if self.delay is None else self.delay
+        self._zeros = np.zeros(robot.wheels.count)
+        self._preview = Preview(self.dt, self.steps_late, self.horizon)
+        self._room = Room.of(self.horizon, robot.wheels.count)
+        self._numbers = numbers(robot, self.dt, self.friction)
+        self._bounds = np.ascontiguousarray(
+            np.broadcast_to(np.array([-volts(robot), volts(robot)])[:, None], (2, self.horizon, robot.wheels.count))
+        )
+        self._fixed = (*self._numbers, *self.settings.tables(robot, self.dt, self.observer), self._bounds)
+
+    def reset(self) -> None:
+        """Forget all steps."""
+        self._memory = Memory.of(self.horizon, self.robot.wheels.count, self.steps_late, self.settings)
+        self._known, self._t, self._last, self._asked = False, math.nan, self._zeros.copy(), (WAITING, 0, 0.0)
+        self._state = np.zeros(6)
+        self._bind()
+
+    def _bind(self) -> None:
+        """The tables that each step works in, in the order of `control_step`."""
+        memory, room = self._memory, self._room
+        self._tables = (memory.estimate, memory.sent, *room.first, memory.x, room.before, memory.u, memory.active,
+                        memory.fast, room.interior)  # fmt: skip
+
+    def replace(self, *, robot: Robot) -> Self:
+        """The same controller for another robot. Where the friction is another, its share is learned anew."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other._take(robot)
+        if robot.wheels.count != self.robot.wheels.count or other.steps_late != self.steps_late:
+            other.reset()
+            return other
+        same = robot.friction == self.robot.friction
+        other._memory, other._state = self._memory.copied(None if same else self.settings), self._state.copy()
+        other._preview = copy(self._preview)  # what it has sampled stays as it is, to the last bit
+        other._last = np.clip(self._last, -other.limit, other.limit)
+        other._bind()
+        return other
+
+    @property
+    def learned(self) -> dict[str, FloatArray]:
+        """What the observer found: "push" on each axis [m/s^2, m/s^2, rad/s^2], share of the modelled "friction"."""
+        return {"push": self._memory.estimate[PUSH].copy(), "friction": self._memory.estimate[SCALE].copy()}
+
+    def batch(self, count: int) -> Batch:
+        """As many controllers of the same robot as asked for, in one: `Batch.step_batch`. They begin anew."""
+        return Batch(self._fixed, self._room, self.settings, self._preview, _whole("count", count, 1, 10_000_000))
+
+    @property
+    def info(self) -> Info:
+        """What the last step did."""
+        status, iterations, took = self._asked
+        if status not in (OK, ENDED):
+            return Info(status, iterations, took)
+        return Info(status, iterations, took, self._memory.x[1:, :3].copy(), self._met())
+
+    def _met(self) -> tuple[str, ...]:
+        """The limits that the last output met."""
+        memory, (_, _, limit, emf) = self._memory, self._fixed[4:8]
+        volts, held = memory.u[0], memory.active[0] != 0
+        at_voltage = np.abs(volts) >= limit[0] - MET
+        at_current = np.abs(volts - emf @ memory.x[0, 3:]) >= limit[1] - MET
+        met = {
+            "voltage": at_voltage.any(), "current": at_current.any(), "slew": (held & ~at_voltage & ~at_current).any(),
+            "speed": memory.fast[0].any(),
+        }  # fmt: skip
+        return tuple(name for name, value in met.items() if value)
+
+    def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:
+        """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
+        begun = time.perf_counter()
+        try:
+            since = t - self._t
+            if since <= 0.0 or since != since:
+                word = self._timing(t, since)
+                if word:
+                    return self._other(word, begun)
+            self._t, state = t, self._state
+            if pose.__class__ is not np.ndarray or pose.shape != (3,):
+                pose = vector(pose)
+            if twist.__class__ is not np.ndarray or twist.shape != (3,):
+                twist = vector(twist)
+            state[:3], state[3:] = pose, twist
+            return self._solved(t, since, path, begun)
+        except Exception as error:  # the loop of a robot must not end here
+            return self._refused(t, pose, twist, path, error, begun)
+
+    def _solved(self, t: float, since: float, path: Any, begun: float) -> FloatArray:
+        """The output of a step whose arguments look well."""
+        preview = self._preview
+        row = preview.row_at(t, path)
+        known = self._known and 0.5 * self.dt < since < 1.5 * self.dt
+        fixed = self._fixed
+        passes = control_step(*fixed, preview.rows, row, self._state, known, *self._tables)
+        if passes < 0:
+            return self._failed(t, passes, begun)
+        self._known = True
+        sent = self._memory.u[0] * self._per_volt
+        if self.output == WHEEL_SPEED:
+            sent = self._speeds()
+        elif self._per_volt != 1.0:
+            sent = np.clip(sent, -self.limit, self.limit)
+        self._last = sent
+        self._asked = (ENDED if t > preview.end else OK, passes, time.perf_counter() - begun)
+        return sent.copy()
+
+    def _failed(self, t: float, passes: int, begun: float) -> FloatArray:
+        """Zeros for a state that is none, and where no input was found: the memory may be why, and goes."""
+        if passes == -1:
+            return self._other(BAD_POSE if _bad(self._state[:3]) else BAD_TWIST, begun)
+        self.reset()
+        self._t = t
+        return self._other(FAILED, begun)
+
+    def _speeds(self) -> FloatArray:
+        """Speeds of the wheels [rad/s] by which the loop of the drive makes the volts wanted.
+
+        A loop without a sum, u = k_p (command - speed), needs u/k_p more than the speed; one with a sum finds u itself.
+        """
+        x, drive = self._memory.x, self.robot.drive
+        speed = wheel_speed(self.robot.wheels, 0.5 * (x[0, 3:] + x[1, 3:]))
+        if not np.any(drive.ki):
+            speed = speed + self._memory.u[0] / drive.kp
+        return np.clip(speed, -self.limit, self.limit)
+
+    def _timing(self, t: float, since: float) -> str:
+        """A word where the time of a step is wrong; what was remembered goes where a clock went back."""
+        if not isinstance(t, int | float | np.number) or not math.isfinite(t):
+            return BAD_TIME
+        if since < 0.0:
+            self.reset()
+            self._t = float(t)
+            return BACKWARDS
+        return STILL if since == 0.0 else ""
+
+    def _other(self, word: str, begun: float) -> FloatArray:
+        """Zeros, and why; the last output again where time stands still."""
+        if word != STILL:
+            self._last, self._known = self._zeros.copy(), False
+            self._memory.sent[:] = 0.0
+        self._asked = (word, 0, time.perf_counter() - begun)
+        return self._last.copy()
+
+    def _refused(self, t: Any, pose: Any, twist: Any, path: Any, error: Exception, begun: float) -> FloatArray:
+        """What to do after an exception: find out what it was about."""
+        try:
+            good = math.isfinite(float(t))
+        except (TypeError, ValueError, OverflowError):
+            good = False
+        if not good:
+            word = BAD_TIME
+        elif vector(pose) is None:
+            word = BAD_POSE
+        elif vector(twist) is None:
+            word = BAD_TWIST
+        elif not callable(getattr(path, "at", None)):
+            word = BAD_PATH
+        else:
+            word = f"{FAILED}: {type(error).__name__}"
+        return self._other(word, begun)
+
+
+def _bad(values: FloatArray) -> bool:
+    """Whether a number is none, or beyond all bounds."""
+    return not bool(np.all(np.abs(values) <= 1e9))
+
+
+def _whole(name: str, value: Any, low: int, high: int) -> int:
+    """A whole number in a range. Raises InputError for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
+        raise InputError("no whole number in range", got=value, expected=f"{low} to {high}", where=name)
+    return int(value)

@@ -1,0 +1,86 @@
+"""What can be chosen of the controller: weights of its cost, and what its observer expects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.control.mpc.model import emf, volts
+from omnidyn.control.mpc.program import (
+    AGAIN,
+    CURRENT,
+    LAST_WEIGHT,
+    LEARN,
+    POSE_WEIGHT,
+    SETTINGS_SIZE,
+    SLEW,
+    SPEED,
+    SPEED_WEIGHT,
+    TWIST_WEIGHT,
+)
+from omnidyn.errors import InputError
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel
+
+Three = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Weights of errors of the pose [1/m^2, 1/m^2, 1/rad^2], of the twist, of volts beside those of the path [1/V^2].
+
+    last: how much more the end of the horizon counts. again: how often at most a step is made linear anew.
+    noise, pose_noise: std of the measured twist and pose that the observer expects [m/s, m/s, rad/s], [m, m, rad].
+    walk, pose_walk: std of what a step may bring that the model does not know. push_walk: of the change of an unknown
+    push in a step [m/s^2, m/s^2, rad/s^2]; scale_walk: of the share of the modelled friction.
+    current: limit of each motor [A], that of the robot's motors by default. slew: limit of the change of volts [V/s].
+    speed: limits of the twist [m/s, m/s, rad/s], soft: speed_weight is the cost beyond them, as of the twist.
+    """
+
+    pose: Three = (200.0, 200.0, 20.0)
+    twist: Three = (1.0, 1.0, 0.1)
+    volts: float = 2e-3
+    last: float = 5.0
+    again: int = 2
+    noise: Three = (0.01, 0.01, 0.04)
+    pose_noise: Three = (0.002, 0.002, 0.004)
+    walk: Three = (0.003, 0.003, 0.012)
+    pose_walk: Three = (5e-4, 5e-4, 1e-3)
+    push_walk: Three = (0.02, 0.02, 0.08)
+    scale_walk: float = 0.005
+    current: float | None = None
+    slew: float | None = None
+    speed: Three | None = None
+    speed_weight: float = 1e4
+
+    def __post_init__(self) -> None:
+        for name in ("pose", "twist", "noise", "pose_noise", "walk", "pose_walk", "push_walk"):
+            value = np.asarray(getattr(self, name), dtype=float)
+            if value.shape != (3,) or not np.all((value >= 0.0) & (value <= 1e9)):
+                raise InputError("no weights", got=getattr(self, name), expected="three numbers >= 0", where=name)
+        for name in ("current", "slew"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value <= 1e9:
+                raise InputError("no limit", got=value, expected="a number above 0, or None", where=name)
+        speed = self.speed
+        if speed is not None and (len(speed) != 3 or not all(0.0 < each <= 1e9 for each in speed)):
+            raise InputError("no limits", got=speed, expected="three numbers above 0, or None", where="speed")
+        for name, low, high in (("volts", 1e-9, 1e9), ("last", 0.0, 1e6), ("again", 1, 20), ("scale_walk", 0.0, 10.0)):
+            if not low <= getattr(self, name) <= high:
+                raise InputError("out of range", got=getattr(self, name), expected=f"{low:g} to {high:g}", where=name)
+
+    def tables(self, robot: Robot, dt: float, learn: bool) -> tuple[FloatArray, ...]:
+        """(settings, weight of each wheel's volts, limits (2, wheels), back-EMF (wheels, 3)) as loop.py reads them."""
+        table, count = np.zeros(SETTINGS_SIZE), robot.wheels.count
+        table[POSE_WEIGHT : POSE_WEIGHT + 3], table[TWIST_WEIGHT : TWIST_WEIGHT + 3] = self.pose, self.twist
+        table[LAST_WEIGHT], table[AGAIN], table[LEARN] = self.last, self.again, learn
+        table[SLEW] = 0.0 if self.slew is None else self.slew * dt
+        own = robot.motor.current_limit
+        table[CURRENT] = self.current is not None or own is not None
+        if self.speed is not None:
+            table[SPEED : SPEED + 3], table[SPEED_WEIGHT] = self.speed, self.speed_weight
+        amperes = np.minimum(*(per_wheel(np.inf if each is None else each, count) for each in (self.current, own)))
+        limit = np.array([volts(robot), np.minimum(amperes * per_wheel(robot.motor.resistance, count), 1e9)])
+        return table, np.full(count, float(self.volts)), limit, emf(robot)

@@ -1,0 +1,180 @@
+"""path: a path by name, from a file or from a Run; with options, in Python or in the text of a command line."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from omnidyn.arguments import unknown_option
+from omnidyn.arrays import FloatArray
+from omnidyn.control.paths.curve import Curve, circle, eight, square, swinging, zigzag
+from omnidyn.control.paths.goal import Goal
+from omnidyn.control.paths.lines import Lines, path_of_file, path_of_run
+from omnidyn.control.paths.motion import Path
+from omnidyn.errors import InputError
+from omnidyn.run import Run
+
+HEADINGS = ("held", "turning", "along")
+MOST = 1e6  # of any option: more is a unit that was mistaken
+TURNING = {"heading": "held", "heading_rad": 0.0, "turn_rad_s": 0.0, "rounds": 2.0}
+# Name -> its options and what they are by default; a None follows from the others.
+OPTIONS: dict[str, dict[str, Any]] = {
+    "eight": {"size_m": 0.6, "period_s": 6.0, **TURNING},
+    "circle": {"radius_m": 0.5, "speed_m_s": 0.5, "period_s": None, **TURNING},
+    "square": {"side_m": 0.8, "speed_m_s": 0.5, "period_s": None, **TURNING},
+    "zigzag": {
+        "speed_m_s": 0.15, "sideways_m_s": None, "turn_rad_s": 1.0, "period_s": 4.0, "lag_s": 0.3, "heading_rad": 0.0,
+        "rounds": 3.0,
+    },
+    "goal": {
+        "x_m": 1.0, "y_m": 0.0, "heading_rad": 0.0, "from_x_m": 0.0, "from_y_m": 0.0, "from_heading_rad": 0.0,
+        "travel_s": 2.0, "hold_s": 2.0,
+    },
+}  # fmt: skip
+POSITIVE = ("size_m", "period_s", "radius_m", "side_m", "speed_m_s", "rounds")
+
+
+def path(what: str | os.PathLike | Run, **options: Any) -> Path:
+    """A path to follow.
+
+    what: "eight", "circle", "square", "zigzag" or "goal"; the same with options in the text, as in
+    "eight:period_s=3.2,heading=along"; a CSV file with t_s, x_m, y_m, heading_rad, its rows joined by straight lines;
+    or a Run, whose poses are the path.
+    options: of eight size_m, period_s; of circle radius_m, speed_m_s or period_s; of square side_m, speed_m_s or
+    period_s; of zigzag speed_m_s, sideways_m_s, turn_rad_s, period_s, lag_s; of goal x_m, y_m, heading_rad, travel_s,
+    hold_s and from_x_m, from_y_m, from_heading_rad. Of the first three also heading ("held", "turning", "along"),
+    heading_rad at the start, turn_rad_s, and rounds to follow it for.
+    Returns a Path: `at(t)` is where to be, how fast and how that changes, in the world frame.
+    Raises InputError for an unknown name or option, or a value out of range.
+    """
+    if isinstance(what, Run):
+        _refuse_options(options, "a run")
+        return path_of_run(what)
+    text = os.fspath(what)
+    name, _, rest = text.partition(":")
+    if name in OPTIONS:
+        return _named(name, {**_parsed(rest, text), **options})
+    if FilePath(text).suffix or os.path.exists(text):
+        _refuse_options(options, "a file")
+        return path_of_file(text)
+    near = difflib.get_close_matches(name, OPTIONS, 1)
+    raise InputError(
+        "unknown path", got=text, expected=f"{', '.join(OPTIONS)}, or a file of t_s, x_m, y_m, heading_rad",
+        remedy=f"did you mean {near[0]}?" if near else "", where="path",
+    )  # fmt: skip
+
+
+def _refuse_options(options: Mapping[str, Any], what: str) -> None:
+    if options:
+        raise InputError(f"{what} is followed as it is", got=", ".join(options), expected="no options", where="path")
+
+
+def _parsed(text: str, whole: str) -> dict[str, str]:
+    """Options in the text of a command line: "period_s=3.2,heading=along"."""
+    found = {}
+    for part in filter(None, text.split(",")):
+        name, sign, value = part.partition("=")
+        if not sign:
+            raise InputError("no option of a path", got=part, expected="name=value", where=whole)
+        found[name.strip()] = value.strip()
+    return found
+
+
+def _named(name: str, given: Mapping[str, Any]) -> Path:
+    """A named path with its options checked."""
+    known = OPTIONS[name]
+    for option in given:
+        if option not in known:
+            raise unknown_option(name, option, known, f"path {name}")
+    values = {option: _value(name, option, given.get(option, default)) for option, default in known.items()}
+    words = ",".join(f"{option}={given[option]}" for option in given)
+    return _MAKERS[name](f"{name}:{words}" if words else name, values, given)
+
+
+def _value(name: str, option: str, value: Any) -> Any:
+    """A value as a number within reach, or the word it must be."""
+    where = f"path {name}, {option}"
+    if option == "heading":
+        if value not in HEADINGS:
+            raise InputError("unknown heading", got=value, expected=" or ".join(HEADINGS), where=where)
+        return value
+    if value is None:
+        return None
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError("not a number", got=value, expected="a number", where=where) from None
+    if not -MOST <= number <= MOST:
+        raise InputError("out of range", got=number, expected=f"-{MOST:g} to {MOST:g}, in SI units", where=where)
+    low = 1e-6 if option in POSITIVE else 0.0 if option.endswith("_s") and not option.startswith("turn") else -MOST
+    if "_m_s" in option and option not in POSITIVE:
+        low = -MOST
+    if number < low:
+        raise InputError("out of range", got=number, expected=f"at least {low:g}", where=where)
+    return number
+
+
+def _turning(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """What the heading of a curve does."""
+    how = values["heading"] if "heading" in given else ("turning" if values["turn_rad_s"] else "held")
+    if how == "held" and values["turn_rad_s"]:
+        raise InputError("a heading that is held does not turn", got=f"turn_rad_s={values['turn_rad_s']:g}",
+                         expected="heading=turning", where=name)  # fmt: skip
+    if how == "along" and name == "square":
+        raise InputError(
+            "a heading along a square turns at once at its corners", got="heading=along", expected="held or turning",
+            remedy="take an eight or a circle", where=name,
+        )  # fmt: skip
+    turn = values["turn_rad_s"] if "turn_rad_s" in given or how != "turning" else 1.0
+    return {"heading": values["heading_rad"], "turn": turn if how == "turning" else 0.0, "along": how == "along"}
+
+
+def _curve(make: Callable[[Mapping[str, Any], float], Any], around: Callable[[Mapping[str, Any]], float]) -> Any:
+    """A maker of a curve; `around`: its length [m], that a speed goes round in a period."""
+
+    def made(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> Path:
+        period = values["period_s"]
+        if period is None:
+            period = around(values) / values["speed_m_s"]
+        elif "speed_m_s" in given and "period_s" in given:
+            raise InputError("speed and period say the same", got="both", expected="speed_m_s or period_s", where=name)
+        kind = name.partition(":")[0]
+        return Curve(name, make(values, period), period, period * values["rounds"], **_turning(kind, values, given))
+
+    return made
+
+
+def _zigzag(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> Path:
+    half, lag, speed = 0.5 * values["period_s"], values["lag_s"], values["speed_m_s"]
+    sideways = 0.7 * speed if values["sideways_m_s"] is None else values["sideways_m_s"]
+    swing = swinging(values["turn_rad_s"], half, 2.0 * lag)
+    plane, period = zigzag(speed, sideways, half, lag), values["period_s"]
+    return Curve(name, plane, period, period * values["rounds"], heading=values["heading_rad"], swing=swing)
+
+
+def _goal(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> Path:
+    start: FloatArray = np.array([values["from_x_m"], values["from_y_m"], values["from_heading_rad"]])
+    goal: FloatArray = np.array([values["x_m"], values["y_m"], values["heading_rad"]])
+    duration = values["travel_s"] + values["hold_s"]
+    if duration <= 0.0:
+        raise InputError("a goal takes some time", got="0 s", expected="travel_s or hold_s above 0", where=name)
+    return Goal(name, start, goal, values["travel_s"], duration)
+
+
+_MAKERS: dict[str, Callable[[str, Mapping[str, Any], Mapping[str, Any]], Path]] = {
+    "eight": _curve(lambda own, period: eight(own["size_m"], period), lambda own: math.nan),
+    "circle": _curve(lambda own, period: circle(own["radius_m"], period), lambda own: 2.0 * math.pi * own["radius_m"]),
+    "square": _curve(
+        lambda own, period: square(own["side_m"], 4.0 * own["side_m"] / period), lambda own: 4.0 * own["side_m"]
+    ),
+    "zigzag": _zigzag,
+    "goal": _goal,
+}
+
+__all__ = ["Lines", "Path", "path"]

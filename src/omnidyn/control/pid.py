@@ -1,0 +1,109 @@
+"""PID control of the pose, with the inverse model of the robot in front.
+
+    alpha = R (k_p e + k_i sum e dt) + k_d (nu_ref - nu),      e = pose of the path - pose, in the world
+    volts = inverse model of the path's motion, friction included, plus alpha as an acceleration
+
+The gains follow from two poles and a slow one (gains.py). Dry friction is compensated in the direction in which the
+robot is to move, the way back to the path included: nu_ref + (k_p/k_d) e. Without `feedforward` nothing is known of the
+robot but what its volts push.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.control.controller import WHEEL_SPEED, Guarded
+from omnidyn.control.feedforward import DT, Volts, check_delay, check_dt, lateness
+from omnidyn.control.gains import check_faster, check_integral, pose_gains
+from omnidyn.control.paths.motion import Path
+from omnidyn.control.speed_loop import MOST_STEPS
+from omnidyn.model.frames import world_to_body
+from omnidyn.model.inverse import Effort
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
+
+FASTER, INTEGRAL = 3.0, 0.25
+
+
+class Aim(NamedTuple):
+    """What a step of the loop shall do, but for the sum of errors.
+
+    turned: world to body, shape (3, 3). now: twist of the path, change: acceleration wanted, way: twist which friction
+    opposes; shape (3,).
+    """
+
+    turned: FloatArray
+    now: FloatArray
+    change: FloatArray
+    way: FloatArray
+
+
+class Pid(Guarded):
+    """PID control of the pose. See Controller.
+
+    dt [s]: between two steps. faster: how many times as fast as the robot by itself the loop settles. integral: the
+    slow pole, as a share of the others; 0 takes no sum of errors. friction: whether dry friction is compensated.
+    feedforward: whether the motion of the path is. delay: steps until an output acts; the latency of the drive by
+    default: the loop is no faster than that allows. supply [V]: behind a duty.
+    """
+
+    name = "pid"
+
+    def __init__(
+        self, robot: Robot, *, dt: float = DT, faster: float = FASTER, integral: float = INTEGRAL,
+        friction: bool = True, feedforward: bool = True, delay: int | None = None, supply: float | None = None,
+    ) -> None:  # fmt: skip
+        self.dt, self.faster, self.integral = check_dt(dt), check_faster(faster), check_integral(integral)
+        self.friction, self.feedforward, self.delay = friction, feedforward, check_delay(delay)
+        without = "" if friction else "_no_friction"
+        self.name = f"{type(self).name}{without}{'' if feedforward else '_no_feedforward'}"
+        super().__init__(robot, supply)
+
+    def _take(self, robot: Robot) -> None:
+        super()._take(robot)
+        self.volts, self.late = Volts(robot, self.dt, self.friction), lateness(robot, self.delay, self.dt)
+        self.gains = pose_gains(self.volts.held.rates, self.faster, self.integral, self.dt, self.late)
+        self._home = self.gains.place / self.gains.speed
+
+    def reset(self) -> None:
+        """Forget all steps."""
+        super().reset()
+        self._sum = np.zeros(3)
+
+    def _output(
+        self, t: float, dt: float, pose: FloatArray, twist: FloatArray, path: Path
+    ) -> tuple[FloatArray, tuple[str, ...]]:
+        motion = path.at(np.array([t, t + self.late, t + self.late + self.dt]))
+        off = motion.pose[0] - pose
+        off[2] = math.remainder(off[2], 2.0 * math.pi)
+        aim = self.aim(off, pose[2], twist, motion.velocity)
+        if self.output == WHEEL_SPEED:
+            return wheel_speed(self.robot.wheels, aim.way), ()
+        more = self._sum + off * min(dt, MOST_STEPS * self.dt)
+        for total in (more, self._sum):  # at a limit, nothing is added to the sum
+            sent, met = self.volts.within(self.effort(aim, total))
+            if not met and np.isfinite(sent).all():
+                self._sum = total
+                break
+        return self._sent(sent), met
+
+    def aim(self, off: FloatArray, heading: FloatArray, twist: FloatArray, velocity: FloatArray) -> Aim:
+        """What a step shall do: off, the error of the pose in the world, shape (3,), its angle within half a turn.
+
+        velocity: of the path in the world now, when the output acts, and a step later. Shape (3, 3).
+        """
+        turned = world_to_body(heading + np.array([0.0, 1.0]) * self.dt * velocity[1, 2])
+        here, now, then = turned[0] @ off, turned[0] @ velocity[1], turned[1] @ velocity[2]
+        back = self.gains.speed * (turned[0] @ velocity[0] - twist) + self.gains.place * here
+        change, way = self.volts.change(now, then), 0.5 * (now + then) + self._home * here
+        if not self.feedforward:
+            now, change = 0.0 * now, 0.0 * change
+        return Aim(turned[0], now, change + back, way)
+
+    def effort(self, aim: Aim, total: FloatArray) -> Effort:
+        """What that takes, with a sum of errors in the world [m s, m s, rad s]. Shape (3,) -> (wheels,)."""
+        return self.volts.softly(aim.now, aim.change + self.gains.sum * (aim.turned @ total), aim.way)

@@ -1,0 +1,185 @@
+"""Tracking: how near a controller brought a robot to a path, at what expense, in numbers and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.document import Document, Part, Points, Table
+from omnidyn.run import Run
+from omnidyn.shown import FIGURE, Shown, make
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MICRO = 1e6
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Tracking(Shown):
+    """What a closed loop did.
+
+    controller, plant, path: their names. run: what the robot did. wanted: poses of the path at the times of the run,
+    shape (samples, 3). skip [s]: errors before it count for nothing. dt [s]: between two steps.
+    saturated_share: of the steps, those with an output at its limit. step_times [s]: of the controller, shape (steps,).
+    statuses: word of `info.status` other than "ok" -> number of steps.
+    """
+
+    controller: str
+    plant: str
+    path: str
+    run: Run
+    wanted: FloatArray
+    skip: float
+    dt: float
+    saturated_share: float
+    step_times: FloatArray
+    statuses: Mapping[str, int] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"<Tracking of {self.path} by {self.controller}: rmse {self.rmse_position:.3g} m>"
+
+    @cached_property
+    def error(self) -> FloatArray:
+        """Pose of the robot minus pose of the path, in the world [m, m, rad]. Shape (samples, 3)."""
+        assert self.run.pose is not None
+        return self.run.pose - self.wanted
+
+    @property
+    def counted(self) -> FloatArray:
+        """The errors that count: from `skip` on, the start apart; the last one where nothing is left. (rows, 3)."""
+        late = self.run.t >= self.skip - 1e-9
+        late[0] = False
+        return self.error[late] if late.any() else self.error[-1:]
+
+    @property
+    def rmse_position(self) -> float:
+        """Root of the mean squared distance from the path [m]."""
+        return float(np.sqrt(np.mean(np.sum(self.counted[:, :2] ** 2, axis=1))))
+
+    @property
+    def rmse_heading(self) -> float:
+        """Root of the mean squared error of the heading [rad]."""
+        return float(np.sqrt(np.mean(self.counted[:, 2] ** 2)))
+
+    @property
+    def worst_position(self) -> float:
+        """The largest distance from the path [m]."""
+        return float(np.hypot(*self.counted[:, :2].T).max())
+
+    @property
+    def effort(self) -> float:
+        """Root of the mean squared voltage of a motor [V]."""
+        assert self.run.voltage is not None
+        return float(np.sqrt(np.mean(self.run.voltage[:-1] ** 2)))
+
+    @property
+    def restlessness(self) -> float:
+        """Mean change of a voltage from step to step [V]: what gears and ears notice."""
+        assert self.run.voltage is not None
+        return float(np.mean(np.abs(np.diff(self.run.voltage[:-1], axis=0)))) if len(self.run) > 2 else 0.0
+
+    @property
+    def step_us(self) -> dict[str, float]:
+        """Time of a step of the controller [us]: median, and what 99 of 100 stay below."""
+        median, high = np.quantile(self.step_times, [0.5, 0.99])
+        return {"median": MICRO * float(median), "p99": MICRO * float(high)}
+
+    @property
+    def verdict(self) -> str:
+        """How near it came, in a sentence."""
+        assert self.run.pose is not None
+        size = float(np.hypot(*np.ptp(self.wanted[:, :2], axis=0)))
+        share = f", {100.0 * self.rmse_position / size:.2g} % of its size" if size > 0.0 else ""
+        limit = ""
+        if self.saturated_share > 0.0:
+            limit = f"; its motors are at their limit in {100.0 * self.saturated_share:.2g} % of the steps"
+        return (
+            f"{self.controller} keeps {self.plant} within {_length(self.worst_position)} of the path {self.path}, "
+            f"{_length(self.rmse_position)} in the mean{share}{limit}."
+        )
+
+    def summary(self) -> str:
+        """The result in words, for reading."""
+        return self.document().to_text()
+
+    def document(self) -> Document:
+        """What it says."""
+        return trackings_document([self])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "name": self.controller, "rmse_position_m": self.rmse_position, "rmse_heading_rad": self.rmse_heading,
+            "worst_position_m": self.worst_position, "saturated_share": self.saturated_share,
+            "step_us": self.step_us, "effort_V": self.effort, "restlessness_V": self.restlessness,
+            "statuses": dict(self.statuses),
+        }  # fmt: skip
+
+    def plot(self) -> Figure:
+        """Path and robot from above, error over time, voltages, as a matplotlib Figure."""
+        return make(FIGURE, self)
+
+
+def trackings_document(found: Sequence[Tracking], notes: Sequence[str] = ()) -> Document:
+    """What controllers on one path did, side by side. notes: what is said beside, such as what the path asks for."""
+    first = found[0]
+    span = float(first.run.t[-1])
+    head = (
+        f"{first.plant} along {first.path}: {len(first.step_times)} steps of {first.dt:g} s, {span:.6g} s; errors from "
+    )
+    head += f"{first.skip:g} s on"
+    rows = [
+        (each.controller, f"{1e3 * each.rmse_position:.3f}", f"{1e3 * each.rmse_heading:.2f}",
+         f"{1e3 * each.worst_position:.2f}", f"{100.0 * each.saturated_share:.1f}", f"{each.effort:.2f}",
+         f"{each.restlessness:.3f}", f"{each.step_us['median']:.0f}", f"{each.step_us['p99']:.0f}")
+        for each in found
+    ]  # fmt: skip
+    columns = (
+        "controller", "position mm", "heading mrad", "worst mm", "at limit %", "effort V", "change V", "step us",
+        "p99 us",
+    )  # fmt: skip
+    told = [words for each in found for words in _odd(each)]
+    parts: list[Part] = [
+        head, "", Table(columns, rows, "<>", name="controllers"), "",
+        "position, heading: rmse; effort: rms of a voltage; change: its mean change from step to step.",
+    ]  # fmt: skip
+    parts += [Points(notes, "-", "path")] if notes else []
+    parts.append(Points(told, "warning:", "warnings"))
+    data = {
+        "robot": first.plant, "path": first.path, "dt_s": first.dt, "duration_s": span, "skip_s": first.skip,
+        "controllers": [each.to_dict() for each in found], "notes": list(notes), "warnings": told,
+    }  # fmt: skip
+    return Document(parts, data, told, verdict=_verdict(found))
+
+
+def _verdict(found: Sequence[Tracking]) -> str:
+    """The best of several first."""
+    best = min(found, key=lambda each: each.rmse_position)
+    if len(found) == 1:
+        return best.verdict
+    others = [each for each in found if each is not best]
+    times = ", ".join(
+        f"{each.controller} {float(f'{each.rmse_position / max(best.rmse_position, 1e-12):.2g}'):g} times as far off"
+        for each in others
+    )
+    return f"{best.verdict[:-1]}; {times}."
+
+
+def _odd(each: Tracking) -> list[str]:
+    """Steps that did not go as they should, in words."""
+    ended = "path ended"
+    return [
+        f"{each.controller}: {count} of {len(each.step_times)} steps: {word}"
+        for word, count in each.statuses.items() if not word.startswith(ended)
+    ]  # fmt: skip
+
+
+def _length(value: float) -> str:
+    """A length as one says it."""
+    return f"{1e3 * value:.3g} mm" if value < 1.0 else f"{value:.3g} m"

@@ -1,0 +1,283 @@
+"""tune: gains by simulation, over the robots that may be meant and not only the one the numbers say.
+
+    J(g) = geometric mean over the paths of  sqrt(mean over the robots of (position rmse^2 + (b heading rmse)^2))
+
+b is the radius of the robot [m]: an error of the heading counts as far as its rim moves. The robots are draws from the
+std and the correlations of the robot file; each is driven with the same noise for every g, so that J has no noise of
+its own. A search by Nelder and Mead (1965) finds the least J; what it says of that is checked on other draws.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+
+from omnidyn.arguments import check_order
+from omnidyn.arrays import FloatArray
+from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
+from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
+from omnidyn.control.feedforward import DT
+from omnidyn.control.paths.motion import Path
+from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.tracking import Tracking
+from omnidyn.document import Document, Part, Points, Table, all_of, plain
+from omnidyn.errors import InputError
+from omnidyn.model.known.told import told
+from omnidyn.model.known.uncertainty import plausible
+from omnidyn.model.robot import Robot
+from omnidyn.shown import Shown
+
+DRAWS, EVALUATIONS, NOISE = 8, 30, 0.005
+MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
+SPREAD = 0.15  # of the range of each gain: the first step of the search
+DONE = 1e-3  # of J: a search that gains less has ended
+
+
+class Range(NamedTuple):
+    """Between which values a gain is looked for, and whether on a logarithmic scale."""
+
+    low: float
+    high: float
+    log: bool = True
+
+    def at(self, place: float) -> float:
+        """The value at a place from 0 to 1, four digits of it."""
+        share = min(1.0, max(0.0, place))
+        value = self.low * (self.high / self.low) ** share if self.log else self.low + share * (self.high - self.low)
+        return float(f"{value:.4g}")
+
+    def of(self, value: float) -> float:
+        """The place of a value."""
+        inside = min(self.high, max(self.low, value))
+        return math.log(inside / self.low) / math.log(self.high / self.low) if self.log else (
+            (inside - self.low) / (self.high - self.low)
+        )  # fmt: skip
+
+
+# Controller -> option -> where its best value is looked for.
+TUNED: dict[str, dict[str, Range]] = {
+    "pid": {"faster": Range(0.3, 20.0), "integral": Range(0.0, 1.0, log=False)},
+    "speed": {"faster": Range(0.3, 20.0)},
+    "mpc": {"volts": Range(1e-4, 1.0), "scale_walk": Range(5e-4, 0.1)},
+}
+
+
+class Score(NamedTuple):
+    """What gains come to over the robots: J [m], the mean and the worst position rmse [m], restlessness [V]."""
+
+    cost: float
+    mean: float
+    worst: float
+    restless: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Tuned(Shown):
+    """What `tune` found.
+
+    robot, paths: names. controller: with the gains found, as a file has it. start: the gains it began with. before,
+    after: of these and of those found, over robots and noise that the search has not seen. own_before, own_after: on
+    the robot of the file itself.
+    draws: robots the search drove, 0 where the file says nothing of how far its numbers may be off: then it was the
+    robot of the file alone. evaluations: gains that were tried. noise [m/s], delay [steps], dt [s]: of the loops.
+    """
+
+    robot: str
+    paths: tuple[str, ...]
+    controller: ControllerFile
+    start: Mapping[str, float]
+    before: Score
+    after: Score
+    own_before: Score
+    own_after: Score
+    draws: int
+    evaluations: int
+    noise: float
+    delay: int
+    dt: float
+
+    def __repr__(self) -> str:
+        return f"<Tuned {self.controller.controller} for {self.robot}: {dict(self.gains)}>"
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """The gains found."""
+        return {name: self.controller.options[name] for name in self.start}
+
+    @property
+    def better(self) -> bool:
+        """Whether they are better than those it began with, on robots that the search has not seen."""
+        return self.after.cost < self.before.cost
+
+    @property
+    def verdict(self) -> str:
+        """What tuning brought, in a sentence."""
+        gains = all_of([f"{name} {value:g}" for name, value in self.gains.items()])
+        before, after = 1e3 * self.before.mean, 1e3 * self.after.mean
+        if not self.better:
+            return f"The gains it began with are as good as any that were tried: {after:.3g} mm."
+        return f"With {gains}, {self.controller.controller} is {after:.3g} mm off in the mean, {before:.3g} mm before."
+
+    def words(self) -> list[str]:
+        """What was optimised, and what that gave up."""
+        robots = (
+            f"{self.draws} robots drawn from the std and correlations of the file" if self.draws
+            else "the robot of the file alone: no number of it has a std, so nothing says how far it may be off"
+        )  # fmt: skip
+        lines = [
+            f"optimised: rms distance from the path and rim error of the heading along {all_of(self.paths)}, over "
+            f"{robots}; noise {self.noise:g} m/s, delay {self.delay} steps, {self.dt:g} s a step; {self.evaluations} "
+            "settings tried",
+        ]
+        if self.draws:
+            lines.append(
+                "the numbers are those of as many other draws and of other noise, which the search has not seen"
+            )
+        lines += self._given_up()
+        return lines
+
+    def _given_up(self) -> list[str]:
+        """What got worse."""
+        lost = []
+        if self.after.restless > 1.02 * self.before.restless:
+            lost.append(
+                f"rest: a voltage changes by {self.after.restless:.3g} V a step, {self.before.restless:.3g} V before"
+            )
+        if self.own_after.mean > 1.02 * self.own_before.mean:
+            lost.append(
+                f"the robot as the file says it: {1e3 * self.own_after.mean:.3g} mm, "
+                f"{1e3 * self.own_before.mean:.3g} mm before: the price of being right for the others"
+            )
+        if self.after.worst > 1.02 * self.before.worst:
+            lost.append(f"the worst robot: {1e3 * self.after.worst:.3g} mm, {1e3 * self.before.worst:.3g} mm before")
+        return [f"given up: {words}" for words in lost] or ["given up: nothing that was measured"]
+
+    def document(self) -> Document:
+        """What it says."""
+        rows = [
+            (name, f"{1e3 * own.mean:.3f}", f"{1e3 * each.mean:.3f}", f"{1e3 * each.worst:.3f}", f"{each.restless:.3f}")
+            for name, own, each in (("before", self.own_before, self.before), ("tuned", self.own_after, self.after))
+        ]  # fmt: skip
+        head = ("", "this robot mm", "robots mm", "worst mm", "change V")
+        scores, words = Table(head, rows, "<>", name="scores"), Points(self.words(), "-", "words")
+        parts: list[Part] = [scores, "", words, "", self.controller.to_toml()]
+        return Document(parts, self.to_dict(), verdict=self.verdict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        scores = {name: getattr(self, name)._asdict() for name in ("before", "after", "own_before", "own_after")}
+        return plain({
+            "robot": self.robot, "paths": self.paths, "controller": self.controller.controller,
+            "options": dict(self.controller.options), "start": dict(self.start), **scores, "draws": self.draws,
+            "evaluations": self.evaluations, "better": self.better, "words": self.words(),
+        })  # fmt: skip
+
+
+def tune(
+    robot: Robot, path: Path | str | Sequence[Path | str], controller: str = "pid", *, draws: int = DRAWS,
+    evaluations: int = EVALUATIONS, noise: float = NOISE, delay: int = 0, dt: float = DT, duration: float | None = None,
+    seed: int = 0, progress: Callable[[str], None] | None = None,
+) -> Tuned:  # fmt: skip
+    """Find the gains of a controller by simulation, over the robots that the file says may be meant.
+
+    path: a Path or what `path` takes; or several. controller: a name or a controller file: its options are where the
+    search begins. draws: robots that are driven. evaluations: settings that are tried, at the most. noise, delay, dt,
+    duration, seed: as for `track`; noise 0 and no delay make gains as large as dt allows.
+    Returns a Tuned, whose `controller` is what `track` reads from a file (`save_controller`).
+    Raises InputError for a controller without gains, or a number out of range.
+    """
+    paths: list[Any] = [path] if isinstance(path, Path | str) else list(path)
+    check_order("tune(robot, path, controller)", (robot, Robot), (paths, (Path, str)), (controller, str))
+    _check_counts(draws, evaluations, paths)
+    around = Circumstances(dt, duration, noise=noise, delay=delay, seed=seed)
+    follow = [each if isinstance(each, Path) else path_named(each) for each in paths]
+    spec = controller_spec(controller)
+    ranges = _ranges(spec)
+    known = bool(told(robot).keys)
+    seen = plausible(robot, draws, seed) if known else [robot]
+    unseen = plausible(robot, draws, seed + 1) if known else [robot]
+    tried: list[tuple[float, dict[str, float]]] = []
+
+    def cost(places: FloatArray) -> float:
+        gains = {name: each.at(float(place)) for (name, each), place in zip(ranges.items(), places, strict=True)}
+        outside = float(np.sum(np.maximum(np.abs(places - 0.5) - 0.5, 0.0)))
+        if progress is not None:
+            progress(f"trying {', '.join(f'{name} {value:g}' for name, value in gains.items())}")
+        found = _score(robot, seen, follow, _with(spec, gains), around).cost
+        tried.append((found, gains))
+        return math.log(found) + outside
+
+    defaults = options_of(spec.controller)
+    start = {name: float(spec.options.get(name, defaults[name])) for name in ranges}
+    first = np.array([each.of(start[name]) for name, each in ranges.items()])
+    corners = np.vstack([first, *(first + _aside(first, k) for k in range(len(first)))])
+    how = {"maxfev": evaluations, "initial_simplex": corners, "xatol": 1e-2, "fatol": DONE}
+    minimize(cost, first, method="Nelder-Mead", options=how)
+    best = min(tried, key=lambda each: each[0])[1]
+    old, new = _with(spec, start), _with(spec, best)
+    fresh = replace(around, seed=seed + 1)
+    before, after = (_score(robot, unseen, follow, each, fresh) for each in (old, new))
+    own_before, own_after = (_score(robot, [robot], follow, each, fresh) for each in (old, new))
+    if after.cost >= before.cost:
+        new, after, own_after = old, before, own_before
+    names = tuple(each.name for each in follow)
+    source = f"tuned for {robot.name} on {all_of(names)}, {draws if known else 0} draws, seed {seed}"
+    return Tuned(
+        robot.name, names, replace(new, source=source), start, before, after, own_before, own_after,
+        draws if known else 0, len(tried), noise, delay, dt,
+    )  # fmt: skip
+
+
+def _check_counts(draws: int, evaluations: int, paths: Sequence[Any]) -> None:
+    for name, value, most in (("draws", draws, MOST_DRAWS), ("evaluations", evaluations, MOST_EVALUATIONS)):
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+            raise InputError("out of range", got=value, expected=f"1 to {most}", where=name)
+    if not paths:
+        raise InputError("nothing to follow", got="no path", expected="a path, or several", where="path")
+
+
+def _ranges(spec: ControllerFile) -> dict[str, Range]:
+    """The gains of a controller that are looked for. Raises InputError where it has none."""
+    if spec.controller not in TUNED:
+        raise InputError(
+            "this controller has no gains", got=spec.controller, expected=" or ".join(TUNED),
+            remedy="it follows from the robot alone", where="controller",
+        )  # fmt: skip
+    return TUNED[spec.controller]
+
+
+def _with(spec: ControllerFile, gains: Mapping[str, float]) -> ControllerFile:
+    return replace(spec, options={**spec.options, **gains})
+
+
+def _aside(first: FloatArray, k: int) -> FloatArray:
+    """A step along one gain, inwards."""
+    step = np.zeros(len(first))
+    step[k] = SPREAD if first[k] < 0.5 else -SPREAD
+    return step
+
+
+def _score(
+    robot: Robot, plants: Sequence[Robot], paths: Sequence[Path], spec: ControllerFile, around: Circumstances
+) -> Score:
+    """What a controller for one robot comes to when it drives the others."""
+    control = spec.make(robot, **told_of_loop(robot, around))
+    rim = float(np.mean(robot.wheels.robot_radius))
+    found = [[tracked(plant, path, control, around) for plant in plants] for path in paths]
+    every = [each for row in found for each in row]
+    logs = [math.log(max(math.sqrt(float(np.mean([_square(each, rim) for each in row]))), 1e-9)) for row in found]
+    errors = [each.rmse_position for each in every]
+    return Score(
+        math.exp(float(np.mean(logs))), float(np.mean(errors)), max(errors),
+        float(np.mean([each.restlessness for each in every])),
+    )  # fmt: skip
+
+
+def _square(each: Tracking, rim: float) -> float:
+    """Squared error of a run, heading at the rim included [m^2]."""
+    return each.rmse_position**2 + (rim * each.rmse_heading) ** 2

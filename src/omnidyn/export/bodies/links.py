@@ -1,0 +1,91 @@
+"""A robot as a base and wheels on joints, which urdf and sdf write down: masses, inertias, limits, friction of axles.
+
+The whole robot weighs M and turns about the vertical axis with I_n: what the wheels take is taken off the base. A wheel
+is a disc whose inertia about its axle is J_w where the robot has one. The positive sense of a joint is that of the
+model: all wheels forward turn the robot counter-clockwise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.export.bodies.shape import Place, inertias, places
+from omnidyn.export.spelling import identifier
+from omnidyn.model.motor import no_load_speed, settled_current, wheel_torque
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel
+
+LIGHT = 1e-3  # of the robot: the mass of a wheel of which no inertia is known
+MOST = 0.25  # of the robot: what all wheels together may weigh, and may add about the vertical axis
+ACROSS = 0.55  # of the inertia about the axle: that about the other axes, a little more than of a flat disc
+
+
+class Wheel(NamedTuple):
+    """A wheel and its joint. inertia: about the axle and across it [kg m^2]; effort [N m], speed [rad/s]: its limits.
+
+    damping [N m s], friction [N m]: at the joint.
+    """
+
+    name: str
+    place: Place
+    mass: float
+    inertia: tuple[float, float]
+    effort: float
+    speed: float
+    damping: float
+    friction: float
+
+    @property
+    def width(self) -> float:
+        """As it is drawn [m]."""
+        return 0.6 * self.place.radius
+
+
+class Links(NamedTuple):
+    """The parts of a robot. mass, inertia (I_xx, I_yy, I_zz): of the base alone. tall: its height [m]."""
+
+    name: str
+    mass: float
+    inertia: tuple[float, float, float]
+    tall: float
+    wheels: tuple[Wheel, ...]
+    notes: tuple[str, ...]
+
+
+def links(robot: Robot, tall: float) -> Links:
+    """The parts of a robot whose base has the height `tall` [m]."""
+    n, where = robot.wheels.count, places(robot)
+    axle = per_wheel(robot.wheels.wheel_inertia, n)
+    most = MOST * robot.body.inertia / n
+    spins = np.minimum(axle, 0.5 * most / ACROSS)
+    radius, far = robot.wheels.radii, per_wheel(robot.wheels.robot_radius, n)
+    mass = np.where(axle > 0.0, 2.0 * axle / radius**2, LIGHT * robot.body.mass)
+    mass = np.minimum.reduce([mass, np.full(n, MOST * robot.body.mass / n), 0.5 * most / far**2])
+    flat = 0.5 * mass * radius**2
+    spins = np.where(axle > 0.0, spins, np.minimum(flat, 0.5 * most / ACROSS))
+    across = ACROSS * spins
+    base = robot.body.mass - mass.sum()
+    turning = robot.body.inertia - float(np.sum(mass * far**2 + across))
+    notes = ("a wheel is lighter in the file than its inertia says: it would weigh more than the robot",)
+    wheels = tuple(
+        Wheel(f"wheel{k + 1}", where[k], float(mass[k]), (float(spins[k]), float(across[k])), *_joint(robot, k))
+        for k in range(n)
+    )
+    return Links(
+        identifier(robot.name), float(base), inertias(float(base), turning, tall), tall, wheels,
+        notes if np.any(spins < axle) else (),
+    )  # fmt: skip
+
+
+def _joint(robot: Robot, wheel: int) -> tuple[float, float, float, float]:
+    """(effort [N m], speed [rad/s], damping [N m s], friction [N m]) of the joint of a wheel."""
+    n, friction = robot.wheels.count, robot.friction.wheels
+    limit, radius = per_wheel(robot.motor.voltage_limit, n), robot.wheels.radii[wheel]
+    stall = wheel_torque(robot.motor, settled_current(robot.motor, limit, np.zeros(n)))[wheel]
+    free = no_load_speed(robot.motor, limit)[wheel]
+    return (
+        float(stall), float(free), float(per_wheel(friction.viscous, n)[wheel] * radius**2),
+        float(per_wheel(friction.coulomb, n)[wheel] * radius),
+    )  # fmt: skip

@@ -1,0 +1,261 @@
+"""Expressions of a kernel as C: (text, type) of each. Names are looked up in the function, then in its module."""
+
+from __future__ import annotations
+
+import ast
+import math
+from typing import Any, Protocol
+
+import numpy as np
+
+from omnidyn.export.code import sources
+from omnidyn.export.code.types import (
+    BOOL,
+    INT,
+    REAL,
+    Array,
+    Columns,
+    Many,
+    Scalar,
+    Struct,
+    TranslationError,
+    Type,
+    joined,
+)
+from omnidyn.export.spelling import c_number
+
+Typed = tuple[str, Type]
+
+_BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
+_BITS = {ast.BitAnd: "&", ast.BitOr: "|"}
+_COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_MATH = ("exp", "expm1", "log1p", "sqrt", "sin", "cos", "sinh", "cosh", "atan2", "copysign")
+RESERVED = frozenset(
+    ("double", "float", "int", "long", "short", "char", "auto", "register", "signed", "default", "fabs", *_MATH)
+)
+
+
+def c_name(name: str) -> str:
+    """A name of Python in C."""
+    name = name.lstrip("_") or "unused"
+    return f"{name}_" if name in RESERVED else name
+
+
+class Called(Protocol):
+    """A translated function, see translate.py."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def returns(self) -> Type: ...
+    @property
+    def writes(self) -> frozenset[int]: ...
+
+
+class Whole(Protocol):
+    """What expressions ask of the program that they belong to, see translate.py."""
+
+    single: bool
+
+    @property
+    def real(self) -> str: ...
+    def function(self, source: sources.Source, arguments: tuple[Type, ...]) -> Called: ...
+    def constant(self, name: str, value: Any) -> tuple[str, Type]: ...
+    def struct(self, cls: type) -> Struct: ...
+    def packed(self, kind: Many, items: list[str]) -> str: ...
+
+
+class Scope(Protocol):
+    """The function that an expression stands in, see translate.py."""
+
+    source: sources.Source
+    types: dict[str, Type]
+
+    @property
+    def program(self) -> Whole: ...
+    def writes_to(self, node: ast.expr) -> None: ...
+
+
+class Expressions:
+    """Translates the expressions of one function; what a call needs is translated before."""
+
+    def __init__(self, body: Scope) -> None:
+        self.body, self.program = body, body.program
+
+    def of(self, node: ast.expr) -> Typed:
+        """An expression, in parentheses where it needs them."""
+        method = getattr(self, f"_{type(node).__name__.lower()}", None)
+        if method is None:
+            raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
+        return method(node)
+
+    def real(self, node: ast.expr) -> str:
+        """An expression as a floating number."""
+        text, kind = self.of(node)
+        return self.number(float(text)) if kind == INT and text.lstrip("-").isdigit() else text
+
+    def number(self, value: float) -> str:
+        """A literal."""
+        return "INFINITY" if value == math.inf else c_number(value, self.program.single)
+
+    def _constant(self, node: ast.Constant) -> Typed:
+        return self.plain(node.value)
+
+    def plain(self, value: Any) -> Typed:
+        """A constant number."""
+        if isinstance(value, bool):
+            return str(int(value)), BOOL
+        if isinstance(value, int):
+            return str(value), INT
+        if isinstance(value, float):
+            return self.number(value), REAL
+        raise TranslationError(f"{self.body.source.name}: no C for {value!r}")
+
+    def _name(self, node: ast.Name) -> Typed:
+        if node.id in self.body.types:
+            return c_name(node.id), self.body.types[node.id]
+        value = sources.value(self.body.source.module, node.id)
+        if isinstance(value, int | float):
+            return self.plain(value)
+        return self.program.constant(node.id, value)
+
+    def _unaryop(self, node: ast.UnaryOp) -> Typed:
+        text, kind = self.of(node.operand)
+        if isinstance(node.op, ast.Not):
+            return f"(!{text})", BOOL
+        return f"(-{text})", kind
+
+    def _binop(self, node: ast.BinOp) -> Typed:
+        (left, one), (right, other) = self.of(node.left), self.of(node.right)
+        if type(node.op) in _BITS:
+            return f"({left} {_BITS[type(node.op)]} {right})", BOOL
+        if isinstance(node.op, ast.Pow) and isinstance(node.right, ast.Constant) and node.right.value == 2:
+            return f"({left} * {left})", one
+        if type(node.op) not in _BINARY:
+            raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
+        kind = joined(one, other) if BOOL not in (one, other) else REAL
+        if kind == REAL or isinstance(node.op, ast.Div):
+            left, right, kind = self._as_real(left, one), self._as_real(right, other), REAL
+        return f"({left} {_BINARY[type(node.op)]} {right})", kind
+
+    def _as_real(self, text: str, kind: Type) -> str:
+        if kind == REAL:
+            return text
+        return self.number(float(text)) if text.isdigit() else f"({self.program.real}){text}"
+
+    def _boolop(self, node: ast.BoolOp) -> Typed:
+        sign = " && " if isinstance(node.op, ast.And) else " || "
+        return f"({sign.join(self.of(each)[0] for each in node.values)})", BOOL
+
+    def _compare(self, node: ast.Compare) -> Typed:
+        sides = [node.left, *node.comparators]
+        parts = []
+        for left, operator, right in zip(sides, node.ops, node.comparators, strict=False):
+            (a, one), (b, other) = self.of(left), self.of(right)
+            if REAL in (one, other):
+                a, b = self._as_real(a, one), self._as_real(b, other)
+            parts.append(f"({a} {_COMPARE[type(operator)]} {b})")
+        return (parts[0] if len(parts) == 1 else f"({' && '.join(parts)})"), BOOL
+
+    def _ifexp(self, node: ast.IfExp) -> Typed:
+        test, (one, kind), (other, second) = self.of(node.test)[0], self.of(node.body), self.of(node.orelse)
+        whole = joined(kind, second)
+        if whole == REAL:
+            one, other = self._as_real(one, kind), self._as_real(other, second)
+        return f"({test} ? {one} : {other})", whole
+
+    def _tuple(self, node: ast.Tuple) -> Typed:
+        items = [self.of(each) for each in node.elts]
+        kind = Many(tuple(each if each != INT else INT for _, each in items))
+        return self.program.packed(kind, [text for text, _ in items]), kind
+
+    def _attribute(self, node: ast.Attribute) -> Typed:
+        if isinstance(node.value, ast.Name) and sources.is_module(self.body.source.module, node.value.id):
+            return self.number(getattr(math, node.attr)), REAL
+        text, kind = self.of(node.value)
+        assert isinstance(kind, Struct)
+        return f"{text}{'->' if kind.by_address else '.'}{c_name(node.attr)}", kind.field(node.attr)
+
+    def _subscript(self, node: ast.Subscript) -> Typed:
+        if (found := self._column(node)) is not None:
+            return found
+        text, kind = self.of(node.value)
+        indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        if isinstance(kind, Columns):
+            return f"{text}[{self.of(indices[0])[0]}]", kind
+        assert isinstance(kind, Array), ast.unparse(node)
+        for each in indices:
+            text += f"[{self.of(each)[0]}]"
+        rest = kind.shape[len(indices) :]
+        return text, Array(rest) if rest else REAL
+
+    def _column(self, node: ast.Subscript) -> Typed | None:
+        """An entry of a table with typed columns, `RULES[rule][0]`; None for another subscript."""
+        if not isinstance(node.value, ast.Subscript) or not isinstance(node.slice, ast.Constant):
+            return None
+        text, kind = self.of(node.value)
+        if not isinstance(kind, Columns) or not isinstance(node.slice.value, int):
+            return None
+        own = kind.columns[node.slice.value]
+        cast = "(int)" if own == INT else ""
+        return f"{cast}{text}[{node.slice.value}]", own
+
+    def _call(self, node: ast.Call) -> Typed:
+        if isinstance(node.func, ast.Attribute):
+            return self._of_math(node)
+        assert isinstance(node.func, ast.Name)
+        name = node.func.id
+        if name in ("abs", "min", "max", "len"):
+            return self._builtin(name, node.args)
+        called = sources.function(self.body.source.module, name)
+        if called is not None:
+            return self._own(called, node.args)
+        made = sources.value(self.body.source.module, name)
+        if isinstance(made, type) and issubclass(made, tuple):
+            kind = self.program.struct(made)
+            return f"({kind.name}){{{', '.join(self.real(each) for each in node.args)}}}", kind
+        raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
+
+    def _of_math(self, node: ast.Call) -> Typed:
+        assert isinstance(node.func, ast.Attribute)
+        if node.func.attr not in _MATH:
+            raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
+        suffix = "f" if self.program.single else ""
+        return f"{node.func.attr}{suffix}({', '.join(map(self.real, node.args))})", REAL
+
+    def _builtin(self, name: str, nodes: list[ast.expr]) -> Typed:
+        first, kind = self.of(nodes[0])
+        if name == "len":
+            assert isinstance(kind, Array)
+            return str(kind.shape[0]), INT
+        if name == "abs":
+            return f"fabs{'f' if self.program.single else ''}({first})", REAL
+        text = self.real(nodes[-1])
+        for each in reversed(nodes[:-1]):
+            text = f"{name}_of({self.real(each)}, {text})"
+        return text, REAL
+
+    def _own(self, called: sources.Source, nodes: list[ast.expr]) -> Typed:
+        """A call of another function of the package, translated for arguments of these types."""
+        given = [self.of(each) for each in nodes]
+        made = self.program.function(called, tuple(REAL if kind == INT and _is_real(text) else kind
+                                                   for text, kind in given))  # fmt: skip
+        for position, node in enumerate(nodes):
+            if position in made.writes:
+                self.body.writes_to(node)
+        return f"{made.name}({', '.join(text for text, _ in given)})", made.returns
+
+
+def _is_real(text: str) -> bool:
+    return "." in text
+
+
+def table_type(value: Any) -> Array | Columns:
+    """The type of a constant table."""
+    if isinstance(value, tuple) and value and isinstance(value[0], tuple):
+        kinds: list[Scalar] = [
+            INT if all(isinstance(row[k], int) for row in value) else REAL for k in range(len(value[0]))
+        ]
+        if INT in kinds:
+            return Columns(len(value), tuple(kinds))
+    return Array(np.shape(value))

@@ -1,0 +1,208 @@
+"""The step of one robot in C: its numbers as constants, the kernels of the exact engine, and what joins them.
+
+What joins them holds no formula: volts are clipped and summed into the drive of each axis, each axis is stepped by
+`exact_step` (with winding inductance by `step_by_segments`), the way by `travel`, the pose by `put_next_pose`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.export.code import sources
+from omnidyn.export.code.translate import Program
+from omnidyn.export.code.types import INT, REAL, Array, Type
+from omnidyn.export.spelling import c_number
+from omnidyn.model.actuation import Driver
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.robot import Robot
+from omnidyn.model.statespace import state_space
+from omnidyn.model.wheels import per_wheel
+from omnidyn.simulation.exact.inductance import axis_laws
+from omnidyn.simulation.exact.inductance_position import COUNT, GAUSS, Axes, Nodes
+from omnidyn.simulation.exact.inductance_step import AxisLaw
+from omnidyn.simulation.exact.march import NODES, WEIGHTS, axis_levels
+
+MARCH, PLACE = "omnidyn.simulation.exact.march", "omnidyn.simulation.exact.inductance_position"
+AXES = Array((3,))
+
+
+@dataclass(frozen=True)
+class StepCode:
+    """A step in C. text: all of it; `arguments`: of `omnidyn_advance`, which moves the state and is static.
+
+    inductance: whether the state holds what the currents do to each axis.
+    """
+
+    text: str
+    wheels: int
+    inductance: bool
+
+
+def step_code(robot: Robot, single: bool = False) -> StepCode:
+    """The step of a robot for which there is an exact one; `omnidyn_advance` is its entry."""
+    program, dynamic = Program(single), robot.motor.electrical == DYNAMIC
+    kernels = _with_inductance(program) if dynamic else _settled(program)
+    if robot.drive.dead_band:
+        _function(program, "omnidyn.model.actuation", "at_motor", REAL, REAL, program.struct(Driver))
+    for name, shape in kernels.items():
+        _function(program, *name, *shape)
+    _function(program, MARCH, "put_next_pose", Array((2, 3)), INT, REAL, REAL, REAL, REAL)
+    tables = {**_common(robot), **(_tables_with_inductance(robot) if dynamic else _tables(robot))}
+    text = "\n\n".join(
+        [
+            "\n".join(_table(program, name, values) for name, values in tables.items()),
+            program.text(),
+            _drive(program, robot),
+            (_ADVANCE_WITH_INDUCTANCE if dynamic else _ADVANCE).replace("real", program.real).strip(),
+        ]
+    )
+    return StepCode(text, robot.wheels.count, dynamic)
+
+
+def _function(program: Program, module: str, name: str, *arguments: Type) -> None:
+    source = sources.function(module, name)
+    assert source is not None, name
+    program.function(source, arguments)
+
+
+def _settled(program: Program) -> dict[tuple[str, str], tuple[Type, ...]]:
+    """The kernels of a robot whose currents settle at once, with the types of their arguments."""
+    nodes = Array(NODES.shape)
+    return {
+        (MARCH.replace("march", "step"), "held"): (REAL, REAL),
+        (MARCH, "exact_step"): (REAL,) * 7,
+        (MARCH, "pieces"): (REAL,) * 7,
+        (MARCH, "_travel"): (AXES,) * 6 + (REAL, nodes, nodes),
+        (MARCH, "turned_within"): (REAL,) * 7,
+    }
+
+
+def _with_inductance(program: Program) -> dict[tuple[str, str], tuple[Type, ...]]:
+    """The kernels of a robot with winding inductance, with the types of their arguments."""
+    program.shapes[Axes] = dict.fromkeys(Axes._fields, (3,))
+    program.shapes[Nodes] = {
+        "weight": (COUNT,), "time": (COUNT,), "kick": (3, COUNT), "phi": (3, COUNT), "total": (COUNT,),
+    }  # fmt: skip
+    law = program.struct(AxisLaw)
+    nodes, axes = program.struct(Nodes), program.struct(Axes)
+    tables = Array((3, 5)), Array((3, 4)), Array(GAUSS.shape)
+    return {
+        (PLACE, "law_of"): (tables[0], INT),
+        ("omnidyn.simulation.exact.inductance", "step_by_segments"): (REAL, REAL, REAL, REAL, law),
+        (PLACE, "travel"): (nodes, AXES, AXES, AXES, REAL, REAL, axes, *tables),
+    }
+
+
+def _common(robot: Robot) -> dict[str, np.ndarray]:
+    """Constants of every robot: what a volt of each motor gives each axis, and how many it may have."""
+    system = state_space(robot)
+    return {"PER_VOLT": system.B, "LIMIT": per_wheel(robot.motor.voltage_limit, robot.wheels.count)}
+
+
+def _tables(robot: Robot) -> dict[str, np.ndarray]:
+    rate, coulomb, breakaway = axis_levels(robot, state_space(robot))
+    return {"RATE": rate, "COULOMB": coulomb, "BREAKAWAY": breakaway, "NODES": NODES, "WEIGHTS": WEIGHTS}
+
+
+def _tables_with_inductance(robot: Robot) -> dict[str, np.ndarray]:
+    laws = axis_laws(robot)
+    return {"LAWS": laws, "RATES": np.array(_rates(laws)), "GAUSS": GAUSS}
+
+
+def _rates(laws: np.ndarray) -> np.ndarray:
+    """How fast the axes change: made inside kernels, called here as it stands."""
+    made = sources.value(PLACE, "_rates")
+    return getattr(made, "py_func", made)(laws)
+
+
+def _table(program: Program, name: str, values: np.ndarray) -> str:
+    return program.table(name, np.asarray(values, dtype=float))
+
+
+def _drive(program: Program, robot: Robot) -> str:
+    """The drive of the axes from the volts: clipped, less the dead band, summed in the order of the wheels."""
+    band, single = robot.drive.dead_band, program.single
+    reach = "volts = at_motor(volts, ZERO, driver).a0;" if band else ""
+    driver = ", ".join(c_number(each, single) for each in (1.0, band, 0.0))
+    return _DRIVE.format(
+        real=program.real, wheels=robot.wheels.count, zero=c_number(0.0, single),
+        band=f"        const Driver driver = {{{driver}}};\n" if band else "",
+        reach=f"\n        {reach.replace('ZERO', c_number(0.0, single))}" if band else "",
+    ).strip()  # fmt: skip
+
+
+_DRIVE = """
+/* What the motors give each axis, divided by mass or inertia, of volts kept within their limits. */
+static void drive_of(const {real} u[{wheels}], {real} drive[3])
+{{
+    int wheel, axis;
+    drive[0] = drive[1] = drive[2] = {zero};
+    for (wheel = 0; wheel < {wheels}; wheel++) {{
+{band}        {real} volts = u[wheel] > LIMIT[wheel] ? LIMIT[wheel] : u[wheel];
+        volts = volts < -LIMIT[wheel] ? -LIMIT[wheel] : volts;{reach}
+        for (axis = 0; axis < 3; axis++) {{
+            drive[axis] += volts * PER_VOLT[axis][wheel];
+        }}
+    }}
+}}
+"""
+
+_ADVANCE = """
+/* Move the state by h [s]; what rounding takes from the heading comes back in *lost. */
+static void omnidyn_advance(const real u[], real h, real twist[3], real pose[3], real *lost)
+{
+    real drive[3], next[3], event[3], before[3], after[3], poses[2][3];
+    int axis, moving = 0;
+    drive_of(u, drive);
+    for (axis = 0; axis < 3; axis++) {
+        const real phi = held(RATE[axis], h), a = RATE[axis], c = COULOMB[axis], s = BREAKAWAY[axis];
+        const many_rrr parts = pieces(twist[axis], drive[axis], c, s, a, phi, h);
+        next[axis] = exact_step(twist[axis], drive[axis], c, s, a, phi, 0);
+        event[axis] = parts.a0;
+        before[axis] = parts.a1;
+        after[axis] = parts.a2;
+        moving |= (twist[axis] != 0) | (before[axis] != 0);
+        poses[0][axis] = pose[axis];
+    }
+    if (moving) {
+        const many_rr way = travel_of(twist, next, event, before, after, RATE, h, NODES, WEIGHTS);
+        const real turn = turned_within(h, twist[2], next[2], event[2], before[2], after[2], RATE[2]);
+        *lost = put_next_pose(poses, 0, way.a0, way.a1, turn, *lost);
+        for (axis = 0; axis < 3; axis++) {
+            twist[axis] = next[axis];
+            pose[axis] = poses[1][axis];
+        }
+    }
+}
+"""
+
+_ADVANCE_WITH_INDUCTANCE = """
+/* Move the state by h [s]; force: what the currents do to each axis, divided by mass or inertia. */
+static void omnidyn_advance(const real u[], real h, real twist[3], real pose[3], real force[3], real *lost)
+{
+    real drive[3], next[3], next_force[3], poses[2][3], spin;
+    int axis, moving = 0;
+    Nodes nodes = {0};
+    Axes axes = {0};
+    drive_of(u, drive);
+    for (axis = 0; axis < 3; axis++) {
+        const many_rri end = step_by_segments(twist[axis], force[axis], drive[axis], h, law_of(LAWS, axis));
+        next[axis] = end.a0;
+        next_force[axis] = end.a1;
+        moving |= (twist[axis] != 0) | (next[axis] != 0) | (end.a2 > 0);
+        poses[0][axis] = pose[axis];
+    }
+    if (moving) {
+        spin = max_of(twist[2] < 0 ? -twist[2] : twist[2], next[2] < 0 ? -next[2] : next[2]);
+        const many_rrr way = travel(&nodes, twist, force, drive, h, spin, &axes, LAWS, RATES, GAUSS);
+        *lost = put_next_pose(poses, 0, way.a0, way.a1, way.a2, *lost);
+    }
+    for (axis = 0; axis < 3; axis++) {
+        twist[axis] = next[axis];
+        force[axis] = next_force[axis];
+        pose[axis] = moving ? poses[1][axis] : pose[axis];
+    }
+}
+"""

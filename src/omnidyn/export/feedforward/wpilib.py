@@ -1,0 +1,73 @@
+"""wpilib: the gains as constants for SimpleMotorFeedforward, in Java, C++ and Python.
+
+Each file holds kS, kV, kA of each axis, the share of the volts of each motor, and the gains of the wheels. The volts of
+motor i are the sum over the axes of PATTERN[axis][i] times what the feed-forward of that axis says.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from omnidyn.export.contract import Export
+from omnidyn.export.features import left_out, refuse
+from omnidyn.export.feedforward.gains import AXES, Row, gains, rows
+from omnidyn.export.feedforward.table import spread
+from omnidyn.export.spelling import line_comment, number
+from omnidyn.model.robot import Robot
+
+NOTES = (
+    "the volts of motor i: the sum over x, y, yaw of PATTERN[axis][i] x SimpleMotorFeedforward(kS, kV, kA) of the axis",
+    "the gains of a wheel hold on the axis that names them: a wheel carries another share of the robot on each",
+)
+HOW = "Volts of motor i: sum over x, y, yaw of PATTERN[axis][i] * feedforward(axis). Axes: x forward, y left, yaw ccw."
+
+
+def wpilib(robot: Robot) -> Export:
+    """kS, kV and kA with standard errors as constants in Java, C++ and Python."""
+    refuse("wpilib", robot)
+    missing = left_out("wpilib", robot)
+    about = [
+        f"{robot.name}: feed-forward gains by omnidyn, SI units, volts.",
+        HOW,
+        *(f"Not in it: {m}" for m in missing),
+    ]
+    every = [(_constant(row), row) for row in rows(robot)]
+    pattern = gains(robot).pattern
+    files = {
+        "RobotGains.java": _java(about, every, pattern), "robot_gains.h": _cpp(about, every, pattern),
+        "robot_gains.py": _python(about, every, pattern),
+    }  # fmt: skip
+    return Export("wpilib", robot.name, files, missing, NOTES, folder=True)
+
+
+def _constant(row: Row) -> str:
+    """X_KS, WHEEL2_ON_X_KV."""
+    return f"{row.place.replace('wheel ', 'wheel').replace(' ', '_')}_{row.name}".upper()
+
+
+def _java(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -> str:
+    lines = [f"  public static final double {name} = {number(row.value)}; // {spread(row)}" for name, row in every]
+    table = ",\n".join(f"    {{{', '.join(map(number, each))}}}" for each in pattern.tolist())
+    return (
+        line_comment(about, "//") + "public final class RobotGains {\n  private RobotGains() {}\n\n" + "\n".join(lines)
+        + f"\n\n  public static final double[][] PATTERN = {{\n{table}\n  }};\n}}\n"
+    )  # fmt: skip
+
+
+def _cpp(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -> str:
+    lines = [f"inline constexpr double {name} = {number(row.value)};  // {spread(row)}" for name, row in every]
+    table = ",\n".join(f"    {{{', '.join(map(number, each))}}}" for each in pattern.tolist())
+    count = pattern.shape[1]
+    return (
+        line_comment(about, "//") + "#pragma once\n\nnamespace robot_gains {\n" + "\n".join(lines)
+        + f"\n\ninline constexpr double PATTERN[{len(AXES)}][{count}] = {{\n{table}}};\n}}  // namespace robot_gains\n"
+    )  # fmt: skip
+
+
+def _python(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -> str:
+    lines = [f"{name} = {number(row.value)}  # {spread(row)}" for name, row in every]
+    table = ",\n".join(f"    ({', '.join(map(number, each))})" for each in pattern.tolist())
+    assert all(math.isfinite(row.value) for _, row in every)
+    return line_comment(about, "#") + "\n" + "\n".join(lines) + f"\n\nPATTERN = (\n{table},\n)\n"

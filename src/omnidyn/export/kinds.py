@@ -1,0 +1,54 @@
+"""Which kinds of export there are, and the file of each: it is imported when the kind is asked for."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+from omnidyn.errors import InputError
+
+if TYPE_CHECKING:
+    from omnidyn.export.contract import Export
+
+
+class Kind(NamedTuple):
+    """A kind of export: the module and function that make it, and what it is, in words."""
+
+    module: str
+    function: str
+    words: str
+
+
+KINDS = {
+    "json": Kind("omnidyn.export.robot_json", "robot_json", "the robot with what is known of its numbers"),
+    "c-model": Kind("omnidyn.export.code.c_model", "c_model", "the exact step as C99, for a microcontroller"),
+    "c-controller": Kind(
+        "omnidyn.export.code.c_controller", "c_controller", "a controller as C99, for a microcontroller"
+    ),
+    "fmu": Kind("omnidyn.export.code.fmu", "fmu", "an FMI 2 co-simulation FMU, from the same C"),
+    "wpilib": Kind("omnidyn.export.feedforward.wpilib", "wpilib", "kS, kV, kA as constants in Java, C++ and Python"),
+    "road-runner": Kind("omnidyn.export.feedforward.road_runner", "road_runner", "kS, kV, kA for Road Runner"),
+    "gains": Kind("omnidyn.export.feedforward.table", "gains_csv", "kS, kV, kA with standard errors as CSV"),
+    "mjcf": Kind("omnidyn.export.bodies.mjcf", "mjcf", "a MuJoCo model, motors in volts"),
+    "urdf": Kind("omnidyn.export.bodies.urdf", "urdf", "base and wheels as links and joints, for ROS"),
+    "sdf": Kind("omnidyn.export.bodies.sdf", "sdf", "base and wheels as links and joints, for Gazebo"),
+    "ros2-control": Kind("omnidyn.export.ros.ros2_control", "ros2_control", "omni_wheel_drive_controller for ROS 2"),
+    "ros2-node": Kind("omnidyn.export.ros.node", "ros2_node", "a node that drives by feed-forward, as text"),
+}
+
+
+def python_name(kind: str) -> str:
+    """The name of a kind in Python: c-model is omnidyn.export.c_model."""
+    return kind.replace("-", "_")
+
+
+def maker(kind: str) -> Callable[..., Export]:
+    """The function that makes a kind of export of a robot. Raises InputError for a kind that there is not."""
+    if kind not in KINDS:
+        close = difflib.get_close_matches(kind, KINDS, n=1)
+        remedy = f"did you mean {close[0]}?" if close else ""
+        raise InputError("no such kind of export", got=kind, expected=", ".join(KINDS), remedy=remedy, where="KIND")
+    known = KINDS[kind]
+    return getattr(importlib.import_module(known.module), known.function)

@@ -1,0 +1,154 @@
+"""The best candidates, and shapes in the place of the one that is fitted: fitted too, where a column tells too little.
+
+A column shows a small change near the fit. A limit that acts half of the time, a battery at half its voltage, or
+friction of another shape is none. So the fit goes on with each of them from where it ended, for some steps, and the
+best for more; the difference of what the two fits show is the column by which a candidate is judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import OmnidynError
+from omnidyn.findings.needs import is_exact
+from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.output_error.memory.whitened import OfRows
+from omnidyn.identification.output_error.prepare import (
+    EXACT,
+    IMPLICIT,
+    LOOP,
+    engine_kind,
+    expand_keys,
+    make_engine,
+    make_problem,
+    stays_exact,
+)
+from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
+from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
+from omnidyn.identification.question import Question
+from omnidyn.identification.structure.candidates import CHANGE, Candidate, Fitted, Trial
+from omnidyn.identification.structure.switches import Switch, switches, told
+from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
+
+BEST = 3  # candidates that are fitted beside the shapes
+CLOSE = 0.1  # squared standard errors to the best point that are enough to compare
+STEPS, MORE, GO_ON = 5, 10, 2  # of every fit; of the best of them; how many those are
+SHAPES = (DIRECTION, BODY_AXES, WHEELS)  # of friction, in the place of what is fitted
+
+
+@dataclass(frozen=True, eq=False)
+class _Refit:
+    """A fit with a candidate switched on, and how far it has come."""
+
+    candidate: Candidate
+    way: Switch
+    solver: Solver[Problem]
+    state: State
+
+    def gone_on(self, steps: int) -> _Refit:
+        """The same after some more steps."""
+        return replace(self, state=self.solver.minimise(self.state, steps).state)
+
+
+def refits(
+    solution: Solution, problem: Problem, parts: Sequence[Parts], ranked: Sequence[Remedy],
+    candidates: Sequence[Candidate],
+) -> dict[str, tuple[Candidate, list[Trial]]]:  # fmt: skip
+    """Key -> a candidate with what a fit with it shows. problem, parts: what was fitted, its rows at the best point.
+
+    ranked: by columns near the fit. Nothing of a speed loop, whose fit takes as long as all else.
+    """
+    if engine_kind(solution.solver.engine) == LOOP:
+        return {}
+    point, begun = solution.state.point, []
+    try:
+        off = _by_coarse_steps(problem, parts, point)
+    except OmnidynError:  # a nuisance that the implicit engine does not know
+        return {}
+    for candidate, remedy in _asked(ranked, candidates):
+        for way in switches(remedy, problem.robot, _question(problem), solution):
+            try:
+                begun.append(_begun(candidate, way, problem, solution, off).gone_on(STEPS))
+            except OmnidynError:  # no engine simulates it, or nothing is left to be fitted
+                continue
+    begun.sort(key=lambda each: each.state.objective)
+    found: dict[str, tuple[Candidate, list[Trial]]] = {}
+    for k, each in enumerate(begun):
+        trial = _trial(each.gone_on(MORE) if k < GO_ON else each, problem, parts, solution)
+        found.setdefault(each.candidate.key, (each.candidate, []))[1].append(trial)
+    return found
+
+
+def _asked(ranked: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, Remedy]]:
+    """What to fit: the best that a robot file or a fit can hold, and every shape."""
+    known = {one.key: one for one in candidates}
+    best = [each for each in ranked if each.offered and each.key != CHANGE][:BEST]
+    yield from ((known[each.key], each) for each in best)
+    for key in SHAPES:
+        if key in known and key not in {each.key for each in best}:
+            yield known[key], Remedy(key, known[key].told(0.0, 0.0), 0.0, 0.0)
+
+
+def _question(problem: Problem) -> Question:
+    """That of the fit itself, written out."""
+    return Question(free=problem.names[: problem.robot_count], nuisances=problem.names[problem.robot_count :])
+
+
+class _Coarse(OfRows):
+    """The implicit engine by a step a row, three times as fast, and what that was off by in the fit before."""
+
+    def __init__(self, problem: Problem, off: Sequence[FloatArray]):
+        self.problem, self._engine, self._off = problem, make_engine(IMPLICIT, problem, None), off
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """Residuals and slopes of every piece, see engines/sums.py."""
+        both = zip(self._engine.residuals(point), self._off, strict=True)
+        return [(residual + off, slopes, at) for (residual, slopes, at), off in both]
+
+    def on(self, problem: Problem) -> _Coarse:
+        """The same engine on other pieces, of which nothing is known."""
+        return _Coarse(problem, [np.zeros(1)] * len(problem.pieces))
+
+
+def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point) -> list[FloatArray]:
+    """What a step a row is off by in the rows of a fit. Of each piece (C, rows)."""
+    known = problem.robot_count  # a robot as it stands needs no slopes: what was driven to 0 has none
+    bare = replace(problem, robot=problem.robot_at(point.values), parameters=problem.parameters[known:], robot_count=0)
+    coarse = make_engine(IMPLICIT, bare, None).residuals(Point(point.values[known:], point.states))
+    return [np.nan_to_num(fine[0] - rough[0]) for fine, rough in zip(parts, coarse, strict=True)]
+
+
+def _begun(
+    candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Sequence[FloatArray]
+) -> _Refit:  # fmt: skip
+    """Where a fit with a candidate begins. Raises OmnidynError for what cannot be fitted."""
+    records = list({id(piece.record): piece.record for piece in problem.pieces}.values())
+    keys = expand_keys(way.question.free or (), way.robot)
+    kind = EXACT if is_exact(way.robot) and stays_exact(way.robot, keys) else IMPLICIT
+    made = make_problem(records, way.robot, replace(way.question, free=keys), kind)
+    made = replace(made, pieces=problem.pieces)
+    before, values = _values(problem, solution), np.array([p.value for p in made.parameters])
+    for k, name in enumerate(made.names[made.robot_count :], made.robot_count):
+        values[k] = before.get(name, values[k])  # numbers of the robot stand in it where they were found
+    engine = make_engine(kind, made) if kind == EXACT else _Coarse(made, off)
+    solver = Solver(made, engine, solution.solver.nu, CLOSE, counted=False)
+    return _Refit(candidate, way, solver, solver.state(Point(values, solution.state.point.states)))
+
+
+def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: Solution) -> Trial:
+    """What a fit shows less of the log than the fit before."""
+    made, point = refit.solver.problem, refit.state.point
+    after = refit.solver.engine.residuals(point)  # pyright: ignore[reportAttributeAccessIssue]  # see RowEngine
+    shown = [np.nan_to_num(a[0] - b[0])[:, :, None] for a, b in zip(parts, after, strict=True)]
+    before, value = _values(problem, solution), dict(zip(made.names, point.values.tolist(), strict=True))
+    changes = {name: (before[name], value[name]) for name in problem.names[: problem.robot_count] if name in value}
+    numbers = max(len(made.parameters) - len(problem.parameters) + refit.way.numbers, 1)
+    return Trial(shown, fitted=Fitted(told(refit.way.words, before, value), numbers, changes))
+
+
+def _values(problem: Problem, solution: Solution) -> dict[str, float]:
+    return dict(zip(problem.names, solution.state.point.values.tolist(), strict=True))

@@ -1,0 +1,45 @@
+"""Which files of other tools can be read as a robot, and who reads each; imported when it is asked for."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from typing import NamedTuple
+
+from omnidyn.errors import InputError
+from omnidyn.files import read_text
+from omnidyn.model.robot import Robot
+
+
+class Reader(NamedTuple):
+    """Who reads a kind of file: module and function. completes: it needs another robot for what the file lacks."""
+
+    module: str
+    function: str
+    completes: bool
+
+
+READERS = {
+    "json": Reader("omnidyn.interop.robot_json", "robot_of_json", False),
+    "urdf": Reader("omnidyn.interop.urdf", "robot_of_urdf", True),
+    "mjcf": Reader("omnidyn.interop.mjcf", "robot_of_mjcf", True),
+}
+MAX_BYTES = 8 * 2**20
+
+
+def import_robot(kind: str, path: str | os.PathLike, like: Robot | None = None) -> Robot:
+    """The robot in a file of another tool; origins of what was read are "imported".
+
+    like: gives what the file does not say, motors above all; without it that is guessed, and marked as a guess.
+    Raises InputError for a kind that is not read, and for a file that cannot be used.
+    """
+    if kind not in READERS:
+        raise InputError("no such kind of import", got=kind, expected=", ".join(READERS), where="KIND")
+    reader = READERS[kind]
+    if like is not None and not reader.completes:
+        raise InputError(
+            f"{kind} holds a whole robot", got="`like`", expected="nothing to complete", remedy="leave it out"
+        )
+    read = getattr(importlib.import_module(reader.module), reader.function)
+    text = read_text(path, MAX_BYTES)
+    return read(text, os.fspath(path), like) if reader.completes else read(text, os.fspath(path))

@@ -1,0 +1,118 @@
+"""A robot from its parts, as files of links and joints tell them: masses, inertias, wheels on axles.
+
+The body is all there is: mass of all parts, inertia about the vertical through their centre. A wheel stands at the
+azimuth of its place; its axle must point to the centre, as that of an omni wheel does: the angle of rollers is in no
+such file. Motors and friction of the floor are not in them either: they come from another robot, or are guessed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import InputError
+from omnidyn.model.first_guess import first_guess, like
+from omnidyn.model.robot import IMPORTED, Prior, Robot
+from omnidyn.model.value import to_list
+from omnidyn.model.wheels import MAX_WHEELS, MIN_WHEELS, Wheels
+
+RADIAL = math.radians(1.0)  # by which an axle may miss the centre
+NEAR = 1e-9  # relative: numbers that differ by less are one number
+LONGEST_NAMES = 150
+
+
+class Lump(NamedTuple):
+    """A rigid part: mass [kg], centre [m], shape (3,), inertia about its centre in the frame of the robot, (3, 3)."""
+
+    mass: float
+    centre: FloatArray
+    inertia: FloatArray
+
+
+class Axle(NamedTuple):
+    """A wheel: its name, centre and axis in the frame of the robot, radius [m], inertia about the axis [kg m^2]."""
+
+    name: str
+    centre: FloatArray
+    axis: FloatArray
+    radius: float
+    inertia: float
+
+
+def whole(lumps: Sequence[Lump]) -> tuple[float, float, FloatArray]:
+    """(mass [kg], inertia about the vertical through the centre of mass [kg m^2], that centre)."""
+    mass = sum(lump.mass for lump in lumps)
+    if not mass > 0.0:
+        raise InputError("nothing in it has a mass", got=f"{len(lumps)} parts", expected="a robot with inertial parts")
+    centre = sum((lump.mass * lump.centre for lump in lumps), np.zeros(3)) / mass
+    turning = 0.0
+    for lump in lumps:
+        away = lump.centre - centre
+        turning += float(lump.inertia[2, 2]) + lump.mass * float(away[0] ** 2 + away[1] ** 2)
+    return float(mass), turning, centre
+
+
+def robot_of_parts(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, other: Robot | None) -> Robot:
+    """The robot of these parts; what they do not say comes from another robot, or is guessed. Raises InputError."""
+    try:
+        return _robot(name, lumps, axles, where, other)
+    except InputError as error:
+        raise error.at(where) from None
+
+
+def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, other: Robot | None) -> Robot:
+    mass, turning, centre = whole(lumps)
+    wheels = _wheels(axles, centre)
+    made = first_guess(name, wheels, mass) if other is None else like(other, name, wheels, mass)
+    if turning > 0.0:
+        made = made.replace(body=made.body.replace(inertia=turning))
+    told = {
+        "body.mass_kg", "wheels.azimuth_deg", "wheels.robot_radius_m", "wheels.wheel_radius_m",
+        *(["body.inertia_kg_m2"] if turning > 0.0 else []), *(["wheels.inertia_kg_m2"] if wheels.wheel_inertia else []),
+    }  # fmt: skip
+    kept = {key: prior for key, prior in made.priors.items() if key.partition("[")[0] not in told}
+    origin = Prior(source=f"imported from {where}"[:300], origin=IMPORTED)
+    joints = ", ".join(axle.name for axle in axles)[:LONGEST_NAMES]
+    return made.replace(
+        source=f"imported from {where}; wheels: {joints}"[:400], priors=kept | dict.fromkeys(told, origin)
+    )
+
+
+def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
+    """Where the wheels stand, seen from the centre of mass."""
+    if not MIN_WHEELS <= len(axles) <= MAX_WHEELS:
+        raise InputError(
+            "cannot tell the wheels", got=f"{len(axles)} found: {', '.join(axle.name for axle in axles) or 'none'}",
+            expected=f"{MIN_WHEELS} to {MAX_WHEELS} parts whose name has wheel in it, on joints that turn about a "
+            "horizontal axis", remedy="name them so in the file, or begin with omnidyn init",
+        )  # fmt: skip
+    azimuth, far = [], []
+    for axle in axles:
+        away = axle.centre - centre
+        angle, turned = math.atan2(away[1], away[0]), math.atan2(axle.axis[1], axle.axis[0])
+        off = abs(math.remainder(turned - angle, math.pi))
+        if off > RADIAL:
+            raise InputError(
+                "an axle does not point to the centre", got=f"{axle.name} is off by {math.degrees(off):.3g} degrees",
+                expected="omni wheels",
+                remedy="for mecanum wheels begin with `omnidyn init`, with `mecanum`",
+            )  # fmt: skip
+        azimuth.append(math.degrees(angle))
+        far.append(math.hypot(away[0], away[1]))
+    return Wheels(
+        azimuth_deg=tuple(float(f"{each:.12g}") for each in azimuth), robot_radius=_one_or_all(far),
+        wheel_radius=_one_or_all([axle.radius for axle in axles]),
+        wheel_inertia=_one_or_all([axle.inertia for axle in axles]),
+    )  # fmt: skip
+
+
+def _one_or_all(values: Sequence[float]) -> float | tuple[float, ...]:
+    """One number where all are the same, else one for each wheel."""
+    array = np.asarray(values, dtype=float)
+    if np.ptp(array) <= NEAR * np.abs(array).max():
+        return float(array[0])
+    return tuple(to_list(array))

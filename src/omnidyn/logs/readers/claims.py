@@ -1,0 +1,78 @@
+"""Which topic gives a component, where several could: the one with the first claim, or none, and then that is said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.logs.readers.recording import Track
+from omnidyn.logs.table.table import Said
+
+USUAL_NAMES = ("odom", "cmd_vel", "joint_states", "battery_state", "data", "pose", "tf")
+
+
+class Out(NamedTuple):
+    """A column made of a topic. component: what it is; "" for nothing by itself; None where its name says it."""
+
+    name: str
+    values: FloatArray
+    unit: str = ""
+    component: str | None = None
+
+
+class Claim(NamedTuple):
+    """The columns of a topic, and its stamps [ns]. rank: of what gives the same component, the least is taken."""
+
+    topic: str
+    stamps: IntArray
+    columns: Sequence[Out]
+    rank: int = 0
+
+
+def tracks_of(claims: Sequence[Claim], notes: list[str]) -> Iterator[Track]:
+    """The tracks, each component given to one topic; what was passed over goes to `notes`."""
+    wanted: dict[str, list[Claim]] = {}
+    for claim in claims:
+        for out in claim.columns:
+            if out.component:
+                wanted.setdefault(out.component, []).append(claim)
+    owners = {component: _owner(each) for component, each in wanted.items()}
+    _say(wanted, owners, notes)
+    for claim in claims:
+        says = {
+            out.name: _said(out.component, claim, wanted, owners) for out in claim.columns if out.component is not None
+        }
+        units = {out.name: out.unit for out in claim.columns if out.unit}
+        yield Track(claim.topic, claim.stamps, {out.name: out.values for out in claim.columns}, units, says)
+
+
+def _said(component: str, claim: Claim, wanted: dict[str, list[Claim]], owners: dict[str, str | None]) -> Said:
+    owner = owners.get(component)
+    if component and owner is None:
+        others = ", ".join(sorted(each.topic for each in wanted[component])[:4])
+        return Said(component, f"and so do those of others ({others})")
+    return Said(component if owner == claim.topic else "")
+
+
+def _owner(claims: Sequence[Claim]) -> str | None:
+    """The topic that gives a component: of the least rank, and of those the one with a usual name; None where two."""
+    least = min(claim.rank for claim in claims)
+    topics = [claim.topic for claim in claims if claim.rank == least]
+    if len(topics) > 1:
+        topics = [topic for topic in topics if topic.rpartition("/")[2] in USUAL_NAMES] or topics
+    return topics[0] if len(topics) == 1 else None
+
+
+def _say(wanted: dict[str, list[Claim]], owners: dict[str, str | None], notes: list[str]) -> None:
+    """Which topics give the same as another, and are not taken."""
+    passed: dict[tuple[str, str], list[str]] = {}
+    for component, claims in wanted.items():
+        owner = owners[component]
+        for claim in claims:
+            if owner is not None and claim.topic != owner:
+                passed.setdefault((claim.topic, owner), []).append(component)
+    notes += [
+        f"{', '.join(components)} of {topic} are not taken: {owner} gives them (`column` takes others)"
+        for (topic, owner), components in passed.items()
+    ]

@@ -1,0 +1,184 @@
+"""Recording: what a file holds whose topics have clocks of their own; and the Tables that the contract asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.errors import InputError, shortened
+from omnidyn.logs.table.header import MAX_COLUMNS
+from omnidyn.logs.table.rows import Column, refuse_infinite
+from omnidyn.logs.table.table import MAX_CELLS, Said, Table
+
+TIME_COLUMN = "t_s"
+EPOCH_NS = 10**17  # later counts from 1970: the start is taken off before it becomes a float, so that no digit is lost
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a file, or a column of a table. count: of its messages, or of cells that are not blank.
+
+    rate: [Hz] by the median step, 0 where it has none. longest_gap: [s]. read: whether its numbers are read. why: what
+    stands against it, in words.
+    """
+
+    name: str
+    type: str
+    count: int
+    rate: float = 0.0
+    longest_gap: float = 0.0
+    read: bool = False
+    why: str = ""
+
+
+@dataclass
+class Track:
+    """The numbers of one topic. stamps [ns], shape (n,), as recorded. columns: name -> shape (n,).
+
+    says: column -> what the format itself says it is. units: column -> unit.
+    """
+
+    topic: str
+    stamps: IntArray
+    columns: dict[str, FloatArray]
+    units: dict[str, str] = field(default_factory=dict)
+    says: dict[str, Said] = field(default_factory=dict)
+
+    def in_order(self) -> Track:
+        """The same by stamps; those of one stamp in their order."""
+        if (self.stamps[1:] >= self.stamps[:-1]).all():
+            return self
+        order = np.argsort(self.stamps, kind="stable")
+        columns = {name: values[order] for name, values in self.columns.items()}
+        return Track(self.topic, self.stamps[order], columns, self.units, self.says)
+
+
+@dataclass
+class Recording:
+    """What was read of a file. topics: all there are. salvaged: how many messages, where the file is cut short."""
+
+    tracks: list[Track]
+    topics: list[Topic]
+    source: str
+    sha256: str = ""
+    notes: list[str] = field(default_factory=list)
+    salvaged: int | None = None
+
+    def tables(self, rows: int) -> Iterator[Table]:
+        """Tables in the order of time: a row per stamp, blank in the columns of topics that have nothing there.
+
+        Raises InputError where no topic holds numbers.
+        """
+        tracks = [track.in_order() for track in self.tracks if len(track.stamps) and track.columns]
+        names = (TIME_COLUMN, *(name for track in tracks for name in track.columns))
+        if not tracks:
+            raise self._nothing()
+        if len(names) > MAX_COLUMNS:
+            raise InputError(
+                "too many columns", got=len(names), expected=f"at most {MAX_COLUMNS}", where=self.source,
+                remedy="record fewer topics, or cut it with `ros2 bag convert`",
+            )  # fmt: skip
+        units = {TIME_COLUMN: "s"} | {name: unit for track in tracks for name, unit in track.units.items()}
+        says = {TIME_COLUMN: Said("t")} | {name: said for track in tracks for name, said in track.says.items()}
+        first, start = min(int(track.stamps[0]) for track in tracks), 0
+        notes = tuple(self.notes)
+        if first >= EPOCH_NS:
+            start = first
+            moment = np.datetime64(start, "ns").astype("datetime64[ms]")
+            notes = (*notes, f"time begins at 0 with the first stamp, {moment} UTC")
+        rest = (units, self.source)
+        own, done = len(tracks) > 1, 0
+        for stamps, columns in _blocks(tracks, max(1, min(rows, MAX_CELLS // len(names)))):
+            lines = np.arange(done + 1, done + 1 + len(stamps))
+            done += len(stamps)
+            block: dict[str, Column] = {TIME_COLUMN: (stamps - start) / 1e9, **columns}
+            refuse_infinite(block, lines, self.source)
+            yield Table(names, block, lines, *rest, "", notes, says=says, own_clocks=own)
+        yield Table(names, {}, np.zeros(0, dtype=np.int64), *rest, self.sha256, notes, says=says, own_clocks=own)
+
+    def _nothing(self) -> InputError:
+        told = [f"{each.name} ({each.type}, {each.count})" for each in self.topics if each.count]
+        return InputError(
+            "no topic holds numbers that can be read", got=shortened(", ".join(told), 400) or "no messages",
+            expected="JointState, Odometry, Twist, BatteryState, Imu or messages with plain numbers",
+            remedy="record the topics of wheels and commands too", where=self.source,
+        )  # fmt: skip
+
+
+def _repeats(stamps: IntArray) -> IntArray:
+    """How many before it have the same stamp. stamps: in order."""
+    new = np.append(True, np.diff(stamps) != 0)
+    if new.all():
+        return np.zeros(len(stamps), dtype=np.int64)
+    rows = np.arange(len(stamps))
+    return rows - np.maximum.accumulate(np.where(new, rows, 0))
+
+
+def _stamps(tracks: Sequence[Track]) -> IntArray:
+    """The stamps of all rows, in order: each as often as the topic that repeats it most."""
+    stamps = np.unique(np.concatenate([track.stamps for track in tracks]))
+    counts = np.ones(len(stamps), dtype=np.int64)
+    for track in tracks:
+        again = _repeats(track.stamps)
+        if again.any():
+            np.maximum.at(counts, np.searchsorted(stamps, track.stamps), again + 1)
+    return np.repeat(stamps, counts)
+
+
+def _blocks(tracks: Sequence[Track], most: int) -> Iterator[tuple[IntArray, dict[str, FloatArray]]]:
+    """(stamps [ns] of at most `most` rows, the columns in them), block by block; each topic's stamps are in order.
+
+    A block is a stretch of time, so that no more than a block is ever put together.
+    """
+    done = [0] * len(tracks)
+    while any(at < len(track.stamps) for at, track in zip(done, tracks, strict=True)):
+        until = _until(tracks, done, most)
+        ends = [int(np.searchsorted(track.stamps, until, side="right")) for track in tracks]
+        parts = [
+            Track(track.topic, track.stamps[a:b], {name: values[a:b] for name, values in track.columns.items()})
+            for a, b, track in zip(done, ends, tracks, strict=True)
+        ]
+        done, stamps = ends, _stamps(parts)
+        rows = [np.searchsorted(stamps, part.stamps) + _repeats(part.stamps) for part in parts]
+        for first in range(0, len(stamps), most):  # one stamp may have more messages than a block has rows
+            columns: dict[str, FloatArray] = {}
+            for part, mine in zip(parts, rows, strict=True):
+                columns |= _placed(part, mine, first, min(most, len(stamps) - first))
+            yield stamps[first : first + most], columns
+
+
+def _until(tracks: Sequence[Track], done: Sequence[int], most: int) -> int:
+    """The latest stamp [ns] up to which all topics have at most `most` messages more; the next one at least."""
+    ahead = [track.stamps[at : at + most + 1] for at, track in zip(done, tracks, strict=True)]
+    ahead = [each for each in ahead if len(each)]
+    low, high = min(int(each[0]) for each in ahead), max(int(each[-1]) for each in ahead)
+    while low < high:
+        middle = (low + high + 1) // 2
+        count = sum(int(np.searchsorted(each, middle, side="right")) for each in ahead)
+        low, high = (middle, high) if count <= most else (low, middle - 1)
+    return low
+
+
+def _placed(track: Track, rows: IntArray, first: int, count: int) -> Mapping[str, FloatArray]:
+    """The columns of a track in rows first .. first + count, NaN where it has no message. rows: of its messages."""
+    a, b = np.searchsorted(rows, [first, first + count])
+    placed = {}
+    for name, values in track.columns.items():
+        column = np.full(count, np.nan)
+        column[rows[a:b] - first] = values[a:b]
+        placed[name] = column
+    return placed
+
+
+def topic_of(name: str, kind: str, stamps: IntArray, read: bool = False, why: str = "") -> Topic:
+    """A Topic with its rate and gaps. stamps [ns]."""
+    steps = np.diff(stamps)
+    if (steps < 0).any():
+        steps = np.diff(np.sort(stamps))
+    longest = int(steps.max(initial=0)) / 1e9
+    positive = steps if len(steps) and steps.min() > 0 else steps[steps > 0]
+    rate = 1e9 / float(np.median(positive, overwrite_input=True)) if positive.size else 0.0
+    return Topic(name, kind, len(stamps), rate, longest, read, why)

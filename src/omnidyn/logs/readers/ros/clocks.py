@@ -1,0 +1,178 @@
+"""Which times of a bag can be trusted: the stamps in headers, where there are any, else when a message was received.
+
+A recorder's clock may be set while it records; a sensor may count from its own start; both show in the difference
+between the two times of a message. What was found is said, and mended where one way is right.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, IntArray
+from omnidyn.errors import shortened
+
+SECOND = 10**9
+SET_BACK, SET_FORWARD = SECOND // 20, 86_400 * SECOND  # a step of the recorder's clock beyond is no recording
+SEAM = SECOND  # what is put where the true time is not known: enough for a gap
+OTHER_CLOCK = SECOND  # two times of one message differ by less, where they are of one clock
+JUMP = SECOND // 2  # of a header against the time of reception
+OWN = "/omnidyn/"  # topics that are written with the time of the row as the time of reception
+YEAR_NS = 365 * 86_400 * SECOND
+
+
+@dataclass(frozen=True)
+class Clocked:
+    """The two times of the messages of a topic [ns], shape (n,). order: place in the file. header: 0 where unset."""
+
+    topic: str
+    receive: IntArray
+    order: IntArray
+    header: IntArray
+
+    @property
+    def stamped(self) -> BoolArray:
+        return self.header != 0
+
+    @property
+    def offset(self) -> int:
+        """How much the stamps lie behind the times of reception, as a median; 0 without stamps."""
+        mine = self.stamped
+        return int(np.median((self.header - self.receive)[mine])) if mine.any() else 0
+
+
+def trusted(topics: Sequence[Clocked]) -> tuple[dict[str, IntArray], list[str]]:
+    """Stamps [ns] for each topic, and what was found, in words."""
+    notes: list[str] = []
+    if not topics:
+        return {}, notes
+    topics = [_smoothed(each, notes) for each in _sewn(topics, notes)]
+    stamped = [each for each in topics if each.stamped.any()]
+    bare = [each.topic for each in topics if not each.stamped.any() and OWN not in each.topic]
+    if bare and stamped:
+        told = shortened(", ".join(bare), 200)
+        notes.append(f"{told}: no stamps, so the times of reception are taken, which lag behind by the way to it")
+    if not stamped and bare:
+        notes.append("no message has a stamp of its own: the times of reception are taken")
+    if not stamped:
+        return {each.topic: _from_1970(each.receive, notes) for each in topics}, list(dict.fromkeys(notes))
+    reference = _reference(stamped)
+    found = {}
+    for each in topics:
+        if not each.stamped.any():
+            found[each.topic] = _as_reference(each.receive, reference)
+            continue
+        apart = each.offset - reference.offset
+        shift = 0
+        if abs(apart) > OTHER_CLOCK:
+            behind = (each.header - each.receive)[each.stamped]
+            shift = int(behind.max()) - (reference.offset if abs(reference.offset) > OTHER_CLOCK else 0)
+            notes.append(
+                f"{each.topic} is stamped by another clock, {apart / 1e9:.6g} s from that of {reference.topic}: moved "
+                "by as much as its fastest message shows; what all of them take is not known"
+            )
+        late = each.receive + (each.offset if each.stamped.any() else 0)
+        found[each.topic] = np.where(each.stamped, each.header, late) - shift
+        bare = ~each.stamped & (each.receive != 0)
+        if bare.any():
+            notes.append(f"{each.topic}: {int(bare.sum())} messages have no stamp: when received is taken")
+    if abs(reference.offset) > OTHER_CLOCK:
+        notes.append(
+            f"stamps lie {reference.offset / 1e9:.6g} s from the times of reception: another clock, or a recording "
+            "that was played again; topics without stamps were moved by as much"
+        )
+    _from_1970(reference.header, notes)
+    return found, list(dict.fromkeys(notes))
+
+
+def _reference(stamped: Sequence[Clocked]) -> Clocked:
+    """The topic whose clock counts: one that agrees with the recorder's, else the busiest."""
+    near = [each for each in stamped if abs(each.offset) <= OTHER_CLOCK]
+    return max(near or stamped, key=lambda each: len(each.receive))
+
+
+def _as_reference(receive: IntArray, reference: Clocked) -> IntArray:
+    """Times of reception on the clock of the stamps: as they are where the two agree, else as those of `reference`."""
+    if abs(reference.offset) <= OTHER_CLOCK:
+        return receive
+    mine = reference.stamped
+    known, stamps = reference.receive[mine], reference.header[mine]
+    order = np.argsort(known, kind="stable")
+    offsets = (stamps - known)[order].astype(float)
+    return receive + np.interp(receive.astype(float), known[order].astype(float), offsets).astype(np.int64)
+
+
+def _sewn(topics: Sequence[Clocked], notes: list[str]) -> list[Clocked]:
+    """The topics with a second in place of each step by which the recorder's clock was set."""
+    if not any(_has_step(each.receive) for each in topics):
+        return list(topics)
+    order = np.concatenate([each.order for each in topics])
+    receive = np.concatenate([each.receive for each in topics])[np.argsort(order)]
+    order = np.sort(order)
+    steps = np.diff(receive)
+    cuts = [k for k in np.flatnonzero((steps < -SET_BACK) | (steps > SET_FORWARD)).tolist() if _is_set(receive, k)]
+    for k in reversed(cuts):
+        step = int(receive[k + 1] - receive[k])
+        way = "back" if step < 0 else "forward"
+        notes.append(
+            f"the clock of the recorder was set {way} by {abs(step) / 1e9:.6g} s: what follows is taken to begin "
+            f"{SEAM / 1e9:g} s later, behind a gap"
+        )
+        topics = [_moved(each, int(order[k]), int(receive[k]), step) for each in topics]
+    return list(topics)
+
+
+def _has_step(receive: IntArray) -> bool:
+    steps = np.diff(receive)
+    return bool(len(steps)) and bool(steps.min() < -SET_BACK or steps.max() > SET_FORWARD)
+
+
+def _is_set(receive: IntArray, k: int) -> bool:
+    """Whether the messages about a step agree in it, and not only one of them lies apart."""
+    before, after = np.median(receive[max(0, k - 4) : k + 1]), np.median(receive[k + 1 : k + 6])
+    step = float(after - before)
+    return step < -SET_BACK or step > SET_FORWARD
+
+
+def _moved(topic: Clocked, last: int, before: int, step: int) -> Clocked:
+    """What stands behind a place in the file, moved: the first of it then comes a second after what was before."""
+    later = topic.order > last
+    shift = np.where(later, SEAM - step, 0)
+    # A stamp goes with the clock that made it: the one before it was set, or the one after.
+    old, new = np.abs(topic.header - before), np.abs(topic.header - before - step)
+    mine = topic.stamped & (np.minimum(old, new) < abs(step) / 2) & (new < old)
+    return replace(topic, receive=topic.receive + shift, header=topic.header + np.where(mine, SEAM - step, 0))
+
+
+def _smoothed(topic: Clocked, notes: list[str]) -> Clocked:
+    """A topic whose stamps jump, while the times of reception do not: its clock was set."""
+    mine = np.flatnonzero(topic.stamped)
+    offset = (topic.header - topic.receive)[mine]
+    jumps = np.flatnonzero(np.abs(np.diff(offset)) > JUMP)
+    jumps = np.array([k for k in jumps.tolist() if _holds(offset, k)], dtype=np.int64)
+    if not jumps.size or jumps.size > 20:
+        return topic
+    edges = [0, *(jumps + 1).tolist(), len(offset)]
+    header = topic.header.copy()
+    last = int(np.median(offset[edges[-2] :]))
+    for a, b in itertools.pairwise(edges):
+        header[mine[a:b]] += last - int(np.median(offset[a:b]))
+    largest = int(np.abs(np.diff(offset)).max())
+    notes.append(
+        f"{topic.topic}: its clock was set {jumps.size} time{'s' * (jumps.size > 1)}, by up to {largest / 1e9:.6g} s; "
+        "what it stamped before was moved, as the times of reception say"
+    )
+    return replace(topic, header=header)
+
+
+def _holds(offset: IntArray, k: int) -> bool:
+    return bool(abs(np.median(offset[k + 1 : k + 6]) - np.median(offset[max(0, k - 4) : k + 1])) > JUMP)
+
+
+def _from_1970(stamps: IntArray, notes: list[str]) -> IntArray:
+    if len(stamps) and SECOND < stamps[0] < YEAR_NS:
+        notes.append("stamps begin in 1970: simulated time, or a clock that was never set; only differences count")
+    return stamps

@@ -1,0 +1,275 @@
+"""Messages of a bag, topic by topic, to tracks: only the numbers that are needed are kept."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import InputError, printable
+from omnidyn.files import too_large
+from omnidyn.logs.readers.claims import Claim, Out, tracks_of
+from omnidyn.logs.readers.recording import Topic, Track, topic_of
+from omnidyn.logs.readers.ros.clocks import Clocked, trusted
+from omnidyn.logs.readers.ros.definitions import USUAL, BadDefinitionError, Types, parse_definition, plain
+from omnidyn.logs.readers.ros.layout import BadMessageError, Layout, column, layout_of
+from omnidyn.logs.readers.ros.usual import NANOSECONDS, SECONDS, Rule, rank_of, rule_of
+from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
+
+BATCH_BYTES = 2**19
+MAX_MESSAGE = 2**16  # bytes of a message whose type no rule knows
+MAX_TOPICS = 5000
+TRIES = 50  # messages of a topic of which none can be read before it is given up
+LAYOUTS = 8  # kept at once
+
+
+class Connection(NamedTuple):
+    """Where messages come from: topic, type, definition ("" where the bag has none). form: "cdr", "ros1", or what is
+    not read."""
+
+    topic: str
+    type: str
+    definition: str = ""
+    form: str = "cdr"
+
+
+class Message(NamedTuple):
+    """A message as recorded: time of reception [ns], and its bytes."""
+
+    connection: Connection
+    receive: int
+    data: bytes
+
+
+class TopicReader:
+    """The messages of one topic, one after the other."""
+
+    def __init__(self, connection: Connection):
+        self.connection, self.why = connection, ""
+        self.receive, self.order = array("q"), array("q")
+        self.left_out = array("q")  # which messages were not understood
+        self.kept = self.taken = 0  # how many were, and how many of these stand in `numbers`
+        self.bad, self.last_fault = 0, ""
+        self.rule: Rule | None = rule_of(connection.type)
+        self.types: Types = {}
+        self.layouts: list[tuple[Layout, dict[str, str]]] = []
+        self.waiting: dict[int, tuple[Layout, dict[str, str], list[int], list[bytes]]] = {}
+        self.bytes_waiting = 0
+        self.numbers: dict[str, array] = {}  # of all messages kept; arrays that grow in place: a long bag is held once
+        self.stamps = array("q")
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """What is known before the first message: whether this topic can be read."""
+        kind = plain(self.connection.type)
+        if self.rule is None:
+            self.why = "pictures, scans and maps are not read"
+        elif self.connection.form not in ("cdr", "ros1"):
+            self.why = f"messages in {printable(self.connection.form)[:40]} are not read"
+        elif self.connection.definition:
+            try:
+                self.types = parse_definition(kind, self.connection.definition)
+            except BadDefinitionError as error:
+                self.why = f"its definition cannot be read: {printable(str(error))}"
+        elif kind in USUAL:
+            self.types = USUAL
+        else:
+            self.why = "the file holds no definition of its type"
+
+    @property
+    def reads(self) -> bool:
+        return not self.why
+
+    def add(self, receive: int, order: int, data: bytes) -> None:
+        """The next message."""
+        number = len(self.receive)
+        self.receive.append(receive)
+        self.order.append(order)
+        if self.why:
+            return
+        found = self._layout(data)
+        if found is None or not found[1]:
+            self.left_out.append(number)
+            return
+        layout, picks = found
+        waiting = self.waiting.get(id(layout))
+        if waiting is None:
+            waiting = self.waiting[id(layout)] = (layout, picks, [], [])
+        waiting[2].append(self.kept - self.taken)
+        waiting[3].append(data)
+        self.kept += 1
+        self.bytes_waiting += len(data)
+        if self.bytes_waiting > BATCH_BYTES:
+            self.flush()
+
+    def _layout(self, data: bytes) -> tuple[Layout, dict[str, str]] | None:
+        for known in reversed(self.layouts):
+            if known[0].fits(data):
+                return known
+        try:
+            if len(data) > MAX_MESSAGE and self.rule is not None and self.rule.rank == 9:
+                raise BadMessageError(f"{len(data)} bytes are no plain numbers")
+            layout = layout_of(self.types, plain(self.connection.type), data, self.connection.form == "ros1")
+        except BadMessageError as error:
+            self.bad, self.last_fault = self.bad + 1, str(error)
+            if self.bad >= TRIES and not self.kept:
+                self.why = f"its messages cannot be read: {printable(self.last_fault)}"
+            return None
+        assert self.rule is not None
+        picks = dict(self.rule.picks(layout))
+        found = layout, picks if picks.keys() - {SECONDS, NANOSECONDS} else {}
+        self.layouts = [*self.layouts[1 - LAYOUTS :], found]
+        return found
+
+    def flush(self) -> None:
+        """Turn the waiting messages into numbers, in the order in which they came; NaN where one has no such number."""
+        count = self.kept - self.taken
+        parts: dict[str, FloatArray] = {}
+        stamps = np.zeros(count, dtype=np.int64)
+        for layout, picks, rows, waiting in self.waiting.values():
+            block = np.frombuffer(b"".join(waiting), dtype=np.uint8).reshape(len(waiting), layout.size)
+            for key, path in picks.items():
+                if key not in (SECONDS, NANOSECONDS):
+                    parts.setdefault(key, np.full(count, np.nan))[rows] = column(block, layout.numbers[path])
+            if SECONDS in picks:
+                seconds = column(block, layout.numbers[picks[SECONDS]]).astype(np.int64)
+                rest = column(block, layout.numbers[picks[NANOSECONDS]]).astype(np.int64)
+                stamps[rows] = seconds * 10**9 + rest
+        for key in parts:
+            if key not in self.numbers:
+                self.numbers[key] = array("d", np.full(self.taken, np.nan).tobytes())
+        for key, numbers in self.numbers.items():
+            numbers.frombytes((parts[key] if key in parts else np.full(count, np.nan)).data.cast("B"))
+        self.stamps.frombytes(stamps.data.cast("B"))
+        self.taken = self.kept
+        self.waiting.clear()
+        self.bytes_waiting = 0
+
+    @property
+    def held(self) -> int:
+        """Bytes of its numbers and times."""
+        return 8 * (len(self.numbers) * self.taken + self.taken + 2 * len(self.receive))
+
+    def clocked(self) -> Clocked:
+        """When its messages were received, and when they say they were made: 0 where they do not. Lets its own go."""
+        self.flush()
+        nothing = np.zeros(0, dtype=np.int64)
+        if not self.kept:
+            return Clocked(self.connection.topic, nothing, nothing, nothing)
+        receive, order, stamps = (
+            np.frombuffer(each, dtype=np.int64) for each in (self.receive, self.order, self.stamps)
+        )
+        if self.left_out:
+            receive, order = (np.delete(each, self.left_out) for each in (receive, order))
+        self.order, self.stamps = array("q"), array("q")
+        return Clocked(self.connection.topic, receive, order, stamps)
+
+    def columns(self, source: str) -> tuple[list[Out], list[str]]:
+        """Its columns, over the messages that were understood, and notes. Raises InputError for an infinite number."""
+        assert self.rule is not None
+        numbers = {key: np.frombuffer(each, dtype=float) for key, each in self.numbers.items()}
+        self.numbers = {}
+        found, notes = [], []
+        for out in self.rule.columns(self.connection.topic, numbers):
+            infinite = np.isinf(out.values)
+            if infinite.any() and out.component:
+                where = f"{source}, {out.name}, message {self._place(int(np.argmax(infinite))) + 1}"
+                raise InputError(
+                    "not a finite number", got="inf", expected="a finite number, or NaN where missing",
+                    remedy="mend what records it", where=where,
+                )  # fmt: skip
+            if infinite.any():
+                notes.append(f"{out.name}: {int(infinite.sum())} infinite numbers are taken as missing")
+                out = out._replace(values=np.where(infinite, np.nan, out.values))
+            if not np.isnan(out.values).all():
+                found.append(out)
+        if self.bad:
+            notes.append(
+                f"{self.connection.topic}: {self.bad} of {len(self.receive)} messages cannot be read and were left "
+                f"out: {printable(self.last_fault)}"
+            )
+        return found, notes
+
+    def _place(self, kept: int) -> int:
+        """The place among all messages, from 0, of one of those that were kept."""
+        return int(np.delete(np.arange(len(self.receive)), self.left_out)[kept])
+
+
+class Bag:
+    """All topics of a bag, filled message by message; and what becomes of them."""
+
+    def __init__(self, source: str, max_bytes: int):
+        self.source, self.max_bytes = source, max_bytes
+        self.readers: dict[tuple[str, str], TopicReader] = {}
+        self.count = 0
+        self._held_at = 10_000
+
+    def reader(self, connection: Connection) -> TopicReader:
+        """The reader of a connection; those of one topic and type are one. Raises InputError for too many."""
+        key = (connection.topic, connection.type)
+        if key not in self.readers:
+            if len(self.readers) >= MAX_TOPICS:
+                raise InputError(
+                    "too many topics", got=f"more than {MAX_TOPICS}", expected=f"at most {MAX_TOPICS}",
+                    where=self.source,
+                )  # fmt: skip
+            self.readers[key] = TopicReader(connection)
+        return self.readers[key]
+
+    def wants(self, connection: Connection) -> bool:
+        """Whether the bytes of its messages are needed."""
+        return self.reader(connection).reads
+
+    def add(self, messages: Iterable[Message]) -> None:
+        """Take all messages. Raises InputError when their numbers take more than `max_bytes`."""
+        for connection, receive, data in messages:
+            self.reader(connection).add(receive, self.count, data)
+            self.count += 1
+            if self.count >= self._held_at:
+                self._held_at += 50_000
+                self._refuse_more()
+        self._refuse_more()
+
+    def _refuse_more(self) -> None:
+        if sum(each.held for each in self.readers.values()) > self.max_bytes:
+            raise too_large(self.source, self.max_bytes, TOO_LARGE_REMEDY)
+
+    def result(self) -> tuple[list[Track], list[Topic], list[str]]:
+        """Tracks, topics, and notes."""
+        readers, clocked = list(self.readers.values()), []
+        read: dict[str, TopicReader] = {}
+        for each in readers:
+            clock = each.clocked()
+            if each.kept and each.reads and each.connection.topic not in read:
+                read[each.connection.topic] = each
+                clocked.append(clock)
+        stamps, notes = trusted(clocked)
+        del clocked
+        claims: dict[str, Claim] = {}
+        topics = []
+        for each in readers:
+            topic = each.connection.topic
+            mine = read.get(topic) is each
+            if mine:
+                found, more = each.columns(self.source)
+                notes += more
+                if found and each.rule is not None:
+                    claims[topic] = Claim(topic, stamps[topic], found, rank_of(topic, each.rule))
+            used = mine and topic in claims
+            seen = stamps[topic] if used else np.array(each.receive, dtype=np.int64)
+            topics.append(topic_of(topic, each.connection.type, seen, used, "" if used else _why(each, mine)))
+            each.receive = array("q")
+        tracks = list(tracks_of(list(claims.values()), notes))
+        return tracks, topics, notes
+
+
+def _why(reader: TopicReader, mine: bool) -> str:
+    """Why the messages of a topic are not used. mine: whether it is this type of them that the topic is read by."""
+    if reader.why:
+        return reader.why
+    if reader.kept and not mine:
+        return "the topic has messages of another type too, and these are read"
+    return f"its messages cannot be read: {printable(reader.last_fault)}" if reader.bad else "it holds no numbers"

@@ -1,0 +1,57 @@
+"""Stribeck's fall: dry friction that is largest at rest and falls to the Coulomb level as the speed grows.
+
+    F = [C + (S - C) f(|v|/v_s)] sgn v,   f(u) = exp(-u^d);   at rest any force up to S
+
+C the Coulomb level, S >= C breakaway, v_s the Stribeck speed (1e-3 to 5e-2 m/s), d the exponent: 2 (the usual one), 1
+(Tustin 1947), 0.5 to 2 measured. Meaningful where surfaces are lubricated, and at low speed on most floors: what makes
+a robot stick and slip. S = C is Coulomb's law, to the last bit. Source: Bo & Pavelescu 1982; Armstrong-Helouvry et al.
+1994. Below a speed of v_s/65536 an exponent under 1 falls along a chord: its slope at rest would be infinite.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from omnidyn.arrays import FloatArray
+from omnidyn.compiled.kernel import part
+
+USUAL = 2.0
+LEAST, MOST = 0.3, 10.0  # of the exponent
+CHORD = 2.0**-16
+
+
+@part
+def fall(u, exponent):
+    """(f, f') at u = |v|/v_s >= 0."""
+    if exponent == 2.0:
+        value = math.exp(-u * u)
+        return value, -2.0 * u * value
+    if exponent < 1.0 and u < CHORD:
+        slope = (math.exp(-(CHORD**exponent)) - 1.0) / CHORD
+        return 1.0 + slope * u, slope
+    if u == 0.0:
+        return 1.0, (-1.0 if exponent == 1.0 else 0.0)
+    power = u**exponent
+    value = math.exp(-power)
+    return value, -exponent * power / u * value
+
+
+@part
+def steepest(u, exponent):
+    """The largest -f' at u and beyond; u = 0: of all."""
+    if exponent < 1.0:
+        return -fall(u, exponent)[1]
+    worst = ((exponent - 1.0) / exponent) ** (1.0 / exponent)
+    return -fall(max(u, worst), exponent)[1]
+
+
+def fallen(speed: ArrayLike, inverse: ArrayLike, exponent: ArrayLike) -> FloatArray:
+    """f at a speed [m/s or rad/s] of any sign; inverse: 1/v_s, 0 for a level that nobody looks at. Any shape."""
+    u, d = np.abs(np.asarray(speed, dtype=float)) * inverse, np.asarray(exponent, dtype=float)
+    with np.errstate(under="ignore"):
+        value = np.exp(-(u**d))
+    chord = 1.0 - (1.0 - np.exp(-(CHORD**d))) * u / CHORD
+    return np.where((d < 1.0) & (u < CHORD), chord, value)

@@ -1,0 +1,90 @@
+"""Karnopp's band: an axis slower than Dv is at rest; momentum gathers while the drive exceeds what holds it.
+
+    |w| < Dv:  v = 0, F = clip(drive, +-S), M w' = drive - F;   else v = w and the law of sliding
+
+w is the momentum over the mass [m/s], a number of its own in a state where v = 0. An axis enters with the w it has, and
+leaves at |w| = Dv: with a drive below S it stays for ever, to the last bit. Only body axes have it, each for itself.
+Source: Karnopp 1985, with the pseudo-momentum of Armstrong-Helouvry et al. 1994.
+"""
+
+from __future__ import annotations
+
+from omnidyn.compiled.kernel import part
+from omnidyn.model.layout import AIMED, BAND, BENT, HOLD, KEEP, MASS, N_AXES, SIGN, SPIN
+from omnidyn.model.stick_slip.forces import forces_at_work
+from omnidyn.model.stick_slip.workspace import RESIDUAL
+
+SIGNS = 3  # where the signs begin in a state
+FIRM = 4.0  # times all forces at work: what an axis in its band is held with, whatever drives it
+
+
+@part
+def hold_in_band(body, element):
+    """Let what is in its band be held by all it takes: who leaves it is no matter of forces."""
+    for a in range(N_AXES):
+        if element[a, BAND] > 0.0:
+            element[a, HOLD], element[a, HOLD + 1] = element[a, KEEP], element[a, KEEP + 1]
+    firm = FIRM * forces_at_work(body, element)
+    for a in range(N_AXES):
+        if element[a, BAND] > 0.0 and element[a, SIGN] == 0.0:
+            element[a, HOLD] = element[a, HOLD + 1] = firm
+
+
+@part
+def aim_band(element, start, first, back):
+    """Set w* of a stage, as currents have their i*."""
+    for a in range(N_AXES):
+        w = start[first + a]
+        element[a, AIMED] = w + back * (element[a, BENT] - w) if back != 0.0 else w
+
+
+@part
+def gather(body, element, s, tau):
+    """w at the end of a stage that has been solved: what drives an axis at rest stands in the residual."""
+    for a in range(N_AXES):
+        element[a, BENT] = 0.0
+        if element[a, BAND] > 0.0 and element[a, SIGN] == 0.0:
+            drive = -s[RESIDUAL, a]
+            excess = max(drive - element[a, KEEP], 0.0) - max(-drive - element[a, KEEP + 1], 0.0)
+            element[a, BENT] = element[a, AIMED] + tau * excess / (body[MASS] + body[SPIN + a])
+
+
+@part
+def keep_band(element, end, first):
+    """Into a state: what has gathered."""
+    for a in range(N_AXES):
+        end[first + a] = element[a, BENT] if element[a, SIGN] == 0.0 else 0.0
+
+
+@part
+def cross_band(element, state, first):
+    """Let axes enter and leave their bands, in place."""
+    for a in range(N_AXES):
+        width, sign = element[a, BAND], state[SIGNS + a]
+        if width == 0.0 or sign == 2.0:
+            continue
+        if sign == 0.0 and abs(state[first + a]) >= width:
+            state[a], state[SIGNS + a] = state[first + a], (1.0 if state[first + a] > 0.0 else -1.0)
+            state[first + a] = 0.0
+        elif sign != 0.0 and abs(state[a]) < width:
+            state[first + a], state[a], state[SIGNS + a] = state[a], 0.0, 0.0
+
+
+@part
+def crosses(element, state, first):
+    """Whether any axis of a state is to enter or to leave its band."""
+    found = False
+    for a in range(N_AXES):
+        width, sign = element[a, BAND], state[SIGNS + a]
+        if width > 0.0 and sign != 2.0:
+            found |= abs(state[first + a]) >= width if sign == 0.0 else abs(state[a]) < width
+    return found
+
+
+@part
+def band_error(one, two, first):
+    """Difference of what has gathered in two states [m/s]."""
+    worst = 0.0
+    for a in range(N_AXES):
+        worst = max(worst, abs(one[first + a] - two[first + a]))
+    return worst

@@ -1,0 +1,1 @@
+"""Where a robot stands, and what its file knows by name: its floor, loads, batteries. vary (varied/) applies them."""

@@ -1,0 +1,1 @@
+"""vary: a robot under another load, on another floor, with another battery."""

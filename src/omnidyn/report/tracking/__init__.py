@@ -1,0 +1,1 @@
+"""What closed loops look like: pictures (path, errors, voltages), animation (a GIF), page (all of it)."""

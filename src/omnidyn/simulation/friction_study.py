@@ -1,0 +1,267 @@
+"""What the friction of a robot does, along each axis: force against speed, presliding loop, breakaway against rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from omnidyn.arguments import check_order
+from omnidyn.arrays import FloatArray
+from omnidyn.document import Document, Points, Table
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
+from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.frames import AXES
+from omnidyn.model.friction.kinds import BENDING
+from omnidyn.model.layout import (
+    BEND_HOLD,
+    BEND_HOLD_XY,
+    BEND_SLIDE,
+    BEND_SLIDE_XY,
+    FALL,
+    FALL_XY,
+    GX,
+    HOLD,
+    HOLD_X,
+    LENGTH,
+    N_AXES,
+    SHAPE,
+    SLIDE,
+    SLIDE_X,
+    STIFF,
+    STIFF_XY,
+    VISCOUS,
+)
+from omnidyn.model.mass import mass_matrix
+from omnidyn.model.robot import Robot
+from omnidyn.model.sliding import sliding_wrench, top_speeds
+from omnidyn.model.stick_slip.plant import Plant, plant
+from omnidyn.simulation.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+UNITS = ("N", "N", "N m")
+POINTS = 200  # of a curve, both ways
+SLOWEST = 1e-4  # of the top speed: where a curve begins
+BENT = 4.0  # times the way a bristle bends before it slips: how far a loop goes
+RAMPS = (10.0, 1.0, 0.1, 0.01)  # [s] from no force to BEYOND times breakaway
+BEYOND, RAMP_ROWS = 1.5, 400
+AFTER, AFTER_ROWS = 0.2, 100  # [s] the force then stays: a bristle takes its time to give way
+
+
+@dataclass(frozen=True, eq=False)
+class AxisFriction:
+    """Friction along one axis of the body, all tables of the file together.
+
+    law: in words. speed [m/s or rad/s], force [N or N m]: of motion along the axis alone, shape (k,). holds: at rest,
+    forward and backward. way [m or rad], loop: a slow presliding loop, force against displacement, shape (k,); empty
+    where nothing bends. rate [N/s or N m/s], breakaway: the most that resists a force that rises so fast, shape (4,).
+    """
+
+    axis: str
+    unit: str
+    law: str
+    speed: FloatArray
+    force: FloatArray
+    holds: tuple[float, float]
+    bends: float
+    way: FloatArray
+    loop: FloatArray
+    rate: FloatArray
+    breakaway: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionStudy:
+    """The friction of a robot, along x, along y and about yaw. notes: what a reader must know."""
+
+    robot: Robot
+    axes: tuple[AxisFriction, ...]
+    notes: tuple[str, ...]
+
+    def document(self) -> Document:
+        """What it says: a table, and words."""
+        head = ("axis", "law", "holds", "slides slowly", "at top speed", "bends", "breakaway, slow to fast ramp")
+        table = Table(head, [_row(each) for each in self.axes], "<<", name="axes")
+        data = {"robot": self.robot.name, "axes": [_told(each) for each in self.axes], "notes": list(self.notes)}
+        return Document([f"friction of {self.robot.name}", "", table, "", Points(self.notes)], data)
+
+
+def friction_study(robot: Robot) -> FrictionStudy:
+    """What friction does along each axis; of a robot whose motors can break it loose, at which rate it does, too.
+
+    The ramps are simulated, with the motors of the robot; everything else is the law itself. A loop is slow: levels are
+    those of the least speed. Raises InputError for what is no robot.
+    """
+    check_order("friction_study(robot)", (robot, Robot))
+    numbers, top = plant(robot), top_speeds(robot)
+    patterns = axis_patterns(robot)
+    volts = breakaway_voltage(robot, patterns)
+    axes = tuple(_axis(robot, numbers, k, float(top[k]), patterns[k], float(volts[k])) for k in range(N_AXES))
+    return FrictionStudy(robot, axes, tuple(_notes(robot, axes)))
+
+
+def _axis(robot: Robot, numbers: Plant, k: int, top: float, pattern: FloatArray, volts: float) -> AxisFriction:
+    side = np.geomspace(SLOWEST, 1.0, POINTS // 2) * top
+    speed = np.concatenate([-side[::-1], side])
+    force = -sliding_wrench(robot, speed[:, None] * np.eye(N_AXES)[k])[:, k]
+    unit = float(numbers.body[LENGTH]) if k == 2 else 1.0
+    way, loop, bends = _loop(numbers, k, unit)
+    rate, breakaway = _ramps(robot, numbers, k, pattern, volts, bends > 0.0)
+    return AxisFriction(
+        AXES[k], UNITS[k], _law(robot, k), speed, force, _holds(numbers, k, unit), bends, way, loop, rate, breakaway
+    )
+
+
+def _parts(numbers: Plant, k: int) -> list[tuple[float, FloatArray, float, float]]:
+    """(lever, level at the least speed forward and backward [N], stiffness, shape) of what acts along k.
+
+    As the tables of a plant count them: a torque over rho.
+    """
+    found = []
+    for row in numbers.element:
+        g, falls = float(row[GX + k]), row[FALL] > 0.0
+        if g == 0.0:
+            continue
+        rigid = row[HOLD : HOLD + 2] if falls else row[SLIDE : SLIDE + 2]
+        soft = row[BEND_HOLD : BEND_HOLD + 2] if falls else row[BEND_SLIDE : BEND_SLIDE + 2]
+        level, stiff = (soft, row[STIFF]) if row[STIFF] > 0.0 else (rigid, 0.0)
+        found.append((g, level if g > 0.0 else level[::-1], float(stiff), float(row[SHAPE])))
+    if k < 2:
+        body = numbers.body
+        falls = body[FALL_XY] > 0.0
+        rigid, soft = (HOLD_X, BEND_HOLD_XY) if falls else (SLIDE_X, BEND_SLIDE_XY)
+        level = body[(soft if body[STIFF_XY] > 0.0 else rigid) + k]
+        found.append((1.0, np.array([level, level]), float(body[STIFF_XY]), 1.0))
+    return [each for each in found if each[1].any()]
+
+
+def _loop(numbers: Plant, k: int, unit: float) -> tuple[FloatArray, FloatArray, float]:
+    """(way, force, the way that bristles bend before they slip) of a slow loop along axis k; empty where none bends."""
+    parts = _parts(numbers, k)
+    bends = max((float(level.max()) / stiff / abs(g) for g, level, stiff, _ in parts if stiff > 0.0), default=0.0)
+    if bends == 0.0:
+        return np.zeros(0), np.zeros(0), 0.0
+    reach, step = BENT * bends, np.linspace(0.0, 1.0, POINTS)
+    way = np.concatenate([reach * step, reach * (1.0 - 2.0 * step), reach * (2.0 * step - 1.0)])
+    force = np.zeros(len(way))
+    for g, level, stiff, shape in parts:
+        force += abs(g) * _slow(way * abs(g), level, stiff, shape)
+    return way / unit, force * unit, bends / unit
+
+
+def _slow(way: FloatArray, level: FloatArray, stiff: float, shape: float) -> FloatArray:
+    """Force [N] of one part along a way [m] that is gone slowly, by the closed form of each half loop.
+
+    z' = dz/dx = w^a, w = 1 - sigma0 z sgn(x')/C: w decays by exp(-sigma0 x/C) for a = 1, else by a power.
+    """
+    out, z, before = np.zeros(len(way)), 0.0, way[0]
+    for j, x in enumerate(way):
+        gone = x - before
+        limit = level[0] if gone >= 0.0 else level[1]
+        side = 1.0 if gone >= 0.0 else -1.0
+        if stiff == 0.0:
+            out[j] = side * limit if gone != 0.0 else 0.0
+        else:
+            w, far = 1.0 - stiff * z * side / limit, stiff * abs(gone) / limit
+            if shape == 1.0:
+                w *= np.exp(-far)
+            elif w > 0.0:
+                left = w ** (1.0 - shape) + (shape - 1.0) * far
+                w = left ** (1.0 / (1.0 - shape)) if left > 0.0 else 0.0
+            z = (1.0 - w) * side * limit / stiff
+            out[j] = stiff * z
+        before = x
+    return out
+
+
+def _holds(numbers: Plant, k: int, unit: float) -> tuple[float, float]:
+    """What resists being moved along axis k from rest, forward and backward; the direction of travel and wheels too."""
+    total = np.zeros(2)
+    for row in numbers.element:
+        g = float(row[GX + k])
+        level = row[HOLD : HOLD + 2] + row[BEND_HOLD : BEND_HOLD + 2]
+        total += abs(g) * (level if g > 0.0 else level[::-1])
+    if k < 2:
+        total += numbers.body[HOLD_X + k] + numbers.body[BEND_HOLD_XY + k]
+    return float(total[0] * unit), float(total[1] * unit)
+
+
+def _ramps(
+    robot: Robot, numbers: Plant, k: int, pattern: FloatArray, volts: float, bends: bool
+) -> tuple[FloatArray, FloatArray]:
+    """(rate, the most that dry friction resists) of forces that rise; NaN where the motors cannot break it loose."""
+    unit = float(numbers.body[LENGTH])
+    reach = BEYOND * volts * float(np.abs(pattern).max())
+    limit = float(np.min(robot.motor.voltage_limit))
+    if not np.isfinite(reach) or reach > limit:
+        return np.full(len(RAMPS), np.nan), np.full(len(RAMPS), np.nan)
+    full = float(drive_wrench(robot, np.zeros(3), BEYOND * volts * pattern)[k])
+    found, per_speed = [], float(numbers.element[:, GX + k] ** 2 @ numbers.element[:, VISCOUS])
+    viscous = per_speed * (1.0 if k < 2 else unit**2)
+    for length in RAMPS if bends else ():
+        rise = (np.arange(RAMP_ROWS) + 0.5) / RAMP_ROWS
+        voltage = np.outer(np.append(rise, np.ones(AFTER_ROWS)) * BEYOND * volts, pattern)
+        dt = np.repeat([length / RAMP_ROWS, AFTER / AFTER_ROWS], [RAMP_ROWS, AFTER_ROWS])
+        run = simulate(robot, voltage, dt, tol=1e-5)
+        assert run.twist is not None
+        middle = 0.5 * (run.twist[1:] + run.twist[:-1])
+        gained = np.diff(run.twist, axis=0) / dt[:, None] @ mass_matrix(robot)
+        dry = (drive_wrench(robot, middle, voltage) - gained)[:, k] - viscous * middle[:, k]
+        found.append(float(dry.max()))
+    rest = float(drive_wrench(robot, np.zeros(3), volts * pattern)[k])
+    return full / np.array(RAMPS), np.array(found) if bends else np.full(len(RAMPS), rest)
+
+
+def _law(robot: Robot, k: int) -> str:
+    """The laws that act along an axis, in words."""
+    friction, named = robot.friction, []
+    for name in type(friction).model_fields:
+        part = getattr(friction, name)
+        turning = name == "direction" and k == 2
+        level = part.yaw_coulomb if turning else (part.coulomb[k] if name == "axes" else part.coulomb)
+        if not np.any(level):
+            continue
+        hold = part.yaw_breakaway if turning else part.breakaway
+        speed = part.yaw_stribeck_speed if turning else part.stribeck_speed
+        more = hold is not None and np.any(np.asarray(hold) > np.asarray(part.yaw_coulomb if turning else part.coulomb))
+        falls = "Stribeck" if more and speed is not None else ("breakaway" if more else "")
+        words = {"coulomb": falls or "Coulomb", "lugre": "LuGre", "dahl": "Dahl", "karnopp": "Karnopp"}[part.law]
+        named.append(f"{words} ({name})")
+    return " + ".join(named) or "viscous only"
+
+
+def _notes(robot: Robot, axes: Sequence[AxisFriction]) -> list[str]:
+    notes = ["a law that does not bend holds exactly; its breakaway is the same at every rate"]
+    if any(getattr(robot.friction, name).law in BENDING for name in type(robot.friction).model_fields):
+        notes.append(
+            "a bristle never holds exactly: under a force that swings below breakaway the robot creeps on, which is "
+            "what the law says"
+        )
+        notes.append("in a fast ramp the damping of LuGre's bristles resists too")
+    weak = [each.axis for each in axes if np.isnan(each.rate).any()]
+    if weak:
+        notes.append(f"the motors cannot break it loose far enough along {', '.join(weak)}: no ramp is shown there")
+    return notes
+
+
+def _row(each: AxisFriction) -> tuple[str, ...]:
+    middle, unit = len(each.speed) // 2, each.unit
+    way = "" if each.bends == 0.0 else f"{each.bends * 1e3:.3g} {'mrad' if unit == 'N m' else 'mm'}"
+    holds = f"{each.holds[0]:.4g}" + ("" if each.holds[0] == each.holds[1] else f", back {each.holds[1]:.4g}")
+    ramps = ", ".join(f"{value:.4g}" for value in each.breakaway) if np.isfinite(each.breakaway).all() else "-"
+    return (
+        each.axis, each.law, f"{holds} {unit}", f"{each.force[middle]:.4g}", f"{each.force[-1]:.4g}", way, ramps,
+    )  # fmt: skip
+
+
+def _told(each: AxisFriction) -> dict[str, Any]:
+    finite = np.isfinite(each.rate).all()
+    return {
+        "axis": each.axis, "unit": each.unit, "law": each.law, "speed": each.speed.tolist(),
+        "force": each.force.tolist(), "holds": list(each.holds), "bends": each.bends, "way": each.way.tolist(),
+        "loop": each.loop.tolist(), "rate": each.rate.tolist() if finite else None,
+        "breakaway": each.breakaway.tolist() if finite else None,
+    }  # fmt: skip

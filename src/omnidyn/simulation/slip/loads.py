@@ -1,0 +1,63 @@
+"""What each wheel carries: the weight, by where the wheels stand under a centre of mass in the middle of them.
+
+    sum N = M g cos(tilt),   sum N x = 0,   sum N y = 0
+
+Three wheels: statics. Four or more, on equally stiff suspensions: of all loads that balance, those of the least sum of
+squares, N = a + b x + c y. A load that would have to be negative is that of a wheel in the air: it carries nothing, and
+the others share the weight.
+
+A centre of mass at a height h shifts loads as the robot speeds up, by the forces F of the floor on it:
+
+    sum N x = -h F_x,   sum N y = -h F_y
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.model.robot import Robot
+from omnidyn.model.surroundings.floor import GRAVITY
+from omnidyn.model.wheels import per_wheel, sin_cos_deg
+
+ROUNDING = 1e-9  # of the weight
+
+
+@dataclass(frozen=True, eq=False)
+class WheelLoads:
+    """newtons (wheels,): 0 of a wheel in the air. lifted: which are, counted from 0."""
+
+    newtons: FloatArray
+    lifted: tuple[int, ...] = ()
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Wheels in the air, each in words."""
+        return tuple(f"wheel {w + 1} carries nothing: it is in the air, and has no grip" for w in self.lifted)
+
+
+def wheel_loads(robot: Robot) -> WheelLoads:
+    """The static loads of the wheels of a robot [N]."""
+    count = robot.wheels.count
+    sin, cos = sin_cos_deg(robot.wheels.azimuth_deg)
+    arm = per_wheel(robot.wheels.robot_radius, count)
+    weight = robot.body.mass * GRAVITY * float(np.cos(np.radians(robot.floor.tilt)))
+    places = np.stack([np.ones(count), arm * cos, arm * sin])
+    down = np.ones(count, dtype=bool)
+    while True:
+        loads = np.zeros(count)
+        loads[down] = np.linalg.pinv(places[:, down]) @ [weight, 0.0, 0.0]
+        lowest = int(np.argmin(loads))
+        if loads[lowest] >= -ROUNDING * weight or down.sum() <= 1:
+            return WheelLoads(np.maximum(loads, 0.0), tuple(np.flatnonzero(~down).tolist()))
+        down[lowest] = False
+
+
+def load_shift(robot: Robot) -> FloatArray:
+    """What a force of the floor along x and along y adds to each load [N/N]. Shape (wheels, 2)."""
+    count, height = robot.wheels.count, robot.body.centre_height
+    sin, cos = sin_cos_deg(robot.wheels.azimuth_deg)
+    arm = per_wheel(robot.wheels.robot_radius, count)
+    return -height * np.asarray(np.linalg.pinv(np.stack([np.ones(count), arm * cos, arm * sin]))[:, 1:], dtype=float)

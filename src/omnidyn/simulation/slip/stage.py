@@ -1,0 +1,146 @@
+"""Body and wheels over one implicit stage: forces found one after the other until nothing changes, and a step of two.
+
+    M (v - v*) / tau = G f + pull + turning frame - B v - dry friction of the axes and of the direction of travel
+
+Each wheel, each axis and the ellipse is a block with one exact answer, given the force of all others (wheel.py). With
+loads that do not depend on the motion all of it is the minimum of a convex function, to which the blocks lead from
+anywhere. Steps are SDIRK2, as in implicit/step.py; friction holds exactly: what rests has a speed of literal 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+from omnidyn.compiled.kernel import part
+from omnidyn.simulation.slip.wheel import FREE, GRIPS, wheel_answer
+
+GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+BACK = (1.0 - GAMMA) / GAMMA
+SWEEPS = 4000
+TIGHT = 2e-15  # of the speeds at hand: a change that is rounding
+
+
+@part
+def _travel_speed(b, m, c):
+    """(v_x, v_y) with m v + c^2 v/sqrt(cx^2 vx^2 + cy^2 vy^2) = b; (0, 0) where the ellipse holds b."""
+    if (b[0] / c[0]) ** 2 + (b[1] / c[1]) ** 2 <= 1.0:
+        return 0.0, 0.0
+    low, high = 0.0, max(abs(b[0]) * c[0] / m[0], abs(b[1]) * c[1] / m[1]) * 1.5
+    q = 0.5 * high
+    for _ in range(200):
+        x, y = c[0] * b[0] / (m[0] * q + c[0] ** 2), c[1] * b[1] / (m[1] * q + c[1] ** 2)
+        off = x * x + y * y - 1.0
+        if off > 0.0:
+            low = q
+        else:
+            high = q
+        slope = -2.0 * (x * x * m[0] / (m[0] * q + c[0] ** 2) + y * y * m[1] / (m[1] * q + c[1] ** 2))
+        following = q - off / slope
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - q) <= 1e-16 * q:
+            break
+        q = following
+    return b[0] * q / (m[0] * q + c[0] ** 2), b[1] * q / (m[1] * q + c[1] ** 2)
+
+
+@part
+def _body_blocks(plant, heavy, total, hold, mode):
+    """Dry friction of the direction of travel, then of the axes, each given all other forces; in place."""
+    mode[3] = FREE
+    if plant.ellipse[0] > 0.0:
+        b0, b1 = total[0] - hold[3], total[1] - hold[4]
+        t0, t1 = _travel_speed((b0, b1), (heavy[0], heavy[1]), (plant.ellipse[0], plant.ellipse[1]))
+        mode[3] = 0.0 if t0 == 0.0 and t1 == 0.0 else 1.0
+        total[0], total[1] = heavy[0] * t0, heavy[1] * t1
+        hold[3], hold[4] = total[0] - b0, total[1] - b1
+    for a in range(3):
+        mode[a] = FREE
+        if plant.dry[a] > 0.0:
+            alone = total[a] - hold[a]
+            held = abs(alone) <= plant.dry[a]
+            mode[a] = 0.0 if held else math.copysign(1.0, alone)
+            total[a] = 0.0 if held else alone - math.copysign(plant.dry[a], alone)
+            hold[a] = total[a] - alone
+
+
+@part
+def solve_stage(plant, volts, bound, tau, goal, pull, x, hold, mode, space):
+    """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. goal: x*. pull (2,) [N] on the body.
+
+    hold (3 + 2 + n,) [N]: forces of the axes, the ellipse and the wheels, a first guess too. mode (3 + 1 + 2 n,): signs
+    of the axes and of the ellipse, then of each wheel and of its contact. space (12,). Returns the number of sweeps.
+    """
+    n, heavy, total, frame, offset = len(plant.spin), space[:3], space[3:6], space[6:9], space[9:12]
+    for a in range(3):
+        heavy[a] = plant.mass[a] / tau + plant.viscous[a]
+        offset[a] = plant.mass[a] / tau * goal[a] + (pull[a] if a < 2 else 0.0)
+        total[a] = offset[a] + hold[a]
+        frame[a] = 0.0
+    total[0], total[1] = total[0] + hold[3], total[1] + hold[4]
+    for w in range(n):
+        for a in range(3):
+            total[a] += plant.g[w, a] * hold[5 + w]
+    for sweep in range(SWEEPS):
+        worst, size, loads = 0.0, 0.0, 0.0  # loads: forces of which what is left is the rounding
+        v0, v1, v2 = total[0] / heavy[0], total[1] / heavy[1], total[2] / heavy[2]
+        if plant.turning > 0.0:
+            f0, f1 = plant.turning * v2 * v1, -plant.turning * v2 * v0
+            total[0], total[1] = total[0] + f0 - frame[0], total[1] + f1 - frame[1]
+            frame[0], frame[1] = f0, f1
+        for w in range(n):
+            free = give = 0.0
+            for a in range(3):
+                g = plant.g[w, a]
+                free += g * (total[a] - g * hold[5 + w]) / heavy[a]
+                give += g * g / heavy[a]
+            limit = plant.grip[w]
+            if len(plant.shift) > 0:  # the floor's force on the body, as far as it is known by now
+                f0, f1 = total[0] - offset[0] - frame[0], total[1] - offset[1] - frame[1]
+                f0, f1 = f0 - plant.viscous[0] * v0, f1 - plant.viscous[1] * v1
+                limit = max(limit + plant.shift[w, 0] * f0 + plant.shift[w, 1] * f1, 0.0)
+            f, s, sign, contact = wheel_answer(
+                plant, w, volts[w], bound[w], tau, goal[3 + w], free, give, limit
+            )  # fmt: skip
+            for a in range(3):
+                total[a] += plant.g[w, a] * (f - hold[5 + w])
+            hold[5 + w], x[3 + w] = f, s
+            loads += abs(f)
+            mode[4 + 2 * w], mode[5 + 2 * w] = sign, contact
+        _body_blocks(plant, heavy, total, hold, mode)
+        for a in range(3):
+            now, was = total[a] / heavy[a], (v0 if a == 0 else (v1 if a == 1 else v2))
+            reach = math.sqrt(plant.mass[a] / plant.mass[0])  # yaw as a length
+            worst, size = max(worst, reach * abs(now - was)), max(size, reach * (abs(now) + abs(goal[a])))
+        size += loads / (heavy[0] + heavy[1])
+        if worst <= TIGHT * size or (worst == 0.0 and sweep > 0):
+            _finish(plant, total, heavy, x, mode)
+            return sweep + 1
+    _finish(plant, total, heavy, x, mode)
+    return SWEEPS
+
+
+@part
+def _finish(plant, total, heavy, x, mode):
+    """The twist, and the rim speeds of what grips; a body that every wheel holds is at rest to the last bit."""
+    n, held = len(plant.spin), True
+    for w in range(n):
+        held &= mode[4 + 2 * w] == 0.0 and mode[5 + 2 * w] == GRIPS
+    for a in range(3):
+        x[a] = 0.0 if held else total[a] / heavy[a]
+    for w in range(n):
+        if mode[5 + 2 * w] == GRIPS:
+            p = plant.g[w, 0] * x[0] + plant.g[w, 1] * x[1] + plant.g[w, 2] * x[2]
+            x[3 + w] = 0.0 if mode[4 + 2 * w] == 0.0 else p
+
+
+@part
+def slip_step(plant, volts, bound, h, start, pull, end, hold, mode, goal, space):
+    """One SDIRK2 step from `start` to `end`, both (3 + n,). Returns the most sweeps of a stage."""
+    tau = GAMMA * h
+    for j in range(len(start)):
+        goal[j], end[j] = start[j], start[j]
+    count = solve_stage(plant, volts, bound, tau, goal, pull, end, hold, mode, space)
+    for j in range(len(start)):
+        goal[j] = start[j] + BACK * (end[j] - start[j])
+    return max(count, solve_stage(plant, volts, bound, tau, goal, pull, end, hold, mode, space))

@@ -1,0 +1,105 @@
+"""omnidyn export and omnidyn import: what is written, what is said, what is refused."""
+
+import json
+
+import pytest
+
+import omnidyn
+
+
+def test_there_and_back(call, here):
+    code, out, err = call("export", "json", "axebot", "-o", "robot.json")
+    assert code == 0
+    assert "axebot as json" in out
+    assert "wrote robot.json" in err
+    code, out, _ = call("import", "json", "robot.json", "-o", "again.toml")
+    assert code == 0
+    assert omnidyn.load_robot("again.toml") == omnidyn.load_robot("axebot")
+
+
+def test_for_machines(call):
+    code, out, _ = call("export", "json", "axebot", "-o", "robot.json", "--json")
+    assert code == 0
+    told = json.loads(out)
+    assert told["kind"] == "json"
+    assert told["output"] == ["robot.json"]
+    assert told["provenance"]["inputs"][0]["name"] == "axebot"
+    code, out, _ = call("import", "json", "robot.json", "--json")
+    assert (code, json.loads(out)["name"]) == (0, "axebot")
+
+
+def test_to_stdout(call):
+    code, out, _ = call("export", "json", "axebot", "-o", "-")
+    assert (code, json.loads(out)["format"]) == (0, "omnidyn robot")
+
+
+def test_nothing_is_replaced_without_force(call, here):
+    (here / "robot.json").write_text("mine")
+    assert call("export", "json", "axebot", "-o", "robot.json")[0] == 3
+    assert (here / "robot.json").read_text() == "mine"
+    assert call("export", "json", "axebot", "-o", "robot.json", "--force")[0] == 0
+    code, _, err = call("import", "json", "robot.json", "-o", "robot.json", "--force")
+    assert (code, "would replace its own input" in err) == (3, True)
+
+
+def test_help_names_every_kind(call):
+    from omnidyn.export.kinds import KINDS
+    from omnidyn.interop.kinds import READERS
+
+    _, out, _ = call("export", "--help")
+    assert not [kind for kind in KINDS if kind not in out]
+    _, out, _ = call("import", "--help")
+    assert not [kind for kind in READERS if kind not in out]
+
+
+def test_a_controller_file_becomes_c(call, here):
+    (here / "loop.toml").write_text('schema = 1\ncontroller = "pid"\nsource = ""\n\n[options]\nfaster = 2.0\n')
+    code, out, _ = call("export", "c-controller", "axebot", "--controller", "loop.toml", "--dt", "0.01", "-o", "loop")
+    assert code == 0
+    assert "axebot as c-controller: omnidyn_control.h, omnidyn_control.c" in out
+    assert "#define OMNIDYN_DT 0.01f" in (here / "loop" / "omnidyn_control.h").read_text()
+    (here / "mpc.toml").write_text('schema = 1\ncontroller = "mpc"\nsource = ""\n\n[options]\nspeed = [1, 1, 1]\n')
+    code, _, err = call("export", "c-controller", "axebot", "--controller", "mpc.toml", "-o", "mpc")
+    assert (code, "no limit of the speed" in err) == (3, True)
+    code, _, err = call("export", "c-model", "axebot", "--controller", "pid")
+    assert (code, "--controller is not for c-model" in err) == (2, True)
+
+
+def test_logs_give_the_covariances(call, here):
+    import numpy as np
+
+    run = omnidyn.simulate(omnidyn.load_robot("axebot"), np.tile([0.0, 3.0, -3.0], (100, 1)), 0.01)
+    omnidyn.write_run(run.replace(wheel_speed=run.wheel_speed + 0.5), here / "log.csv")
+    code, out, _ = call("export", "ros2-control", "axebot", "--log", "log.csv", "-o", "ros", "--json")
+    assert code == 0
+    told = json.loads(out)
+    assert "from 1 log, 101 samples" in " ".join(told["notes"])
+    assert told["provenance"]["inputs"][1]["name"] == "log.csv"
+    assert sorted(path.name for path in (here / "ros").iterdir()) == sorted(told["files"])
+    assert call("export", "ros2-control", "axebot", "-o", "ros")[0] == 3
+    before = (here / "log.csv").read_bytes()
+    code, _, err = call("export", "ros2-control", "axebot", "--log", "log.csv", "-o", "log.csv", "--force")
+    assert (code, "the result would replace its own input" in err) == (3, True)
+    assert (here / "log.csv").read_bytes() == before
+    code, _, err = call("export", "json", "axebot", "--log", "log.csv")
+    assert (code, "--log is not for json" in err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    "arguments, code, words",
+    [
+        (["export", "jason", "axebot"], 3, "no such kind of export"),
+        (["export", "json", "nobot"], 3, "nobot"),
+        (["export", "json"], 2, "ROBOT"),
+        (["export", "json", "axebot", "--height", "1"], 2, "--height is not for json"),
+        (["import", "json", "nothing.json"], 3, "no such file"),
+        (["import", "jason", "x"], 3, "no such kind of import"),
+        (["import", "json", "nothing.json", "--like", "axebot"], 3, "--like|holds a whole robot"),
+    ],
+)
+def test_what_is_refused(call, arguments, code, words):
+    import re
+
+    ended, out, err = call(*arguments)
+    assert (ended, out) == (code, "")
+    assert re.search(words, err)

@@ -1,0 +1,115 @@
+"""mjcf: MuJoCo loads it, its motors push as ours do, and it moves as we do as far as its friction can."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.errors import InputError
+from omnidyn.export.bodies.mjcf import mjcf
+from omnidyn.model.actuation import clip_voltage
+from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.mass import per_mass
+from omnidyn.model.sliding import coulomb_along
+from omnidyn.model.wheels import per_wheel
+from tests.support.mixed_robots import random_robot, with_spin
+
+mujoco = pytest.importorskip("mujoco")
+ROBOT = omnidyn.load_robot("axebot")
+
+
+def loaded(robot):
+    model = mujoco.MjModel.from_xml_string(mjcf(robot).text)
+    return model, mujoco.MjData(model)
+
+
+def simulated(robot, volts, dt=1e-3):
+    """(speeds, positions) of the joints after each row. Shape (rows + 1, 3) each."""
+    model, data = loaded(robot)
+    assert model.opt.timestep == dt
+    out = np.zeros((len(volts) + 1, 2, 3))
+    for k, row in enumerate(volts):
+        data.ctrl[:] = row
+        mujoco.mj_step(model, data)
+        out[k + 1] = data.qvel, data.qpos
+    return out[:, 0], out[:, 1]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_motors_push_as_ours_do(seed):
+    """Without dry friction, at heading 0: accelerations of a random robot at a random speed under random volts."""
+    robot, rng = random_robot(seed), np.random.default_rng(seed)
+    model, data = loaded(with_spin(robot, seed))
+    assert model.nu == robot.wheels.count
+    model, data = loaded(robot)
+    model.dof_frictionloss[:] = 0.0
+    twist, volts = rng.normal(size=3), rng.uniform(-8.0, 8.0, model.nu)
+    data.qvel[:], data.ctrl[:] = twist, volts
+    mujoco.mj_forward(model, data)
+    plain = robot.replace(
+        motor=robot.motor.replace(voltage_drop=0.0, gear_efficiency=1.0, electrical="quasi-static"),
+    )  # fmt: skip
+    rims = robot.wheels.wrench_matrix.T @ twist
+    viscous = np.array(robot.friction.axes.viscous) * twist
+    along = robot.friction.direction
+    viscous += np.array([along.viscous, along.viscous, along.yaw_viscous]) * twist
+    wheels = per_wheel(robot.friction.wheels.viscous, model.nu) * rims
+    limited = robot.motor.current_limit is not None  # it then bounds the force with the wheel's own friction in it
+    wrench = (
+        drive_wrench(plain, twist, clip_voltage(robot.motor, volts)) - viscous - robot.wheels.wrench_matrix @ wheels
+    )
+    if not (limited and np.any(wheels)):
+        np.testing.assert_allclose(data.qacc, per_mass(robot, wrench), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(model.actuator_ctrlrange[:, 1], per_wheel(robot.motor.voltage_limit, model.nu))
+
+
+def test_inertias_are_those_of_a_body():
+    for tall in (None, 0.01, 2.0):
+        model = mujoco.MjModel.from_xml_string(mjcf(ROBOT, height=tall).text)
+        x, y, z = sorted(model.body_inertia[1])
+        assert x + y > z
+        assert model.body_mass[1] == 1.5
+    with pytest.raises(InputError, match="no body has this height; got 0"):
+        mjcf(ROBOT, height=0.0)
+
+
+@pytest.mark.parametrize("pattern", [[0.0, 1.0, -1.0], [-1.0, 0.5, 0.5], [1.0, 1.0, 1.0]])
+def test_within_its_dead_zone_it_drifts_less_than_a_tenth_of_a_millimetre_in_a_minute(pattern):
+    volts = 0.5 * omnidyn.breakaway_voltage(ROBOT, pattern) * np.array(pattern)
+    _, places = simulated(ROBOT, np.tile(volts, (6_000, 1)))
+    assert 10.0 * np.abs(places[-1]).max() < 1e-4  # steady creep: six seconds tell of sixty
+
+
+@pytest.mark.parametrize("volts", [[0, 2, -2], [0, 4, -4], [-3, 1.5, 1.5], [-5, 2.5, 2.5], [1.5, 1.5, 1.5]])
+def test_on_the_runs_of_the_paper_it_is_near(volts):
+    """To 2e-3 m/s and 1e-2 rad/s at steps of 1 ms: an implicit Euler's own error."""
+    program = np.repeat([volts, np.zeros(3), np.negative(volts)], [800, 400, 400], axis=0)
+    run = omnidyn.simulate(ROBOT, program, 1e-3)
+    speeds, _ = simulated(ROBOT, program)
+    assert run.twist is not None
+    assert (np.abs(speeds - run.twist).max(axis=0) < [2e-3, 2e-3, 1.2e-2]).all()
+
+
+def test_a_turning_robot_is_ours_with_the_turning_frame():
+    robot = ROBOT.replace(body=ROBOT.body.replace(rotating_frame=True), friction=type(ROBOT.friction)())
+    volts = np.tile([1.5, 5.5, -2.5], (1000, 1))
+    _, places = simulated(robot, volts)
+    run = omnidyn.simulate(robot, volts, 1e-3)
+    assert run.pose is not None
+    np.testing.assert_allclose(places[-1], run.pose[-1], atol=2e-2)
+    assert not any("Newtonian" in words for words in mjcf(robot).missing)
+    assert any("Newtonian" in words for words in mjcf(ROBOT).missing)
+
+
+def test_friction_of_other_shapes_is_its_level_along_each_axis():
+    robot = omnidyn.load_robot("robotino")
+    model, _ = loaded(robot)
+    np.testing.assert_allclose(model.dof_frictionloss, coulomb_along(robot), rtol=1e-12)
+    made = mjcf(robot)
+    assert any("no disc, no ellipse" in words for words in made.missing)
+    assert all(words in made.text for words in made.missing)
+
+
+@pytest.mark.parametrize("name", ['<&"x">', "a--b", "速度", "-->", "'"])
+def test_whatever_the_robot_is_called(name):
+    model, _ = loaded(ROBOT.replace(name=name))
+    assert model.nu == 3

@@ -1,0 +1,177 @@
+"""c-controller: in C as in Python, to what float32 holds; clean under sanitizers; it drives the simulated robot."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.control.controllers import BESIDE, NAMES, ControllerFile, save_controller
+from omnidyn.control.paths.motion import Motion, Path
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.export.code.c_controller import c_controller
+from omnidyn.export.features import CONTROLLERS, REFUSES, Cell
+from omnidyn.model.drive import Drive
+from tests.support.controlled import CController
+from tests.support.exported import STRICT, exact_robot
+from tests.support.mixed_robots import random_robot, with_spin
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
+ROBOT = omnidyn.load_robot("axebot")
+WRITTEN = [name for name, cell in CONTROLLERS.items() if cell.does != REFUSES and name != "mpc"]  # see mpc/
+OK, LIMITED, STILL, BACKWARDS, BAD_TIME, BAD_POSE, BAD_TWIST, BAD_PATH = range(8)
+
+
+def without_losses(robot):
+    """The robot with gears that lose nothing."""
+    return robot.replace(motor=robot.motor.replace(gear_efficiency=1.0))
+
+
+def driven(kind):
+    """The axebot with another drive."""
+    loop = {"rate_Hz": 200.0, "kp_V_s_rad": 0.1} if kind == "speed" else {"supply_V": 7.0}
+    return ROBOT.replace(drive=Drive.model_validate({"kind": kind, "latency_s": 0.03, **loop}))
+
+
+ROBOTS = [
+    ROBOT, *(without_losses(random_robot(seed)) for seed in range(4)),
+    *(without_losses(with_spin(random_robot(seed), seed)) for seed in (6,)), exact_robot(2), driven("duty"),
+    driven("speed"),
+]  # fmt: skip
+
+
+class Given(Path):
+    """A path that is asked for three times, now, as late as outputs are, and a step later, and knows those."""
+
+    name, duration, end = "given", 1.0, np.inf
+
+    def __init__(self, pose, velocity):
+        self.pose, self.velocity = pose, velocity
+
+    def at(self, t):
+        count = len(np.atleast_1d(t))
+        return Motion(self.pose[-count:].copy(), self.velocity[-count:].copy(), np.zeros((count, 3)))
+
+
+def steps(seed, count):
+    """Random steps near a path: (elapsed, pose, twist, poses, velocities), as float32 holds them."""
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        velocity = rng.uniform(-0.5, 0.5, 3) * [1.0, 1.0, 3.0] * rng.choice([0.0, 0.01, 1.0], p=[0.1, 0.2, 0.7])
+        slower = rng.uniform(0.9, 1.1, (3, 1)) * velocity
+        place = rng.uniform(-3.0, 3.0, 3)
+        poses = place + np.outer([0.0, 0.5, 1.0], 0.02 * velocity)
+        pose = place + rng.normal(0.0, [1e-3, 1e-3, 3e-3]) + [0.0, 0.0, rng.choice([0.0, 2.0 * np.pi])]
+        twist = rng.normal(0.0, [0.3, 0.3, 1.0])
+        given = (0.0 if k == 0 else rng.uniform(0.015, 0.025), pose, twist, poses, slower)
+        yield tuple(np.asarray(each, np.float32).astype(float) for each in given)
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: f"{robot.name} {robot.drive.kind}".replace(" ", "-"))
+def test_it_is_the_controller_of_python(name, robot, tmp_path):
+    t, apart = 0.0, []
+    with CController(robot, tmp_path / "c", name) as control:
+        for elapsed, pose, twist, poses, velocities in steps(1, 400):
+            t += float(elapsed)
+            own = control.own.step(t, pose, twist, Given(poses, velocities))
+            says, output = control.call(elapsed, pose, twist, poses, velocities)
+            assert says == (LIMITED if control.own.info.limits else OK)
+            apart.append(np.max(np.abs(output - own) / control.limit))
+    assert np.max(apart) < 1e-4
+    assert np.median(apart) < 1e-5
+
+
+@pytest.mark.parametrize("kind", ["voltage", "duty", "speed"])
+@pytest.mark.parametrize("path", ["eight", "square"])
+def test_it_drives_the_simulated_robot_as_python_does(kind, path, tmp_path):
+    robot = driven(kind) if kind != "voltage" else ROBOT
+    with CController(robot, tmp_path / "c") as control:
+        in_c, own = (omnidyn.track(robot, path, each, duration=4.0) for each in (control, "pid"))
+    assert in_c.rmse_position == pytest.approx(own.rmse_position, rel=0.01)
+    assert in_c.rmse_heading == pytest.approx(own.rmse_heading, rel=0.01, abs=1e-4)
+
+
+def test_nothing_that_is_no_step_gets_through(tmp_path):
+    nan, zeros, path = float("nan"), np.zeros(3), (np.zeros((3, 3)), np.zeros((3, 3)))
+    place = np.array([0.01, 0.0, 0.0])
+    with CController(ROBOT, tmp_path / "c") as control:
+        says, first = control.call(0.0, place, zeros, *path)
+        assert says in (OK, LIMITED)
+        assert first.any()
+        says, again = control.call(0.0, zeros, zeros, *path)
+        assert says == STILL
+        assert np.array_equal(again, first)
+        for wrong, word in (
+            ((nan, place, zeros, *path), BAD_TIME),
+            ((-0.02, place, zeros, *path), BACKWARDS),
+            ((0.02, [nan, 0.0, 0.0], zeros, *path), BAD_POSE),
+            ((0.02, [1e30, 0.0, 0.0], zeros, *path), BAD_POSE),
+            ((0.02, place, [0.0, 0.0, np.inf], *path), BAD_TWIST),
+            ((0.02, place, zeros, np.full((3, 3), nan), path[1]), BAD_PATH),
+        ):
+            says, output = control.call(*wrong)
+            assert says == word
+            assert not output.any()
+        rng = np.random.default_rng(3)
+        for _ in range(2000):  # whatever comes, a number within the limits
+            size = 10.0 ** rng.uniform(-40.0, 12.0, 25) * rng.choice([-1.0, 1.0, nan], 25, p=[0.45, 0.549, 0.001])
+            _, output = control.call(0.02, size[:3], size[3:6], size[6:15].reshape(3, 3), size[15:24].reshape(3, 3))
+            assert np.all(np.abs(output) <= np.float32(6.0))
+
+
+def test_its_size_is_small_and_it_asks_for_no_memory(tmp_path, capsys):
+    c_controller(ROBOT).write(tmp_path / "c")
+    subprocess.run(["gcc", *STRICT, "-Os", "-c", "omnidyn_control.c"], cwd=tmp_path / "c", check=True)
+    needs = subprocess.run(["nm", "-u", "omnidyn_control.o"], cwd=tmp_path / "c", capture_output=True, text=True)
+    assert {line.split()[-1] for line in needs.stdout.splitlines()} <= {
+        "cosf", "sinf", "sincosf", "remainderf", "__stack_chk_fail", "_GLOBAL_OFFSET_TABLE_",
+    }  # fmt: skip
+    size = subprocess.run(["size", "omnidyn_control.o"], cwd=tmp_path / "c", capture_output=True, text=True)
+    text, data, bss = map(int, size.stdout.splitlines()[1].split()[:3])
+    with capsys.disabled():
+        print(f"\npid of the axebot in C: {text} bytes of code, {data + bss} of memory of its own")
+    assert text < 4096
+    assert data + bss == 0
+
+
+def test_it_is_cpp_too(tmp_path):
+    if shutil.which("g++") is None:
+        pytest.skip("no g++ here")
+    c_controller(ROBOT.replace(name="*/ int x; /* Größe??/")).write(tmp_path / "c")
+    (tmp_path / "c" / "use.cpp").write_text(
+        '#include "omnidyn_control.h"\nint main() { omnidyn_control c; omnidyn_control_reset(&c); return c.begun; }'
+    )
+    for command in (
+        ["gcc", *STRICT, "-c", "omnidyn_control.c"],
+        ["g++", "-o", "use", "use.cpp", "omnidyn_control.o", "-lm"],
+        ["./use"],
+    ):
+        subprocess.run(command, cwd=tmp_path / "c", check=True)
+
+
+def test_a_controller_file_gives_its_options(tmp_path):
+    file = tmp_path / "loop.toml"
+    save_controller(ControllerFile("pid", {"faster": 1.5, "friction": False}), file)
+    made, plain = c_controller(ROBOT, controller=file, dt=0.01), c_controller(ROBOT, dt=0.01)
+    assert made.files["omnidyn_control.c"].startswith("/* pid_no_friction of axebot")
+    assert made.files["omnidyn_control.c"] != plain.files["omnidyn_control.c"]
+    assert "#define OMNIDYN_DT 0.01f" in made.files["omnidyn_control.h"]
+    late = c_controller(driven("duty")).files["omnidyn_control.h"]
+    assert "#define OMNIDYN_LATE 0.03f" in late
+    assert "duties, -1 to 1" in late
+
+
+def test_controllers_and_robots_without_c_are_refused_by_name(monkeypatch):
+    assert set(CONTROLLERS) == {*NAMES, *BESIDE}
+    with pytest.raises(UnsupportedError, match="the controller araujo: it is there for comparison alone"):
+        c_controller(ROBOT, controller="araujo")
+    monkeypatch.setitem(CONTROLLERS, "speed", Cell(REFUSES, "no C today"))
+    with pytest.raises(UnsupportedError, match=r"the controller speed: no C today.*expected feedforward or pid or mpc"):
+        c_controller(ROBOT, controller="speed")
+    lossy = ROBOT.replace(motor=ROBOT.motor.replace(gear_efficiency=0.9))
+    with pytest.raises(UnsupportedError, match=r"found by trying.*gear efficiency"):
+        c_controller(lossy)
+    with pytest.raises(InputError, match="step out of range"):
+        c_controller(ROBOT, dt=0.0)

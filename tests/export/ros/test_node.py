@@ -1,0 +1,205 @@
+"""ros2-node: the loop drives our simulated robot, and the node does so over a bus that is none: stubs of rclpy."""
+
+import importlib.util
+import sys
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.errors import InputError
+from omnidyn.export.ros.node import ros2_node
+from omnidyn.model.wheels import wheel_speed
+from tests.support.exported import exact_robot
+
+ROBOT = omnidyn.load_robot("axebot")
+DT = 0.01
+
+
+def loaded(path, name):
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def drive(tmp_path):
+    """The module drive_loop of a robot."""
+
+    def made(robot):
+        folder = tmp_path / robot.name.replace(" ", "_")
+        ros2_node(robot).write(folder)
+        return loaded(folder / "drive_loop.py", "drive_loop")
+
+    return made
+
+
+class Plant:
+    """Our simulation as the robot on the other end."""
+
+    def __init__(self, robot):
+        self.robot, self.twist, self.pose = robot, np.zeros(3), np.zeros(3)
+
+    def step(self, duty, supply):
+        run = omnidyn.simulate(self.robot, [np.array(duty) * supply], DT, twist=self.twist, pose=self.pose)
+        self.twist, self.pose = run.twist[-1], run.pose[-1]
+
+    @property
+    def speeds(self):
+        return wheel_speed(self.robot.wheels, self.twist).tolist()
+
+
+def driven(module, robot, goal, seconds, told=True):
+    """Where the loop brings the robot that is asked for a twist all the time."""
+    loop, plant = module.DriveLoop(), Plant(robot)
+    for k in range(round(seconds / DT)):
+        now = k * DT
+        loop.command(now, goal)
+        if told:
+            loop.measured(now, plant.speeds)
+        plant.step(loop.step(now), module.SUPPLY)
+    return plant
+
+
+@pytest.mark.parametrize("robot", [ROBOT, exact_robot(1), exact_robot(4)], ids=lambda robot: robot.name)
+@pytest.mark.parametrize(
+    "goal", [(0.4, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.0, 2.0), (0.3, 0.2, 1.0), (0.05, 0.0, 0.0)]
+)
+@pytest.mark.parametrize("told", [True, False])
+def test_it_reaches_the_twist_that_is_asked_for(drive, robot, goal, told):
+    told = told or robot.friction.axes.breakaway is not None  # from rest it must know that it rests
+    plant = driven(drive(robot), robot, goal, 1.5, told)
+    np.testing.assert_allclose(plant.twist, goal, atol=1e-3)
+
+
+def test_without_a_command_it_stops(drive):
+    module = drive(ROBOT)
+    loop, plant = module.DriveLoop(), Plant(ROBOT)
+    assert loop.step(0.0) == [0.0, 0.0, 0.0]
+    for k in range(300):
+        now = k * DT
+        if now < 1.0:
+            loop.command(now, (0.5, 0.0, 0.0))
+        duty = loop.step(now)
+        assert any(duty) or now > 1.28  # the last command came at 0.99 s
+        assert not any(duty) or now < 1.3
+        plant.step(duty, module.SUPPLY)
+    assert not plant.twist.any()
+    loop.command(10.0, (0.5, 0.0, 0.0))
+    assert loop.step(9.0) == [0.0, 0.0, 0.0]  # a clock that went back
+
+
+@pytest.mark.parametrize("bad", [(np.nan, 0.0, 0.0), (np.inf, 0.0, 0.0), (1.0,), ("1", 0.0, 0.0), ()])
+def test_what_is_no_command_is_none(drive, bad):
+    loop = drive(ROBOT).DriveLoop()
+    loop.command(0.0, bad)
+    assert loop.asked_at is None
+    loop.measured(0.0, bad)
+    assert loop.twist is None
+
+
+def test_duties_stay_in_their_range_and_keep_the_direction(drive):
+    module = drive(ROBOT)
+    loop = module.DriveLoop()
+    for k in range(400):
+        loop.command(k * DT, (50.0, 0.0, 0.0))
+        duty = loop.step(k * DT, supply=7.2)
+        assert max(map(abs, duty)) <= 6.0 / 7.2 + 1e-12
+        assert duty[0] == pytest.approx(0.0, abs=1e-12)
+        assert duty[1] == pytest.approx(-duty[2])
+
+
+@pytest.fixture
+def bus(monkeypatch):
+    """Stubs of what the node imports: the topics that it has, and what it published."""
+    found = SimpleNamespace(heard={}, said=[], timers=[], clock=0.0, parameters={}, stopped=False)
+
+    class Node:
+        def __init__(self, name):
+            found.name = name
+
+        def declare_parameter(self, name, default):
+            return SimpleNamespace(value=found.parameters.get(name, default))
+
+        def create_publisher(self, kind, topic, depth):
+            return SimpleNamespace(publish=lambda message: found.said.append((topic, list(message.data))))
+
+        def create_subscription(self, kind, topic, call, depth):
+            found.heard[topic] = (kind, call)
+
+        def create_timer(self, period, call):
+            found.timers.append((period, call))
+
+        def get_clock(self):
+            return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(found.clock * 1e9)))
+
+        def destroy_node(self):
+            found.stopped = True
+
+    class Message:
+        data: list
+
+    def interrupted(node):
+        raise KeyboardInterrupt
+
+    stubs = {
+        "rclpy": {"init": lambda: None, "spin": interrupted, "try_shutdown": lambda: None},
+        "rclpy.node": {"Node": Node},
+        "geometry_msgs.msg": {"Twist": type("Twist", (), {}), "TwistStamped": type("TwistStamped", (), {})},
+        "sensor_msgs.msg": {"JointState": type("JointState", (), {})},
+        "std_msgs.msg": {"Float64MultiArray": Message}, "geometry_msgs": {}, "sensor_msgs": {}, "std_msgs": {},
+    }  # fmt: skip
+    for name, content in stubs.items():
+        module = ModuleType(name)
+        module.__dict__.update(content)
+        monkeypatch.setitem(sys.modules, name, module)
+    return found
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_the_node_on_a_bus(bus, tmp_path, monkeypatch, stamped):
+    ros2_node(ROBOT).write(tmp_path / "n")
+    monkeypatch.setitem(sys.modules, "drive_loop", loaded(tmp_path / "n" / "drive_loop.py", "drive_loop"))
+    module = loaded(tmp_path / "n" / "omnidyn_node.py", "omnidyn_node")
+    bus.parameters = {"stamped": stamped, "supply_V": 7.2}
+    node = module.OmnidynNode()
+    (period, tick), = bus.timers  # fmt: skip
+    assert period == DT
+    kind, command = bus.heard["cmd_vel"]
+    assert kind.__name__ == ("TwistStamped" if stamped else "Twist")
+    twist = SimpleNamespace(linear=SimpleNamespace(x=0.3, y=0.1), angular=SimpleNamespace(z=-1.0))
+    plant = Plant(ROBOT)
+    for k in range(150):
+        bus.clock = k * DT
+        command(SimpleNamespace(twist=twist) if stamped else twist)
+        w = plant.speeds
+        states = bus.heard["joint_states"][1]
+        states(
+            SimpleNamespace(
+                name=["arm", "wheel3_joint", "wheel1_joint", "wheel2_joint"], velocity=[9, w[2], w[0], w[1]]
+            )
+        )
+        states(SimpleNamespace(name=["wheel1_joint"], velocity=[99.0]))  # not all of them: left out
+        states(SimpleNamespace(name=["wheel1_joint", "wheel2_joint", "wheel3_joint"], velocity=[]))
+        tick()
+        plant.step(bus.said[-1][1], 7.2)
+    np.testing.assert_allclose(plant.twist, [0.3, 0.1, -1.0], atol=1e-3)
+    node.stop()
+    assert bus.said[-1] == ("duty", [0.0, 0.0, 0.0])
+    module.main()
+    assert bus.stopped
+    assert bus.said[-1][1] == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("name", ['"""', "\\", "速度\u202e", "a\nimport os"])
+def test_whatever_the_robot_is_called(name):
+    for text in ros2_node(ROBOT.replace(name=name)).files.values():
+        compile(text, "file.py", "exec")
+
+
+@pytest.mark.parametrize("options", [{"rate": 0.0}, {"timeout": -1.0}, {"rate": float("nan")}])
+def test_what_makes_no_loop_is_refused(options):
+    with pytest.raises(InputError, match="out of range"):
+        ros2_node(ROBOT, **options)

@@ -1,0 +1,45 @@
+"""Candidates that are fitted before they are ranked: other shapes of friction, and what that costs."""
+
+import pytest
+
+from benchmarks.wrong_worlds.kinds import by_name
+from benchmarks.wrong_worlds.log import logged, robot_of
+from benchmarks.wrong_worlds.score import FRICTION, drawn
+from omnidyn.identification.structure import diagnosis, refits
+from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.keys import WHEELS
+from omnidyn.model.robot_file import load_robot
+from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import excitation, noisy_draw
+
+
+@pytest.mark.parametrize("number", [62, 65])
+def test_friction_at_the_wheels_under_the_file_of_a_box_is_named_first(number):
+    """A simulator that shares no code; a column near the fit named limits, radii and resistances instead."""
+    case, seed, _ = drawn(by_name("wheels"), number)
+    lack = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION).lack_of_fit
+    assert lack.found
+    first = lack.remedies[0]
+    assert first.key == WHEELS
+    assert first.gain > first.gain_std
+
+
+def test_a_right_model_costs_no_fit_of_others(monkeypatch):
+    """All that is tried of it stays within columns near the fit."""
+    asked = []
+    monkeypatch.setattr(diagnosis, "refits", lambda *args: asked.append(args) or {})
+    robot = load_robot("axebot")
+    log = noisy_draw(simulate(robot, excitation(20.0, 100.0), 0.01), 3)
+    assert not fit_output_error(log, robot).lack_of_fit.found
+    assert not asked
+
+
+def test_steps_are_few(monkeypatch):
+    """Every candidate STEPS of the solver, the best GO_ON of them MORE."""
+    taken, own = [], refits._Refit.gone_on
+    monkeypatch.setattr(refits._Refit, "gone_on", lambda self, steps: taken.append(steps) or own(self, steps))
+    case, seed, _ = drawn(by_name("resistance"), 61)
+    lack = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION).lack_of_fit
+    assert lack.found
+    assert sum(steps == refits.MORE for steps in taken) <= refits.GO_ON
+    assert sum(steps == refits.STEPS for steps in taken) <= refits.BEST + 2 * len(refits.SHAPES)

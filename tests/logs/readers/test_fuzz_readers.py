@@ -1,0 +1,46 @@
+"""Mutated and random files for a minute per format: only an OmnidynError leaves a reader, and nothing is slow."""
+
+import time
+
+import pytest
+
+from benchmarks import fuzz_readers
+from benchmarks.fuzz_readers import FORMATS, READERS, measure
+
+MINUTE = 60.0
+
+
+def needed():
+    for library in ("pyarrow", "h5py", "rosbags", "mcap"):
+        pytest.importorskip(library)
+
+
+def test_every_reader_has_a_share_of_the_minute_of_its_format():
+    assert sorted(name for names in FORMATS.values() for name in names) == sorted(READERS)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", list(FORMATS))
+def test_whatever_a_file_holds_only_our_errors_leave_a_reader(name):
+    needed()
+    share = (5.0 if name == "info" else MINUTE) / len(FORMATS[name])
+    table = measure(share, FORMATS[name], seed=11)
+    assert not table.missed, table.as_text()
+
+
+@pytest.mark.parametrize("reader", [name for name in READERS if name.startswith("read_log, ") or name == "info"])
+def test_a_second_of_it(reader):
+    needed()
+    table = measure(1.0, [reader], seed=12)
+    assert not table.missed, table.as_text()
+
+
+def test_a_reader_that_hangs_is_ended_and_said(monkeypatch, tmp_path):
+    """The watch is a thread of C: a loop that never comes back to Python is ended as well."""
+    monkeypatch.setenv("OMNIDYN_FUZZ_HANG", "1")
+    begun = time.monotonic()
+    table = measure(0.5, [fuzz_readers.HANGS], seed=1)
+    assert time.monotonic() - begun < 20.0
+    assert table.missed
+    assert "the process died" in table.as_text()
+    assert "Timeout" in table.as_text()

@@ -1,0 +1,298 @@
+"""Wheels that slip: against an event-driven reference, closed forms, energy, and the engine of wheels that roll."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.errors import UnsupportedError
+from omnidyn.model.deadzone import breakaway_voltage
+from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+from omnidyn.model.surroundings.floor import GRAVITY, Floor
+from omnidyn.simulation.live import LiveRobot
+from omnidyn.simulation.sensitivity.derivatives import derivatives
+from omnidyn.simulation.slip.loads import load_shift, wheel_loads
+from tests.support.friction_shapes import shaped
+from tests.support.slipping import EDGE, Slip
+
+AXEBOT, FOUR = load_robot("axebot"), load_robot("four-wheel")
+
+
+def slippery(robot, mu, inertia=2e-5, **body):
+    wheels = robot.wheels.replace(traction_mu=mu, wheel_inertia=inertia)
+    return robot.replace(wheels=wheels, body=robot.body.replace(**body))
+
+
+def levels(robot, seed, rows=8, most=6.0):
+    found = np.random.default_rng(seed).uniform(-most, most, (rows, robot.wheels.count))
+    found[rows // 2] = 0.0
+    return found
+
+
+# --- the reference ----------------------------------------------------------------------------------------------------
+
+
+LONG = [pytest.param(seed, marks=pytest.mark.long) for seed in range(4, 20)]
+
+
+@pytest.mark.parametrize("seed", [*range(4), *LONG])
+def test_against_the_events(seed):
+    """Random grip, wheels, frame and levels: within tol [m/s], 10 tol [rad/s], the rims too, of DOP853 by events."""
+    rng = np.random.default_rng(seed)
+    robot = slippery(
+        (AXEBOT, FOUR)[seed % 2], rng.uniform(0.1, 0.8), rng.uniform(1e-5, 5e-5), rotating_frame=bool(seed // 2 % 2)
+    )
+    u, reference = levels(robot, seed), Slip(robot, wheel_loads(robot).newtons)
+    twist, rims, contact = reference.run(u, 0.25)
+    if reference.least < EDGE:
+        pytest.skip("what holds and what drives differ by no more than rounding")
+    run = omnidyn.simulate(robot, u, 0.25, tol=1e-6)
+    assert "wheels that slip" in run.source
+    assert (np.abs(run.twist - twist) / [1.0, 1.0, 10.0]).max() < 1e-6
+    assert np.abs(run.wheel_speed * robot.wheels.radii - rims).max() < 1e-5
+    assert contact.any()
+    assert any(words.startswith("wheels slip: wheel ") for words in run.warnings)
+
+
+@pytest.mark.parametrize("seed", [*range(3), *LONG])
+def test_loads_that_shift_against_the_events(seed):
+    """The same with a centre of mass at a height of up to 0.4 of where the wheels stand."""
+    rng = np.random.default_rng(100 + seed)
+    robot = slippery(
+        (AXEBOT, FOUR)[seed % 2], rng.uniform(0.2, 0.8), rng.uniform(1e-5, 5e-5), rotating_frame=bool(seed // 2 % 2),
+        centre_height=rng.uniform(0.01, 0.04),
+    )  # fmt: skip
+    u, reference = levels(robot, 100 + seed), Slip(robot, wheel_loads(robot).newtons, load_shift(robot))
+    twist, rims, contact = reference.run(u, 0.25)
+    if reference.least < EDGE:
+        pytest.skip("what holds and what drives differ by no more than rounding")
+    run = omnidyn.simulate(robot, u, 0.25, tol=1e-6)
+    low = omnidyn.simulate(robot.replace(body=robot.body.replace(centre_height=0.0)), u, 0.25, tol=1e-6)
+    assert np.abs(run.twist - low.twist).max() > 1e-4
+    assert (np.abs(run.twist - twist) / [1.0, 1.0, 10.0]).max() < 1e-6
+    assert np.abs(run.wheel_speed * robot.wheels.radii - rims).max() < 1e-5
+    assert contact.any()
+
+
+# --- wheels that roll -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robot", [AXEBOT, FOUR, shaped("ellipse"), shaped("wheels"), load_robot("mecanum")])
+def test_with_more_grip_than_is_asked_for_it_is_the_engine_of_wheels_that_roll(robot):
+    grips = slippery(robot, 100.0)
+    rolls = grips.replace(wheels=grips.wheels.replace(traction_mu=None))
+    u = levels(robot, 3)
+    run, plain = (omnidyn.simulate(each, u, 0.25, tol=1e-6) for each in (grips, rolls))
+    assert not run.warnings
+    assert (np.abs(run.twist - plain.twist) / [1.0, 1.0, 10.0]).max() < 2e-6
+    assert np.abs(run.wheel_speed - plain.wheel_speed).max() * 0.035 < 2e-5
+    np.testing.assert_allclose(run.current, plain.current, atol=2e-5)
+    np.testing.assert_allclose(run.pose, plain.pose, atol=1e-5)
+
+
+def test_within_the_dead_zone_it_rests_exactly():
+    run = omnidyn.simulate(slippery(AXEBOT, 0.4), np.tile([0.0, 0.2, -0.2], (50, 1)), 0.1)
+    assert not run.twist.any()
+    assert not run.wheel_speed.any()
+
+
+@pytest.mark.parametrize("name", ["wheels", "ellipse"])
+def test_friction_of_wheels_and_of_the_direction_rests_exactly_too(name):
+    run = omnidyn.simulate(slippery(shaped(name), 0.4), np.full((20, 3), 0.01), 0.1)
+    assert not run.twist.any()
+    assert not run.wheel_speed.any()
+
+
+# --- closed forms -----------------------------------------------------------------------------------------------------
+
+
+def test_wheels_that_spin_push_with_mu_times_the_load():
+    """Forward at full volts on ice: M v' = 2 mu N cos 30 - C - B v, N = M g/3; rims run to the motors' speed."""
+    mu = 0.4
+    robot = slippery(AXEBOT.replace(friction=AXEBOT.friction.replace(
+        axes=AXEBOT.friction.axes.replace(coulomb=(0.5, 0.5, 0.05)))), mu, 1e-6)  # fmt: skip
+    mass, axes = robot.body.mass, robot.friction.axes
+    load = mass * GRAVITY / 3.0
+    np.testing.assert_allclose(wheel_loads(robot).newtons, load)
+    push = 2.0 * mu * load * np.cos(np.radians(30.0)) - axes.coulomb[0]
+    run = omnidyn.simulate(robot, np.tile([0.0, 6.0, -6.0], (30, 1)), 0.01)
+    expected = push / axes.viscous[0] * -np.expm1(-axes.viscous[0] * run.t / mass)
+    slips = np.abs(run.wheel_speed[:, 1] * 0.035) > np.abs(run.twist[:, 0]) * np.cos(np.radians(30.0)) + 1e-6
+    slips[0] = True
+    assert slips[:10].all()
+    np.testing.assert_allclose(run.twist[slips, 0], expected[slips], atol=1e-5)
+    motor = robot.motor
+    stall = motor.gear_ratio * motor.torque_constant / 0.035
+    rim = 0.035 / (motor.gear_ratio * motor.emf_constant) * (6.0 - motor.resistance * mu * load / stall)
+    assert abs(run.wheel_speed[5, 1]) * 0.035 == pytest.approx(rim, rel=1e-3)
+
+
+def test_a_robot_whose_wheels_are_locked_slides_to_a_stop_at_mu_g():
+    """Four wheels shorted by motors far too strong: each brakes along its own direction with mu N."""
+    motor = FOUR.motor.replace(resistance=1e-3)
+    robot = slippery(FOUR.replace(motor=motor), 0.1, 1e-3)
+    run = omnidyn.simulate(robot, np.zeros((20, 4)), 0.01, twist=(0.8, 0.0, 0.0))
+    load, axes = robot.body.mass * GRAVITY / 4.0, robot.friction.axes
+    force = 4.0 * 0.1 * load * np.cos(np.radians(45.0)) + axes.coulomb[0]
+    rate = axes.viscous[0] / robot.body.mass
+    expected = (0.8 + force / axes.viscous[0]) * np.exp(-rate * run.t) - force / axes.viscous[0]
+    moving = expected > 0.05
+    np.testing.assert_allclose(run.twist[moving, 0][3:], expected[moving][3:], atol=4e-3)
+
+
+def test_slip_takes_energy_and_gives_none():
+    """Kinetic energy, of the wheels too, never grows beyond what the motors put in."""
+    robot = slippery(AXEBOT, 0.3, rotating_frame=True)
+    u = np.repeat(levels(robot, 8, 10), 100, axis=0)
+    run = omnidyn.simulate(robot, u, 1e-3)
+    rims, spin = run.wheel_speed * 0.035, 2e-5 / 0.035**2
+    mass = [robot.body.mass, robot.body.mass, robot.body.inertia]
+    kinetic = 0.5 * np.sum(mass * run.twist**2, axis=1) + 0.5 * spin * np.sum(rims**2, axis=1)
+    thrust, emf = 19.0 * 0.0059 / 0.035, 19.0 * 0.0059 / 0.035
+
+    def power(rim):
+        return np.sum(thrust * (u - emf * rim) / 1.69 * rim, axis=1)
+
+    work = np.cumsum(0.5e-3 * (power(rims[:-1]) + power(rims[1:])))
+    lost = work - (kinetic[1:] - kinetic[0])
+    assert (np.diff(lost) > -1e-4).all()
+    assert lost[-1] > 1.0
+
+
+# --- loads ------------------------------------------------------------------------------------------------------------
+
+
+def test_loads_are_those_of_statics():
+    robot = AXEBOT.replace(
+        wheels=AXEBOT.wheels.replace(azimuth_deg=(170.0, -50.0, 70.0), robot_radius=(0.1, 0.12, 0.09))
+    )
+    loads = wheel_loads(robot).newtons
+    angle, arm = np.radians(robot.wheels.azimuth_deg), np.array(robot.wheels.robot_radius)
+    assert loads.sum() == pytest.approx(robot.body.mass * GRAVITY)
+    assert np.abs([loads @ (arm * np.cos(angle)), loads @ (arm * np.sin(angle))]).max() < 1e-12
+    slope = wheel_loads(robot.replace(floor=Floor(tilt=20.0))).newtons
+    np.testing.assert_allclose(slope, loads * np.cos(np.radians(20.0)))
+
+
+def test_four_wheels_on_equal_springs():
+    """N = a + b x + c y, by the sums of force and moments."""
+    robot = FOUR.replace(wheels=FOUR.wheels.replace(azimuth_deg=(30.0, 150.0, -120.0, -60.0)))
+    loads = wheel_loads(robot).newtons
+    angle = np.radians(robot.wheels.azimuth_deg)
+    places = np.stack([np.ones(4), np.cos(angle), np.sin(angle)])
+    np.testing.assert_allclose(places @ loads, [robot.body.mass * GRAVITY, 0.0, 0.0], atol=1e-12)
+    assert np.linalg.matrix_rank(np.vstack([places, loads]), tol=1e-9) == 3
+
+
+def test_a_wheel_in_the_air_carries_nothing_and_is_named():
+    robot = slippery(AXEBOT.replace(wheels=AXEBOT.wheels.replace(azimuth_deg=(0.0, 40.0, 170.0))), 0.5)
+    loads = wheel_loads(robot)
+    assert loads.lifted == (1,)
+    assert loads.newtons[1] == 0.0
+    run = omnidyn.simulate(robot, np.ones((5, 3)), 0.01)
+    assert any("wheel 2 carries nothing: it is in the air" in words for words in run.warnings)
+
+
+def test_loads_shift_by_the_height_times_what_the_floor_pushes_with():
+    """Sums of force and moments again: braking loads the wheels in front."""
+    robot = FOUR.replace(body=FOUR.body.replace(centre_height=0.03))
+    shift, angle = load_shift(robot), np.radians(FOUR.wheels.azimuth_deg)
+    force = np.array([-3.0, 1.0])  # braking, and pushed to the left
+    more = shift @ force
+    assert abs(more.sum()) < 1e-12
+    assert more @ (0.1 * np.cos(angle)) == pytest.approx(-0.03 * force[0])
+    assert more @ (0.1 * np.sin(angle)) == pytest.approx(-0.03 * force[1])
+    assert more[0] > 0.0  # in front, on the left
+    assert more[2] < 0.0
+
+
+def test_a_wheel_that_lifts_off_is_said():
+    robot = slippery(FOUR, 1.5, centre_height=0.2)
+    run = omnidyn.simulate(robot, np.tile([-6.0, -6.0, 6.0, 6.0], (10, 1)), 0.01)
+    assert any("lifts off in " in words for words in run.warnings)
+    low = omnidyn.simulate(slippery(FOUR, 1.5, centre_height=0.01), np.tile([-6.0, -6.0, 6.0, 6.0], (10, 1)), 0.01)
+    assert not any("lifts off" in words for words in low.warnings)
+
+
+def test_a_robot_at_rest_on_a_slope_leans_downhill():
+    """The floor holds it with m g sin(tilt): the loads below are larger, and its friction is what holds it."""
+    robot = slippery(FOUR, 0.5, centre_height=0.04).replace(floor=Floor(tilt=5.0))
+    run = omnidyn.simulate(robot, np.zeros((5, 4)), 0.1)
+    assert not run.twist.any()
+    assert not run.warnings
+
+
+def test_the_height_of_a_mecanum_robot_is_refused():
+    with pytest.raises(UnsupportedError, match="the height of the centre of mass on mecanum wheels"):
+        omnidyn.simulate(slippery(load_robot("mecanum"), 0.3, centre_height=0.1), np.ones((2, 4)), 0.01)
+
+
+# --- in every engine, and where it is refused -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["voltage", "speed"])
+def test_a_live_robot_slips_as_well(kind):
+    robot = slippery(AXEBOT, 0.3)
+    name, rows = "voltage", np.repeat(levels(robot, 5, 6), 4, axis=0)
+    if kind == "speed":
+        robot = robot.replace(drive=robot.drive.replace(kind="speed", kp=0.3, ki=2.0, rate=100.0))
+        name, rows = "wheel_speed_command", 4.0 * rows
+    run = omnidyn.simulate(robot, dt=0.04, **{name: rows})
+    live = LiveRobot(robot, 0.04)
+    for k, row in enumerate(rows):
+        live.step(row)
+        np.testing.assert_allclose(live.twist, run.twist[k + 1], atol=5e-5)
+        np.testing.assert_allclose(live.wheel_speed, run.wheel_speed[k + 1], atol=1e-2)
+
+
+def test_a_slope_pulls_at_it_too():
+    """Steeper than what friction and wheels that are shorted take: it slides down, wheels or no wheels."""
+    robot = slippery(AXEBOT, 0.05).replace(floor=Floor(tilt=15.0, downhill=90.0))
+    run = omnidyn.simulate(robot, np.zeros((20, 3)), 0.05)
+    assert run.pose[-1, 1] > 0.05
+    assert abs(run.pose[-1, 0]) < 1e-6
+
+
+def test_a_floor_of_the_file_can_be_slippery():
+    text = robot_to_toml(slippery(AXEBOT, None)) + (
+        "\n[variations.floor.ice]\ntraction_mu = 0.1\n[variations.floor.ice.friction.axes]\n"
+        "viscous = [0.9, 0.9, 0.01]\ncoulomb = [0.3, 0.3, 0.02]\n"
+    )
+    robot = parse_robot(text)
+    assert parse_robot(robot_to_toml(robot)) == robot
+    ice = omnidyn.vary(robot, floor="ice")
+    assert ice.wheels.traction_mu == 0.1
+    tracked = omnidyn.track(robot, "circle", "pid", plant=ice, duration=1.0)
+    rim = np.abs(tracked.run.wheel_speed * 0.035 - tracked.run.twist @ robot.wheels.wrench_matrix)
+    assert rim.max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    "change, named",
+    [
+        (lambda r: r.replace(wheels=r.wheels.replace(wheel_inertia=0.0)), "wheels that weigh nothing"),
+        (lambda r: r.replace(motor=r.motor.replace(electrical="dynamic")), "winding inductance"),
+        (lambda r: r.replace(motor=r.motor.replace(gear_efficiency=0.8)), "gear efficiency"),
+        (lambda r: r.replace(friction=r.friction.replace(axes=r.friction.axes.replace(breakaway=(3.0, 2.0, 0.2)))),
+         "a breakaway above Coulomb"),
+    ],
+    ids=["weightless", "windings", "gear", "breakaway"],
+)  # fmt: skip
+def test_what_has_no_law_here_is_named(change, named):
+    with pytest.raises(UnsupportedError, match=rf"\[wheels\] traction_mu: .*got .*{named}"):
+        omnidyn.simulate(change(slippery(AXEBOT, 0.3)), np.ones((2, 3)), 0.01)
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda robot: breakaway_voltage(robot, [0.0, 1.0, -1.0]),
+        lambda robot: omnidyn.acceleration(robot, np.zeros(3), np.zeros(3)),
+        lambda robot: derivatives(robot, np.ones((5, 3)), 0.01, ["friction.axes.viscous[0]"]),
+        lambda robot: omnidyn.track(robot, "circle", "mpc"),
+        lambda robot: omnidyn.fit_output_error(omnidyn.simulate(AXEBOT, np.ones((50, 3)), 0.01), robot),
+    ],
+    ids=["dead zone", "acceleration", "derivatives", "mpc", "fit"],
+)
+def test_what_knows_rolling_wheels_only_says_so(use):
+    with pytest.raises(UnsupportedError, match=r"no wheels that slip; got traction_mu = 0.5"):
+        use(slippery(AXEBOT, 0.5))

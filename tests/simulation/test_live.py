@@ -1,0 +1,69 @@
+"""A robot driven step by step does what `simulate` says of all commands at once."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.errors import InputError
+from omnidyn.model.robot_file import load_robot
+from omnidyn.simulation.live import LiveRobot
+from omnidyn.simulation.programs import prbs
+from tests.support.friction_shapes import shaped
+
+AXEBOT = load_robot("axebot")
+
+
+def driven(**drive):
+    return AXEBOT.replace(drive=AXEBOT.drive.replace(**drive))
+
+
+SPEED = {"kind": "speed", "kp": 0.3, "ki": 2.0}
+CASES = {
+    "exact": (AXEBOT, "voltage", 1e-14),
+    "windings": (AXEBOT.replace(motor=AXEBOT.motor.replace(electrical="dynamic")), "voltage", 1e-13),
+    "implicit": (shaped("ellipse"), "voltage", 5e-6),
+    "late": (driven(latency=0.033, dead_band=0.2), "voltage", 1e-12),
+    "duty": (driven(kind="duty", supply=6.0), "duty", 1e-14),
+    "coasting": (driven(kind="duty", supply=6.0, off="coast"), "duty", 5e-6),
+    "speed loop, fast": (driven(**SPEED, rate=130.0), "wheel_speed_command", 5e-6),
+    "speed loop, slow": (driven(**SPEED, rate=40.0), "wheel_speed_command", 5e-6),
+}
+SIZE = {"voltage": 1.0, "duty": 1.0 / 6.0, "wheel_speed_command": 5.0}
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_step_by_step_is_all_at_once(name):
+    robot, kind, near = CASES[name]
+    rows = SIZE[kind] * prbs([4.0] * 3, 0.1, 1.5, 0.02, 1)
+    run = omnidyn.simulate(robot, dt=0.02, **{kind: rows})
+    live = LiveRobot(robot, 0.02)
+    for k, row in enumerate(rows):
+        live.step(row)
+        np.testing.assert_allclose(live.twist, run.twist[k + 1], atol=near * 10)
+        np.testing.assert_allclose(live.pose, run.pose[k + 1], atol=near * 10)
+        assert live.voltage == pytest.approx(run.voltage[k], abs=1e-3)
+
+
+def test_a_delay_moves_commands_by_whole_steps():
+    rows = prbs([4.0] * 3, 0.1, 1.0, 0.02, 1)
+    late, now = LiveRobot(AXEBOT, 0.02, delay=2), LiveRobot(AXEBOT, 0.02)
+    for row in [*np.zeros((2, 3)), *rows[:-2]]:
+        now.step(row)
+    for row in rows:
+        late.step(row)
+    np.testing.assert_array_equal(late.twist, now.twist)
+    np.testing.assert_array_equal(late.pose, now.pose)
+
+
+def test_a_push_moves_it_as_far_as_its_motors_would():
+    """A constant force in the steady state: v = (F - C)/(B + k G G^T)."""
+    live = LiveRobot(AXEBOT, 0.02, push=(4.0, 0.0, 0.0))
+    for _ in range(200):
+        live.step(np.zeros(3))
+    system = omnidyn.state_space(AXEBOT)
+    assert live.twist[0] == pytest.approx((4.0 - 2.2) / 1.5 / -system.A[0, 0], rel=1e-9)
+
+
+def test_a_start_that_is_none_is_refused():
+    with pytest.raises(InputError, match="cannot start there"):
+        LiveRobot(AXEBOT, 0.02, pose=[np.nan, 0.0, 0.0])

@@ -1,0 +1,86 @@
+"""What tests of exports share: robots that have an exact step, voltage programs, C that is compiled and run."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from pathlib import Path
+from random import Random
+
+import numpy as np
+
+import omnidyn
+from omnidyn.model.friction import AxesFriction, Friction
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.robot import Robot
+from omnidyn.model.surroundings.floor import Floor
+from omnidyn.model.wheels import Wheels
+
+STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
+
+
+def exact_robot(seed: int) -> Robot:
+    """A robot with an exact step: 3 to 6 wheels, breakaway, rotors, dead band, winding inductance by its seed."""
+    random, plain = Random(f"exact {seed}"), omnidyn.load_robot("axebot")
+
+    def around(value: float) -> float:
+        return float(f"{value * random.uniform(0.6, 1.4):.6g}")
+
+    count, first = 3 + seed % 4, random.uniform(-180.0, 180.0)
+    azimuth = [(first + 360.0 * k / count + 180.0) % 360.0 - 180.0 for k in range(count)]
+    wheels = Wheels(
+        azimuth_deg=tuple(azimuth), robot_radius=around(0.1), wheel_radius=around(0.035),
+        wheel_inertia=around(1e-5) if seed % 3 == 0 else 0.0,
+    )  # fmt: skip
+    coulomb = tuple(map(around, (2.2, 1.5, 0.099)))
+    friction = Friction(
+        axes=AxesFriction(
+            viscous=tuple(map(around, (0.94, 0.96, 0.01))), coulomb=coulomb,
+            breakaway=tuple(c * random.uniform(1.0, 1.5) for c in coulomb) if seed % 2 else None,
+        )
+    )  # fmt: skip
+    motor = plain.motor.replace(
+        resistance=around(1.69), gear_ratio=around(19.0), rotor_inertia=around(1e-7) if seed % 3 == 1 else 0.0,
+        inductance=around(10.0 ** random.uniform(-4.0, -2.0)), electrical=DYNAMIC if seed % 4 == 3 else "quasi-static",
+    )  # fmt: skip
+    drive = plain.drive.replace(dead_band=around(0.2)) if seed % 5 == 2 else plain.drive
+    body = plain.body.replace(mass=around(1.5), inertia=around(0.025))
+    return Robot(name=f"exact {seed}", body=body, wheels=wheels, motor=motor, drive=drive, friction=friction)
+
+
+def program(robot: Robot, seed: int, rows: int = 400) -> np.ndarray:
+    """Volts, beyond the limit now and then, held for some rows, with rest in between. Shape (rows, wheels)."""
+    rng = np.random.default_rng(seed)
+    levels = rng.uniform(-8.0, 8.0, (rows // 20 + 1, robot.wheels.count)) * rng.choice(
+        [0.0, 0.1, 1.0], (rows // 20 + 1, 1)
+    )
+    return np.repeat(levels, 20, axis=0)[:rows]
+
+
+class Stepper:
+    """omnidyn_step of an exported c-model, compiled with every warning an error."""
+
+    def __init__(self, robot: Robot, folder: Path, precision: str = "double") -> None:
+        omnidyn.export.c_model(robot, precision=precision).write(folder)
+        command = ["gcc", *STRICT, "-shared", "-fPIC", "-o", "step.so", "omnidyn_step.c", "-lm"]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        self.real, real = (np.float32, ctypes.c_float) if precision == "single" else (np.float64, ctypes.c_double)
+        self._step = ctypes.CDLL(str(folder / "step.so")).omnidyn_step
+        self.states = 3 if robot.motor.electrical == DYNAMIC else 2
+        self._step.argtypes = [ctypes.c_void_p, real, *[ctypes.c_void_p] * self.states]
+        self._step.restype = None
+
+    def run(self, volts: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """(twist, pose) after each row, the start in row 0. Shape (rows + 1, 3) each."""
+        state = np.zeros((self.states, 3), self.real)
+        volts = np.ascontiguousarray(volts, self.real)
+        out = np.zeros((len(volts) + 1, 2, 3))
+        for k in range(len(volts)):
+            self._step(volts[k].ctypes.data, dt, *(state[i].ctypes.data for i in range(self.states)))
+            out[k + 1] = state[:2]
+        return out[:, 0], out[:, 1]
+
+
+def sloping(robot: Robot) -> Robot:
+    """The same robot on a floor that is not level."""
+    return robot.replace(name=f"{robot.name} on a slope", floor=Floor(tilt=2.0, downhill=30.0))
