@@ -138,6 +138,24 @@ def test_a_packed_variable_that_grows_too_much_is_refused_before_it_is_held(tmp_
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
 
 
+def test_a_struct_of_a_billion_elements_in_a_hundred_bytes_takes_no_time(tmp_path):
+    """Found by the fuzzer: with no fields there is nothing to read; with some, each needs a tag at least."""
+
+    def struct_of(fields):
+        part = struct.pack("<IIII", 6, 8, 2, 0) + struct.pack("<IIii", 5, 8, 2**30, 3)  # flags, shape
+        part += struct.pack("<HH4s", 1, 1, b"s") + struct.pack("<HHI", 5, 4, 8)  # name, length of a field's name
+        part += struct.pack("<II", 1, 8 * len(fields)) + b"".join(name.ljust(8, b"\0") for name in fields)
+        return struct.pack("<II", 14, len(part)) + part
+
+    path = mat5(tmp_path / "a.mat", t_s=T, w1_rad_s=T)
+    whole = path.read_bytes()
+    path.write_bytes(whole + struct_of([]))
+    assert set(read_table(path).names) == {"t_s", "w1_rad_s"}
+    path.write_bytes(whole + struct_of([b"w", b"u"]))
+    with pytest.raises(InputError, match=r"damaged or cut short; got s says 3221225472 structs of 2 fields"):
+        read_table(path)
+
+
 def test_a_packed_dataset_that_grows_too_much_is_refused_before_it_is_read(tmp_path):
     with h5py.File(tmp_path / "bomb.h5", "w") as file:
         file.create_dataset("w1", shape=(10**8,), dtype="f8", chunks=(10**6,), compression="gzip")

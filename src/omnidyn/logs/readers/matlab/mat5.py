@@ -191,8 +191,10 @@ class _Matrix:
         fields = [
             names[k : k + size].partition(b"\0")[0].decode("latin-1") for k in range(0, len(names) // size * size, size)
         ]
+        if count * len(fields) * TAG > len(self.content) - self.at:  # each part has a tag at least
+            raise _Damaged(f"{name} says {count} structs of {len(fields)} fields, and is shorter")
         singles: dict[str, list[float]] = {field: [] for field in fields}
-        for k in range(count):
+        for k in range(count if fields else 0):
             inner = Variables(self.variables.source)
             for field, part in zip(fields, self._parts(len(fields)), strict=True):
                 index = f"[{k + 1}]" if count > 1 else ""
