@@ -276,7 +276,10 @@ def measure(seconds: float = SECONDS, readers: list[str] | None = None, seed: in
         f"fuzz_readers: {seconds:g} s each, mutated and random files, seed {seed}",
         ["reader", "files", "read", "refused", "escaped", "slow", "peak MB"],
     )
-    table.notes += [machine(), f"slow: longer than {SLOW_S:g} s of the processor; escaped: any error but omnidyn's, or a crash"]
+    table.notes += [
+        machine(),
+        f"slow: longer than {SLOW_S:g} s of the processor; escaped: any error but omnidyn's, or a crash",
+    ]
     folder = Path(tempfile.mkdtemp(prefix="omnidyn-fuzz-"))
     for reader in readers or list(READERS):
         request = json.dumps([reader, seconds, seed, str(folder)])
