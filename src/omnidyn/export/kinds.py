@@ -35,7 +35,9 @@ KINDS = {
     "urdf": Kind("omnidyn.export.bodies.urdf", "urdf", "base and wheels as links and joints, for ROS"),
     "sdf": Kind("omnidyn.export.bodies.sdf", "sdf", "base and wheels as links and joints, for Gazebo"),
     "ros2-control": Kind("omnidyn.export.ros.ros2_control", "ros2_control", "omni_wheel_drive_controller for ROS 2"),
-    "ros2-node": Kind("omnidyn.export.ros.node", "ros2_node", "a node that drives by feed-forward, as text"),
+    "ros2-node": Kind(
+        "omnidyn.export.ros.node", "ros2_node", "a node that drives by feed-forward or a controller, as text"
+    ),
 }
 
 

@@ -39,11 +39,11 @@ def drive(tmp_path):
 class Plant:
     """Our simulation as the robot on the other end."""
 
-    def __init__(self, robot):
-        self.robot, self.twist, self.pose = robot, np.zeros(3), np.zeros(3)
+    def __init__(self, robot, dt=DT):
+        self.robot, self.dt, self.twist, self.pose = robot, dt, np.zeros(3), np.zeros(3)
 
     def step(self, duty, supply):
-        run = omnidyn.simulate(self.robot, [np.array(duty) * supply], DT, twist=self.twist, pose=self.pose)
+        run = omnidyn.simulate(self.robot, [np.array(duty) * supply], self.dt, twist=self.twist, pose=self.pose)
         self.twist, self.pose = run.twist[-1], run.pose[-1]
 
     @property
@@ -199,7 +199,7 @@ def test_whatever_the_robot_is_called(name):
         compile(text, "file.py", "exec")
 
 
-@pytest.mark.parametrize("options", [{"rate": 0.0}, {"timeout": -1.0}, {"rate": float("nan")}])
+@pytest.mark.parametrize("options", [{"dt": 0.0}, {"timeout": -1.0}, {"dt": float("nan")}])
 def test_what_makes_no_loop_is_refused(options):
     with pytest.raises(InputError, match="out of range"):
         ros2_node(ROBOT, **options)

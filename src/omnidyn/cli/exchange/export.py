@@ -33,9 +33,13 @@ def export(
     ),
     max_bytes: int = log_options.MAX_BYTES,
     controller: str = typer.Option(
-        "", metavar="NAME|FILE", help="Controller by name or file (c-controller); pid by default."
+        "",
+        metavar="NAME|FILE",
+        help="Controller by name or file (c-controller, pid by default; ros2-node, to follow a path).",
     ),
-    dt: float | None = typer.Option(None, metavar="S", help="Between two of its steps [s]; 0.02 by default."),
+    dt: float | None = typer.Option(
+        None, metavar="S", help="Between two of its steps [s]; 0.02 by default (c-controller, ros2-node)."
+    ),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="What was written and left out, for machines."),
 ) -> None:

@@ -3,10 +3,12 @@
 No omnidyn runs on the robot: drive_loop.py is plain Python without imports beyond the standard library: also for a
 robot without ROS. omnidyn_node.py puts it on /cmd_vel and /joint_states, and gives duties. Constants come from the
 robot: gains of feedforward/gains.py, the twist from the wheels by the pseudo-inverse of G^T. Checked without ROS:
-against stubs of rclpy, with our simulation as the robot.
+against stubs of rclpy, with our simulation as the robot. With a controller: see follower.py.
 """
 
 from __future__ import annotations
+
+import os
 
 import numpy as np
 
@@ -14,12 +16,14 @@ from omnidyn.errors import InputError
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import gains
+from omnidyn.export.ros.follower import BUILD, follower
 from omnidyn.export.ros.ros2_control import limits
 from omnidyn.export.spelling import line_comment, number
 from omnidyn.model.deadzone import HIGHEST, axis_patterns, breakaway_voltage
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 
+KIND = "ros2-node"
 RATE = 100.0  # [Hz]
 TIMEOUT = 0.3  # [s]
 NOTES = (
@@ -28,23 +32,34 @@ NOTES = (
 )
 
 
-def ros2_node(robot: Robot, rate: float = RATE, timeout: float = TIMEOUT) -> Export:
+def ros2_node(
+    robot: Robot, controller: str | os.PathLike = "", dt: float | None = None, timeout: float = TIMEOUT
+) -> Export:
     """A node for /cmd_vel and /joint_states that gives duties, and the loop in it as plain Python.
 
-    rate [Hz]: of the loop. timeout [s]: without a command for so long the robot stops. Raises InputError.
+    controller: by name or file, then the node takes a path or /cmd_vel, and /odom, and steers by its C. dt [s]: between
+    two steps; 0.01, or 0.02 with a controller. timeout [s]: without a command for so long the robot stops. Raises
+    InputError, and UnsupportedError for a robot or a controller that cannot be exported.
     """
-    refuse("ros2-node", robot)
-    for name, value, most in (("rate", rate, 1e4), ("timeout", timeout, 60.0)):
+    from omnidyn.control.feedforward import DT
+
+    dt = dt if dt is not None else (DT if controller else 1.0 / RATE)
+    for name, value, most in (("dt", dt, 1.0), ("timeout", timeout, 60.0)):
         if not 0.0 < value <= most:
             raise InputError("out of range", got=value, expected=f"more than 0 and at most {most:g}", where=name)
-    missing = left_out("ros2-node", robot)
+    own = "c-controller" if controller else KIND
+    refuse(own, robot)
+    missing = left_out(own, robot)
     about = line_comment([f"{robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in missing),
                           "Checked without ROS, see docs/exports.md: try it on blocks first."], "#")  # fmt: skip
+    if controller:
+        files = follower(robot, controller, dt, timeout, about)
+        return Export(KIND, robot.name, files, missing, (*NOTES, BUILD), folder=True)
     files = {
-        "drive_loop.py": about + _constants(robot, rate, timeout) + _LOOP,
+        "drive_loop.py": about + _constants(robot, 1.0 / dt, timeout) + _LOOP,
         "omnidyn_node.py": about + _NODE,
     }
-    return Export("ros2-node", robot.name, files, missing, NOTES, folder=True)
+    return Export(KIND, robot.name, files, missing, NOTES, folder=True)
 
 
 def _constants(robot: Robot, rate: float, timeout: float) -> str:
