@@ -41,6 +41,14 @@ class Found:
 
 
 @dataclass(frozen=True)
+class Wild:
+    """Of an output, the samples that are far beyond its noise: their share of all, and of the squares of residuals."""
+
+    share: float
+    held: float
+
+
+@dataclass(frozen=True)
 class Remedy:
     """key: of the robot file, a nuisance or "change". words: what it is, with its value. gain: share of the squared
     held-out error that it takes away, with its standard error. same_as: keys that the log cannot tell from it.
@@ -104,7 +112,8 @@ class LackOfFit:
     found: whether they do. channels: output -> share of the variance of its residuals that is no noise. sizes: output
     -> what that is, root mean square, in the unit of the output. follows: what residuals follow, first what explains
     most. remedies: best first; those that the log cannot tell from each other name each other in `same_as`. tested:
-    what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst.
+    what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst. wild: outputs with wild
+    samples, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's t.
     """
 
     found: bool
@@ -114,6 +123,7 @@ class LackOfFit:
     remedies: tuple[Remedy, ...]
     tested: Mapping[str, float]
     pictures: tuple[Binned, ...] = ()
+    wild: Mapping[str, Wild] = field(default_factory=dict)
 
     def words(self) -> str:
         """In a sentence, "" for a model that fits."""
@@ -161,12 +171,24 @@ class LackOfFit:
     def statements(self) -> list[str]:
         """What was found, a sentence each."""
         if not self.found:
-            return ["the residuals hold nothing but noise, as far as these logs tell"]
+            return ["the residuals hold nothing but noise, as far as these logs tell", *self._tails()]
         shares = [
             f"{name}: {self.sizes[name]:.2g} of its residual is no noise, {100.0 * share:.0f} % of the variance"
             for name, share in self.channels.items() if share >= WORTH
         ]  # fmt: skip
-        return [self.words(), *shares]
+        return [self.words(), *shares, *self._tails()]
+
+    def _tails(self) -> list[str]:
+        """What is to be said of wild samples: nothing, or a sentence."""
+        if not self.wild:
+            return []
+        worst = max(self.wild, key=lambda name: self.wild[name].held)
+        one, others = self.wild[worst], len(self.wild) - 1
+        more = f", and of {others} more" if others else ""
+        return [
+            f"heavy tails: {100.0 * one.share:.2g} % of the samples of {worst}{more} are wild, far beyond its noise, and "
+            f"hold {100.0 * one.held:.0f} % of its squared error; --loss student-t counts them little"
+        ]
 
     def parts(self) -> list[Part]:
         """As lines and a table."""
@@ -178,6 +200,7 @@ class LackOfFit:
             "found": self.found, "channels": self.channels, "sizes": self.sizes,
             "follows": [asdict(each) for each in self.follows],
             "remedies": [asdict(each) for each in self.remedies], "tested": self.tested,
+            "wild": {name: asdict(each) for name, each in self.wild.items()},
         })  # fmt: skip
 
 

@@ -26,6 +26,7 @@ from omnidyn.identification.structure.refits import refits
 from omnidyn.identification.structure.remedies import remedies
 from omnidyn.identification.structure.rests_on import rests_on
 from omnidyn.identification.structure.shifts import stability
+from omnidyn.identification.structure.tails import wild_samples
 from omnidyn.identification.structure.unoffered import unoffered
 from omnidyn.identification.structure.workbench import Workbench
 
@@ -71,7 +72,7 @@ def examine(solution: Solution) -> Examined:
     pictures = binned(rows, moved, int(np.argmax(seen.shares))) if found else ()
     lack = LackOfFit(
         found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
-        pictures,
+        pictures, {} if solver.nu else wild_samples(seen),
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
     return Examined(diagnosis, seen.linear.memory, len(tried), count)

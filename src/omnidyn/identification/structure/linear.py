@@ -110,11 +110,13 @@ class Linear:
 
     def of_piece(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, its start still in them."""
-        rows = self.rows
-        parts = [
-            _new(self.memory[c], values[j], rows.there[k][j], rows.steps[k][j]) for j, c in enumerate(rows.column[k])
-        ]
+        parts = [self.of_column(k, j, values[j]) for j in range(len(self.rows.column[k]))]
         return np.concatenate(parts) if parts else np.zeros((0, values.shape[2]))
+
+    def of_column(self, k: int, j: int, values: FloatArray) -> FloatArray:
+        """Values (rows, K) of column j of piece k made white, in the rows that count."""
+        rows = self.rows
+        return _new(self.memory[rows.column[k][j]], values, rows.there[k][j], rows.steps[k][j])
 
     def without_starts(self, shown: Shown) -> list[FloatArray]:
         """What is shown, in rows as they are, without what the starts of pieces explain of it. (C, rows, K) each."""

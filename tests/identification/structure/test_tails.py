@@ -1,0 +1,61 @@
+"""Heavy tails: two samples in a hundred that are wild are named, with the loss that counts them little; noise is not."""
+
+import numpy as np
+import pytest
+
+from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, excitation
+
+AXEBOT = load_robot("axebot")
+CLEAN = simulate(AXEBOT, dt=0.01, voltage=excitation(30.0, 100.0, 3))
+
+
+def log(noise):
+    return Run(t=CLEAN.t, voltage=CLEAN.voltage, twist=CLEAN.twist + noise, source="log")
+
+
+def spoiled(seed, times, share=0.02):
+    """Normal noise, and samples that are `times` as far off."""
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=CLEAN.twist.shape) * NOISE
+    return log(np.where(rng.random(noise.shape) < share, times * noise, noise))
+
+
+@pytest.mark.parametrize("times", [15.0, 100.0])
+def test_wild_samples_are_named_with_the_way_out(times):
+    estimate = fit_output_error(spoiled(1, times), AXEBOT, nuisances=())
+    lack = estimate.lack_of_fit
+    assert set(lack.wild) == {"twist[0]", "twist[1]", "twist[2]"}
+    for one in lack.wild.values():
+        assert 0.01 < one.share < 0.022
+        assert one.held > 0.7  # 0.02 times^2 of 0.98 + 0.02 times^2
+    assert any("heavy tails" in words and "--loss student-t" in words for words in lack.statements())
+    assert lack.to_dict()["wild"]["twist[0]"]["share"] == lack.wild["twist[0]"].share
+
+
+def test_student_t_counts_them_little():
+    """Its intervals are those of a log without wild samples, within a fifth; Gauss's are not."""
+    bare, wild = spoiled(2, 1.0), spoiled(2, 30.0)
+    name = "friction.axes.viscous[0]"
+    clean = fit_output_error(bare, AXEBOT, nuisances=()).std[name]
+    robust = fit_output_error(wild, AXEBOT, nuisances=(), loss="student-t")
+    assert robust.std[name] == pytest.approx(clean, rel=0.2)
+    assert fit_output_error(wild, AXEBOT, nuisances=()).std[name] > 2.0 * clean
+    assert not robust.lack_of_fit.wild
+    low, high = robust.ci95[name]
+    assert low <= AXEBOT.friction.axes.viscous[0] <= high
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_normal_noise_has_no_heavy_tails(seed):
+    assert not fit_output_error(spoiled(seed, 1.0), AXEBOT, nuisances=()).lack_of_fit.wild
+
+
+def test_quantised_speeds_have_none():
+    step = 0.02
+    run = log(np.random.default_rng(4).normal(size=CLEAN.twist.shape) * NOISE)
+    rounded = Run(t=run.t, voltage=run.voltage, twist=np.round(run.twist / step) * step, source="log")
+    assert not fit_output_error(rounded, AXEBOT, nuisances=()).lack_of_fit.wild
