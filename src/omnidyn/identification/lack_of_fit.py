@@ -112,8 +112,8 @@ class LackOfFit:
     found: whether they do. channels: output -> share of the variance of its residuals that is no noise. sizes: output
     -> what that is, root mean square, in the unit of the output. follows: what residuals follow, first what explains
     most. remedies: best first; those that the log cannot tell from each other name each other in `same_as`. tested:
-    what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst. wild: outputs with wild
-    samples, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's t.
+    what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst. wild: outputs
+    with wild samples, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's.
     """
 
     found: bool
@@ -186,8 +186,8 @@ class LackOfFit:
         one, others = self.wild[worst], len(self.wild) - 1
         more = f", and of {others} more" if others else ""
         return [
-            f"heavy tails: {100.0 * one.share:.2g} % of the samples of {worst}{more} are wild, far beyond its noise, and "
-            f"hold {100.0 * one.held:.0f} % of its squared error; --loss student-t counts them little"
+            f"heavy tails: {100.0 * one.share:.2g} % of the samples of {worst}{more} are wild, far beyond its noise, "
+            f"and hold {100.0 * one.held:.0f} % of its squared error; --loss student-t counts them little"
         ]
 
     def parts(self) -> list[Part]:

@@ -1,4 +1,4 @@
-"""Heavy tails: two samples in a hundred that are wild are named, with the loss that counts them little; noise is not."""
+"""Heavy tails: two wild samples in a hundred are named, with the loss that counts them little; noise is not."""
 
 import numpy as np
 import pytest
