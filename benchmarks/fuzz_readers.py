@@ -42,9 +42,9 @@ from omnidyn.run import CHANNELS, Run
 SECONDS = float(os.environ.get("OMNIDYN_FUZZ_SECONDS", "60"))
 ROOT = Path(__file__).resolve().parents[1]
 SLOW_S, MAX_MB = 2.0, 2048
-START_S = 60.0  # to load the libraries and make the seeds
+START_S = 300.0  # to load the libraries and make the seeds, on a machine that is busy
 HANG_S = float(
-    os.environ.get("OMNIDYN_FUZZ_HANG", "20")
+    os.environ.get("OMNIDYN_FUZZ_HANG", "60")
 )  # a reader that is no further by then is ended, wherever it hangs, and the file kept
 MAX_SEED_BYTES = 6000
 
