@@ -100,7 +100,8 @@ class AutoRegression:
         p, a = self.order, np.concatenate([[1.0], -self.coefficients])
         wide = np.concatenate([np.zeros(p + 1), a, np.zeros(p + 1)])
         weights = np.array([a[: p + 1 - k] @ a[k:] for k in range(p + 1)])
-        total = 2.0 / self.rows * (weights @ reach) ** 2
+        rows = max(self.rows, 1)
+        total = 2.0 / rows * (weights @ reach) ** 2
         if not p:
             return total
         at = np.arange(1, p + 1)[:, None] + p + 1
@@ -108,7 +109,7 @@ class AutoRegression:
         slope = -(wide[at + lag] + wide[at - lag])  # of w_k by phi_i
         slope[:, 0] = -2.0 * a[1:]
         by_phi = slope @ reach
-        return total + (by_phi * np.linalg.solve(self.covariance, by_phi)).sum(axis=0) / self.rows
+        return total + (by_phi * np.linalg.solve(self.covariance, by_phi)).sum(axis=0) / rows
 
 
 def _steps(partial: FloatArray) -> list[FloatArray]:
@@ -123,9 +124,11 @@ def autoregression(stretches: Sequence[FloatArray], most: int | None = None) -> 
     """That of series without gaps, each of shape (n, K): the series is what all K columns add up to in the square.
 
     The first column is the series itself; the others may be what a fit has taken out of it, see whitening.py.
-    most: the highest order; by default ORDERS log10(rows).
+    most: the highest order; by default ORDERS log10(rows). Without rows it has order 0 and variance 0.
     """
     rows = sum(len(each) for each in stretches)
+    if not rows:
+        return AutoRegression(np.zeros(0), 0.0, 0)
     limit = int(min(ORDERS * np.log10(max(rows, 1)), SHARE * rows)) if most is None else most
     ends = np.cumsum([0, *map(len, stretches)])
     ahead = np.ascontiguousarray(np.concatenate(stretches), dtype=float)
