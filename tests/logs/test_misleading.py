@@ -203,3 +203,16 @@ def test_a_doubtful_column_is_listed_once(write):
     columns = load_log(write(three("speed_m1 [m/s],speed_m2 [m/s],mood"))).columns
     assert columns.unused == ("speed_m1", "speed_m2", "mood")
     assert columns.passed_over == ("mood",)
+
+
+def test_a_unit_may_be_said_of_all_columns_of_one_name(tmp_path):
+    """`--assume enc=ticks/1440` for enc1 .. enc3: what the user reads in the file, not what we call it."""
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "t_s,pwm_1,pwm_2,pwm_3,enc1,enc2,enc3\n" + "".join(f"{k / 50},9,0,{k},{k},0,{k}\n" for k in range(99))
+    )
+    by_name = load_log(path, options=LogOptions(assume={"enc": "ticks/1440", "pwm": "duty/255"}))
+    by_letter = load_log(path, options=LogOptions(assume={"a": "ticks/1440", "d": "duty/255"}))
+    for name in ("wheel_angle", "duty"):
+        assert np.array_equal(by_name.channels[name], by_letter.channels[name])
+    assert "assume" not in " ".join(by_name.columns.doubts)

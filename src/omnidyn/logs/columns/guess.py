@@ -52,12 +52,13 @@ def guess_columns(
 ) -> ColumnMap:
     """Guess the map of a table. robot: settles what a name leaves open (volts or duty, which side of the gear).
 
-    assume: name of a column or letter of a component ("u", "w1", "vx") -> unit, where the file gives none. A name that
+    assume: name of a column, what several are called but for their numbers ("enc" of enc1, enc2), or letter of a
+    component ("u", "w1", "vx") -> unit, where the file gives none. A name that
     a units row or its own ending gives a unit needs none. With @motor or @wheel behind the unit, "ticks/48@motor", it
     says the side of the gear too. taken: column -> component, where the user says it
     himself: nothing is doubted of them. Raises InputError for an unknown unit in `assume`.
     """
-    told = {name: unit_and_side(text) for name, text in (assume or {}).items()}
+    told = {each: unit_and_side(text) for name, text in (assume or {}).items() for each in _meant(name, table.names)}
     assumed = {name: unit.text for name, (unit, _) in told.items()}
     found = Guess(robot=robot)
     names = [name for name in table.names if is_numeric(table.columns[name]) and name not in table.says]
@@ -96,6 +97,12 @@ def _take_said(table: Table, found: Guess) -> None:
         elif said.component and said.component not in found.columns:
             unit = table.units.get(name) or si_suffix(said.component).replace("_", "/")
             found.columns[said.component] = Column(name, unit)
+
+
+def _meant(name: str, names: Iterable[str]) -> list[str]:
+    """The columns called so but for a number behind; the name itself where there are none, or it is a letter."""
+    numbered = [each for each in names if re.fullmatch(re.escape(name) + r"[ _]?\d+", each)]
+    return numbered if numbered and name not in names and not place(f"{name}1") else [name]
 
 
 def _is_used(name: str, table: Table, components: Iterable[str]) -> bool:
