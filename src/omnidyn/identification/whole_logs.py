@@ -8,7 +8,7 @@ from functools import cache
 from typing import Unpack
 
 from omnidyn.arguments import check_order
-from omnidyn.errors import UnsupportedError
+from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
@@ -81,7 +81,13 @@ def solved(fit: Fit, runs: Sequence[Run], progress: Progress) -> Answer:
 
 def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
     """What a solution says, each estimate with its diagnosis, which is made when it is first asked for."""
-    answer = fit.answer(solution, progress)
+    try:
+        answer = fit.answer(solution, progress)
+    except InsufficientDataError:
+        plainer = fit.with_latencies_only(solution, progress)
+        if plainer is None:
+            raise
+        answer = fit.answer(plainer, progress)
     found = {
         group: replace(estimate, study=_study(seen))
         for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)

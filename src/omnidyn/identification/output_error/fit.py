@@ -204,6 +204,20 @@ class Fit:
             progress = progress.aside(f"once more without {', '.join(lost)}")
         return replace(self._solve(group, group.problem(kept), progress), notes=notes)
 
+    def with_latencies_only(self, found: Solution, progress: Progress) -> Solution | None:
+        """The fit of one group without its other automatic nuisances; None where there are none, or they were asked for.
+
+        Beside them the logs may tell no number of the robot at all.
+        """
+        names = _nuisances(found.solver.problem)
+        lost = [name for name in names if name.partition(".")[0] != LATENCY]
+        if not lost or len(self.groups) > 1 or self.question.nuisances is not None:
+            return None
+        (group,) = self.groups
+        plainer = self._solve(group, group.problem([name for name in names if name not in lost]), progress)
+        note = f"beside {' and '.join(lost)} these logs tell no number of the robot: not fitted"
+        return replace(plainer, notes=(*found.notes, note))
+
     def _solve(self, group: Group, problem: Problem, progress: Progress) -> Solution:
         """The best point of one group alone."""
         if group.engine == LOOP:

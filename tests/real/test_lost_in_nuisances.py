@@ -1,0 +1,25 @@
+"""Where automatic nuisances leave nothing to tell of the robot, the answer does without them, and says so."""
+
+import pytest
+
+from benchmarks import real_nuisances, udea
+from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.run import Run
+from tests.support import real_logs as logs
+
+
+@pytest.fixture(scope="module")
+def turning():
+    """Half of a recording of the udea robot that turns on the spot, seen by a camera."""
+    whole = logs.udea_turning(logs.folder())[1]
+    cut = udea.part(whole, slice(len(whole) // 2, None))
+    return Run(t=cut.t, duty=cut.duty, pose=cut.pose, source="half")
+
+
+def test_the_answer_does_without_a_dead_band_and_a_gain(turning):
+    robot = real_nuisances._udea()
+    fit = fit_output_error(turning, robot)
+    assert [*fit.nuisances] == ["latency.heading"]
+    assert any(words == "beside dead_band and gain these logs tell no number of the robot: not fitted"
+               for words in fit.warnings)  # fmt: skip
+    assert "friction.axes.coulomb[2]" not in fit.unidentifiable
