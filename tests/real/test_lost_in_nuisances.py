@@ -9,9 +9,9 @@ from tests.support import real_logs as logs
 
 
 @pytest.fixture(scope="module")
-def turning():
+def turning(data):
     """Half of a recording of the udea robot that turns on the spot, seen by a camera."""
-    whole = logs.udea_turning(logs.folder())[1]
+    whole = logs.udea_turning(data)[1]
     cut = udea.part(whole, slice(len(whole) // 2, None))
     return Run(t=cut.t, duty=cut.duty, pose=cut.pose, source="half")
 

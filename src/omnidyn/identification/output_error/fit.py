@@ -205,7 +205,7 @@ class Fit:
         return replace(self._solve(group, group.problem(kept), progress), notes=notes)
 
     def with_latencies_only(self, found: Solution, progress: Progress) -> Solution | None:
-        """The fit of one group without its other automatic nuisances; None where there are none, or they were asked for.
+        """The fit of one group without other automatic nuisances; None where there are none, or they were asked for.
 
         Beside them the logs may tell no number of the robot at all.
         """
@@ -213,7 +213,7 @@ class Fit:
         lost = [name for name in names if name.partition(".")[0] != LATENCY]
         if not lost or len(self.groups) > 1 or self.question.nuisances is not None:
             return None
-        (group,) = self.groups
+        group = self.groups[0]
         plainer = self._solve(group, group.problem([name for name in names if name not in lost]), progress)
         note = f"beside {' and '.join(lost)} these logs tell no number of the robot: not fitted"
         return replace(plainer, notes=(*found.notes, note))
