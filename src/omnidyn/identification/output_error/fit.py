@@ -211,7 +211,7 @@ class Fit:
         """
         names = _nuisances(found.solver.problem)
         lost = [name for name in names if name.partition(".")[0] != LATENCY]
-        if not lost or len(self.groups) > 1 or self.question.nuisances is not None:
+        if not lost or len(self.groups) != 1 or self.question.nuisances is not None:
             return None
         group = self.groups[0]
         plainer = self._solve(group, group.problem([name for name in names if name not in lost]), progress)
