@@ -30,11 +30,12 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.control.without_slip import without_slip
 from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings.floor import refuse_slope
-from omnidyn.model.wheels import per_wheel, refuse_slip
+from omnidyn.model.wheels import per_wheel
 
 OK, WAITING, ENDED = "ok", "no step yet", "path ended: holding its last pose"
 BAD_TIME, BACKWARDS, STILL = "time is no finite number", "time went backwards", "time stands still"
@@ -135,7 +136,7 @@ class Safe:
     def _take(self, robot: Robot) -> None:
         """Make ready for a robot; settings and memory stay."""
         refuse_slope(robot.floor, "controllers know")
-        refuse_slip(robot.wheels, "controllers know")
+        robot = without_slip(robot)
         self.robot = robot
         self.output = output_kind(robot)
         self.limit = output_limit(robot)

@@ -243,7 +243,7 @@ TABLE: dict[str, dict[str, Cell]] = {
         "bends": Cell(LEAVES_OUT, "nothing bends, and nothing rests in a band, as for the controller in Python"),
         "inductance": Cell(LEAVES_OUT, "the currents have settled, as for the controller in Python"),
         "slope": Cell(REFUSES, "controllers know level floors only"),
-        "slip": Cell(REFUSES, "controllers know no wheels that slip"),
+        "slip": Cell(PARTLY, "it drives as if wheels rolled, with no more current than static loads let them"),
         "gear": Cell(REFUSES, "which gears drive is found by trying, and the C has no loops"),
     },
     "fmu": {**_NOT_EXACT, **_DRIVE},

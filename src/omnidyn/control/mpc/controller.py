@@ -42,10 +42,11 @@ from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.preview import Preview
 from omnidyn.control.mpc.settings import Settings
 from omnidyn.control.mpc.tables import Memory, Room
+from omnidyn.control.without_slip import without_slip
 from omnidyn.errors import InputError
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings.floor import refuse_slope
-from omnidyn.model.wheels import refuse_slip, wheel_speed
+from omnidyn.model.wheels import wheel_speed
 
 HORIZON, MOST_HORIZON, MOST_DELAY = 20, 500, 50
 MET = 1e-5  # [V] from a limit
@@ -77,7 +78,7 @@ class Mpc:
     def _take(self, robot: Robot) -> None:
         """Make ready for a robot; settings stay."""
         refuse_slope(robot.floor, "controllers know")
-        refuse_slip(robot.wheels, "controllers know")
+        robot = without_slip(robot)
         self.robot, self.output, self.limit = robot, output_kind(robot), output_limit(robot)
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
         latency = min(round(robot.drive.latency / self.dt), MOST_DELAY)

@@ -1,0 +1,50 @@
+"""Wheels that may slip: controllers keep currents to what the floor takes, so that their wheels roll."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.control.without_slip import without_slip
+from omnidyn.errors import UnsupportedError
+
+AXEBOT = omnidyn.load_robot("axebot")
+
+
+def gripping(mu, **motor):
+    wheels = AXEBOT.wheels.replace(traction_mu=mu, wheel_inertia=2e-6)
+    return AXEBOT.replace(wheels=wheels, motor=AXEBOT.motor.replace(**motor))
+
+
+def test_a_motor_pushes_no_harder_than_its_wheel_can_hold():
+    """By hand: mu m g/3 at the rim, times its radius, over gear ratio and torque constant."""
+    motor, wheels = AXEBOT.motor, AXEBOT.wheels
+    amperes = 0.5 * AXEBOT.body.mass * 9.81 / 3.0 * wheels.wheel_radius / (motor.gear_ratio * motor.torque_constant)
+    believed = without_slip(gripping(0.5))
+    assert believed.wheels.traction_mu is None
+    np.testing.assert_allclose(believed.motor.current_limit, amperes, rtol=1e-12)
+    np.testing.assert_allclose(without_slip(gripping(0.5, current_limit=0.1)).motor.current_limit, 0.1)
+
+
+def test_a_robot_that_never_slips_stays_as_it_is():
+    assert without_slip(AXEBOT) is AXEBOT
+
+
+def test_the_mpc_that_knows_the_floor_corners_better():
+    """On the same slippery floor, beside the MPC that believes that wheels always roll."""
+    floor = gripping(0.6)
+    knows = omnidyn.track(floor, "square", "mpc", plant=floor).rmse_position
+    believes = omnidyn.track(gripping(None), "square", "mpc", plant=floor).rmse_position
+    assert knows < 0.4 * believes
+
+
+@pytest.mark.parametrize("controller", ["pid", "speed", "feedforward"])
+def test_the_others_drive_it_too(controller):
+    floor = gripping(0.8)
+    known = omnidyn.track(floor, "circle", controller, plant=floor)
+    assert np.isfinite(known.rmse_position)
+
+
+def test_a_slope_is_still_refused():
+    slope = gripping(0.5).replace(floor=AXEBOT.floor.replace(tilt=3.0))
+    with pytest.raises(UnsupportedError, match="not level"):
+        omnidyn.track(slope, "circle", "pid")
