@@ -96,7 +96,7 @@ class Fit:
         if question.bootstrap:
             refuse_bootstrap(question.bootstrap, Counter(names if groups is not None else [""] * len(names)))
         refuse_unknown(question.fixed, robot)
-        asked_axes(question.free or (), question.fixed)
+        asked_axes(robot, question.free or (), question.fixed)
         (progress or Progress()).doing("looking for what moved")
         keys = question.free if question.free is not None else guesses(robot)
         exact = exact and stays_exact(robot, [key for key in keys if key not in question.fixed])
@@ -287,7 +287,9 @@ class Fit:
     def with_levels(self, solution: Solution) -> tuple[Solution, list[Breakaway]]:
         """Breakaway of the axes that were asked for, and the fit with it."""
         group = self.groups[0]
-        axes = [axis for axis in asked_axes(self.question.free or (), self.question.fixed) if group.moved[axis]]
+        axes = [
+            axis for axis in asked_axes(group.robot, self.question.free or (), self.question.fixed) if group.moved[axis]
+        ]
         if not axes:
             return solution, []
         if group.engine != EXACT:
@@ -337,7 +339,7 @@ def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Ques
 
 
 def _refuse_joint(runs: Sequence[Run], robot: Robot, question: Question) -> None:
-    if asked_axes(question.free or ()):
+    if asked_axes(robot, question.free or ()):
         raise UnsupportedError(
             "breakaway is not profiled in groups", got=KEY, expected="other keys", remedy="fit each group alone",
             where="free",
