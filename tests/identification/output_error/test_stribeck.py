@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import guesses
 from omnidyn.identification.output_error.problem.parameters import Parameter
@@ -136,10 +135,3 @@ def test_without_a_fall_breakaway_is_coulomb():
     assert low <= 2.2 <= high
     assert fit.value[HELD] >= fit.value[KEYS[1]]
     assert high - low < 0.3
-
-
-def test_bristles_are_not_fitted_and_it_says_what_to_do(truth):
-    axes = robot_with().friction.axes.replace(law="lugre", stiffness=(1e5, 1e5, 1e3))
-    robot = AXEBOT.replace(friction=Friction(axes=axes))
-    with pytest.raises(UnsupportedError, match=r"no derivatives of a run with law.*identify the levels as coulomb"):
-        omnidyn.identify([log_of(truth, 0)], robot, free=KEYS[:2])

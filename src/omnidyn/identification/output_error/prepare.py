@@ -14,6 +14,7 @@ from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
+from omnidyn.identification.output_error.problem.band import BAND
 from omnidyn.identification.output_error.problem.differences import differences
 from omnidyn.identification.output_error.problem.falling import falls, kept_in_order
 from omnidyn.identification.output_error.problem.motion import Motion, motion
@@ -60,8 +61,8 @@ ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows th
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
 LIMIT = "motor.voltage_limit_V"
-# A drawing, a setting of the firmware and a battery: their std is for the reader. A nominal supply has a nuisance,
-# and so have a dead band and a latency.
+# A drawing, a setting of the firmware, a battery and Karnopp's band: their std is for the reader. A nominal supply has
+# a nuisance, and so have a dead band and a latency.
 NEVER_FREE = (
     "wheels.azimuth_deg",
     "wheels.roller_angle_deg",
@@ -69,6 +70,7 @@ NEVER_FREE = (
     "drive.supply_V",
     DEAD_BAND,
     DRIVE_LATENCY,
+    BAND,
 )
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.errors import OmnidynError
+from omnidyn.identification.output_error.problem.bending import bending_keys
 from omnidyn.identification.output_error.problem.falling import falls
 from omnidyn.identification.structure.linear import Linear, solved
 from omnidyn.identification.structure.workbench import Workbench, scaled
@@ -32,7 +33,7 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {p.name: {} for p in problem.robot_parameters}
     taken = {Key.parse(p.name).name for p in problem.robot_parameters}
     fixed = [(name, TRIED) for name in FIXED if name not in taken]
-    for name, tried in [*fixed, *((name, TRIED_FALL) for name in _of_falls(bench))]:
+    for name, tried in [*fixed, *((name, TRIED_FALL) for name in _of_laws(bench))]:
         robot = scaled(bench.robot, name, 1.0 + tried)
         if robot is None:
             continue
@@ -52,9 +53,10 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
     }  # fmt: skip
 
 
-def _of_falls(bench: Workbench) -> list[str]:
-    """What a level that falls with the speed has beside Coulomb friction, and the fit takes as it stands."""
+def _of_laws(bench: Workbench) -> list[str]:
+    """What a law that falls with the speed, or bends, has beside Coulomb friction, and the fit takes as it stands."""
     robot, free = bench.robot, bench.problem.names
     levels = [key for name in LEVELS for key in expand(name, robot) if falls(key, robot)]
     speeds = [key.replace(BREAKAWAY, "stribeck_speed").removesuffix("_backward") for key in levels]
-    return [key for key in dict.fromkeys((*levels, *speeds)) if key not in free]
+    bends = [key for name in bending_keys(robot) for key in expand(name, robot)]
+    return [key for key in dict.fromkeys((*levels, *speeds, *bends)) if key not in free]
