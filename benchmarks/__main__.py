@@ -23,6 +23,7 @@ NAMES = {
     "big_bag": "an MCAP of 2 GB: rate and memory beside rosbags and mcap (writes it to a temporary folder)",
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
+    "laws_identified": "Stribeck, Dahl, LuGre fitted back from logs of other integrators: coverage, std (an hour)",
     "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
     "outputs": "output error from counts of encoders, from positions, and on a tilted floor (eight minutes)",
     "identify": "output error on simulated logs: coverage, starts, nuisances, time beside peers (ten minutes)",

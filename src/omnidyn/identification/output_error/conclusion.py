@@ -17,6 +17,7 @@ from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.belonging import key_of, with_nuisances
 from omnidyn.identification.output_error.combinations import combinations
+from omnidyn.identification.output_error.problem.falling import falls
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
@@ -217,7 +218,7 @@ def intervals(
         low, high = inner - half, inner + half
         if known.held[j]:
             pushed = float(known.free_step[j])
-            below = value <= p.low
+            below = 2.0 * value <= p.low + p.high  # or at Coulomb friction, which breakaway never is below
             low = inner if below else inner + min(-half, pushed - half)
             high = inner + max(half, pushed + half) if below else inner
         low, high = (max(low, p.low), min(high, max(p.high, inner))) if not p.log else (low, high)
@@ -334,6 +335,8 @@ def _warnings(
             bound = f"{p.name} is at its bound {solution.state.point.values[j]:.4g}"
             still = Key.parse(p.name.partition("@")[0]).name in (ROTOR, WHEEL)
             why = "nothing is seen to spin beside the body" if still else "the best fit lies beyond it"
+            if falls(p.name.partition("@")[0], solver.problem.robot):
+                why = "the log shows no fall from it to Coulomb friction"
             words.append(f"{bound}: {why}")
     if known.kind == "sandwich":
         by = f" by the scatter from run to run ({known.runs} runs)" if known.runs else ""

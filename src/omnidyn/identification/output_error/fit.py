@@ -31,6 +31,8 @@ from omnidyn.identification.output_error.prepare import (
     read_records,
     stays_exact,
 )
+from omnidyn.identification.output_error.problem.band import band_words, with_band, without_band
+from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated, refuse_unknown
 from omnidyn.identification.output_error.problem.problem import Problem
@@ -61,11 +63,13 @@ class Fit:
     """A fit of whole logs, ready to be solved.
 
     `solve` finds the best point, `answer` says what it means. After an interrupt, `answer` takes the `best` of the
-    Progress that `solve` was given. twice: which runs were given twice and count once, in words.
+    Progress that `solve` was given. began: the robot as it was given. twice: which runs were given twice and count
+    once, in words.
     """
 
     question: Question
     groups: tuple[Group, ...]
+    began: Robot
     twice: tuple[str, ...] = ()
 
     @classmethod
@@ -83,10 +87,12 @@ class Fit:
         names = _group_names(every, question, groups)
         kept, twice = count_once(every, names)
         every, names = [every[k] for k in kept], [names[k] for k in kept]
-        exact = is_exact(robot)
-        usual = free_by_default(robot, exact)
+        rigid = without_band(robot, ())
+        exact = is_exact(rigid)
+        usual = free_by_default(rigid, exact)
         refuse_repeated(question.free or ())
         question = _written_out(question, robot, usual)
+        began, robot = robot, with_damping(without_band(robot, question.free or ()), question.free or ())
         if groups is not None:
             _refuse_joint(every, robot, question)
         found = {
@@ -96,7 +102,7 @@ class Fit:
         if question.bootstrap:
             refuse_bootstrap(question.bootstrap, Counter(names if groups is not None else [""] * len(names)))
         refuse_unknown(question.fixed, robot)
-        asked_axes(question.free or (), question.fixed)
+        asked_axes(robot, question.free or (), question.fixed)
         (progress or Progress()).doing("looking for what moved")
         keys = question.free if question.free is not None else guesses(robot)
         exact = exact and stays_exact(robot, [key for key in keys if key not in question.fixed])
@@ -106,7 +112,7 @@ class Fit:
         ]
         if groups is not None:
             own_names(question.per_free, [group.problem() for group in made])
-        return cls(question, tuple(made), twice)
+        return cls(question, tuple(made), began, twice)
 
     @property
     def nu(self) -> float:
@@ -126,7 +132,19 @@ class Fit:
         Raises InputError for a name to profile that is not free, InsufficientDataError where the logs say nothing about
         any of the robot's numbers.
         """
-        progress, done = progress or Progress(), isinstance(found, Solution)
+        answer = self._answer(found, progress or Progress())
+        words, estimates = band_words(self.began), answer.estimates
+        return replace(
+            answer,
+            estimates={
+                name: replace(one, robot=with_band(one.robot, self.began), warnings=(*one.warnings, *words))
+                for name, one in estimates.items()
+            },
+        )
+
+    def _answer(self, found: Solution | Best, progress: Progress) -> Answer:
+        """The same, of the robot that was fitted."""
+        done = isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
         warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution)]
         solution, levels = self.with_levels(solution) if done else (solution, [])
@@ -301,7 +319,9 @@ class Fit:
     def with_levels(self, solution: Solution) -> tuple[Solution, list[Breakaway]]:
         """Breakaway of the axes that were asked for, and the fit with it."""
         group = self.groups[0]
-        axes = [axis for axis in asked_axes(self.question.free or (), self.question.fixed) if group.moved[axis]]
+        axes = [
+            axis for axis in asked_axes(group.robot, self.question.free or (), self.question.fixed) if group.moved[axis]
+        ]
         if not axes:
             return solution, []
         if group.engine != EXACT:
@@ -351,7 +371,7 @@ def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Ques
 
 
 def _refuse_joint(runs: Sequence[Run], robot: Robot, question: Question) -> None:
-    if asked_axes(question.free or ()):
+    if asked_axes(robot, question.free or ()):
         raise UnsupportedError(
             "breakaway is not profiled in groups", got=KEY, expected="other keys", remedy="fit each group alone",
             where="free",

@@ -14,7 +14,9 @@ from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
+from omnidyn.identification.output_error.problem.band import BAND
 from omnidyn.identification.output_error.problem.differences import differences
+from omnidyn.identification.output_error.problem.falling import falls, kept_in_order
 from omnidyn.identification.output_error.problem.motion import Motion, motion
 from omnidyn.identification.output_error.problem.nuisances import (
     LATENCY,
@@ -28,7 +30,7 @@ from omnidyn.identification.output_error.problem.parameters import Parameter, na
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
 from omnidyn.identification.output_error.solve.loop import loop_keys, loop_pieces, looped
-from omnidyn.identification.output_error.trust.breakaway import KEY
+from omnidyn.identification.output_error.trust.breakaway import KEY, is_profiled
 from omnidyn.identification.question import Question
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.frames import AXES
@@ -59,8 +61,8 @@ ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows th
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
 LIMIT = "motor.voltage_limit_V"
-# A drawing, a setting of the firmware and a battery: their std is for the reader. A nominal supply has a nuisance,
-# and so have a dead band and a latency.
+# A drawing, a setting of the firmware, a battery and Karnopp's band: their std is for the reader. A nominal supply has
+# a nuisance, and so have a dead band and a latency.
 NEVER_FREE = (
     "wheels.azimuth_deg",
     "wheels.roller_angle_deg",
@@ -68,6 +70,7 @@ NEVER_FREE = (
     "drive.supply_V",
     DEAD_BAND,
     DRIVE_LATENCY,
+    BAND,
 )
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 
@@ -179,14 +182,15 @@ def make_problem(
     unknown = [key for key in question.fixed if key not in keys]
     if unknown and question.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
-    keys = [key for key in keys if key not in question.fixed and Key.parse(key).name != KEY]
+    keys = [key for key in keys if key not in question.fixed and not is_profiled(key, robot)]
     if not keys:
         got = ", ".join(question.free or ()) or "no key"
         raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
     own = robot_parameters(robot, keys, priors)
     engine = engine or engine_for(records, robot, keys)
     if engine != EXACT:
-        own = [_within_reach(p, _drive(records, robot)) for p in own]
+        drive = _drive(records, robot)
+        own = [kept_in_order(_within_reach(p, drive), robot, keys) for p in own]
     auto = automatic(records, engine == EXACT)
     more = (
         nuisance_parameters(auto, records, robot, earliest(records)) if question.nuisances is None
@@ -250,7 +254,7 @@ def _drive(records: Sequence[Record], robot: Robot) -> float:
 def _within_reach(p: Parameter, drive: float) -> Parameter:
     """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
     low = LEAST * p.value if p.low == 0.0 else p.low
-    if Key.parse(p.name).level != COULOMB or drive == 0.0:
+    if Key.parse(p.name).level not in (COULOMB, BREAKAWAY) or drive == 0.0:
         return replace(p, low=low)
     return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
 
@@ -269,14 +273,14 @@ def free_by_default(robot: Robot, exact: bool | None = None) -> tuple[str, ...]:
 def guesses(robot: Robot, looped: bool = False) -> tuple[str, ...]:
     """What is free by default beside friction: every number whose std no fit has written, and that a fit can move.
 
-    The EMF constant follows the torque constant, and breakaway coulomb. looped: whether a speed loop makes the voltage;
-    where it is logged, a limit on it says nothing.
+    The EMF constant follows the torque constant, and breakaway coulomb where it does not fall to it. looped: whether a
+    speed loop makes the voltage; where it is logged, a limit on it says nothing.
     """
     found = {name: Key.parse(name) for name in known_priors(robot)}
     magnet = any(key.name == TORQUE for key in found.values())
     kept = []
     for name, key in found.items():
-        tied = (magnet and key.name == EMF) or key.level == BREAKAWAY
+        tied = (magnet and key.name == EMF) or (key.level == BREAKAWAY and not falls(name, robot))
         held = key.name in NEVER_FREE or (key.name == LIMIT and not looped)
         if not tied and not held and (key.level or key.get(robot) > 0.0):
             kept.append(name)

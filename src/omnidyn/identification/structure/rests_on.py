@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.errors import OmnidynError
+from omnidyn.identification.output_error.problem.bending import bending_keys
+from omnidyn.identification.output_error.problem.falling import falls
 from omnidyn.identification.structure.linear import Linear, solved
 from omnidyn.identification.structure.workbench import Workbench, scaled
-from omnidyn.model.keys import EMF, TORQUE, Key
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 
 PERCENT = 0.01
 TRIED = 0.01  # relative change of a fixed number, either way is alike
@@ -15,6 +17,9 @@ FIXED = (
     "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.resistance_ohm",
     TORQUE, EMF, "motor.gear_ratio", "motor.rotor_inertia_kg_m2", "motor.voltage_drop_V", "motor.current_limit_A",
 )  # fmt: skip
+
+LEVELS = (f"{BODY_AXES}.breakaway", f"{DIRECTION}.breakaway", f"{DIRECTION}.yaw_breakaway", f"{WHEELS}.breakaway")
+TRIED_FALL = 1e-3  # the same of a level at which things break away: a larger change may move that to another row
 
 
 def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
@@ -27,15 +32,18 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
     values = bench.point.values
     found: dict[str, dict[str, float]] = {p.name: {} for p in problem.robot_parameters}
     taken = {Key.parse(p.name).name for p in problem.robot_parameters}
-    for name in FIXED:
-        robot = None if name in taken else scaled(bench.robot, name, 1.0 + TRIED)
+    fixed = [(name, TRIED) for name in FIXED if name not in taken]
+    for name, tried in [*fixed, *((name, TRIED_FALL) for name in _of_laws(bench))]:
+        robot = scaled(bench.robot, name, 1.0 + tried)
         if robot is None:
             continue
         try:
             shown = bench.change(robot)
         except OmnidynError:
             continue
-        step = solved(j, -linear.white(shown)[:, 0]) / TRIED * PERCENT
+        if not any(own.any() for own in shown):
+            continue  # of an axis that never moved
+        step = solved(j, -linear.white(shown)[:, 0]) / tried * PERCENT
         for p, value, change in zip(problem.robot_parameters, values, step, strict=False):
             share = change if p.log else change / value if value else np.nan
             if np.isfinite(share):
@@ -43,3 +51,12 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
     return {
         name: dict(sorted(by.items(), key=lambda item: -abs(item[1]))) for name, by in found.items()
     }  # fmt: skip
+
+
+def _of_laws(bench: Workbench) -> list[str]:
+    """What a law that falls with the speed, or bends, has beside Coulomb friction, and the fit takes as it stands."""
+    robot, free = bench.robot, bench.problem.names
+    levels = [key for name in LEVELS for key in expand(name, robot) if falls(key, robot)]
+    speeds = [key.replace(BREAKAWAY, "stribeck_speed").removesuffix("_backward") for key in levels]
+    bends = [key for name in bending_keys(robot) for key in expand(name, robot)]
+    return [key for key in dict.fromkeys((*levels, *speeds, *bends)) if key not in free]

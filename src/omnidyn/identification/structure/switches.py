@@ -20,7 +20,7 @@ from omnidyn.identification.output_error.prepare import expand_keys, guesses, st
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY
 from omnidyn.identification.output_error.solve.solver import Solution
-from omnidyn.identification.output_error.trust.breakaway import HIGHEST, levels_of
+from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.laws import along_axes, along_travel
@@ -128,7 +128,7 @@ def _free(asked: Question, *keys: str) -> Question:
 def _with_levels_as_they_are(way: Switch) -> Switch:
     """The same; where the engine cannot look for levels of breakaway, they stay."""
     keys = expand_keys(way.question.free or (), way.robot)
-    kept = tuple(key for key in keys if Key.parse(key).name != BREAKAWAY)
+    kept = tuple(key for key in keys if not is_profiled(key, way.robot))
     if kept == keys or (is_exact(way.robot) and stays_exact(way.robot, kept)):
         return way
     return replace(way, question=replace(way.question, free=kept))

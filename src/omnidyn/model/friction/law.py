@@ -16,7 +16,7 @@ A law acts between body and floor. It must:
    (stick_slip/step_bound.py). What it remembers is eliminated from a stage: its force is a function of the speed there;
 6. say so in two tables: `add_to` adds its levels, and the numbers of its kind, to those of the elements on which it
    acts (model/layout.py). Solvers, step control, dead zone, feed-forward and derivatives take them from there; what has
-   a memory has no derivatives, and is refused by name.
+   a memory has derivatives of it too; Karnopp's band has none, and is refused by name.
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ from omnidyn.simulation.sensitivity.directions import (
     difference,
     directions_of,
     prepared,
+    width,
 )
 from omnidyn.simulation.sensitivity.loop import run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.march import march_with_derivatives
@@ -71,9 +72,9 @@ def derivatives(
     whether something breaks away at all, a stop that only just happens, an ellipse crossing rest at an angle, a voltage
     exactly at its limit, a tick at which the integral of a speed loop begins or ceases to stand still. At tol 1e-6 a
     derivative of the twist or pose is within 1e-5 of its largest value in the run, within 5e-5 after a release inside a
-    row; of a current that has inductance, within 1e-4.
+    row; of a current that has inductance, and of all that moves on bristles, within 3e-4.
     Raises InputError for what `simulate` refuses, for an unknown key, and for friction or a gear loss that is off;
-    UnsupportedError for the rate of a speed loop.
+    UnsupportedError for the rate of a speed loop, and for Karnopp's law.
     """
 
     if robot.drive.latency or LATENCY in keys:
@@ -119,7 +120,7 @@ def differentiate(
         refuse_rate(keys)
     directions, length = directions_of(numbers, plants, rates), numbers.body[LENGTH]
     stretch = difference(np.array([p.body[LENGTH] for p in plants]))
-    first = np.zeros((len(keys), N_AXES + numbers.wheels))
+    first = np.zeros((len(keys), width(numbers)))
     first[:, 2] = start[0][2] * stretch
     bound = current_bounds(robot, given, len(given.dt))
     if given.set_point is None:
@@ -135,7 +136,7 @@ def differentiate(
     dtwist = ds[..., :N_AXES].copy()
     dtwist[..., 2] = (dtwist[..., 2] - run.twist[:, 2, None] * stretch) / length
     if robot.motor.electrical == DYNAMIC:
-        dcurrent = ds[..., N_AXES:]
+        dcurrent = ds[..., N_AXES : N_AXES + numbers.wheels]
     else:
         dcurrent = _settled(robots, run, dtwist, dvolts)
     dcurrent = dcurrent * (np.append(bound, bound[-1:], axis=0)[:, None] > 0.0)  # none while a motor coasts
@@ -161,7 +162,7 @@ def run_with_derivatives(
     numbers: Plant, directions: Directions, given: Commands, bound: FloatArray, start: tuple[FloatArray, FloatArray],
     first: FloatArray, tol: float, seen: Samples | None = None,
 ) -> tuple[Outcome, FloatArray, FloatArray]:  # fmt: skip
-    """The run of `run_implicit`, with derivatives of state (rows + 1, K, 3 + n) and pose (rows + 1, K, 3).
+    """The run of `run_implicit`, with derivatives of state (rows + 1, K, D) and pose (rows + 1, K, 3).
 
     With `seen`, the run is sampled there instead: the derivatives by row are left out, both arrays are empty.
     """

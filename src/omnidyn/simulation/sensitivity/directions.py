@@ -11,8 +11,23 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.friction.kinds import KARNOPP
 from omnidyn.model.keys import ROTOR, WHEEL, Key
-from omnidyn.model.layout import ACTIVE, EFFICIENCY, ELLIPSE, GX, GZ, HOLD, N_AXES, SLIDE, SLIDE_X, SLIDE_Y
+from omnidyn.model.layout import (
+    ACTIVE,
+    BEND_HOLD,
+    BEND_SLIDE,
+    EFFICIENCY,
+    ELLIPSE,
+    GX,
+    GZ,
+    HOLD,
+    SLIDE,
+    SLIDE_X,
+    SLIDE_Y,
+    STIFF,
+    STIFF_XY,
+)
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant, plant
 from omnidyn.model.stick_slip.release import new_state
@@ -34,13 +49,13 @@ class Directions(NamedTuple):
     lift: FloatArray  # (3, 6) rows of the elimination: stuck direction, and what it is made of
     held: IntArray  # (2, 3) which elements span what is stuck; pivots
     point: FloatArray  # (5, 3) points, accelerations
-    aim: FloatArray  # (K, 3 + n) derivative of x* and i*
-    middle: FloatArray  # (K, 3 + n) derivative at stage 1
-    half: FloatArray  # (K, 3 + n) derivative after the first half step
+    aim: FloatArray  # (K, D) derivative of x*, i* and z*; D = 3 + n, and all elements and the plane where any bends
+    middle: FloatArray  # (K, D) derivative at stage 1
+    half: FloatArray  # (K, D) derivative after the first half step
     state: FloatArray  # (2, size of a state)
     gained: FloatArray  # (3,) acceleration
     carry: FloatArray  # (3, n) di/di*, the force per ampere of i*, and the branch of the current
-    kept: FloatArray  # (K, 3 + n) derivative before a piece of a half step
+    kept: FloatArray  # (K, D) derivative before a piece of a half step
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +74,7 @@ def prepared(robot: Robot, keys: Sequence[str]) -> Prepared:
     """Raises InputError for an unknown key, for friction or a gear loss that is off, UnsupportedError on a slope, or of
     wheels that slip."""
     refuse_slope(robot.floor, "derivatives of a run know")
-    refuse_bristles(robot)
+    refuse_band(robot)
     refuse_slip(robot.wheels, "derivatives of a run know")
     scale = np.array([_scale(robot, key) for key in keys])
     robots = [_moved(robot, key, s, side) for key, s in zip(keys, scale, strict=True) for side in (1.0, -1.0)]
@@ -78,13 +93,18 @@ def directions_of(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Dir
     element = np.array([*(p.element for p in plants), numbers.element])
     count, n = len(plants) // 2, numbers.wheels
     arm = np.ascontiguousarray(np.swapaxes(difference(element[:-1, :, GX : GZ + 1]), 0, 1))
-    work = np.zeros((4, count, N_AXES + n))
+    work = np.zeros((4, count, width(numbers)))
     return Directions(
         body=body, element=element, arm=arm, voltage=rates, workspace=np.array([workspace(), workspace()]),
         lift=np.zeros((3, 6)), held=np.zeros((2, 3), np.int64), point=np.zeros((5, 3)), aim=work[0], middle=work[1],
         half=work[2], state=np.zeros((2, len(new_state(numbers)))), gained=np.zeros(3), carry=np.zeros((3, n)),
         kept=work[3],
     )  # fmt: skip
+
+
+def width(numbers: Plant) -> int:
+    """D: how many numbers of a state have derivatives. x, currents, and where anything bends how far all of it does."""
+    return len(new_state(numbers)) - len(numbers.element) - 1  # less the signs
 
 
 def difference(values: FloatArray) -> FloatArray:
@@ -101,24 +121,24 @@ def current_derivatives(
     return difference(np.array(values))[0]
 
 
-def refuse_bristles(robot: Robot) -> None:
-    """Raises UnsupportedError for a law whose memory has no derivatives: one that bends, or Karnopp's band."""
-    for name in type(robot.friction).model_fields:
-        law = getattr(robot.friction, name).law
-        if law != "coulomb":
-            raise UnsupportedError(
-                f'no derivatives of a run with law = "{law}"', got=law, expected='law = "coulomb", with stribeck_speed',
-                remedy="identify the levels as coulomb with breakaway and stribeck_speed: they are those of the "
-                "bristle once it slips; then write law and stiffness back into the file", where=f"friction.{name}.law",
-            )  # fmt: skip
+def refuse_band(robot: Robot) -> None:
+    """Raises UnsupportedError for Karnopp's law, whose band is no motion that a number could move."""
+    if robot.friction.axes.law == KARNOPP:
+        raise UnsupportedError(
+            f'no derivatives of a run with law = "{KARNOPP}"', got=KARNOPP, expected='law = "coulomb"',
+            remedy='take law = "coulomb" with the same levels: it sticks exactly, which the band stands in for',
+            where="friction.axes.law",
+        )  # fmt: skip
 
 
 def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
     """Dry friction, or a gear loss, of 0 is not a number to differentiate by: where it is off nothing can stick."""
     levels = np.r_[SLIDE : HOLD + 2, EFFICIENCY]
     off = (numbers.element[:, levels] != up.element[:, levels]).any(axis=1) & (numbers.element[:, ACTIVE] == 0.0)
+    bends = slice(BEND_SLIDE, BEND_HOLD + 2)
+    off |= (numbers.element[:, bends] != up.element[:, bends]).any(axis=1) & (numbers.element[:, STIFF] == 0.0)
     ellipse = numbers.body[ELLIPSE] == 2.0 and up.body[SLIDE_X] + up.body[SLIDE_Y] > 0.0
-    if off.any() or ellipse:
+    if off.any() or ellipse or (numbers.body[STIFF_XY] == 0.0 and up.body[STIFF_XY] > 0.0):
         raise InputError(
             "cannot differentiate with respect to what is off", got=key, expected="a level that is not 0, a loss",
             remedy="give it a value first", where="keys",

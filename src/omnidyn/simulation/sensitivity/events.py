@@ -8,6 +8,7 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
     BOUND,
     BRANCH,
+    BRISTLES,
     CURRENT,
     DROP,
     EFFICIENCY,
@@ -33,6 +34,7 @@ from omnidyn.model.layout import (
 from omnidyn.model.stick_slip.active_set import find_active_set, newton_direction
 from omnidyn.model.stick_slip.can_hold import worst_direction
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses, winding
+from omnidyn.model.stick_slip.laws import aim_bristles
 from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, settle, sticks
 from omnidyn.model.stick_slip.workspace import NEWTON, WORST, copy_row, copy_table
 from omnidyn.simulation.implicit.march import SHORTEST
@@ -56,6 +58,8 @@ def _at_instant(body, element, state, x, delay):
         body[GOAL + a] = x[a]
     for e in range(N_AXES, m):
         element[e, NOW] = state[current_entry(e, m)]
+    if body[BRISTLES] > 0.0:
+        aim_bristles(body, element, state, current_entry(m, m), 0.0)
 
 
 @part

@@ -26,8 +26,9 @@ from omnidyn.simulation.sensitivity.directions import (
     current_derivatives,
     difference,
     directions_of,
-    refuse_bristles,
+    refuse_band,
     refuse_switched_off,
+    width,
 )
 from omnidyn.simulation.sensitivity.loop import LoopRun, run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.sample import MEET, PATH, TURN, Samples, empty_samples
@@ -137,7 +138,7 @@ def late_samples(
     """
     numbers, plants = _plants(robot, directions)
     rates = np.zeros((len(directions), *voltage.shape))
-    first, length = np.zeros((len(directions), N_AXES + numbers.wheels)), numbers.body[LENGTH]
+    first, length = np.zeros((len(directions), width(numbers))), numbers.body[LENGTH]
     stretch = _stretch(plants)
     for k, one in enumerate(directions):
         rates[k] = 0.0 if one.voltage is None else one.voltage
@@ -167,7 +168,7 @@ def looped_samples(
     seen, count = _room(robot, t, late, len(directions), travel), len(directions)
     found = run_loop_with_derivatives(
         robot, robots, numbers, directions_of(numbers, plants, np.zeros((count, *set_point.shape))), given,
-        (np.zeros(3), np.zeros(3)), np.zeros((count, N_AXES + numbers.wheels)), as_tolerance(tol), settled, seen,
+        (np.zeros(3), np.zeros(3)), np.zeros((count, width(numbers))), as_tolerance(tol), settled, seen,
     )  # fmt: skip
     for c, own in enumerate(seen.late):
         rests = seen.t - own < -MEET
@@ -198,7 +199,7 @@ def _in_force(found: LoopRun) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _plants(robot: Robot, directions: Sequence[Direction]) -> tuple[Plant, list[Plant]]:
     """(the plant of the robot, those up and down each direction)."""
-    refuse_bristles(robot)
+    refuse_band(robot)
     numbers = plant(robot)
     plants = [numbers if r is None else plant(r) for one in directions for r in (one.up, one.down)]
     for k, one in enumerate(directions):

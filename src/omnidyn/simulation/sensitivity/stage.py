@@ -7,14 +7,22 @@ With P a right inverse of A and J = dR/dx, a change of a parameter changes A and
 
 No force is written here: dR is a central difference of the residual of two plants, a little up and down the
 parameter. Signs, and branches of the currents, are those of the solution: what is stuck has a derivative of exactly 0,
-and a current limit or a voltage drop within the reach of the difference is not straddled.
+and a current limit or a voltage drop within the reach of the difference is not straddled. What bends goes along as the
+currents do: z* is moved with its derivative, and the differences are of z at the solution.
 """
 
 from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import (
+    AIMED,
+    AIMED_XY,
+    BEND_HOLD,
+    BEND_HOLD_XY,
+    BENT,
+    BENT_XY,
     BRANCH,
+    BRISTLES,
     CURRENT,
     EFFICIENCY,
     ELLIPSE,
@@ -27,6 +35,8 @@ from omnidyn.model.layout import (
     NOW,
     PUSH,
     SIGN,
+    STIFF,
+    STIFF_XY,
     TAU,
     THRUST,
 )
@@ -81,10 +91,10 @@ def _holders(body, element, along):
 
 @part
 def _same_problem(body, element, along, k, aim):
-    """Give the two plants of parameter k the stage at hand: signs, branches, i*, and x* with its derivative `aim`."""
+    """Give the two plants of parameter k the stage at hand: signs, branches, i*; x* and z* with derivative `aim`."""
     for side in range(2):
         b, el, eps = along.body[2 * k + side], along.element[2 * k + side], EPS * (1 - 2 * side)
-        b[TAU], b[ELLIPSE] = body[TAU], body[ELLIPSE]
+        b[TAU], b[ELLIPSE], m = body[TAU], body[ELLIPSE], len(element)
         for a in range(3):
             b[GOAL + a], b[PUSH + a] = body[GOAL + a] + eps * aim[a], body[PUSH + a]
         for e in range(len(element)):
@@ -92,6 +102,11 @@ def _same_problem(body, element, along, k, aim):
             el[e, NOW] = element[e, NOW]
             if e >= N_AXES:
                 el[e, BRANCH] = along.carry[2, e - N_AXES]
+            if element[e, STIFF] > 0.0:
+                el[e, AIMED] = element[e, AIMED] + eps * aim[m + e]
+        if body[STIFF_XY] > 0.0:
+            for a in range(2):
+                b[AIMED_XY + a] = body[AIMED_XY + a] + eps * aim[2 * m + a]
 
 
 @part
@@ -128,7 +143,7 @@ def _active_set_shift(along, k, rank, x, r0, r1, r2, shift, force):
 
 @part
 def stage_derivatives(body, element, s, along, x, aim, out):
-    """Derivatives (K, 3 + n) of a stage solved at x, for the derivatives `aim` of x* and i*."""
+    """Derivatives (K, D) of a stage solved at x, for the derivatives `aim` of x*, i* and z*."""
     residual(body, element, x, s)
     rank, holders = find_active_set(body, element, s), _holders(body, element, along)
     r0, r1, r2 = s[RESIDUAL, 0], s[RESIDUAL, 1], s[RESIDUAL, 2]
@@ -151,13 +166,14 @@ def stage_derivatives(body, element, s, along, x, aim, out):
         newton_direction(s, rank)
         for a in range(3):
             out[k, a] = shift[a] + s[NEWTON, a]
-        _current_derivatives(element, along, k, x, aim[k], out[k])
+        _inner_derivatives(body, element, along, k, x, aim[k], out[k])
 
 
 @part
-def _current_derivatives(element, along, k, x, aim, out):
-    """Derivative of the currents at the solution; of windings with inductance only: the others follow at once."""
-    some = False
+def _inner_derivatives(body, element, along, k, x, aim, out):
+    """Derivative of what is eliminated, at the solution: of currents with inductance (the others follow at once), and
+    of what bends."""
+    some, m = body[BRISTLES] > 0.0, len(element)
     for e in range(N_AXES, len(element)):
         some |= element[e, INDUCTANCE] > 0.0
     if not some:
@@ -170,6 +186,28 @@ def _current_derivatives(element, along, k, x, aim, out):
     for e in range(N_AXES, len(element)):
         change = along.element[2 * k, e, CURRENT] - along.element[2 * k + 1, e, CURRENT]
         out[3 + e - N_AXES] = change / (2.0 * EPS) + along.carry[0, e - N_AXES] * aim[3 + e - N_AXES]
+    if body[BRISTLES] > 0.0:
+        for e in range(m):
+            out[m + e] = (along.element[2 * k, e, BENT] - along.element[2 * k + 1, e, BENT]) / (2.0 * EPS)
+        for a in range(2):
+            out[2 * m + a] = (along.body[2 * k, BENT_XY + a] - along.body[2 * k + 1, BENT_XY + a]) / (2.0 * EPS)
+
+
+@part
+def _aim_within(body, element, along, k, aim):
+    """Derivatives of z* beyond stage 1, in place, where `aim_bristles` cut it off at what its level can bend."""
+    m, up, down = len(element), along.element[2 * k], along.element[2 * k + 1]
+    for e in range(m):
+        for side in range(2 if element[e, STIFF] > 0.0 else 0):
+            sign = 1.0 - 2.0 * side
+            if sign * element[e, AIMED] >= element[e, BEND_HOLD + side] / element[e, STIFF]:
+                most = up[e, BEND_HOLD + side] / up[e, STIFF] - down[e, BEND_HOLD + side] / down[e, STIFF]
+                aim[m + e] = sign * most / (2.0 * EPS)
+    for a in range(2 if body[STIFF_XY] > 0.0 else 0):
+        if abs(body[AIMED_XY + a]) >= body[BEND_HOLD_XY + a] / body[STIFF_XY]:
+            one, other = along.body[2 * k], along.body[2 * k + 1]
+            most = one[BEND_HOLD_XY + a] / one[STIFF_XY] - other[BEND_HOLD_XY + a] / other[STIFF_XY]
+            aim[2 * m + a] = (most if body[AIMED_XY + a] > 0.0 else -most) / (2.0 * EPS)
 
 
 @part
@@ -184,5 +222,7 @@ def step_with_derivatives(body, element, s, along, start, end, middle, h, d0, d1
     for k in range(len(d0)):
         for j in range(d0.shape[1]):
             along.aim[k, j] = d0[k, j] + back * (along.middle[k, j] - d0[k, j])
+        if body[BRISTLES] > 0.0 and back != 0.0:
+            _aim_within(body, element, along, k, along.aim[k])
     stage_derivatives(body, element, s, along, end, along.aim, d1)
     return max(first, last)

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.keys import BREAKAWAY, EMF, ROTOR, TORQUE, WHEEL, Key, expand
+from omnidyn.model.keys import BREAKAWAY, EMF, FRICTION, ROTOR, TORQUE, WHEEL, Key, expand
 from omnidyn.model.robot import Robot
 
 FRICTION_LIMIT = 1e6  # what a robot file takes
 AT = "@"  # KEY@GROUP is the number that a group has for itself
 EFFICIENCY = "motor.gear_efficiency"  # of which nothing is above 1
 SPAN = 1e4  # a number that must be positive stays within so many times its start, either way
+SPAN_OF_SPEED = 30.0  # the same of a speed at which friction changes: far beyond, it changes nothing, or in no time
 LIGHT = 1e-3  # of its start, that what spins stays above: it has no place where it would be off, but slopes need a size
 
 LARGEST = 700.0  # e^709 is the last float
@@ -93,9 +94,10 @@ def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, o
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")
     if place.name in (ROTOR, WHEEL):
         return Parameter(key, value, LIGHT * value, value * SPAN, prior=prior)
-    most = 1.0 if place.name == EFFICIENCY else value * SPAN
+    span = SPAN_OF_SPEED if place.part == FRICTION and place.field.endswith("_speed") else SPAN
+    most = 1.0 if place.name == EFFICIENCY else value * span
     also = tuple((str(each), float(each.get(robot)) / value) for each in _followers(robot, place, others))
-    return Parameter(key, value, value / SPAN, most, True, prior, also)
+    return Parameter(key, value, value / span, most, True, prior, also)
 
 
 def _followers(robot: Robot, key: Key, others: Sequence[str]) -> list[Key]:

@@ -13,12 +13,13 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.rates import RateEngine
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TRAVELS
+from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.problem.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solver, State
-from omnidyn.model.keys import FRICTION
+from omnidyn.model.keys import FRICTION, find_key
 
 CURRENTS, MOTOR = f"{LATENCY}.current", "motor"
 MANY = 100_000  # rows to which a long log is first fitted
@@ -131,6 +132,24 @@ def _by_rates(problem: Problem, point: Point, nu: float, watch: Progress) -> Poi
     return Point(found.values, point.states)
 
 
+def _levels_first(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
+    """The point with the levels of friction that go with the shape of its law as it begins: speeds, stiffness, damping.
+
+    Of levels far off, a first step takes all that falls or bends out of the law, and no descent brings it back.
+    """
+    keys = [find_key(p.name.partition(AT)[0]) for p in problem.parameters]
+    shape = [key is not None and key.part == FRICTION and not key.level for key in keys]
+    if not any(shape):
+        return point
+    held = tuple(
+        replace(p, low=v, high=v) if own else p
+        for p, own, v in zip(problem.parameters, shape, point.values.tolist(), strict=True)
+    )
+    first = replace(problem, parameters=held)
+    aside = watch.aside("levels of friction first")
+    return Solver(first, ImplicitEngine(first), nu, NEAR).minimise(point, watch=aside).state.point
+
+
 def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
     """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes.
 
@@ -142,6 +161,7 @@ def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
     costs = side_by_side(lambda point: solver.state(point).objective, points)
     best = points[int(np.argmin(costs))]
+    best = _levels_first(short, best, nu, watch)
     begun = [best]
     if any(name in TRAVELS for name, _ in short.columns):
         begun.append(_by_rates(short, best, nu, watch))

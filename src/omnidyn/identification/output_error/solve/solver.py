@@ -20,6 +20,7 @@ from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, infor
 from omnidyn.identification.output_error.problem.problem import Fitted, Parts, PieceSums, Point, per_column
 from omnidyn.identification.output_error.solve.bend import Bend
 from omnidyn.identification.output_error.solve.edges import Edges
+from omnidyn.identification.output_error.solve.ordered import Order
 
 MAX_ITERATIONS = 60
 CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
@@ -100,7 +101,7 @@ class Solver(Generic[P]):
         self.creep = CREEP * close if close > CLOSE else 0.0  # a speed loop may creep for long, and yet find its way
         self.tick = problem.tick if counted else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
-        self._edges = Edges(problem)
+        self._edges, self.order = Edges(problem), Order(problem)
         self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
         self._high = np.array([p.inner(p.high) for p in problem.parameters])
 
@@ -211,11 +212,12 @@ class Solver(Generic[P]):
         return np.array([p.outer(float(z)) for p, z in zip(self.problem.parameters, inner, strict=True)])
 
     def clipped(self, inner: FloatArray) -> FloatArray:
-        return np.clip(inner, self._low, self._high)
+        return self.order.kept(np.clip(inner, self._low, self._high))
 
     def at_bound(self, inner: FloatArray, gradient: FloatArray) -> BoolArray:
         """Which parameters stand at a bound and are pushed against it by `gradient` (downhill direction)."""
-        return ((inner <= self._low) & (gradient < 0.0)) | ((inner >= self._high) & (gradient > 0.0))
+        ends = ((inner <= self._low) & (gradient < 0.0)) | ((inner >= self._high) & (gradient > 0.0))
+        return ends | self.order.at_bound(inner, gradient)
 
     def _begun(self, start: Point | State) -> State:
         """The state to start from, within the bounds; one of this very problem is not marched through again."""
@@ -284,9 +286,10 @@ class Normal:
 
     def distance_without(self, still: BoolArray) -> float:
         """Squared length of the Gauss-Newton step in standard errors, over the parameters that are not `still`."""
-        free = ~still
-        step = _solve(self.information[np.ix_(free, free)], self.gradient[free])
-        total = float(step @ self.gradient[free])
+        free, fold = ~still, self.solver.order.together(self.inner, still)
+        gradient = fold.T @ self.gradient
+        step = _solve((fold.T @ self.information @ fold)[np.ix_(free, free)], gradient[free])
+        total = float(step @ gradient[free])
         for grad, info in self.pieces:  # what the states alone would gain
             if grad.shape[0] > self._count:
                 k = self._count
@@ -310,10 +313,11 @@ class Normal:
         bend (P, P): what the information lacks, see bend.py. onto (P,): the step of these, see edges.py.
         """
         gradient, information = self._reduced(damping)
-        information, free = information + bend, ~still
+        free, fold = ~still, self.solver.order.together(self.inner, still)
+        gradient, information = fold.T @ gradient, fold.T @ (information + bend) @ fold
         step = np.where(still, onto, 0.0)
         step[free] = _solve(information[np.ix_(free, free)], (gradient - information @ step)[free])
-        inner = self.solver.clipped(self.inner + step)
+        inner = self.solver.clipped(self.inner + fold @ step)
         step = inner - self.inner
         k, states = self._count, []
         for (grad, info), old in zip(self.pieces, self.state.point.states, strict=True):

@@ -21,7 +21,7 @@ from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem
 from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.dynamics import drive_wrench
-from omnidyn.model.keys import COULOMB, VISCOUS, find_key
+from omnidyn.model.keys import BREAKAWAY, COULOMB, VISCOUS, find_key
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 
@@ -73,7 +73,7 @@ def _size(p: Parameter, value: float, push: FloatArray, top: FloatArray) -> floa
     key = find_key(p.name.partition("@")[0])
     if key is not None:
         axis = key.axis or 0
-        least = {COULOMB: push[axis], VISCOUS: push[axis] / top[axis]}.get(key.level or "", 0.0)
+        least = {COULOMB: push[axis], BREAKAWAY: push[axis], VISCOUS: push[axis] / top[axis]}.get(key.level or "", 0.0)
         return max(abs(value), SMALL * float(least)) or 1.0
     if p.part == LATENCY:
         return LATE

@@ -16,9 +16,12 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.engines.exact import ExactEngine
+from omnidyn.identification.output_error.problem.falling import falls
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
+from omnidyn.model.keys import Key
+from omnidyn.model.robot import Robot
 
 KEY = "friction.axes.breakaway"
 LIMIT = 7.35 / 2.0
@@ -39,9 +42,15 @@ class Breakaway:
     tied: bool
 
 
-def asked_axes(free: Sequence[str], fixed: Sequence[str] = ()) -> list[int]:
-    """The axes whose breakaway is among the free keys and not among the fixed ones."""
-    return [axis for axis in range(3) if f"{KEY}[{axis}]" in free and f"{KEY}[{axis}]" not in fixed]
+def asked_axes(robot: Robot, free: Sequence[str], fixed: Sequence[str] = ()) -> list[int]:
+    """The axes whose breakaway is to be profiled: among the free keys and not among the fixed ones."""
+    names = [f"{KEY}[{axis}]" for axis in range(3)]
+    return [k for k, name in enumerate(names) if name in free and name not in fixed and is_profiled(name, robot)]
+
+
+def is_profiled(name: str, robot: Robot) -> bool:
+    """Whether this is a breakaway of the body axes that no slope tells of."""
+    return Key.parse(name).name == KEY and not falls(name, robot)
 
 
 class _Profile:

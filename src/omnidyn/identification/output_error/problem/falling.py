@@ -1,0 +1,60 @@
+"""Breakaway where the level falls with the speed, from breakaway to Coulomb: a smooth number, with a derivative.
+
+Where it does not fall, S says only which drives hold: trust/breakaway.py. Here every slow row tells of it. S is never
+below C; they are kept so far apart that the slopes of the fall exist: nearer, no log tells them apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from omnidyn.identification.output_error.problem.parameters import AT, Parameter
+from omnidyn.model.friction.kinds import COULOMB as PLAIN
+from omnidyn.model.friction.kinds import LUGRE
+from omnidyn.model.keys import BREAKAWAY, COULOMB, Key, find_key
+from omnidyn.model.robot import Robot
+
+APART = 1.001  # S over C at least
+
+
+def falls(name: str, robot: Robot) -> bool:
+    """Whether this is the breakaway of a law that falls from it with the speed."""
+    key = find_key(name)
+    if key is None or key.level != BREAKAWAY:
+        return False
+    law = getattr(robot.friction, key.table.rpartition(".")[2])
+    speed = "yaw_stribeck_speed" if key.field.startswith("yaw_") else "stribeck_speed"
+    return law.law in (PLAIN, LUGRE) and getattr(law, speed, None) is not None
+
+
+def coulomb_below(name: str, robot: Robot | None = None) -> str:
+    """The Coulomb level that this breakaway is at least; of a group, that of the group.
+
+    robot: whose own level backward it is, where it has one.
+    """
+    key, at, group = name.partition(AT)
+    found = key.replace(BREAKAWAY, COULOMB)
+    if robot is not None and "_backward" in found and robot.friction.axes.coulomb_backward is None:
+        found = found.replace("_backward", "")
+    return f"{found}{at}{group}"
+
+
+def kept_in_order(p: Parameter, robot: Robot, names: Sequence[str]) -> Parameter:
+    """The parameter with the bound that the other level is, where that one is not free (`names`) and they fall."""
+    if falls(p.name, robot) and coulomb_below(p.name, robot) not in names:
+        least = APART * float(Key.parse(coulomb_below(p.name, robot)).get(robot))
+        return replace(p, low=max(p.low, least), value=max(p.value, least))
+    above = p.name.replace(COULOMB, BREAKAWAY)
+    if Key.parse(p.name).level == COULOMB and above not in names and falls(above, robot):
+        hold = _level(above, robot)
+        most = p.high if hold is None else hold / APART
+        return replace(p, high=min(p.high, most), value=min(p.value, most))
+    return p
+
+
+def _level(name: str, robot: Robot) -> float | None:
+    """A level of the robot; None where it has none."""
+    key = Key.parse(name)
+    law = getattr(robot.friction, key.table.rpartition(".")[2])
+    return None if getattr(law, key.field, None) is None else float(key.get(robot))
