@@ -21,6 +21,7 @@ from typing import Any, Protocol
 from numba.core.caching import FunctionCache, _Cache
 from numba.core.serialize import dumps
 
+from omnidyn.compiled.loading import loaded
 from omnidyn.compiled.stamp import stamp
 
 SUFFIX = ".kernel"
@@ -49,7 +50,6 @@ class Entries(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled function; None where there is none of this stamp, or none that is whole."""
-        target_context.refresh()
         key = self._key(sig, target_context.codegen())
         file = self._file(key)
         self.asked.add(file)
@@ -58,7 +58,7 @@ class Entries(_Cache):
             return None
         try:
             found, reduced = pickle.loads(content)
-            return self._impl.rebuild(target_context, reduced) if found == key else None
+            return loaded(target_context, reduced) if found == key else None
         except Exception:  # whole, but of another numba or system: whatever that means, it is compiled again
             return None
 

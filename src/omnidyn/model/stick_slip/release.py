@@ -72,10 +72,12 @@ def with_given_currents(plant: Plant) -> Plant:
     return bare
 
 
-@part
-def current_entry(e, m):
+def place_of_current(e, m):
     """Where the current of element e stands in a state of m elements."""
     return SIGNS + 1 + m + e - N_AXES
+
+
+current_entry = part(place_of_current)
 
 
 @part
@@ -106,7 +108,7 @@ def sticks(state, m):
 def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> FloatArray:
     """The state of a robot that moves with `twist` [m/s, m/s, rad/s] under `current` [A]."""
     state = moving_states(plant, twist[None])[0]
-    first = current_entry(N_AXES, len(plant.element))
+    first = place_of_current(N_AXES, len(plant.element))
     state[first : first + plant.wheels] = current
     return state
 
