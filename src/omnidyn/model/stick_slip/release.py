@@ -200,11 +200,13 @@ def _accelerations(body, element, bare_body, bare_element, s, states, voltage, o
         settle(body, element, bare_body, bare_element, s, states[k], out[k])
 
 
-def accelerations(plant: Plant, states: FloatArray, voltage: FloatArray) -> FloatArray:
+def accelerations(plant: Plant, states: FloatArray, voltage: FloatArray, bare: Plant | None = None) -> FloatArray:
     """Acceleration of x [m/s^2] in each state under its voltages [V]. Shapes (k, size), (k, wheels) -> (k, 3).
 
-    The signs in `states` are changed in place to those of what gives way.
+    The signs in `states` are changed in place to those of what gives way. bare: the plant `with_given_currents`, where
+    many ask.
     """
     out = np.zeros((len(states), 3))
-    _accelerations(*plant.copy(), *with_given_currents(plant), workspace(), states, voltage, out)
+    given = with_given_currents(plant) if bare is None else bare.copy()
+    _accelerations(*plant.copy(), *given, workspace(), states, voltage, out)
     return out
