@@ -84,7 +84,7 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
         applied = drive_wrench(robot, twist, voltage) + frame_wrench(robot, twist)
         return per_mass(robot, applied + robot.friction.axes.wrench(twist, applied))
     twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
-    volts = np.ascontiguousarray(np.broadcast_to(voltage, (*batch, n)).reshape(-1, n))
+    volts = np.array(np.broadcast_to(voltage, (*batch, n)), dtype=float).reshape(-1, n)  # writable: one kernel for all
     numbers = plant(robot.rigid.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
     return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(
         *batch, 3

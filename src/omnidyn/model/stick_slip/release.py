@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.kernel import kernel, part
+from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.model.layout import (
     BOUND,
     BRISTLES,
@@ -192,7 +192,7 @@ def settle(body, element, bare_body, bare_element, s, state, acceleration):
     return count
 
 
-@kernel
+@branching_kernel
 def _accelerations(body, element, bare_body, bare_element, s, states, voltage, out):
     for k in range(len(states)):
         for e in range(N_AXES, len(element)):
