@@ -33,6 +33,7 @@ NAMES = {
     "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
+    "first_minutes": "CSV to report of a robot of `init`, whole commands: nothing compiled, and compiled (3 minutes)",
     "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
     "mpc": "the predictive controller: a step beside others' in the same run, cold starts, tracking, C (8 minutes)",
     "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",

@@ -3,6 +3,8 @@
 import hashlib
 import os
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import numba
@@ -206,3 +208,41 @@ def test_what_no_kernel_would_take_is_dropped(folder, entry):
     assert stock.size == sum(file.stat().st_size for file in files(folder))
     assert len(files(folder)) == 4
     assert entries.take_stock(caches) == replace(stock, dropped=0)
+
+
+def test_what_cannot_be_loaded_our_way_is_loaded_in_numbas(folder, entry, monkeypatch):
+    def refuse(context, saved):
+        raise AttributeError("another numba")
+
+    monkeypatch.setattr(entries, "loaded", refuse)
+    again = kernel(thrice)
+    assert again(3.0) == 9.0
+    assert hits(again) == 1
+
+
+ASLEEP = """
+import sys
+import numpy as np
+from omnidyn.model.robot_file import load_robot
+from omnidyn.model.dynamics import acceleration
+print(acceleration(load_robot("robotino"), np.zeros(3), np.ones(3)).tolist(), "numba.np.arraymath" in sys.modules)
+"""
+
+
+def test_a_process_that_compiles_nothing_does_not_wake_the_compiler(tmp_path):
+    """If this fails, every command waits two seconds more."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    first, again = (
+        subprocess.run([sys.executable, "-c", ASLEEP], env=environment, capture_output=True, text=True, check=True)
+        for _ in range(2)
+    )
+    numbers, woken = first.stdout.rsplit(maxsplit=1)
+    assert woken == "True"
+    assert again.stdout.rsplit(maxsplit=1) == [numbers, "False"]
+
+
+def test_a_loaded_kernel_can_still_be_called_by_another(folder, entry):
+    inner = kernel(thrice)
+    assert inner(2.0) == 6.0
+    assert hits(inner) == 1
+    assert kernel(lambda x: inner(x) + 1.0)(2.0) == 7.0

@@ -179,8 +179,8 @@ def decorated(decorator):
 
 
 def test_every_kernel_is_stamped_and_nothing_else_is_cached():
-    kernels = decorated("kernel")
-    assert {"omnidyn.simulation.exact.march._twists", "omnidyn.simulation.exact.march._poses"} <= kernels
+    kernels = decorated("kernel") | decorated("branching_kernel")
+    assert {"omnidyn.simulation.exact.march._twists", "omnidyn.simulation.implicit.march._march"} <= kernels
     everything = dispatchers()
     assert kernels <= set(everything)
     for name, function in everything.items():
@@ -198,7 +198,7 @@ def test_every_kernel_is_stamped_and_nothing_else_is_cached():
 
 def test_parts_count_no_references():
     """Counting costs three times as long as the arithmetic. If this fails, numba has changed `_nrt`: time it anew."""
-    counted = decorated("kernel") | decorated("maker")
+    counted = decorated("kernel") | decorated("branching_kernel") | decorated("maker")
     for name, function in dispatchers().items():
         assert function.targetoptions.get("_nrt", True) == (name in counted), name
 

@@ -81,3 +81,16 @@ def test_a_piece_under_two_kernels_gives_both_its_code():
     for factor in (1.0, 2.0):
         outer = compiled.kernel(lambda x, by=factor: by * between(x) + inner(x, 0))
         assert outer(np.array([1.0, 5.0])) == factor * 18.0 + 3.0
+
+
+def test_a_kernel_of_branches_gives_the_same_numbers_and_is_kept(folder):
+    def turned(x, out):
+        for k in range(len(x)):
+            out[k] = np.sin(x[k]) if x[k] > 0.5 else x[k] / 3.0 - 1.0
+
+    x = np.linspace(-1.0, 2.0, 101)
+    results = []
+    for make in (compiled.kernel, compiled.branching_kernel, compiled.branching_kernel):
+        results.append(np.zeros_like(x))
+        make(turned)(x, results[-1])
+    assert results[0].tobytes() == results[1].tobytes() == results[2].tobytes()

@@ -6,15 +6,19 @@ Exit codes: 0 ok, 1 our bug, 2 usage, 3 bad input, 4 the data cannot answer, 5 a
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
+
+RARELY = 50_000, 20, 50  # new objects before garbage is looked for, ..: loading makes many, and none of them is garbage
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; `arguments` without the name of the program."""
     if "numpy" not in sys.modules:  # our matrices are small: threads cost more than they give, most where others work
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        gc.set_threshold(*RARELY)
     from omnidyn.cli.outcome import run_guarded
 
     return run_guarded(list(sys.argv[1:] if arguments is None else arguments))

@@ -21,6 +21,7 @@ from typing import Any, Protocol
 from numba.core.caching import FunctionCache, _Cache
 from numba.core.serialize import dumps
 
+from omnidyn.compiled.loading import loaded
 from omnidyn.compiled.stamp import stamp
 
 SUFFIX = ".kernel"
@@ -49,7 +50,6 @@ class Entries(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled function; None where there is none of this stamp, or none that is whole."""
-        target_context.refresh()
         key = self._key(sig, target_context.codegen())
         file = self._file(key)
         self.asked.add(file)
@@ -58,9 +58,17 @@ class Entries(_Cache):
             return None
         try:
             found, reduced = pickle.loads(content)
-            return self._impl.rebuild(target_context, reduced) if found == key else None
+            return self._rebuilt(target_context, reduced) if found == key else None
         except Exception:  # whole, but of another numba or system: whatever that means, it is compiled again
             return None
+
+    def _rebuilt(self, target_context: Any, reduced: Any) -> Any:
+        """The compiled function of what was saved."""
+        try:
+            return loaded(target_context, reduced)
+        except Exception:  # another numba: in its own way, which wakes its compiler
+            target_context.refresh()
+            return self._impl.rebuild(target_context, reduced)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled function. A disk that refuses is no reason to stop: it will be compiled again."""

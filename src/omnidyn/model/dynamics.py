@@ -24,7 +24,7 @@ from omnidyn.model.mass import masses_couple, per_mass
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.model.stick_slip.release import accelerations, moving_states
+from omnidyn.model.stick_slip.release import accelerations, moving_states, with_given_currents
 from omnidyn.model.surroundings.floor import refuse_slope
 from omnidyn.model.wheels import refuse_slip, wheel_speed, wrench_from_traction
 
@@ -84,7 +84,7 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
         applied = drive_wrench(robot, twist, voltage) + frame_wrench(robot, twist)
         return per_mass(robot, applied + robot.friction.axes.wrench(twist, applied))
     twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
-    volts = np.ascontiguousarray(np.broadcast_to(voltage, (*batch, n)).reshape(-1, n))
+    volts = np.array(np.broadcast_to(voltage, (*batch, n)), dtype=float).reshape(-1, n)  # writable: one kernel for all
     numbers = plant(robot.rigid.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
     return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(
         *batch, 3
@@ -103,11 +103,11 @@ def holds_under(robot: Robot) -> Callable[[FloatArray], BoolArray]:
     numbers = plant(
         robot.rigid.model_copy(update={"motor": robot.motor.model_copy(update={"electrical": QUASI_STATIC})})
     )
-    at_rest = moving_states(numbers, np.zeros((1, N_AXES)))
+    at_rest, bare = moving_states(numbers, np.zeros((1, N_AXES))), with_given_currents(numbers)
 
     def holds(voltage: FloatArray) -> BoolArray:
         volts = np.ascontiguousarray(voltage, dtype=float)
-        return np.all(accelerations(numbers, np.tile(at_rest, (len(volts), 1)), volts) == 0.0, axis=-1)
+        return np.all(accelerations(numbers, np.tile(at_rest, (len(volts), 1)), volts, bare) == 0.0, axis=-1)
 
     return holds
 

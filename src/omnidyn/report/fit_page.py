@@ -21,13 +21,13 @@ from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.path import Path, body_twist, driven, path_of
 from omnidyn.model.known.uncertainty import DRAWS
 from omnidyn.report.dead_zone_section import dead_zone_section
+from omnidyn.report.estimate_picture import draw_estimates
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.misfit import draw_misfit
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
 from omnidyn.report.figures.residuals import draw_residuals, residuals_of
 from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, section
-from omnidyn.report.plots import draw_estimates
 from omnidyn.report.style import Picture
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact

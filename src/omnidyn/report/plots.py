@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -13,7 +13,7 @@ from omnidyn.control.tracking import Tracking
 from omnidyn.errors import InputError
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.friction_curve import FrictionCurve, friction_curve, sliding_force
+from omnidyn.identification.friction_curve import FrictionCurve, sliding_force
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.identification.steady.study_table import SteadyStudy
@@ -22,6 +22,7 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 from omnidyn.report.drift_picture import draw_drift
+from omnidyn.report.estimate_picture import WHOLE, draw_estimates
 from omnidyn.report.figures.channels import draw_run
 from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 from omnidyn.report.figures.friction_speed import draw_friction_speed, speeds_up_to
@@ -34,8 +35,6 @@ from omnidyn.report.figures.shapes import draw_polar
 from omnidyn.report.style import Picture
 from omnidyn.report.tracking.pictures import draw_tracking
 from omnidyn.run import Run
-
-WHOLE = "all"  # the name of the one group where there are no groups
 
 
 def plot(result: Any, **options: Any) -> Figure:
@@ -90,18 +89,6 @@ def _of_file(robot: Robot) -> list[FrictionCurve]:
         speed = speeds_up_to(float(top))
         curves.append(FrictionCurve(AXES[axis], speed, sliding_force(robot, axis, speed), 0.0 * speed))
     return curves
-
-
-def estimate_curves(estimate: Estimate) -> list[FrictionCurve]:
-    """The curves of an estimate along x, along y and about yaw, up to the speeds that its robot can reach."""
-    tops = top_speeds(estimate.robot)
-    return [friction_curve(estimate, axis, speeds_up_to(float(top))) for axis, top in enumerate(tops)]
-
-
-def draw_estimates(estimates: Mapping[str, Estimate], **how: Any) -> Picture:
-    """Friction against speed of one estimate, or of the groups of one identification."""
-    names = {name: estimate.robot.name if name == WHOLE else name for name, estimate in estimates.items()}
-    return draw_friction_speed({names[name]: estimate_curves(each) for name, each in estimates.items()}, **how)
 
 
 PICTURES: dict[type, Callable[..., Picture]] = {

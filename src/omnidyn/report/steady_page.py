@@ -13,9 +13,9 @@ from omnidyn.identification.steady.study_words import FORCES
 from omnidyn.identification.verdict import steady_verdict
 from omnidyn.logs.path import driven
 from omnidyn.report.dead_zone_section import dead_zone_section
+from omnidyn.report.estimate_picture import draw_estimates
 from omnidyn.report.figures.shapes import shape_pictures
 from omnidyn.report.html import page, section
-from omnidyn.report.plots import draw_estimates
 
 
 def render_study(

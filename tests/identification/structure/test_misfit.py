@@ -152,3 +152,19 @@ def test_the_cause_is_named_first(kind, key):
     best = found.remedies[0]
     assert found.found
     assert key in (best.key, *best.same_as)
+
+
+def test_a_gyro_alone_leaves_the_other_axes_unasked():
+    """Nothing was measured along x and y: no noise to be told from, and no share of it."""
+    robot = load_robot("axebot")
+    run = simulate(robot, excitation(20.0, 50.0), 0.02)
+    random = np.random.default_rng(4)
+    assert run.twist is not None
+    assert run.wheel_speed is not None
+    gyro = np.full(run.twist.shape, np.nan)
+    gyro[:, 2] = run.twist[:, 2] + 0.02 * random.standard_normal(len(gyro))
+    wheels = run.wheel_speed + 0.1 * random.standard_normal(run.wheel_speed.shape)
+    fit = fit_output_error(Run(t=run.t, voltage=run.voltage, twist=gyro, wheel_speed=wheels), robot)
+    assert fit.lack_of_fit is not None
+    assert not fit.lack_of_fit.found
+    assert fit.lack_of_fit.channels["twist[0]"] == fit.lack_of_fit.channels["twist[1]"] == 0.0

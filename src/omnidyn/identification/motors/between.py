@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.plateaus import STEPWISE
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Rows = Sequence[tuple[int, int]]  # first and last row of what has no gap and no row without an input
 
@@ -23,6 +26,8 @@ CUBIC_ROWS = 4
 
 def _curves(t: FloatArray, u: FloatArray, pieces: Rows) -> Iterator[tuple[int, int, CubicSpline]]:
     """(first row, row after the last, curve) of the stretches on which the input does not jump."""
+    from scipy.interpolate import CubicSpline  # takes a second to import
+
     for first, last in pieces:
         step = np.abs(np.diff(u[first : last + 1]))
         near = np.maximum(np.append(step[1:], 0.0), np.append(0.0, step[:-1]))

@@ -57,7 +57,7 @@ def conclude(
     open_ = tuple(p.name for p, b in zip(problem.parameters, known.open, strict=True) if b or p.name in ended)
     own = problem.robot_count
     missed = unexplained(solver, solution)
-    directions = () if missed else tuple(blind_in_words(problem, values, way, moved) for way in known.ways)
+    directions = () if missed else blind_in_words(problem, values, known.ways, moved)
     if known.open[:own].all():
         _refuse_blind(problem.names[:own], missed, records[0].source, known.unseen[:own], directions)
     as_they_were = [p.value if p.prior is None else p.prior[0] for p in problem.parameters]

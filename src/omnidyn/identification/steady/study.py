@@ -13,7 +13,6 @@ from itertools import combinations
 from typing import Unpack
 
 import numpy as np
-from scipy.linalg import null_space
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
@@ -259,5 +258,7 @@ def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
 
 def _internal(robot: Robot, points: ForcePoints) -> float:
     """rms [N] of the part of the traction that pushes nowhere: G f = 0."""
+    from scipy.linalg import null_space  # takes a while to import, and most fits never come here
+
     against = points.traction @ null_space(robot.wheels.wrench_matrix)
     return float(np.sqrt(np.mean((against**2).sum(axis=1))))

@@ -153,10 +153,9 @@ def _later(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[
     """Forces that begin at some time of the log, at several times."""
 
     def trials(bench: Workbench) -> list[Trial]:
-        return [
-            Trial(bench.by_force(lambda m, when=when: force(m) * (m.share >= when)[:, None, None]), when)
-            for when in [*WHEN.tolist(), *bench.moments]
-        ]
+        every = [*WHEN.tolist(), *bench.moments]
+        shown = bench.by_forces([lambda m, when=when: force(m) * (m.share >= when)[:, None, None] for when in every])
+        return [Trial(own, when) for own, when in zip(shown, every, strict=True)]
 
     return trials
 

@@ -152,6 +152,9 @@ def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray
                     there = rows.there[k][j]
                     more = [] if taken is None else [taken[k][j][there]]
                     series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
+        if not series:  # of a gyro alone: along x and y nothing was measured
+            found.append(AutoRegression(np.zeros(0), 1.0, 1))
+            continue
         plain = autoregression(series, 0)
         found.append(plain if rows.is_rounding(c, plain.variance) else autoregression(series))
     return found
@@ -182,4 +185,5 @@ def _shares(rows: Rows, left: Sequence[FloatArray], found: bool) -> tuple[FloatA
             rest[c] += float((left[k][j][there] ** 2).sum())
     explained = [a - b for a, b in zip(rows.residual, left, strict=True)]
     shares = np.clip(1.0 - rest / np.maximum(whole, 1e-300), 0.0, 1.0) if found else 0.0 * whole
+    shares[whole == 0.0] = 0.0
     return shares, explained

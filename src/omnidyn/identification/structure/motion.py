@@ -59,24 +59,23 @@ class Motion:
 
     def shown(self, change: FloatArray) -> FloatArray:
         """What the columns show of a change of the twist (n, K, 3). Shape (C, n, K)."""
+        columns = self.piece.record.columns
+        every = {name: self._channel(name, change) for name in dict.fromkeys(name for name, _ in columns)}
+        return np.stack([every[name][..., i] for name, i in columns])
+
+    def _channel(self, name: str, change: FloatArray) -> FloatArray:
+        """What all components of a channel show of a change of the twist (n, K, 3). Shape (n, K, components)."""
+        if name == "twist":
+            return change
+        if name == "wheel_speed":
+            return wheel_speed(self.robot.wheels, change)
+        if name == "current":
+            return settled_currents(self.robot, change, np.zeros(self.robot.wheels.count))
         step = np.diff(self.t)[:, None, None]
         path = np.concatenate([np.zeros_like(change[:1]), np.cumsum(0.5 * (change[1:] + change[:-1]) * step, axis=0)])
-        found = []
-        for name, i in self.piece.record.columns:
-            if name == "twist":
-                found.append(change[..., i])
-            elif name == "wheel_speed":
-                found.append(wheel_speed(self.robot.wheels, change)[..., i])
-            elif name == "wheel_angle":
-                found.append(wheel_speed(self.robot.wheels, path)[..., i])
-            elif name == "heading":
-                found.append(path[..., YAW])
-            elif name == "current":
-                still = np.zeros((*change.shape[:-1], self.robot.wheels.count))
-                found.append(settled_currents(self.robot, change, still)[..., i])
-            else:
-                found.append(self._position(change, path[..., YAW])[..., i])
-        return np.stack(found)
+        if name == "wheel_angle":
+            return wheel_speed(self.robot.wheels, path)
+        return path[..., YAW:] if name == "heading" else self._position(change, path[..., YAW])
 
     def _position(self, change: FloatArray, turned: FloatArray) -> FloatArray:
         c, s = np.cos(self.pose[:, 2])[:, None], np.sin(self.pose[:, 2])[:, None]

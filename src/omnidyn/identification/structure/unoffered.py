@@ -37,7 +37,11 @@ def unoffered(bench: Workbench) -> Iterator[Candidate]:
 
 
 def _tried(force: Force, sizes: tuple[float, ...]) -> Callable[[Workbench], list[Trial]]:
-    return lambda bench: [Trial(bench.by_force(lambda m, size=size: force(m, size)), size) for size in sizes]
+    def trials(bench: Workbench) -> list[Trial]:
+        shown = bench.by_forces([lambda m, size=size: force(m, size) for size in sizes])
+        return [Trial(own, size) for own, size in zip(shown, sizes, strict=True)]
+
+    return trials
 
 
 def _along_axes(values: FloatArray) -> FloatArray:

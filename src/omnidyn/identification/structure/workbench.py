@@ -53,7 +53,18 @@ class Workbench:
 
     def by_force(self, force: Callable[[Motion], FloatArray]) -> list[FloatArray]:
         """What forces (n, K, 3) on the body show. Of each piece (C, rows, K)."""
-        return [motion.shown_by(force(motion)) for motion in self.motions]
+        return self.by_forces([force])[0]
+
+    def by_forces(self, forces: Sequence[Callable[[Motion], FloatArray]]) -> list[list[FloatArray]]:
+        """What each of several forces shows: in one go through the rows, which takes hardly longer than one of them."""
+        found: list[list[FloatArray]] = [[] for _ in forces]
+        for motion in self.motions:
+            every = [force(motion) for force in forces]
+            ends = np.cumsum([own.shape[1] for own in every])[:-1]
+            parts = np.split(motion.shown_by(np.concatenate(every, axis=1)), ends, axis=2)
+            for own, part in zip(found, parts, strict=True):
+                own.append(part)
+        return found
 
     def _residuals(self, robot: Robot, driver: Driver, kind: str) -> list[FloatArray]:
         known, records = self.problem.robot_count, dict[int, Record]()

@@ -134,7 +134,7 @@ def _drawn(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> R
             value = float(known.value[k])
             draw = key.set(draw, _off(key, value, float(off[k]), bool(known.log[k])), checked=False)
         draw = _holding(draw)
-        bad = _out_of_range(draw)
+        bad = _out_of_range(draw, robot)
         if not bad:
             return draw
         off = np.where([key.part in bad for key in keys], 0.5 * off, off)
@@ -147,15 +147,17 @@ def _off(key: Key, value: float, error: float, log: bool) -> float:
     return value + error if key.name in ANGLES else max(LEAST * max(value, abs(error)), value + error)
 
 
-def _out_of_range(robot: Robot) -> set[str]:
-    """The parts of a robot that hold what no file may hold."""
+def _out_of_range(robot: Robot, origin: Robot) -> set[str]:
+    """The parts of a robot that hold what no file may hold; those that are still the ones of its origin do not."""
     bad = set()
     for part in ("body", "wheels", "motor", "drive"):
+        own = getattr(robot, part)
         try:
-            getattr(robot, part).replace()
+            if own is not getattr(origin, part):
+                own.replace()
         except InputError:
             bad.add(part)
-    for law in robot.friction.laws:
+    for law in robot.friction.laws if robot.friction is not origin.friction else ():
         try:
             law.replace()  # pyright: ignore[reportAttributeAccessIssue]
         except InputError:
@@ -198,7 +200,7 @@ def effects(robot: Robot, function: Callable[[Robot], ArrayLike], keys: Sequence
         std = (own[name].std if name in own else None) or 0.01 * abs(value)
         log = is_log(name, value, std)
         moved = _holding(key.set(robot, _off(key, value, std / value if log else std, log), checked=False))
-        other = at if _out_of_range(moved) else np.asarray(function(moved), dtype=float)
+        other = at if _out_of_range(moved, robot) else np.asarray(function(moved), dtype=float)
         with np.errstate(invalid="ignore", divide="ignore"):
             found[name] = float(np.nanmax(np.abs(other - at) / np.abs(at), initial=0.0))
     return found

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.kernel import kernel, part
+from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.model.layout import (
     BOUND,
     BRISTLES,
@@ -72,10 +72,12 @@ def with_given_currents(plant: Plant) -> Plant:
     return bare
 
 
-@part
-def current_entry(e, m):
+def place_of_current(e, m):
     """Where the current of element e stands in a state of m elements."""
     return SIGNS + 1 + m + e - N_AXES
+
+
+current_entry = part(place_of_current)
 
 
 @part
@@ -106,7 +108,7 @@ def sticks(state, m):
 def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> FloatArray:
     """The state of a robot that moves with `twist` [m/s, m/s, rad/s] under `current` [A]."""
     state = moving_states(plant, twist[None])[0]
-    first = current_entry(N_AXES, len(plant.element))
+    first = place_of_current(N_AXES, len(plant.element))
     state[first : first + plant.wheels] = current
     return state
 
@@ -190,7 +192,7 @@ def settle(body, element, bare_body, bare_element, s, state, acceleration):
     return count
 
 
-@kernel
+@branching_kernel
 def _accelerations(body, element, bare_body, bare_element, s, states, voltage, out):
     for k in range(len(states)):
         for e in range(N_AXES, len(element)):
@@ -198,11 +200,13 @@ def _accelerations(body, element, bare_body, bare_element, s, states, voltage, o
         settle(body, element, bare_body, bare_element, s, states[k], out[k])
 
 
-def accelerations(plant: Plant, states: FloatArray, voltage: FloatArray) -> FloatArray:
+def accelerations(plant: Plant, states: FloatArray, voltage: FloatArray, bare: Plant | None = None) -> FloatArray:
     """Acceleration of x [m/s^2] in each state under its voltages [V]. Shapes (k, size), (k, wheels) -> (k, 3).
 
-    The signs in `states` are changed in place to those of what gives way.
+    The signs in `states` are changed in place to those of what gives way. bare: the plant `with_given_currents`, where
+    many ask.
     """
     out = np.zeros((len(states), 3))
-    _accelerations(*plant.copy(), *with_given_currents(plant), workspace(), states, voltage, out)
+    given = with_given_currents(plant) if bare is None else bare.copy()
+    _accelerations(*plant.copy(), *given, workspace(), states, voltage, out)
     return out

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.compiled.kernel import kernel, part
+from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import (
     BOUND,
@@ -299,7 +299,7 @@ def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, most,
     return h
 
 
-@kernel
+@branching_kernel
 def _march(
     body, element, bare_body, bare_element, s, spare, voltage, bound, dt, kp, ki, limit, radius, command, tick, period,
     total, dead, tol, most, poses, states, iterations, steps,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.compiled.kernel import kernel, part
+from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.model.layout import LENGTH, N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import Plant
@@ -152,7 +152,7 @@ def _as_before(loop, extra, state, d, settled):
     return change < settled
 
 
-@kernel
+@branching_kernel
 def march_loop(
     body, element, bare_body, bare_element, s, spare, along, loop, extra, bound, dt, first, tol, settled, found
 ):

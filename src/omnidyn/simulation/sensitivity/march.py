@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from omnidyn.compiled.kernel import kernel, part
+from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.model.layout import BOUND, LENGTH, LIMIT, N_AXES, VOLTAGE
 from omnidyn.model.stick_slip.release import current_entry, settle, sticks
 from omnidyn.model.stick_slip.workspace import copy_row, copy_table
@@ -145,7 +145,7 @@ def apply_row(element, along, voltage, bound, dvoltage):
             along.element[2 * k + 1, e, VOLTAGE] = voltage[w] - EPS * dvoltage[k, w]
 
 
-@kernel
+@branching_kernel
 def march_with_derivatives(
     body, element, bare_body, bare_element, s, spare, along, voltage, bound, dt, tol, poses, states, iterations, steps,
     first, ds, dposes, seen,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.kernel import kernel, part
+from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.simulation.implicit.march import SIMPSON, advance_pose
 from omnidyn.simulation.slip.plant import SlipPlant
@@ -188,7 +188,7 @@ def _sign(value):
     return 1.0 if value > 0.0 else (-1.0 if value < 0.0 else 0.0)
 
 
-@kernel
+@branching_kernel
 def _march(
     plant, voltage, bound, dt, kp, ki, limit, radius, command, tick, period, total, dead, tol, most, poses, states,
     contacts, lifted,

@@ -6,12 +6,13 @@ were not logged would show it, and by voltages along all axes, to see whether an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.compiled.beside import side_by_side
 from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.engines.actuation import driver_of
@@ -60,13 +61,22 @@ class Blind:
         return f"{self.words}; to tell {what}: {' or '.join(self.cures)}" if self.cures else self.words
 
 
-def blind_in_words(problem: Problem, values: FloatArray, way: Way, moved: BoolArray) -> Blind:
-    """A direction in words, with what would show it. values (P,); moved (3,): which axes did."""
+def blind_in_words(
+    problem: Problem, values: FloatArray, ways: Sequence[Way], moved: BoolArray
+) -> tuple[Blind, ...]:  # fmt: skip
+    """Each direction in words, with what would show it. values (P,); moved (3,): which axes did."""
+    drives = _drives(problem, values) if ways else ()
+    return tuple(side_by_side(lambda way: _in_words(problem, values, way, moved, drives), ways))
+
+
+def _in_words(
+    problem: Problem, values: FloatArray, way: Way, moved: BoolArray, drives: Sequence[_Drive]
+) -> Blind:  # fmt: skip
     at = np.flatnonzero(way.step)
     names = [problem.names[j].partition("@")[0] for j in at]
     changes = {name: _relative(problem, values, way, int(j)) for name, j in zip(names, at, strict=True)}
     exact = way.reach > EXACT
-    cures = tuple(dict.fromkeys(_cures(problem, values, way, names, moved)))[:MOST]
+    cures = tuple(dict.fromkeys(_cures(problem, values, way, names, moved, drives)))[:MOST]
     return Blind({name: 0.01 * change for name, change in changes.items()}, exact, _words(changes, exact), cures)
 
 
@@ -103,13 +113,17 @@ def _alike(percent: Mapping[str, float]) -> Iterator[tuple[str, float]]:
             del left[each]
 
 
-def _cures(problem: Problem, values: FloatArray, way: Way, names: list[str], moved: BoolArray) -> Iterator[str]:
+def _cures(
+    problem: Problem, values: FloatArray, way: Way, names: list[str], moved: BoolArray, drives: Sequence[_Drive]
+) -> Iterator[str]:
     yield from (MEASURED[one] for one in MEASURED if any(_is(name, one) for name in names))
-    if any(piece.record.set_point is not None for piece in problem.pieces):
+    if not drives:
         return
+    of_the_log, of_all_axes = drives
     try:
-        yield from _by_channels(problem, values, way)
-        if _by_driving(problem, values, way):
+        yield from _by_channels(problem, of_the_log.differs(problem, values, way))
+        seen = of_all_axes.differs(problem, values, way)
+        if any(seen[name] for name in dict.fromkeys(name for name, _ in problem.columns) if name in seen):
             axes = {key.axis for name in names if (key := find_key(name)) is not None and key.axis is not None}
             still = sorted(axis for axis in axes if not moved[axis])
             yield all_of([DRIVE[axis] for axis in still]) or "drive at several speeds, both ways, with starts and stops"
@@ -122,45 +136,61 @@ def _is(name: str, one: str) -> bool:
     return (Key.parse(name).name if key is not None else name) == one
 
 
-def _by_channels(problem: Problem, values: FloatArray, way: Way) -> Iterator[str]:
+def _by_channels(problem: Problem, seen: Mapping[str, bool]) -> Iterator[str]:
     """Channels that were not logged, and would show it under the same voltages."""
-    piece = max(problem.pieces, key=lambda each: each.last - each.first)
-    rows = slice(piece.first, min(piece.last, piece.first + ROWS))
-    t = piece.record.t[piece.first : rows.stop + 1]
-    seen = _differs(problem, values, way, piece.record.voltage[rows], np.diff(t), piece.start)
     logged = {name for name, _ in problem.columns}
     for channel, (words, instead) in CHANNELS.items():
         if not logged & set(instead) and seen[channel]:
             yield words
 
 
-def _by_driving(problem: Problem, values: FloatArray, way: Way) -> bool:
-    """Whether what was logged would show it under voltages along all axes."""
+@dataclass(frozen=True, eq=False)
+class _Drive:
+    """Voltages (n, W) over dt (n,) from a twist (3,), and what each channel shows of the fitted robot under them."""
+
+    volts: FloatArray
+    dt: FloatArray
+    start: FloatArray
+    before: Mapping[str, FloatArray]
+
+    @classmethod
+    def of(
+        cls, problem: Problem, values: FloatArray, volts: FloatArray, dt: FloatArray, start: FloatArray
+    ) -> _Drive:  # fmt: skip
+        return cls(volts, dt, start, _channels(problem, values, volts, dt, start))
+
+    def differs(self, problem: Problem, values: FloatArray, way: Way) -> dict[str, bool]:
+        """Channel -> whether a change along the direction shows in it."""
+        other = values.copy()
+        for j in np.flatnonzero(way.step):
+            p = problem.parameters[j]
+            other[j] = p.outer(p.inner(float(values[j])) + TRIED * float(way.step[j]))
+        after, found = _channels(problem, other, self.volts, self.dt, self.start), {}
+        for name, own in self.before.items():
+            size = np.sqrt((own**2).mean(axis=0))
+            change = np.sqrt(((after[name] - own) ** 2).mean(axis=0))
+            found[name] = bool((change > SEEN * TRIED * np.maximum(size, 1e-3 * size.max(initial=1e-9))).any())
+        return found
+
+
+def _drives(problem: Problem, values: FloatArray) -> tuple[_Drive, ...]:
+    """That of the log, and one along all axes; none where there are no voltages, or no engine simulates them."""
+    if any(piece.record.set_point is not None for piece in problem.pieces):
+        return ()
+    piece = max(problem.pieces, key=lambda each: each.last - each.first)
+    rows = slice(piece.first, min(piece.last, piece.first + ROWS))
+    t = piece.record.t[piece.first : rows.stop + 1]
     robot = problem.robot_at(values)
     shape = np.linalg.pinv(robot.wheels.wrench_matrix)
     shape /= np.abs(shape).max(axis=0)
     levels = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS // HOLD, 3)) @ shape.T
     limit = robot.motor.voltage_limit or max(float(np.nanmax(np.abs(p.record.voltage))) for p in problem.pieces)
     volts = np.repeat(np.clip(levels, -1.0, 1.0) * float(np.min(limit)), HOLD, axis=0)
-    seen = _differs(problem, values, way, volts, np.full(len(volts), STEP), np.zeros(3))
-    return any(seen[name] for name in dict.fromkeys(name for name, _ in problem.columns) if name in seen)
-
-
-def _differs(
-    problem: Problem, values: FloatArray, way: Way, volts: FloatArray, dt: FloatArray, start: FloatArray
-) -> dict[str, bool]:
-    """Channel -> whether a change along the direction shows in it. start (3,): the twist there."""
-    other = values.copy()
-    for j in np.flatnonzero(way.step):
-        p = problem.parameters[j]
-        other[j] = p.outer(p.inner(float(values[j])) + TRIED * float(way.step[j]))
-    before, after = (_channels(problem, each, volts, dt, start) for each in (values, other))
-    found = {}
-    for name, own in before.items():
-        size = np.sqrt((own**2).mean(axis=0))
-        change = np.sqrt(((after[name] - own) ** 2).mean(axis=0))
-        found[name] = bool((change > SEEN * TRIED * np.maximum(size, 1e-3 * size.max(initial=1e-9))).any())
-    return found
+    asked = (piece.record.voltage[rows], np.diff(t), piece.start), (volts, np.full(len(volts), STEP), np.zeros(3))
+    try:
+        return tuple(side_by_side(lambda each: _Drive.of(problem, values, *each), asked))
+    except OmnidynError:
+        return ()
 
 
 def _channels(
