@@ -37,17 +37,6 @@ def test_a_memory_alone_is_no_lack_of_fit(rho):
     assert not any(found)
 
 
-def test_an_output_without_a_row_is_none():
-    """A robot with counts and a gyroscope has neither vx nor vy."""
-    clean = simulate(AXEBOT, dt=0.01, voltage=excitation(20.0, 100.0, 5))
-    omega = clean.twist + np.random.default_rng(5).normal(size=clean.twist.shape) * NOISE
-    omega[:, :2] = np.nan
-    log = Run(t=clean.t, voltage=clean.voltage, twist=omega, wheel_angle=clean.wheel_angle, source="log")
-    lack = fit_output_error(log, AXEBOT, nuisances=()).lack_of_fit
-    assert not lack.found
-    assert lack.channels["twist[0]"] == 0.0
-
-
 def test_how_well_the_power_of_slow_errors_is_known_follows_from_the_memory():
     """Of many series of one memory: the scatter of what is estimated, against what the degrees of freedom say."""
     rng, rho, rows = np.random.default_rng(5), 0.9, 2000

@@ -152,9 +152,6 @@ def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray
                     there = rows.there[k][j]
                     more = [] if taken is None else [taken[k][j][there]]
                     series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
-        if not series:  # of a gyro alone: along x and y nothing was measured
-            found.append(AutoRegression(np.zeros(0), 1.0, 1))
-            continue
         plain = autoregression(series, 0)
         found.append(plain if rows.is_rounding(c, plain.variance) else autoregression(series))
     return found
