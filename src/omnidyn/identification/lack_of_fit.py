@@ -187,7 +187,7 @@ class LackOfFit:
         more = f", and of {others} more" if others else ""
         return [
             f"heavy tails: {100.0 * one.share:.2g} % of the samples of {worst}{more} are wild, far beyond its noise, "
-            f"and hold {100.0 * one.held:.0f} % of its squared error; --loss student-t counts them little"
+            f"and hold {100.0 * one.held:.0f} % of its squared error; `loss` student-t counts them little"
         ]
 
     def parts(self) -> list[Part]:

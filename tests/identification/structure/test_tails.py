@@ -32,7 +32,7 @@ def test_wild_samples_are_named_with_the_way_out(times):
     for one in lack.wild.values():
         assert 0.01 < one.share < 0.022
         assert one.held > 0.7  # 0.02 times^2 of 0.98 + 0.02 times^2
-    assert any("heavy tails" in words and "--loss student-t" in words for words in lack.statements())
+    assert any("heavy tails" in words and "`loss` student-t" in words for words in lack.statements())
     assert lack.to_dict()["wild"]["twist[0]"]["share"] == lack.wild["twist[0]"].share
 
 
