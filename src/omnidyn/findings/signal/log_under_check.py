@@ -19,9 +19,9 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.findings.finding import Span, spans_of
-from omnidyn.findings.signal.robust import clusters, quantum, white_noise
+from omnidyn.findings.signal.robust import clusters
 from omnidyn.logs.channels import components
-from omnidyn.logs.log import Log
+from omnidyn.logs.log import ON_CHANGE, Log
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL
 
@@ -100,12 +100,13 @@ class LogUnderCheck:
         """True in every row."""
         return np.ones(len(self), dtype=bool)
 
-    def noise(self, component: str, values: FloatArray) -> float:
-        """Noise of one component: what its neighbours scatter by, at least what its quantisation makes."""
-        cache: dict[str, float] = self.known.get("noise", {})
-        if component not in cache:
-            cache[component] = max(white_noise(values), quantum(values) / np.sqrt(12.0))
-        return cache[component]
+    def recorded(self, channel: str, k: int) -> IntArray:
+        """Rows in which component k was recorded; those between are no measurements where it has times of its own."""
+        logged = self.log.channels.get(channel)
+        if logged is None:
+            return np.arange(len(self))
+        there = np.isfinite(logged.reshape(len(self.log), -1)[self.rows, k])
+        return np.flatnonzero(there) if 1.0 - there.mean() > ON_CHANGE else np.arange(len(self))
 
     def replace(self, **channels: FloatArray | None) -> LogUnderCheck:
         """The log with some channels changed, or taken out where None."""

@@ -9,7 +9,6 @@ from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, sample, spread
 from omnidyn.logs.channels import place
-from omnidyn.logs.log import ON_CHANGE
 from omnidyn.statistics import robust_std
 
 MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
@@ -23,7 +22,7 @@ def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     for channel in MEASURED:
         for component, values in work.columns(channel):
             k = place(component)[1]  # type: ignore[index]
-            own = recorded(work, channel, k)
+            own = work.recorded(channel, k)
             bad = np.zeros(len(work), dtype=bool)
             bad[own] = _isolated(values[own]) & ~_kicked(changed[own])
             if not bad.any() or bad.mean() > 0.2:
@@ -80,12 +79,3 @@ def _isolated(values: FloatArray) -> BoolArray:
     with np.errstate(invalid="ignore"):
         bad[1:-1] = (jump > SPIKE * scale) & (apart < 0.25 * jump)
     return bad
-
-
-def recorded(work: LogUnderCheck, channel: str, k: int) -> IntArray:
-    """Rows in which a component was recorded; those between are no measurements where it is recorded on change."""
-    logged = work.log.channels.get(channel)
-    if logged is None:
-        return np.arange(len(work))
-    there = np.isfinite(logged.reshape(len(work.log), -1)[work.rows, k])
-    return np.flatnonzero(there) if 1.0 - there.mean() > ON_CHANGE else np.arange(len(work))

@@ -10,7 +10,7 @@ from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderC
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.findings.signal.robust import HELD, quantum, smooth, turned_by, white_noise
 from omnidyn.findings.values.codes import check_codes
-from omnidyn.findings.values.spikes import check_spikes, recorded
+from omnidyn.findings.values.spikes import check_spikes
 from omnidyn.findings.values.stuck import check_stuck
 from omnidyn.logs.channels import place
 from omnidyn.logs.columns.mapping import SIDED, component_channel
@@ -83,14 +83,15 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
     for channel in SENSORS:
         for component, values in work.columns(channel):
             k = place(component)[1]  # type: ignore[index]
-            step = quantum(values)
-            busy = np.abs(values[np.isfinite(values) & (values != 0.0)])
+            own = values[work.recorded(channel, k)]
+            step = quantum(own)
+            busy = np.abs(own[np.isfinite(own) & (own != 0.0)])
             usual = float(np.median(busy)) if busy.size else 0.0
             if not step or step < 0.02 * usual:
                 continue
             key = next((known for known in groups if known[0] == channel and abs(known[1] / step - 1.0) < 0.01),
                        (channel, step))  # fmt: skip
-            groups.setdefault(key, []).append((component, step / usual, white_noise(values)))
+            groups.setdefault(key, []).append((component, step / usual, white_noise(own)))
             if channel == "wheel_speed" and expected is not None and expected[1].shape[1] > k:
                 found += _reads_zero(work, component, values, step, expected[0], expected[1][:, k])
     for (_, step), members in groups.items():
@@ -239,4 +240,4 @@ def _told(work: LogUnderCheck, source: str) -> IntArray:
     """Rows in which what tells the speed of a wheel was recorded."""
     if source not in MEASUREMENTS:
         return np.arange(len(work))
-    return recorded(work, "current" if source == "voltage and current" else source.removeprefix("the "), 0)
+    return work.recorded("current" if source == "voltage and current" else source.removeprefix("the "), 0)

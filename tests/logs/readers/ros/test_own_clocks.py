@@ -92,3 +92,18 @@ def test_intervals_hold_what_they_promise_with_three_clocks(tmp_path):
         held += [fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in TRUTH.items()]
     assert np.mean(held) == pytest.approx(0.95, abs=0.03)
     assert np.std(scores) == pytest.approx(1.0, abs=0.12)
+
+
+def test_the_steps_of_a_slow_sensor_are_those_that_it_made(tmp_path):
+    """Values between two of its messages, which comparisons make, are none of its own."""
+    maker, step = BagMaker(), 0.5
+    rng = np.random.default_rng(3)
+    for k in range(0, 12_000, 5):
+        maker.numbers(k * 1e-3, np.sin(k * 1e-3 + np.arange(3.0)), "/omnidyn/voltage", late=0.0)
+    for k in range(2, 12_000, 50):
+        speed = 4.0 * np.sin(k * 1e-3 + np.arange(3.0)) + rng.normal(0.0, 0.1, 3)
+        maker.joints(k * 1e-3, ["wheel_1", "wheel_2", "wheel_3"], [], np.round(speed / step) * step)
+    robot = omnidyn.load_robot("axebot")
+    verdict = omnidyn.check(load_log(write_mcap(maker, tmp_path / "slow.mcap"), robot), robot)
+    (finding,) = [each for each in verdict.findings if each.code == "quantised"]
+    assert finding.numbers["step"] == pytest.approx(step)
