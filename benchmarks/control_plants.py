@@ -64,12 +64,15 @@ def log_of(robot: Robot, seed: int) -> omnidyn.Run:
     return run.replace(twist=None, pose=None, current=None, wheel_speed=seen, source=robot.name)
 
 
+LEVELS = ("coulomb", "viscous", "breakaway", "yaw_coulomb", "yaw_viscous", "yaw_breakaway")
+
+
 def guessed(robot: Robot) -> Robot:
     """A robot whose friction has the right shape and half the size, its motors those of the data sheet."""
     halves = {}
     for name in type(robot.friction).model_fields:
         law = getattr(robot.friction, name)
-        levels = {key: _half(value) for key, value in dict(law).items() if value is not None}
+        levels = {key: _half(value) for key, value in dict(law).items() if key in LEVELS and value is not None}
         halves[name] = law.replace(**levels)
     motor = robot.motor.replace(resistance=1.69, rotor_inertia=0.5 * np.max(robot.motor.rotor_inertia))
     return robot.replace(name="guess", friction=robot.friction.replace(**halves), motor=motor)
