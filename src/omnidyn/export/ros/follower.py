@@ -58,8 +58,40 @@ IN_VOLTS = {made.output == "voltage"}  # what the controller gives; else duties
 AHEAD = ({", ".join(number(each) for each in ahead)})
 '''
     return {**code.files, "control_shared.c": _SHARED, "path_loop.py": about + constants + _LOOP,
-            "omnidyn_node.py": about + _NODE}  # fmt: skip
+            "omnidyn_node.py": about + _NODE + NODE_END}  # fmt: skip
 
+
+# How every node ends: its step, its last word, its loop. rclpy imports are at the top of the text before it.
+NODE_END = '''    def on_timer(self):
+        """One step of the loop."""
+        message = Float64MultiArray()
+        message.data = self.loop.step(self.now(), supply=self.supply)
+        self.duty.publish(message)
+
+    def stop(self):
+        """Duties of 0, the last word of the node."""
+        message = Float64MultiArray()
+        message.data = [0.0] * WHEELS
+        self.duty.publish(message)
+
+
+def main():
+    """Run until interrupted; then stop."""
+    rclpy.init()
+    node = OmnidynNode()
+    try:
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        node.stop()
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()
+'''
 
 _SHARED = """/* The controller of a node, for a shared library:
    cc -O2 -std=c99 -shared -fPIC -o libomnidyn_control.so omnidyn_control.c control_shared.c -lm */
@@ -258,33 +290,4 @@ class OmnidynNode(Node):
             (twist.linear.x, twist.linear.y, twist.angular.z),
         )
 
-    def on_timer(self):
-        """One step of the loop."""
-        message = Float64MultiArray()
-        message.data = self.loop.step(self.now(), supply=self.supply)
-        self.duty.publish(message)
-
-    def stop(self):
-        """Duties of 0, the last word of the node."""
-        message = Float64MultiArray()
-        message.data = [0.0] * WHEELS
-        self.duty.publish(message)
-
-
-def main():
-    """Run until interrupted; then stop."""
-    rclpy.init()
-    node = OmnidynNode()
-    try:
-        rclpy.spin(node)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        node.stop()
-        node.destroy_node()
-        rclpy.try_shutdown()
-
-
-if __name__ == "__main__":
-    main()
 '''

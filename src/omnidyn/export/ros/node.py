@@ -16,7 +16,7 @@ from omnidyn.errors import InputError
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import gains
-from omnidyn.export.ros.follower import BUILD, follower
+from omnidyn.export.ros.follower import BUILD, NODE_END, follower
 from omnidyn.export.ros.ros2_control import limits
 from omnidyn.export.spelling import line_comment, number
 from omnidyn.model.deadzone import HIGHEST, axis_patterns, breakaway_voltage
@@ -57,7 +57,7 @@ def ros2_node(
         return Export(KIND, robot.name, files, missing, (*NOTES, BUILD), folder=True)
     files = {
         "drive_loop.py": about + _constants(robot, 1.0 / dt, timeout) + _LOOP,
-        "omnidyn_node.py": about + _NODE,
+        "omnidyn_node.py": about + _NODE + NODE_END,
     }
     return Export(KIND, robot.name, files, missing, NOTES, folder=True)
 
@@ -197,33 +197,4 @@ class OmnidynNode(Node):
         if all(name in found for name in self.joints):
             self.loop.measured(self.now(), [found[name] for name in self.joints])
 
-    def on_timer(self):
-        """One step of the loop."""
-        message = Float64MultiArray()
-        message.data = self.loop.step(self.now(), supply=self.supply)
-        self.duty.publish(message)
-
-    def stop(self):
-        """Duties of 0, the last word of the node."""
-        message = Float64MultiArray()
-        message.data = [0.0] * WHEELS
-        self.duty.publish(message)
-
-
-def main():
-    """Run until interrupted; then stop."""
-    rclpy.init()
-    node = OmnidynNode()
-    try:
-        rclpy.spin(node)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        node.stop()
-        node.destroy_node()
-        rclpy.try_shutdown()
-
-
-if __name__ == "__main__":
-    main()
 '''
