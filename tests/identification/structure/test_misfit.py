@@ -79,7 +79,7 @@ def test_wheels_that_slip_at_random_are_no_lack_of_fit(seed):
     assert not fit_output_error(log, AXEBOT, nuisances=()).lack_of_fit.found
 
 
-@pytest.mark.parametrize("kind", ["resistance", "voltage drop", "wheel radius"])
+@pytest.mark.parametrize("kind", ["resistance", "voltage drop", "wheel radius", "umbilical", "Stribeck"])
 def test_a_wrong_model_of_a_robot_with_encoders_is_found(kind):
     """The sum of counts wanders where the model is wrong: it was taken for a memory that says nothing."""
     case, _, _ = drawn(by_name(kind), 69)

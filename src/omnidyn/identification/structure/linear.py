@@ -153,7 +153,7 @@ class Linear:
         for k, (piece, columns) in enumerate(zip(self.rows.pieces, self.rows.column, strict=True)):
             for j, (c, tick) in enumerate(zip(columns, piece.record.ticks, strict=True)):
                 variance = max(self.memory[c].variance, TINY)
-                if tick <= 0.0 or self.memory[c].order:
+                if tick <= 0.0 or self.memory[c].remembers:
                     continue
                 there = self.rows.there[k][j]
                 angle = (piece.record.outputs[piece.first : piece.last + 1, j] - self.rows.residual[k][j])[there]
@@ -229,7 +229,7 @@ class Gram:
 def _new(memory: AutoRegression, values: FloatArray, there: BoolArray, steps: IntArray) -> FloatArray:
     """What is new in each row that counts, over its standard deviation. values (rows, K) -> (rows that count, K)."""
     own = np.ascontiguousarray(values[there])
-    new = innovations(own, steps, memory.coefficients, memory.covariance) if memory.order else own
+    new = innovations(own, steps, *memory.filter) if memory.remembers else own
     return new / np.sqrt(max(memory.variance, TINY))
 
 

@@ -17,6 +17,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Found
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.whitened import without_gaps
+from omnidyn.identification.output_error.problem.outputs import TRAVEL
 from omnidyn.identification.structure.disturbances import THEMES, Theme, shown_by_themes
 from omnidyn.identification.structure.linear import Gram, Linear, Rows, root_of_covariance, solved
 from omnidyn.identification.structure.motion import Motion
@@ -152,8 +153,8 @@ def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray
                     there = rows.there[k][j]
                     more = [] if taken is None else [taken[k][j][there]]
                     series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
-        plain = autoregression(series, 0)
-        found.append(plain if rows.is_rounding(c, plain.variance) else autoregression(series))
+        plain, adds_up = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
+        found.append(plain if rows.is_rounding(c, plain.variance) else autoregression(series, may_add_up=adds_up))
     return found
 
 

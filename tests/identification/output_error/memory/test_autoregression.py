@@ -72,3 +72,36 @@ def test_stretches_are_fitted_together():
     uneven = np.cumsum(np.random.default_rng(4).geometric(0.1, 400))  # few stretches reach far back
     assert autoregression(np.split(whole, uneven[uneven < 4000])).order == 1
     assert model.partial[0] == pytest.approx(0.9, abs=4.0 * np.sqrt((1.0 - 0.81) / 4000))
+
+
+@pytest.mark.parametrize("missing", [[], [1], [20, 21, 22, 40]])
+def test_what_is_new_of_errors_that_add_up_is_what_is_new_of_their_changes(missing):
+    """Against the dense likelihood of all contrasts of rows: where the series began is anywhere and says nothing."""
+    model = AutoRegression(THREE.partial, 1.0, 1000, adds_up=True)
+    values = np.random.default_rng(5).normal(size=(60, 3)).cumsum(axis=0) + 1000.0
+    left = np.setdiff1d(np.arange(60), missing)
+    steps = np.concatenate([[0], np.diff(left)])
+    new = innovations(values[left], steps, *model.filter)
+    summed = np.tri(59)  # rows 1 to 59 from the changes before them
+    dense = (summed @ toeplitz(THREE.autocovariance(59)) @ summed.T)[np.ix_(left[1:] - 1, left[1:] - 1)]
+    apart = values[left[1:]] - values[left[0]]
+    np.testing.assert_allclose(new[1:].T @ new[1:], apart.T @ np.linalg.solve(dense, apart), rtol=1e-5)
+    assert np.abs(new[0]).max() < 0.2
+
+
+def test_errors_that_add_up_are_told_from_errors_that_forget():
+    """Forces leave their marks in an angle for good; noise of .98 a row is gone after some hundred rows."""
+    adding = [autoregression([series(THREE, 2000, s).cumsum(axis=0)], may_add_up=True) for s in range(20)]
+    assert np.mean([model.adds_up and model.order == 3 for model in adding]) >= 0.9
+    slow = AutoRegression(np.array([0.98]), 1.0, 1)
+    assert not any(autoregression([series(slow, 2000, seed)], may_add_up=True).adds_up for seed in range(20))
+    assert not any(autoregression([series(THREE, 2000, s).cumsum(axis=0)]).adds_up for s in range(3))
+
+
+def test_nothing_is_added_at_rest():
+    """Rows that repeat the one before are no rows of the changes: their variance is that of those which move."""
+    walk = series(AutoRegression(np.zeros(0), 1.0, 1), 2000, 6).cumsum(axis=0)
+    model = autoregression([walk], may_add_up=True)
+    assert model.adds_up
+    halting = np.repeat(walk, np.where(np.arange(2000) % 20 == 0, 30, 1), axis=0)
+    assert autoregression([halting], may_add_up=True).variance == pytest.approx(model.variance, rel=0.01)

@@ -5,13 +5,17 @@
 Fitted by Burg's recursion over stretches without a gap, which is stable by construction and differs from maximum
 likelihood in terms of 1/n only: J. P. Burg, Maximum entropy spectral analysis (1975); of several stretches the sums go
 over all of them. The order has the least BIC: G. Schwarz, Ann. Stat. 6, 461 (1978).
+
+Errors of an angle or a place may add up: a push, a slip, a force that the model lacks stay in them for good. Then their
+changes from row to row are what remembers, and where they began says nothing. Taken as errors that forget, they would
+remember as long as the log lasts, and nothing in it could be told from noise.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,16 +26,18 @@ ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tr
 SHARE = 0.1  # of the rows that may be coefficients
 PATIENCE = 15  # orders without a better one, after which none is looked for
 FOLLOWED = 20_000  # rows after which a memory is as good as endless
+ANYWHERE = 1e8  # times the variance of what is new: where errors that add up may begin
 
 
 @dataclass(frozen=True, eq=False)
 class AutoRegression:
     """partial (p,): partial correlations, each within -1 to 1, so that the series is stationary. variance: of what is
-    new in a row. rows: that it was fitted to."""
+    new in a row. rows: that it was fitted to. adds_up: whether all this is of the changes from row to row."""
 
     partial: FloatArray
     variance: float
     rows: int
+    adds_up: bool = False
 
     @property
     def order(self) -> int:
@@ -42,6 +48,20 @@ class AutoRegression:
     def coefficients(self) -> FloatArray:
         """phi, shape (p,), by Levinson's recursion."""
         return _steps(self.partial)[-1]
+
+    @property
+    def remembers(self) -> bool:
+        """Whether a row says anything of the next one."""
+        return bool(self.order) or self.adds_up
+
+    @property
+    def filter(self) -> tuple[FloatArray, FloatArray]:
+        """(phi (p,), covariance of p rows in a row (p, p)) of the errors as they are, for `innovations`."""
+        if not self.adds_up:
+            return self.coefficients, self.covariance
+        back = np.tri(self.order + 1, self.order, -1)  # from the last row to those before, by the changes between
+        start = back @ self.covariance @ back.T + ANYWHERE
+        return np.append(self.coefficients, 0.0) + np.append(1.0, -self.coefficients), start
 
     @property
     def covariance(self) -> FloatArray:
@@ -86,6 +106,7 @@ class AutoRegression:
 
     def products(self, ways: FloatArray) -> FloatArray:
         """Sums of a series times itself k rows on, for k from 0 to p, both ways. ways (n, K): K series. (p + 1, K)."""
+        ways = np.diff(ways, axis=0) if self.adds_up else ways
         found = np.zeros((self.order + 1, ways.shape[1]))
         for k in range(min(len(found), len(ways))):
             found[k] = (1.0 if k == 0 else 2.0) * (ways[k:] * ways[: len(ways) - k]).sum(axis=0)
@@ -120,25 +141,47 @@ def _steps(partial: FloatArray) -> list[FloatArray]:
     return found
 
 
-def autoregression(stretches: Sequence[FloatArray], most: int | None = None) -> AutoRegression:
+def autoregression(
+    stretches: Sequence[FloatArray], most: int | None = None, may_add_up: bool = False
+) -> AutoRegression:
     """That of series without gaps, each of shape (n, K): the series is what all K columns add up to in the square.
 
     The first column is the series itself; the others may be what a fit has taken out of it, see whitening.py.
-    most: the highest order; by default ORDERS log10(rows). Without rows it has order 0 and variance 0.
+    most: the highest order; by default ORDERS log10(rows). may_add_up: whether the errors may add up: whether they do
+    is found by their likelihood, and no row in which nothing changes counts then, for a robot at rest adds nothing.
+    Without rows it has order 0 and variance 0.
     """
+    found, cost = _fitted(stretches, most)
+    if not may_add_up or not found.order:
+        return found
+    changes, own = _fitted([np.diff(each, axis=0) for each in stretches], most)
+    own += (found.rows - changes.rows) * _log_variance(stretches)  # a stretch may begin wherever the others are
+    if own >= cost:
+        return found
+    moving = [each[(each != 0.0).any(axis=1)] for each in (np.diff(one, axis=0) for one in stretches)]
+    return replace(_fitted(moving, most)[0], adds_up=True)
+
+
+def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegression, float]:
+    """(the autoregression of series as they are, its BIC)."""
     rows = sum(len(each) for each in stretches)
     if not rows:
-        return AutoRegression(np.zeros(0), 0.0, 0)
+        return AutoRegression(np.zeros(0), 0.0, 0), 0.0
     limit = int(min(ORDERS * np.log10(max(rows, 1)), SHARE * rows)) if most is None else most
     ends = np.cumsum([0, *map(len, stretches)])
     ahead = np.ascontiguousarray(np.concatenate(stretches), dtype=float)
-    partial, order, variance = _burg(ahead, ahead.copy(), ends, limit, PATIENCE)
-    return AutoRegression(partial[:order], variance, rows)
+    partial, order, variance, cost = _burg(ahead, ahead.copy(), ends, limit, PATIENCE)
+    return AutoRegression(partial[:order], variance, rows), cost + rows * _log_variance(stretches)
+
+
+def _log_variance(stretches: Sequence[FloatArray]) -> float:
+    square = sum(float((each**2).sum()) for each in stretches)
+    return math.log(max(square / max(sum(map(len, stretches)), 1), 1e-300))
 
 
 @kernel
 def _burg(ahead, behind, ends, limit, patience):
-    """(partial correlations, the order with the least BIC, its variance) by Burg's recursion, in place.
+    """(partial correlations, the order with the least BIC, its variance, its BIC less that of white ones), in place.
 
     ahead, behind (rows, K): the series, twice: errors of the predictions from the rows before and from those after.
     ends (stretches + 1,): where each stretch ends. With m orders done, row t of a stretch that begins at s is one of
@@ -180,4 +223,4 @@ def _burg(ahead, behind, ends, limit, patience):
             best, least, found = order + 1, cost, variance
         elif order + 1 >= best + patience:
             break
-    return partial, best, found
+    return partial, best, found, least
