@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson, quad
+from scipy.signal import lfilter
 
 import omnidyn
 from omnidyn.errors import InputError
@@ -61,6 +62,21 @@ def test_what_lasts_is_not_called_small(fit):
     assert "no larger than on the fitted ones" in words
     assert "most of them is no noise" in words
     assert "small" not in words
+
+
+def test_noise_that_remembers_is_not_taken_for_a_fault():
+    """A right model, noise of a correlation of .9 from row to row: nothing lasts but the noise."""
+
+    def remembered(seed):
+        clean = simulate(AXEBOT, excitation(20.0, seed=seed), 0.01)
+        white = np.random.default_rng(seed).normal(size=(len(clean.t) + 300, 3))
+        noise = lfilter([np.sqrt(0.19)], [1.0, -0.9], white, axis=0)[300:] * NOISE
+        return Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise, source=f"log {seed}")
+
+    fit = fit_output_error(remembered(1), AXEBOT, nuisances=())
+    (words,) = validate(fit, [remembered(1)], [remembered(2)]).statements()
+    assert "noise that remembers" in words
+    assert "misses" not in words
 
 
 def test_another_floor_is_seen(fit):

@@ -60,12 +60,14 @@ def coloured(scores: Mapping[str, Score]) -> list[str]:
 class Validation:
     """Comparisons with the fitted robot, and the scores in them: "fitted" and "held out" -> component -> Score.
 
-    held_out is None where no log was held out. All are free runs from the measured start.
+    held_out is None where no log was held out. All are free runs from the measured start. explained: whether the errors
+    that the fit left follow nothing that a model should know, `Estimate.lack_of_fit`: then what lasts in them is noise.
     """
 
     fitted: Comparison
     held_out: Comparison | None
     scores: dict[str, dict[str, Score]]
+    explained: bool = False
 
     def table(self) -> Table:
         """The scores, a row per component."""
@@ -92,6 +94,12 @@ class Validation:
             )
             return
         names = coloured(found)
+        if names and self.explained:
+            yield (
+                f"on held-out logs the errors of {', '.join(names)} are no larger than on the fitted ones; they are "
+                "not white, but follow nothing that the model should know: noise that remembers"
+            )
+            return
         shares = {name: self._lasting(name) for name in names}
         if (worst := max(shares.values(), default=0.0)) > LASTING:
             lasting = [name for name, share in shares.items() if share > LASTING]
@@ -168,7 +176,8 @@ def validate(
     fitted = _compared(fit, runs, progress)
     other = _compared(fit, held_out, progress) if held_out else None
     scores = {FITTED: _scores(fit, fitted, runs)} | ({HELD_OUT: _scores(fit, other, held_out)} if other else {})
-    return Validation(fitted, other, scores)
+    lack = fit.lack_of_fit if coloured(scores.get(HELD_OUT, {})) else None  # else there is nothing to be asked
+    return Validation(fitted, other, scores, lack is not None and not lack.found)
 
 
 def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[[str], object] | None) -> Comparison:
