@@ -7,9 +7,15 @@ import pytest
 
 from omnidyn import load_robot, simulate
 from omnidyn.control.mpc.controller import Mpc
+from omnidyn.control.mpc.model import numbers
 from omnidyn.control.mpc.settings import Settings
+from omnidyn.control.mpc.stages import friction_at
 from omnidyn.control.paths.path import path
 from omnidyn.errors import InputError
+from omnidyn.model.friction import Friction
+from omnidyn.model.friction.direction import DirectionFriction
+from omnidyn.model.mass import per_mass
+from omnidyn.model.sliding import sliding_wrench
 from omnidyn.simulation.live import LiveRobot
 
 ROBOT = load_robot("axebot")
@@ -211,3 +217,52 @@ def test_what_makes_no_controller(wrong):
 def test_what_makes_no_settings(wrong):
     with pytest.raises(InputError, match="|".join(wrong)):
         Settings(**wrong)
+
+
+def falling(robot, part="axes"):
+    """The robot with friction that falls to the level it had, from 1.6 times that at rest."""
+    own = getattr(robot.friction, part)
+    speed = (0.1, 0.08, 1.0) if part == "axes" else 0.1
+    more = (1.6 * np.asarray(own.coulomb)).tolist()
+    law = own.replace(breakaway=more, stribeck_speed=speed, stribeck_exponent=1.3)
+    return robot.replace(friction=robot.friction.replace(**{part: law}))
+
+
+def ellipse(robot):
+    coulomb, viscous = robot.friction.axes.coulomb, robot.friction.axes.viscous
+    along = DirectionFriction(coulomb=coulomb[:2], viscous=viscous[0], yaw_coulomb=coulomb[2], yaw_viscous=viscous[2])
+    return robot.replace(friction=Friction(direction=along))
+
+
+@pytest.mark.parametrize("robot", [falling(ROBOT), falling(ellipse(ROBOT), "direction")])
+def test_friction_that_falls_is_predicted_as_the_law_has_it(robot):
+    """The force by the law's own numpy formula, its slope by central differences."""
+    own = numbers(robot, DT)
+    one = np.ones(3)
+
+    def at(twist):
+        return friction_at(own.linear, own.levels, one, tuple(twist), 1.0, False)
+
+    for twist in ([0.05, -0.03, 0.4], [0.2, 0.1, -1.5], [-0.04, 0.3, 0.1]):
+        twist = np.array(twist)
+        dry = sliding_wrench(robot, twist) - linear_drag(robot, twist)
+        force, slope = at(twist)
+        np.testing.assert_allclose(force, -per_mass(robot, dry), rtol=1e-9, atol=1e-12)
+        steps = 1e-6 * np.eye(3)
+        changes = [(np.array(at(twist + d)[0]) - np.array(at(twist - d)[0])) / 2e-6 for d in steps]
+        np.testing.assert_allclose(np.reshape(slope, (3, 3)).T, changes, rtol=1e-5, atol=1e-6)
+
+
+def linear_drag(robot, twist):
+    """Viscous friction alone: what is left of the wrench of sliding where it counts for all, at a great speed."""
+    far = 1e6 * twist
+    return (sliding_wrench(robot, far) - sliding_wrench(robot, 0.5 * far)) / 0.5e6
+
+
+@pytest.mark.parametrize("name", ["eight:size_m=0.25,period_s=12", "circle:turn_rad_s=2"])
+def test_a_law_that_falls_is_followed_along_the_prediction(name):
+    """Told of the Coulomb level alone, the observer chases the fall: four times the error, and more."""
+    plant, along = falling(ROBOT), path(name)
+    told, _, _ = drive(Mpc(plant), along, 300, plant=plant)
+    untold, _, _ = drive(Mpc(ROBOT), along, 300, plant=plant)
+    assert rmse(told, along) < 0.25 * rmse(untold, along)

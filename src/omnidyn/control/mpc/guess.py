@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.model import SLOW, WIDTH
+from omnidyn.control.mpc.model import FALLING, SLOW, WIDTH
 from omnidyn.control.mpc.small import dot, put3, vector
+from omnidyn.control.mpc.stages import level_at
 
 TURN = 6.283185307179586
 NEAR = tuple(SLOW.tolist())  # [m/s, m/s, rad/s] below which robot and path stand still
@@ -85,6 +86,10 @@ def moved(levels, emf, limited, x, before):
             a, b = min(max(dot(g, one) * r, -1.0), 1.0), min(max(dot(g, two) * r, -1.0), 1.0)
             if abs(a - b) > MOVED:
                 return True
+            if levels[e, FALLING] > 0.0:
+                now, then = level_at(levels, e, dot(g, one))[0], level_at(levels, e, dot(g, two))[0]
+                if abs(now - then) > MOVED * now:
+                    return True
         if limited:
             change = one[0] - two[0], one[1] - two[1], one[2] - two[2]
             for i in range(len(emf)):

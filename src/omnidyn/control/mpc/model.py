@@ -16,7 +16,22 @@ import numpy as np
 from scipy.linalg import expm
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.layout import BODY_SIZE, ELEMENT_SIZE, N_AXES, SLIDE, SLIDE_X, SLIDE_Y, VISCOUS
+from omnidyn.model.layout import (
+    BODY_SIZE,
+    ELEMENT_SIZE,
+    EXPONENT,
+    EXPONENT_XY,
+    FALL,
+    FALL_XY,
+    HOLD,
+    HOLD_X,
+    HOLD_Y,
+    N_AXES,
+    SLIDE,
+    SLIDE_X,
+    SLIDE_Y,
+    VISCOUS,
+)
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import discretise, is_decoupled, motor_wrench, state_space
@@ -24,9 +39,11 @@ from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.exact.slopes import hold_slopes
 
 DECAY, PHI, PSI, FEED, TURNING, BY_MASS = 0, 9, 18, 27, 36, 45  # columns of `linear`, matrices row by row
-ELLIPSE, STEP, LINEAR_SIZE = 54, 57, 58  # squares of the levels Cx, Cy [N^2], and their width; dt [s]
+ELLIPSE, STEP = 54, 57  # levels Cx, Cy [N], and the width of their slope [N m/s]; dt [s]
+ELLIPSE_FALL, LINEAR_SIZE = 58, 62  # 1/v_s [s/m], the exponent, and how much more at rest, along x and y [N]
 GX, ACROSS, FORWARD, BACKWARD = 0, 3, 6, 7  # columns of `levels`: direction g, M^-1 g, levels of both directions,
-WIDTH, SOFT, LEVEL_SIZE = 8, 9, 10  # speed below which the level falls to 0, and below which it has a slope
+WIDTH, SOFT = 8, 9  # speed below which the level falls to 0, and below which it has a slope
+FALLING, POWER, MORE_FORWARD, MORE_BACKWARD, LEVEL_SIZE = 10, 11, 12, 13, 14  # 1/v_s, d, and how much more at rest
 SLOW = np.array([0.002, 0.002, 0.02])  # [m/s, m/s, rad/s] below which the predicted friction falls linearly to 0
 SOFTER = np.array([30.0, 30.0, 40.0])  # times as wide, it has a slope: how soon the program may count on friction
 
@@ -57,7 +74,9 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     push = np.ascontiguousarray(per_mass(robot, motors.driving).T)
     levels = np.zeros((0, LEVEL_SIZE))
     if friction:
-        linear[0, ELLIPSE : ELLIPSE + 2] = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2
+        linear[0, ELLIPSE : ELLIPSE + 2] = body[SLIDE_X], body[SLIDE_Y]
+        more = body[HOLD_X] - body[SLIDE_X], body[HOLD_Y] - body[SLIDE_Y]
+        linear[0, ELLIPSE_FALL:LINEAR_SIZE] = body[FALL_XY], body[EXPONENT_XY], *more
         linear[0, ELLIPSE + 2] = SLOW[0] * max(body[SLIDE_X], body[SLIDE_Y])
         levels = _levels(robot, element, directions)
     return Numbers(linear, push, np.asarray(np.linalg.pinv(push), dtype=float), levels)
@@ -104,6 +123,8 @@ def _levels(robot: Robot, element: FloatArray, directions: FloatArray) -> FloatA
     table[:, GX : GX + 3] = directions[kept]
     table[:, ACROSS : ACROSS + 3] = per_mass(robot, directions[kept])
     table[:, FORWARD], table[:, BACKWARD] = element[kept, SLIDE], element[kept, SLIDE + 1]
+    table[:, FALLING], table[:, POWER] = element[kept, FALL], element[kept, EXPONENT]
+    table[:, MORE_FORWARD : MORE_BACKWARD + 1] = element[kept, HOLD : HOLD + 2] - element[kept, SLIDE : SLIDE + 2]
     table[:, WIDTH] = np.where(kept < N_AXES, SLOW[np.minimum(kept, 2)], SLOW[0])
     table[:, SOFT] = table[:, WIDTH] * np.where(kept < N_AXES, SOFTER[np.minimum(kept, 2)], SOFTER[0])
     return table

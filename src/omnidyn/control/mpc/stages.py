@@ -5,8 +5,9 @@
 f, the friction, is taken where the step ends, as in an implicit step: what slides is exact, what would turn round
 stops. Below a small speed it falls linearly to 0. The program is given a wider slope than that, largest at rest and
 falling to 0: it tells that friction gives way where motion turns round, which the level along one predicted motion
-hides; saturated wheels need it. It acts on the end of the step, so that it never makes the prediction stiff. With F
-the slope, J that of the frame terms and G = F - J/2:
+hides; saturated wheels need it. It acts on the end of the step, so that it never makes the prediction stiff. What falls
+with the speed (Stribeck) is taken with its own slope along the prediction. With F the slope, J that of the frame terms
+and G = F - J/2:
 
     V = K (DECAY + PHI J/2),   HV = K PHI,   K = (I + PHI G)^-1
     displacement = PHI twist + PSI (a + d - f + frame)     turned by the heading in the middle of the step
@@ -26,8 +27,13 @@ from omnidyn.control.mpc.model import (
     BY_MASS,
     DECAY,
     ELLIPSE,
+    ELLIPSE_FALL,
+    FALLING,
     FORWARD,
+    MORE_BACKWARD,
+    MORE_FORWARD,
     PHI,
+    POWER,
     PSI,
     SOFT,
     STEP,
@@ -35,8 +41,21 @@ from omnidyn.control.mpc.model import (
     WIDTH,
 )
 from omnidyn.control.mpc.small import added, inverse, matrix, minus, mm, mv, plus, put3, put9, vector
+from omnidyn.model.friction.stribeck import fall
 
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@part
+def level_at(levels, e, speed):
+    """(the level of part e at a speed, what it grows by with the size of the speed): it falls by Stribeck's law."""
+    forward = speed >= 0.0
+    level = levels[e, FORWARD] if forward else levels[e, BACKWARD]
+    if levels[e, FALLING] == 0.0:
+        return level, 0.0
+    left, slope = fall(abs(speed) * levels[e, FALLING], levels[e, POWER])
+    more = levels[e, MORE_FORWARD] if forward else levels[e, MORE_BACKWARD]
+    return level + more * left, more * slope * levels[e, FALLING]
 
 
 @part
@@ -52,26 +71,41 @@ def friction_at(linear, levels, scale, twist, narrow, soft):
         x, y, z = vector(levels, e, 0)
         dx, dy, dz = vector(levels, e, ACROSS)
         speed, width = x * twist[0] + y * twist[1] + z * twist[2], narrow * levels[e, WIDTH]
-        level = levels[e, FORWARD] if speed >= 0.0 else levels[e, BACKWARD]
+        level, falls = level_at(levels, e, speed)
         share = min(max(speed / width, -1.0), 1.0)
         slope = level / width if abs(speed) < width else 0.0
         if soft:
             near = levels[e, SOFT]
             slope = 2.0 * level / near * max(0.0, 1.0 - abs(speed) / near)
+        slope += abs(share) * falls
         force = level * share
         f0, f1, f2 = f0 + dx * force, f1 + dy * force, f2 + dz * force
         s0, s1, s2 = s0 + dx * x * slope, s1 + dx * y * slope, s2 + dx * z * slope
         s3, s4, s5 = s3 + dy * x * slope, s4 + dy * y * slope, s5 + dy * z * slope
         s6, s7, s8 = s6 + dz * x * slope, s7 + dz * y * slope, s8 + dz * z * slope
     if linear[0, ELLIPSE] > 0.0:
-        qx, qy, width = linear[0, ELLIPSE], linear[0, ELLIPSE + 1], narrow * linear[0, ELLIPSE + 2]
+        ax, ay, width = linear[0, ELLIPSE], linear[0, ELLIPSE + 1], narrow * linear[0, ELLIPSE + 2]
+        bx = by = speed = 0.0  # by what of itself each level grows with the speed
+        if linear[0, ELLIPSE_FALL] > 0.0:
+            more_x, more_y = linear[0, ELLIPSE_FALL + 2], linear[0, ELLIPSE_FALL + 3]
+            speed = math.hypot(twist[0], twist[1])
+            left, by_speed = fall(speed * linear[0, ELLIPSE_FALL], linear[0, ELLIPSE_FALL + 1])
+            ax, ay, by_speed = ax + more_x * left, ay + more_y * left, by_speed * linear[0, ELLIPSE_FALL]
+            bx, by = more_x * by_speed / ax, more_y * by_speed / ay
+        qx, qy = ax * ax, ay * ay
         size = math.sqrt(qx * twist[0] * twist[0] + qy * twist[1] * twist[1])
         r = 1.0 / max(size, width)
         fx, fy = qx * twist[0] * r, qy * twist[1] * r
         bend = r if size > width else 0.0
+        grows_x = grows_y = 0.0
+        if speed > 0.0:
+            both = 0.0 if bend == 0.0 else (fx * twist[0] * bx + fy * twist[1] * by) * bend
+            grows_x, grows_y = fx * (2.0 * bx - both) / speed, fy * (2.0 * by - both) / speed
         b = matrix(linear, 0, BY_MASS)
-        g = mm(b, (qx * r - fx * fx * bend, -fx * fy * bend, 0.0, -fx * fy * bend, qy * r - fy * fy * bend,
-                   0.0, 0.0, 0.0, 0.0))  # fmt: skip
+        g = mm(b, (
+            qx * r - fx * fx * bend + grows_x * twist[0], -fx * fy * bend + grows_x * twist[1], 0.0,
+            -fx * fy * bend + grows_y * twist[0], qy * r - fy * fy * bend + grows_y * twist[1], 0.0, 0.0, 0.0, 0.0,
+        ))  # fmt: skip
         v = mv(b, (fx, fy, 0.0))
         f0, f1, f2 = f0 + v[0], f1 + v[1], f2 + v[2]
         s0, s1, s2, s3, s4, s5 = s0 + g[0], s1 + g[1], s2 + g[2], s3 + g[3], s4 + g[4], s5 + g[5]

@@ -106,7 +106,9 @@ def _constants(controller: Mpc) -> str:
         "START_PUSH": tables.START_PUSH, "START_SCALE": tables.START_SCALE, "SHARP": settings.volts,
     }  # fmt: skip
     if ellipse:
-        numbers |= dict(zip(("ELLIPSE_X", "ELLIPSE_Y", "ELLIPSE_WIDTH"), linear[ELLIPSE : ELLIPSE + 3], strict=True))
+        numbers |= dict(
+            zip(("ELLIPSE_X", "ELLIPSE_Y", "ELLIPSE_WIDTH"), linear[ELLIPSE : ELLIPSE + 3] ** (2, 2, 1), strict=True)
+        )
     if settings.slew is not None:
         numbers["SLEW_STEP"] = settings.slew * controller.dt
     lines = [f"#define {name} {int(value)}" for name, value in whether.items()]
@@ -128,7 +130,7 @@ def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
     found |= {"NEAR": guess.NEAR, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
     if len(own.levels):
         assert (GX, ACROSS, SOFT) == (0, 3, 9)  # columns that model.c counts by hand
-        found["LEVEL"] = own.levels
+        found["LEVEL"] = own.levels[:, : SOFT + 1]  # what falls with the speed has no C
     if controller.observer:
         found |= _noise(settings)
     return found
