@@ -103,7 +103,8 @@ def _blocked(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
             levels, back = np.unique(np.round(voltage[rest], 3), axis=0, return_inverse=True)
             if len(levels) <= 2000:
                 # It would have to be seen: a speed after a moment that is well above what counts as rest.
-                start = acceleration(robot, np.zeros((len(levels), 3)), levels / SAFETY)
+                grips = robot.replace(wheels=robot.wheels.replace(traction_mu=None))  # as all wheels do at rest
+                start = acceleration(grips, np.zeros((len(levels), 3)), levels / SAFETY)
                 soon = np.abs(wheel_speed(robot.wheels, MOMENT * start)).max(axis=1)
                 bad[rest] = (soon > 3.0 * _level(work))[back.ravel()]
     elif current is not None:

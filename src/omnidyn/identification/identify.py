@@ -290,7 +290,7 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
         validations, cut = {}, NOT_COMPARED
     for group, fit in answer.estimates.items() if not cut else ():
         heard.now(f"looking for what the model leaves out{f' in {group}' if len(answer.estimates) > 1 else ''}")
-        assert fit.diagnosis is not None  # found now, and told below
+        _ = fit.diagnosis  # made now, and told below
     words = [*verdict_advice(verdicts), *_not_independent(runs, held)]
     for group, fit in answer.estimates.items():
         own = advice(fit, validations.get(group))

@@ -89,10 +89,18 @@ def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
             raise
         answer = fit.answer(plainer, progress)
     found = {
-        group: replace(estimate, study=_study(seen))
+        group: _with_study(estimate, seen)
         for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)
     }
     return replace(answer, estimates=found)
+
+
+def _with_study(estimate: OutputErrorEstimate, solution: Solution) -> OutputErrorEstimate:
+    """The estimate with what is asked of it beyond its numbers, of which nothing knows wheels that slip."""
+    if estimate.robot.wheels.traction_mu is None:
+        return replace(estimate, study=_study(solution))
+    words = "wheels may slip (traction_mu): whether the model is right, and what its numbers rest on, is not asked"
+    return replace(estimate, warnings=(*estimate.warnings, words))
 
 
 def _study(solution: Solution) -> Callable[[], Diagnosis]:

@@ -20,6 +20,8 @@ def dead_zone_section(robots: Mapping[str, Robot]) -> Section:
 
 
 def _one(group: str, robot: Robot) -> str:
+    if robot.wheels.traction_mu is not None:
+        return paragraph("Wheels may slip (traction_mu): at which voltage this robot starts to move is not worked out.")
     found = dead_zone(robot)
     drawn = draw_dead_zone_map({robot.name: robot}, {robot.name: found})
     anchor = "".join(c if c.isalnum() or c in "-_." else "-" for c in f"{drawn.name}{group}")

@@ -13,6 +13,7 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.slipping import implicit_engine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.band import BAND
 from omnidyn.identification.output_error.problem.differences import differences
@@ -218,7 +219,7 @@ def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactE
     if kind == LOOP:
         return LoopEngine(problem, tol)
     travels = any(name in TRAVELS for name, _ in problem.columns)
-    return ImplicitEngine(problem, tol if tol is None or not travels else min(tol, FINER))
+    return implicit_engine(problem, tol if tol is None or not travels else min(tol, FINER))
 
 
 def engine_kind(engine: object) -> str:

@@ -131,7 +131,7 @@ def late_samples(
 ) -> tuple[list[LateSample], int]:  # fmt: skip
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
-    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors, or (rows, n): see `_held`; start: (3,)
+    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors, or (rows, n): see `held`; start: (3,)
     twist; tol as for `simulate`; travel: what is wanted of the way, see sample.py. Also returns the number of rows in
     which the friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which
     is off.
@@ -144,7 +144,7 @@ def late_samples(
         rates[k] = 0.0 if one.voltage is None else one.voltage
         first[k, :N_AXES] = 0.0 if one.start is None else one.start * [1.0, 1.0, length]
     first[:, 2] += start[2] * stretch
-    given = Commands(_held(t, len(voltage), late), np.ascontiguousarray(voltage))
+    given = Commands(held(t, len(voltage), late), np.ascontiguousarray(voltage))
     seen = _room(robot, t, late, len(directions), travel)
     outcome, _, _ = run_with_derivatives(
         numbers, directions_of(numbers, plants, rates), given, current_bounds(robot, given, len(given.dt)),
@@ -164,7 +164,7 @@ def looped_samples(
     refuse_rate([one.name for one in directions])
     numbers, plants = _plants(robot, directions)
     robots = [each or robot for one in directions for each in (one.up, one.down)]
-    given = Commands(_held(t, len(set_point), late), None, set_point=np.ascontiguousarray(set_point))
+    given = Commands(held(t, len(set_point), late), None, set_point=np.ascontiguousarray(set_point))
     seen, count = _room(robot, t, late, len(directions), travel), len(directions)
     found = run_loop_with_derivatives(
         robot, robots, numbers, directions_of(numbers, plants, np.zeros((count, *set_point.shape))), given,
@@ -177,7 +177,7 @@ def looped_samples(
     return _looks(robot, directions, seen, (numbers.body[LENGTH], _stretch(plants)), _in_force(found))
 
 
-def _held(t: FloatArray, commands: int, late: Sequence[float]) -> FloatArray:
+def held(t: FloatArray, commands: int, late: Sequence[float]) -> FloatArray:
     """For how long each of the commands holds [s]. The last row may have one too, or none; t (rows,) [s].
 
     It then holds on for as long as any channel looks ahead. Otherwise these channels would show nothing in their last

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
+from omnidyn.identification.output_error.engines.slipping import implicit_engine
 from omnidyn.identification.output_error.memory.whitened import OfRows
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine
@@ -37,4 +38,4 @@ def near(engine: RowEngine[Problem], point: Point) -> RowEngine[Problem]:
     """An engine for a few steps from a point: by a step a row where one with a tolerance simulates, else itself."""
     if not isinstance(engine, ImplicitEngine) or engine.tol is None:
         return engine
-    return NearEngine(engine, ImplicitEngine(engine.problem), point)
+    return NearEngine(engine, implicit_engine(engine.problem), point)

@@ -20,6 +20,7 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
+from omnidyn.simulation.slip.plant import grips
 from omnidyn.statistics import difference_noise
 
 DRIVE = ("drive it forward and back", "drive it sideways", "turn it")
@@ -73,7 +74,7 @@ def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot:
         for first, last in record.pieces:
             wrench = reaching(robot, record.voltage[first:last]) @ drive.T @ mass
             most = np.maximum(most, np.where(known, np.abs(wrench).max(axis=0), 0.0))
-    return most
+    return np.minimum(most, np.abs(robot.wheels.wrench_matrix) @ grips(robot))  # beyond it wheels slip
 
 
 def _moved(twist: FloatArray, axis: int, first: int, last: int, rows: int) -> bool:

@@ -10,8 +10,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.beside import side_by_side
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.rates import RateEngine
+from omnidyn.identification.output_error.engines.slipping import implicit_engine
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.problem.problem import Point, Problem, per_column
@@ -83,14 +83,14 @@ def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
     watch.doing("looking for a start")
     rows = sum(piece.last - piece.first for piece in problem.pieces)
     solver, short, own = (
-        Solver(problem, ImplicitEngine(problem), nu, max(NEAR, BIAS * rows)),
+        Solver(problem, implicit_engine(problem), nu, max(NEAR, BIAS * rows)),
         problem.shortened(FEW),
         moving_start(problem, nu, watch),
     )
     if short is problem:
         return solver.minimise(own, watch=watch).state.point
     found = (
-        Solver(short, ImplicitEngine(short), nu, NEAR)
+        Solver(short, implicit_engine(short), nu, NEAR)
         .minimise(own, watch=watch.aside("a part of the log first"))
         .state.point
     )
@@ -109,8 +109,8 @@ def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
     if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
         return point
     held = _on_time(problem)
-    first = Solver(held, ImplicitEngine(held), nu, NEAR).minimise(point, watch=watch.aside("motors first"))
-    return _with_latencies(Solver(problem, ImplicitEngine(problem), nu), first.state).point
+    first = Solver(held, implicit_engine(held), nu, NEAR).minimise(point, watch=watch.aside("motors first"))
+    return _with_latencies(Solver(problem, implicit_engine(problem), nu), first.state).point
 
 
 def _on_time(problem: Problem) -> Problem:
@@ -147,7 +147,7 @@ def _levels_first(problem: Problem, point: Point, nu: float, watch: Progress) ->
     )
     first = replace(problem, parameters=held)
     aside = watch.aside("levels of friction first")
-    return Solver(first, ImplicitEngine(first), nu, NEAR).minimise(point, watch=aside).state.point
+    return Solver(first, implicit_engine(first), nu, NEAR).minimise(point, watch=aside).state.point
 
 
 def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
@@ -156,7 +156,7 @@ def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
     With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
     """
     own, short = problem.start(), problem.shortened(FEW)
-    solver = Solver(short, ImplicitEngine(short), nu)
+    solver = Solver(short, implicit_engine(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
     costs = side_by_side(lambda point: solver.state(point).objective, points)

@@ -1,0 +1,158 @@
+"""A run of wheels that slip as a log shows it, each channel late in its own way, and how that changes.
+
+Derivatives are central differences of whole runs in fixed steps: steps that solve an inclusion are continuous in every
+number, and smooth but where a wheel grips or stops a step sooner. The run itself may be as exact as is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.compiled.beside import side_by_side
+from omnidyn.model.frames import body_to_world
+from omnidyn.model.layout import N_AXES
+from omnidyn.model.motor import settled_current
+from omnidyn.model.robot import Robot
+from omnidyn.simulation.commands import Commands, current_bounds
+from omnidyn.simulation.sensitivity.directions import EPS, difference
+from omnidyn.simulation.sensitivity.late_sample import Direction, held
+from omnidyn.simulation.slip.march import rolling, run_slipping
+from omnidyn.simulation.slip.plant import slip_plant
+from omnidyn.simulation.speed_loop import no_loop
+
+A_MOMENT = 1e-4  # [s]
+Values = tuple[FloatArray, FloatArray, FloatArray]  # (rows, m), time derivative (rows, m), derivatives (rows, K, m)
+
+
+class Look(NamedTuple):
+    """What one run shows at some rows: twist (rows, 3), pose (rows, 3) from the start, turning [rad/s], turned [rad]
+    and current [A] of the wheels (rows, n)."""
+
+    twist: FloatArray
+    pose: FloatArray
+    turning: FloatArray
+    turned: FloatArray
+    current: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SlipSample:
+    """The counterpart of late_sample.py: what channels with one latency show at the rows of a log.
+
+    seen: the run itself; soon: how it goes on, A_MOMENT before and after; by: the runs up and down each direction, in
+    turn.
+    """
+
+    seen: Look
+    soon: tuple[Look, Look]
+    by: Sequence[Look]
+
+    @property
+    def twist(self) -> FloatArray:
+        """Shape (rows, 3)."""
+        return self.seen.twist
+
+    @property
+    def pace(self) -> FloatArray:
+        """Time derivative of the twist, (rows, 3)."""
+        return self._pace("twist")
+
+    @property
+    def dtwist(self) -> FloatArray:
+        """Shape (rows, K, 3)."""
+        return self._changes([each.twist for each in self.by])
+
+    def heading(self) -> Values:
+        """Heading since the start [rad]."""
+        return self.seen.pose[:, 2:], self.seen.twist[:, 2:], self._changes([each.pose[:, 2:] for each in self.by])
+
+    def wheel_speeds(self) -> Values:
+        """Speeds of the wheels themselves [rad/s]."""
+        turning = self.seen.turning
+        return turning, self._pace("turning"), self._changes([each.turning for each in self.by])
+
+    def wheel_angles(self) -> Values:
+        """What the wheels have turned by [rad]."""
+        return self.seen.turned, self.seen.turning, self._changes([each.turned for each in self.by])
+
+    def position(self, facing: float) -> Values:
+        """Place since the start [m] of a robot that faced `facing` [rad] there."""
+        turn = body_to_world(facing)[:2, :2].T
+        pace = np.einsum("kij,kj->ki", body_to_world(facing + self.seen.pose[:, 2])[:, :2, :2], self.seen.twist[:, :2])
+        return self.seen.pose[:, :2] @ turn, pace, self._changes([each.pose[:, :2] @ turn for each in self.by])
+
+    def currents(self) -> Values:
+        """Currents of the motors [A]."""
+        current = self.seen.current
+        return current, self._pace("current"), self._changes([each.current for each in self.by])
+
+    def _pace(self, name: str) -> FloatArray:
+        before, after = (getattr(each, name) for each in self.soon)
+        return (after - before) / (2.0 * A_MOMENT)
+
+    def _changes(self, ends: Sequence[FloatArray]) -> FloatArray:
+        if not ends:
+            return np.zeros((len(self.seen.twist), 0, self.seen.twist.shape[1]))
+        return np.moveaxis(difference(np.array(ends)), 0, 1)
+
+
+def slipping_samples(
+    robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
+    late: Sequence[float], steps: int, tol: float,
+) -> list[SlipSample]:  # fmt: skip
+    """Simulate under held voltages, and sample at t - late: one SlipSample for every latency.
+
+    steps: of a row, for derivatives, and for all where tol is 0; else tol [m/s] is of the run. Others as of
+    `late_samples`. Raises UnsupportedError for a robot that the engine does not know.
+    """
+    ends = [(robot, voltage, start)]
+    for one in directions:
+        for end, side in ((one.up, EPS), (one.down, -EPS)):
+            moved = voltage if one.voltage is None else voltage + side * one.voltage
+            ends.append((end or robot, moved, start if one.start is None else start + side * one.start))
+    around = [own + side for own in late for side in (0.0, A_MOMENT, -A_MOMENT)]
+    first = partial(_looks, t=t, late=around, steps=1 if tol else steps, tol=tol)
+    others = partial(_looks, t=t, late=late, steps=steps, tol=0.0)
+    own, *found = side_by_side(lambda k: (others if k else first)(*ends[k]), range(len(ends)))
+    return [
+        SlipSample(own[3 * c], (own[3 * c + 1], own[3 * c + 2]), [each[c] for each in found]) for c in range(len(late))
+    ]
+
+
+def _looks(
+    robot: Robot, voltage: FloatArray, start: FloatArray, t: FloatArray, late: Sequence[float], steps: int,
+    tol: float,
+) -> list[Look]:  # fmt: skip
+    """One run, seen with each latency."""
+    plant, n = slip_plant(robot), robot.wheels.count
+    ends = np.append(t[0], t[0] + np.cumsum(held(t, len(voltage), late)))
+    seen = [t - own for own in late]
+    every = np.unique(np.concatenate([ends, *(each[(each > ends[0]) & (each < ends[-1])] for each in seen)]))
+    parts = np.arange(steps) / steps
+    grid = np.append((every[:-1, None] + np.diff(every)[:, None] * parts).ravel(), every[-1])
+    at = np.clip(np.searchsorted(ends, grid[:-1], side="right") - 1, 0, len(voltage) - 1)
+    given = Commands(np.diff(grid), np.ascontiguousarray(voltage[at]))
+    assert given.voltage is not None
+    out = run_slipping(
+        plant, given.voltage, current_bounds(robot, given, len(given.dt)), given.dt, rolling(plant, start), np.zeros(3),
+        no_loop(n), tol,
+    )  # fmt: skip
+    turning = out.state[:, N_AXES:] / robot.wheels.radii
+    middle = 0.5 * (turning[1:] + turning[:-1]) * given.dt[:, None]
+    turned = np.concatenate([np.zeros((1, n)), np.cumsum(middle, axis=0)])
+    held_on = np.concatenate([given.voltage, given.voltage[-1:]])
+    looks = []
+    for each in seen:
+        own = np.clip(np.searchsorted(grid, each), 0, len(grid) - 1)
+        outside = (each < grid[0]) | (each > grid[-1])
+        state, shown = out.state[own], turning[own]
+        current = settled_current(robot.motor, held_on[own], shown)
+        parts_of = (state[:, :N_AXES], out.pose[own], shown, turned[own], current)
+        looks.append(Look(*(np.where(outside[:, None], np.nan, part) for part in parts_of)))
+    return looks

@@ -1,0 +1,103 @@
+"""Fits to robots whose wheels slip: the friction coefficient and the rest, from logs of the event-driven reference."""
+
+import numpy as np
+import pytest
+
+from omnidyn import check
+from omnidyn.errors import UnsupportedError
+from omnidyn.identification.output_error.engines.slipping import SlipEngine
+from omnidyn.identification.output_error.prepare import make_engine, make_problem, read_records
+from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.identification.question import Question
+from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.keys import Key
+from omnidyn.model.robot_file import load_robot
+from omnidyn.report.dead_zone_section import dead_zone_section
+from omnidyn.run import Run
+from omnidyn.simulation.slip.loads import wheel_loads
+from tests.support.slipping import Slip
+
+AXEBOT = load_robot("axebot")
+DT, MU = 0.02, 0.35
+ROBOT = AXEBOT.replace(wheels=AXEBOT.wheels.replace(traction_mu=MU, wheel_inertia=2e-5))
+NOISE = {"twist": np.array([0.005, 0.005, 0.025]), "wheel_speed": 0.1}  # [m/s, m/s, rad/s], [rad/s]
+
+
+def log(seed, seconds, noisy=True):
+    """Starts in every direction, hard enough to slip, and stops: by DOP853 from event to event."""
+    rng, moves = np.random.default_rng(seed), []
+    while sum(map(len, moves)) * DT < seconds:
+        way = rng.uniform(0.0, 2.0 * np.pi)
+        rim = np.array([np.cos(way), np.sin(way), rng.uniform(-0.1, 0.1)]) @ AXEBOT.wheels.wrench_matrix
+        moves += [np.tile(rng.uniform(2.0, 6.0) * rim / np.abs(rim).max(), (20, 1)), np.zeros((10, 3))]
+    voltage = np.concatenate(moves)
+    twist, rims, contact = Slip(ROBOT, wheel_loads(ROBOT).newtons).run(voltage, DT)
+    assert 0.2 < (contact != 0.0).mean() < 0.8
+    seen = {"twist": twist, "wheel_speed": rims / ROBOT.wheels.radii}
+    noise = {name: noisy * NOISE[name] * rng.normal(size=each.shape) for name, each in seen.items()}
+    rows = min(len(each) for each in seen.values())
+    return Run(
+        t=DT * np.arange(rows), voltage=np.concatenate([voltage, voltage[-1:]])[:rows],
+        **{name: (each + noise[name])[:rows] for name, each in seen.items()},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def fit():
+    axes = ROBOT.friction.axes.replace(coulomb=(3.0, 2.0, 0.13), viscous=(1.3, 0.7, 0.014))
+    guess = ROBOT.replace(
+        wheels=ROBOT.wheels.replace(traction_mu=0.45), friction=ROBOT.friction.replace(axes=axes)
+    )  # fmt: skip
+    return fit_output_error(
+        log(1, 6.0), guess, free=("friction", "wheels.traction_mu"), outputs=("twist", "wheel_speed"), nuisances=()
+    )
+
+
+def test_what_the_floor_takes_comes_back_with_the_friction(fit):
+    for name, value in fit.value.items():
+        assert abs(value - Key.parse(name).get(ROBOT)) < 4.0 * fit.std[name], name
+    assert fit.std["wheels.traction_mu"] < 0.002
+
+
+def test_what_is_not_asked_of_wheels_that_slip_is_said(fit):
+    assert fit.lack_of_fit is None
+    assert any("wheels may slip" in words for words in fit.warnings)
+
+
+def test_its_page_leaves_out_what_nobody_knows_of_wheels_that_slip(fit):
+    html = dead_zone_section({"": fit.robot}).content
+    assert "not worked out" in html
+
+
+def test_check_takes_the_wheels_to_grip_at_rest():
+    """A robot that is driven hard and stands is blocked, whatever its wheels might do on the move."""
+    run = log(2, 6.0, noisy=False)
+    held = run.t > 4.0
+    still = {name: np.where(held[:, None], 0.0, getattr(run, name)) for name in ("twist", "wheel_speed")}
+    assert "blocked" in {finding.code for finding in check(run.replace(**still), ROBOT).findings}
+
+
+def test_derivatives_are_those_of_the_runs_themselves():
+    """Its run is that of the reference; a number moved by a hundredth of a percent leads to as exact a run."""
+    run = log(2, 1.5, noisy=False)
+    keys = ("friction.axes.coulomb[0]", "friction.axes.viscous[1]", "wheels.traction_mu")
+    question = Question(free=keys, outputs=("twist", "wheel_speed"), nuisances=(), start="rest")
+    problem = make_problem(read_records([run], ROBOT, question), ROBOT, question)
+    engine, point = make_engine("implicit", problem), problem.start()
+    assert isinstance(engine, SlipEngine)
+    ((residual, slopes, at),) = engine.residuals(point)
+    assert np.nanmax(np.abs(residual[:3])) < 2e-5
+    for k in np.flatnonzero(at < len(problem.parameters)):
+        step = np.zeros_like(point.values)
+        step[at[k]] = 1e-4 * point.values[at[k]]
+        (up, _, _), (down, _, _) = (engine.residuals(Point(point.values + s * step, point.states))[0] for s in (1, -1))
+        expected = -(up - down) / (2.0 * step[at[k]])
+        off = np.abs(slopes[:, :, k] - expected)
+        assert np.nanmedian(off) < 1e-3 * np.nanmax(np.abs(expected))
+
+
+def test_a_speed_loop_with_wheels_that_slip_is_refused():
+    run = log(2, 1.5)
+    looped = ROBOT.replace(drive=ROBOT.drive.replace(kind="speed", kp=0.1, ki=1.0, rate=100.0))
+    with pytest.raises(UnsupportedError, match="slip"):
+        fit_output_error(run.replace(voltage=None, wheel_speed_command=run.wheel_speed), looped)
