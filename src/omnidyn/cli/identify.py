@@ -16,7 +16,7 @@ from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed
-from omnidyn.identification.question import MOTORS, STEADY_STATE, Question
+from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.identification.question import options as fields_of_question
 
 INTERRUPTED = 130
@@ -119,6 +119,7 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
     from omnidyn.cli.identify_logs import load_runs
     from omnidyn.cli.identify_show import load_meanwhile, tell
     from omnidyn.cli.terminal.session import provenance, robot_input
+    from omnidyn.identification.first_runs import share_out
     from omnidyn.identification.identify import Identification, settle_method
     from omnidyn.model.robot_file import load_robot
 
@@ -142,6 +143,8 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
         elif loaded.folders:
             told("all folders are fitted together; `per` NAME=GLOB makes groups of them")
         load_meanwhile(to)
+        if question.method == OUTPUT_ERROR:
+            share_out(start)
         found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
         now("writing")
         tell(found, record, to)

@@ -9,14 +9,19 @@ from typing import Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.elsewhere import compiled_elsewhere
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import OUTPUT_ERROR, identify
+from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.model.drive import SPEED
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.simulation.sensitivity.derivatives import derivatives
+from omnidyn.simulation.sensitivity.march import march_with_derivatives
 from omnidyn.simulation.simulate import simulate
 
 ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds
@@ -46,6 +51,26 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("simulation, inductance", partial(_run, winding)),
         ("simulation, wheels that slip", partial(_run, slips)),
     ]
+
+
+def share_out(robot: Robot) -> None:
+    """Compile what a fit of this robot needs, where it is not on disk, in two processes: one takes the largest kernel.
+
+    Returns at once where there is nothing to wait for, or nothing to share: the fit then compiles what it misses.
+    """
+    if not why_not_exact(robot) or robot.drive.kind == SPEED or robot.wheels.traction_mu is not None:
+        return
+    with compiled_elsewhere(march_with_derivatives, differentiate) as shared:
+        if shared:
+            _run(load_robot("mecanum"))
+            acceleration(load_robot("robotino"), np.zeros(3), np.ones(3))
+            autoregression([np.random.default_rng(2).standard_normal((ROWS, 1))])
+
+
+def differentiate() -> None:
+    """The smallest run that needs the derivatives of any friction."""
+    robot = load_robot("mecanum")
+    derivatives(robot, np.ones((2, robot.wheels.count)), DT, ["body.mass_kg"], tol=None)
 
 
 def _run(robot: Robot) -> Run:
