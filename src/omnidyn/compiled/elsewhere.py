@@ -39,8 +39,8 @@ def compiled_elsewhere(kernel: Any, caller: Callable[[], object]) -> Iterator[bo
 
 
 def _wanted(kernel: Any) -> bool:
-    kept = getattr(kernel, "_cache", None)
-    return hasattr(kept, "is_there") and not kept.is_there() and _processors() > 1
+    is_there = getattr(getattr(kernel, "_cache", None), "is_there", None)  # numba's own cache has none
+    return is_there is not None and not is_there() and _processors() > 1
 
 
 def _processors() -> int:
