@@ -12,7 +12,10 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.elsewhere import compiled_elsewhere
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import OUTPUT_ERROR, identify
+from omnidyn.identification.output_error.kernel.of_rows import row_squares, row_terms
 from omnidyn.identification.output_error.memory.autoregression import autoregression
+from omnidyn.identification.output_error.problem.starts import count_far
+from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.drive import SPEED
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.motor import DYNAMIC
@@ -20,7 +23,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
-from omnidyn.simulation.sensitivity.derivatives import derivatives
+from omnidyn.simulation.sensitivity.first_run import differentiate
 from omnidyn.simulation.sensitivity.march import march_with_derivatives
 from omnidyn.simulation.simulate import simulate
 
@@ -64,13 +67,17 @@ def share_out(robot: Robot) -> None:
         if shared:
             _run(load_robot("mecanum"))
             acceleration(load_robot("robotino"), np.zeros(3), np.ones(3))
-            autoregression([np.random.default_rng(2).standard_normal((ROWS, 1))])
+            _small_kernels()
 
 
-def differentiate() -> None:
-    """The smallest run that needs the derivatives of any friction."""
-    robot = load_robot("mecanum")
-    derivatives(robot, np.ones((2, robot.wheels.count)), DT, ["body.mass_kg"], tol=None)
+def _small_kernels() -> None:
+    """The others that a fit needs whatever its engine, on next to nothing, as it calls them."""
+    rows, one = np.zeros((2, 3)), np.ones(1)
+    count_far(rows, 0, 0, 1, 1, 1.0)
+    at_motors(rows, np.zeros(2), Driver(0.0, 0.0, 0.0))
+    row_terms(np.zeros((1, 2)), one, 0.0, None, one, False)
+    row_squares(np.zeros((1, 2, 1)), np.zeros((1, 2)))
+    autoregression([np.random.default_rng(2).standard_normal((ROWS, 1))])
 
 
 def _run(robot: Robot) -> Run:
