@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -119,7 +120,7 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
     from omnidyn.cli.identify_logs import load_runs
     from omnidyn.cli.identify_show import load_meanwhile, tell
     from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.identification.first_runs import share_out
+    from omnidyn.identification.first_runs import shared_out
     from omnidyn.identification.identify import Identification, settle_method
     from omnidyn.model.robot_file import load_robot
 
@@ -143,9 +144,8 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
         elif loaded.folders:
             told("all folders are fitted together; `per` NAME=GLOB makes groups of them")
         load_meanwhile(to)
-        if question.method == OUTPUT_ERROR:
-            share_out(start)
-        found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
+        with shared_out(start) if question.method == OUTPUT_ERROR else nullcontext():
+            found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
         now("writing")
         tell(found, record, to)
     if found.interrupted:

@@ -1,7 +1,7 @@
-"""A kernel compiled by another process, while this one compiles what else is wanted.
+"""Kernels compiled by another process, while this one compiles what it needs first.
 
 numba compiles one kernel after the other, whatever the number of processors. What another process compiles lies on
-disk, where this one finds it. Should that process fail, or not be started at all, this one compiles for itself.
+disk, where this one finds it when it comes to need it. Should it not be there by then, this one compiles for itself.
 """
 
 from __future__ import annotations
@@ -13,29 +13,23 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from omnidyn.compiled.hearing import told
-
-LONGEST = 300.0  # [s] that the other process is waited for
+NICE = 5  # steps of priority below ours
 LEAVES = 5.0  # [s] that it has to go when it is told to
 
 
 @contextlib.contextmanager
-def compiled_elsewhere(kernel: Any, caller: Callable[[], object]) -> Iterator[bool]:
-    """Another process calls `caller`, of a module, which needs this kernel; it is waited for at the end.
+def compiled_elsewhere(kernel: Any, caller: Callable[[], object]) -> Iterator[None]:
+    """Meanwhile another process calls `caller`, of a module, which needs this kernel; in the end it is gone.
 
-    Yields whether there is one: not where the kernel is on disk, where none can be kept there, on one processor, or in
-    a program that is no Python that could be started again.
+    None is started where the kernel is on disk, where none can be kept there, on one processor, or in a program that is
+    no Python that could be started again. It takes only what others leave of the processors.
     """
     process = _started(caller) if _wanted(kernel) else None
-    if process is None:
-        yield False
-        return
     try:
-        yield True
-        with told(kernel.__name__), contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(LONGEST)
+        yield
     finally:
-        _end(process)
+        if process is not None:
+            _end(process)
 
 
 def _wanted(kernel: Any) -> bool:
@@ -52,7 +46,8 @@ def _started(caller: Callable[[], object]) -> subprocess.Popen[bytes] | None:
     """A Python that makes the call and says nothing; None where there is none to start."""
     if not sys.executable or getattr(sys, "frozen", False):
         return None
-    words = f"from {caller.__module__} import {caller.__name__}; {caller.__name__}()"
+    polite = f"import os; hasattr(os, 'nice') and os.nice({NICE})"
+    words = f"{polite}; from {caller.__module__} import {caller.__name__}; {caller.__name__}()"
     command = [sys.executable, "-P", "-c", words]  # -P: nothing of the folder that we are in
     nothing = subprocess.DEVNULL
     try:

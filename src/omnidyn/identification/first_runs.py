@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from typing import Any
 
@@ -14,8 +15,6 @@ from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import OUTPUT_ERROR, identify
 from omnidyn.identification.output_error.kernel.of_rows import row_squares, row_terms
 from omnidyn.identification.output_error.memory.autoregression import autoregression
-from omnidyn.identification.output_error.problem.starts import count_far
-from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.drive import SPEED
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.motor import DYNAMIC
@@ -23,8 +22,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
-from omnidyn.simulation.sensitivity.first_run import differentiate
-from omnidyn.simulation.sensitivity.march import march_with_derivatives
+from omnidyn.simulation.implicit.march import _march
 from omnidyn.simulation.simulate import simulate
 
 ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds
@@ -56,26 +54,20 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
     ]
 
 
-def share_out(robot: Robot) -> None:
-    """Compile what a fit of this robot needs, where it is not on disk, in two processes: one takes the largest kernel.
-
-    Returns at once where there is nothing to wait for, or nothing to share: the fit then compiles what it misses.
-    """
+def shared_out(robot: Robot) -> AbstractContextManager[None]:
+    """While it holds, another process compiles what a fit of this robot needs late, where that is not on disk."""
     if not why_not_exact(robot) or robot.drive.kind == SPEED or robot.wheels.traction_mu is not None:
-        return
-    with compiled_elsewhere(march_with_derivatives, differentiate) as shared:
-        if shared:
-            _run(load_robot("mecanum"))
-            acceleration(load_robot("robotino"), np.zeros(3), np.ones(3))
-            _small_kernels()
+        return nullcontext()
+    return compiled_elsewhere(_march, needed_late)
 
 
-def _small_kernels() -> None:
-    """The others that a fit needs whatever its engine, on next to nothing, as it calls them."""
-    rows, one = np.zeros((2, 3)), np.ones(1)
-    count_far(rows, 0, 0, 1, 1, 1.0)
-    at_motors(rows, np.zeros(2), Driver(0.0, 0.0, 0.0))
-    row_terms(np.zeros((1, 2)), one, 0.0, None, one, False)
+def needed_late() -> None:
+    """Runs of what a fit by the implicit engine needs beside its derivatives, which take longer to compile than these.
+
+    The kernels that add up rows are called as the fit calls them, on next to nothing.
+    """
+    _run(load_robot("mecanum"))
+    row_terms(np.zeros((1, 2)), np.ones(1), 0.0, None, np.ones(1), False)
     row_squares(np.zeros((1, 2, 1)), np.zeros((1, 2)))
     autoregression([np.random.default_rng(2).standard_normal((ROWS, 1))])
 

@@ -2,5 +2,5 @@
 
 derivatives is the door. Then directions (what is derived by), stage (one implicit step), events (stops, reversals,
 releases), sample (a run between its rows), march (a run), loop (through the firmware's speed loop); late_sample (a run
-as a log shows it). first_run: for who compiles.
+as a log shows it).
 """
