@@ -22,7 +22,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
-from omnidyn.simulation.implicit.march import _march
 from omnidyn.simulation.simulate import simulate
 
 ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds
@@ -58,7 +57,7 @@ def shared_out(robot: Robot) -> AbstractContextManager[None]:
     """While it holds, another process compiles what a fit of this robot needs late, where that is not on disk."""
     if not why_not_exact(robot) or robot.drive.kind == SPEED or robot.wheels.traction_mu is not None:
         return nullcontext()
-    return compiled_elsewhere(_march, needed_late)
+    return compiled_elsewhere(row_squares, needed_late)  # which stands for all of them
 
 
 def needed_late() -> None:
