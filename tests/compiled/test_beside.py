@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.compiled import beside
-from omnidyn.compiled.beside import side_by_side
+from omnidyn.compiled.beside import one_by_one, side_by_side
 
 
 @pytest.fixture(autouse=True)
@@ -39,3 +39,11 @@ def test_settings_of_numpy_are_those_of_the_caller():
 def test_the_first_failure_is_raised():
     with pytest.raises(ValueError, match="2"):
         side_by_side(lambda k: k if k < 2 else int(f"no {k}"), range(4))
+
+
+def test_large_results_are_not_made_before_they_are_wanted():
+    asked = []
+    results = one_by_one(lambda k: asked.append(k) or k * k, range(9))
+    assert next(results) == 0
+    assert sorted(asked) == [0, 1]
+    assert list(results) == [k * k for k in range(1, 9)]

@@ -252,13 +252,13 @@ def test_no_part_calls_a_maker():
 
 
 def test_nobody_compiles_behind_our_back():
-    """numba is imported in compiled/, of which others import `kernel`, `hearing` and `beside` (without numba), and what
-    counts."""
+    """numba is imported in compiled/, of which others import `kernel`, what needs no numba (`hearing`, `beside`,
+    `elsewhere`), and what counts."""
     for file in PACKAGE.rglob("*.py"):
         if file.parent == PACKAGE / "compiled":
             continue
         inside = re.findall(
-            r"omnidyn\.compiled\b(?!\.kernel\b|\.hearing\b|\.beside\b|\.warmed\b|\.entries import take_stock)",
+            r"omnidyn\.compiled\b(?!\.(?:kernel|hearing|beside|elsewhere|warmed)\b|\.entries import take_stock)",
             file.read_text(encoding="utf-8"),
         )
         assert not inside, file

@@ -150,3 +150,13 @@ def test_what_never_moves_is_infinite():
     )
     assert np.isinf(dead_zone_map(weak, [0.0, 1.0])[0]).all()
     assert np.isinf(dead_zone_force(weak, [0.0, 1.0])).all()
+
+
+@pytest.mark.parametrize("name", ["disc", "ellipse", "ellipse, breakaway", "four wheels, disc"])
+def test_the_closed_form_of_an_ellipse_is_what_the_inclusion_holds(name, monkeypatch):
+    """Bisection asks the solver of what sticks, and knows no ellipse."""
+    robot = SHAPES[name]
+    patterns = np.random.default_rng(3).uniform(-1.0, 1.0, (50, robot.wheels.count))
+    closed = breakaway_voltage(robot, patterns)
+    monkeypatch.setattr("omnidyn.model.deadzone.direction_holds_alone", lambda robot: False)
+    np.testing.assert_allclose(closed, breakaway_voltage(robot, patterns), rtol=1e-9)

@@ -11,7 +11,11 @@ import os
 import sys
 from collections.abc import Sequence
 
-RARELY = 50_000, 20, 50  # new objects before garbage is looked for, ..: loading makes many, and none of them is garbage
+RARELY = (
+    200_000,
+    20,
+    50,
+)  # new objects before garbage is looked for, ..: loading makes many, and none of them is garbage
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

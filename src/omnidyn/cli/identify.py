@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed
-from omnidyn.identification.question import MOTORS, STEADY_STATE, Question
+from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.identification.question import options as fields_of_question
 
 INTERRUPTED = 130
@@ -119,6 +120,7 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
     from omnidyn.cli.identify_logs import load_runs
     from omnidyn.cli.identify_show import load_meanwhile, tell
     from omnidyn.cli.terminal.session import provenance, robot_input
+    from omnidyn.identification.first_runs import shared_out
     from omnidyn.identification.identify import Identification, settle_method
     from omnidyn.model.robot_file import load_robot
 
@@ -142,7 +144,8 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
         elif loaded.folders:
             told("all folders are fitted together; `per` NAME=GLOB makes groups of them")
         load_meanwhile(to)
-        found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
+        with shared_out(start) if question.method == OUTPUT_ERROR else nullcontext():
+            found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
         now("writing")
         tell(found, record, to)
     if found.interrupted:

@@ -11,10 +11,9 @@ from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.known.told import told
 from omnidyn.model.known.uncertainty import DRAWS, plausible
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.band import Band, band_of
+from omnidyn.simulation.band import Band, band_of, first_order_band
 
 COARSE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest
-FEW = 20  # robots drawn where each run is dear: the least that have a 95 % interval
 
 
 def with_bands(
@@ -45,3 +44,17 @@ def with_bands(
         if known.guessed:
             words.append(f"the band of {name} rests on guesses: {', '.join(known.guessed)}")
     return replace(found, bands=bands, guesses=guessed, warnings=(*found.warnings, *words))
+
+
+def with_fitted_band(found: Comparison, robot: Robot, log: int = 0) -> Comparison:
+    """The comparison with the band of a robot that was fitted, in one of its logs: to first order.
+
+    That is what a fit knows of its numbers, and some of them it knows only together: see `first_order_std`. The runs
+    that slopes are taken from have one step a row, as those of the fit. No band where no number has a std.
+    """
+    (name,) = found.robots
+    if not told(robot).keys:
+        return found
+    run = found.simulated[name][log]
+    band = first_order_band(robot, run, lambda each: replay(each, found.measured[log], tol=None, log=robot.log).run)
+    return replace(found, bands={name: {log: band}})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import TypeVar
@@ -25,3 +25,10 @@ def side_by_side(task: Callable[[T], R], items: Iterable[T]) -> list[R]:
         return [task(item) for item in every]
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(lambda item, context: context.run(task, item), every, [copy_context() for _ in every]))
+
+
+def one_by_one(task: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
+    """The same where results are large: no more of them are there at a time than processors."""
+    every, threads = list(items), min(os.cpu_count() or 1, MOST_THREADS)
+    for begin in range(0, len(every), threads):
+        yield from side_by_side(task, every[begin : begin + threads])

@@ -92,6 +92,10 @@ class Entries(_Cache):
     def disable(self) -> None:
         self._enabled = False
 
+    def is_there(self) -> bool:
+        """Whether there is an entry of today's sources, for any types of arguments."""
+        return any(self.content(file) is not None for file in self._folder.glob(f"{self._stem}-*{SUFFIX}"))
+
     def flush(self) -> None:
         """Drop all entries of this kernel."""
         for file in self._folder.glob(f"{self._stem}-*{SUFFIX}"):

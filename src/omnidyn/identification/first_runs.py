@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.elsewhere import compiled_elsewhere
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import OUTPUT_ERROR, identify
+from omnidyn.identification.output_error.kernel.of_rows import row_squares, row_terms
+from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.model.drive import SPEED
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.exact.march import why_not_exact
 from omnidyn.simulation.simulate import simulate
 
 ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds
@@ -46,6 +51,24 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("simulation, inductance", partial(_run, winding)),
         ("simulation, wheels that slip", partial(_run, slips)),
     ]
+
+
+def shared_out(robot: Robot) -> AbstractContextManager[None]:
+    """While it holds, another process compiles what a fit of this robot needs late, where that is not on disk."""
+    if not why_not_exact(robot) or robot.drive.kind == SPEED or robot.wheels.traction_mu is not None:
+        return nullcontext()
+    return compiled_elsewhere(row_squares, needed_late)  # which stands for all of them
+
+
+def needed_late() -> None:
+    """Runs of what a fit by the implicit engine needs beside its derivatives, which take longer to compile than these.
+
+    The kernels that add up rows are called as the fit calls them, on next to nothing.
+    """
+    _run(load_robot("mecanum"))
+    row_terms(np.zeros((1, 2)), np.ones(1), 0.0, None, np.ones(1), False)
+    row_squares(np.zeros((1, 2, 1)), np.zeros((1, 2)))
+    autoregression([np.random.default_rng(2).standard_normal((ROWS, 1))])
 
 
 def _run(robot: Robot) -> Run:

@@ -13,6 +13,7 @@ from omnidyn.model.dynamics import (
     acceleration,
     axes_hold_alone,
     axes_move_alone,
+    direction_holds_alone,
     drive_wrench,
     holds_under,
     linear_part,
@@ -62,13 +63,19 @@ def breakaway_voltage(robot: Robot, pattern: ArrayLike, halvings: int = BISECTIO
     """
     check_order("breakaway_voltage(robot, pattern)", (robot, Robot), (pattern, object))
     pattern = _patterns(robot, pattern)
-    linear = not np.any(robot.motor.voltage_drop) and robot.motor.current_limit is None
-    if axes_hold_alone(robot) and linear and robot.drive.dead_band == 0.0:
+    motor = robot.motor
+    linear = not np.any(motor.voltage_drop) and motor.current_limit is None and robot.drive.dead_band == 0.0
+    if linear and axes_hold_alone(robot):
         wrench_per_volt = np.abs(drive_wrench(robot, np.zeros((*pattern.shape[:-1], 3)), pattern))
         breakaway = robot.friction.axes.levels[2]
         with np.errstate(divide="ignore", invalid="ignore"):
             scale = np.where(wrench_per_volt > 1e-12 * breakaway, breakaway / wrench_per_volt, np.inf)
         return scale.min(axis=-1)
+    if linear and direction_holds_alone(robot) and robot.friction.direction.holds_all:
+        wrench_per_volt = drive_wrench(robot, np.zeros((*pattern.shape[:-1], 3)), pattern)
+        share = robot.friction.direction.held_share(wrench_per_volt)
+        with np.errstate(divide="ignore"):
+            return np.where(share > 1e-12, 1.0 / share, np.inf)
     return _bisect(robot, pattern.reshape(-1, pattern.shape[-1]), halvings).reshape(pattern.shape[:-1])
 
 

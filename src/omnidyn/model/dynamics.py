@@ -139,6 +139,11 @@ def axes_hold_alone(robot: Robot) -> bool:
     return robot.friction.only_axes and bool(np.all(np.asarray(robot.motor.gear_efficiency) == 1.0))
 
 
+def direction_holds_alone(robot: Robot) -> bool:
+    """Whether nothing but friction along the direction of travel and about yaw can hold the robot."""
+    return robot.friction.only_direction and bool(np.all(np.asarray(robot.motor.gear_efficiency) == 1.0))
+
+
 def axes_move_alone(robot: Robot) -> bool:
     """Whether, besides, no axis at rest has to hold against another one that speeds up."""
     return axes_hold_alone(robot) and not masses_couple(robot)

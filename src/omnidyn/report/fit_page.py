@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.comparison.bands import FEW, with_bands
+from omnidyn.comparison.bands import with_fitted_band
 from omnidyn.comparison.result import Comparison
 from omnidyn.document import Points, sentence
 from omnidyn.identification.fit_document import difference_table, number_table, verdict_table
@@ -19,7 +19,6 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name
 from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.path import Path, body_twist, driven, path_of
-from omnidyn.model.known.uncertainty import DRAWS
 from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.report.estimate_picture import draw_estimates
 from omnidyn.report.figures.correlation import draw_correlation
@@ -30,7 +29,6 @@ from omnidyn.report.figures.residuals import draw_residuals, residuals_of
 from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, section
 from omnidyn.report.style import Picture
 from omnidyn.run import Run
-from omnidyn.simulation.exact.march import why_not_exact
 
 Fits = Mapping[str, OutputErrorEstimate]
 Bands = tuple[Comparison, Comparison | None]
@@ -110,16 +108,10 @@ def _each(parts: Mapping[str, Any], content: Callable[[str, Any], str]) -> str:
 
 
 def _with_bands(fits: Fits, group: str, validation: Validation) -> Bands:
-    """The comparison with fitted logs, and that with logs held out, each with the band of the model in its first log;
-    fewer draws where the engine is slow."""
+    """The comparisons with fitted logs and with logs held out, each with the band of the model in its first log."""
     robot = (fits.get(group) or next(iter(fits.values()))).robot
-    draws = FEW if why_not_exact(robot) else DRAWS
-    fitted, held_out = (
-        None if each is None else with_bands(each, [robot], logs=(0,), draws=draws)
-        for each in (validation.fitted, validation.held_out)
-    )
-    assert fitted is not None
-    return fitted, held_out
+    held_out = validation.held_out
+    return with_fitted_band(validation.fitted, robot), held_out and with_fitted_band(held_out, robot)
 
 
 def _runs(group: str, banded: Future[Bands]) -> str:

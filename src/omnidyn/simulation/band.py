@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtri
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.model.known.uncertainty import DRAWS, Ends, plausible
+from omnidyn.compiled.beside import one_by_one
+from omnidyn.model.known.uncertainty import DRAWS, Ends, first_order_std, plausible
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
 COMMANDED = ("duty", "wheel_speed_command", "twist_command", "supply")  # the same for every robot
-MOST_THREADS = 8
+WIDTH = float(ndtri(0.975))  # half of a 95 % interval, in std of a normal
 
 
 class Band(NamedTuple):
     """The ends of a 95 % interval of a run, sample by sample and component by component: what a robot may do whose
-    numbers are off as its file says. What sensors add is not in it. draws: robots that were run.
+    numbers are off as its file says. What sensors add is not in it. draws: robots that were run, 0 of slopes.
 
     The low end is no run of one robot: where one goes further along x, it may go less far along y.
     """
@@ -49,13 +49,21 @@ def band_of(robots: Sequence[Robot], run_of: Callable[[Robot], Run]) -> Band:
     """The band over the runs of some robots, all at the same times. The kernels let other threads run."""
     first, ends = run_of(robots[0]), Ends(len(robots))
     ends.add(_predicted(first))
-    threads = min(os.cpu_count() or 1, MOST_THREADS)
-    with ThreadPoolExecutor(threads) as pool:
-        for begin in range(1, len(robots), threads):  # no more runs at a time than there are threads: they are large
-            for run in pool.map(run_of, robots[begin : begin + threads]):
-                ends.add(_predicted(run))
+    for run in one_by_one(run_of, robots[1:]):
+        ends.add(_predicted(run))
     low, high = (_as_run(first, end, words) for end, words in zip(ends.interval, ("low", "high"), strict=True))
     return Band(low, high, len(robots))
+
+
+def first_order_band(robot: Robot, run: Run, run_of: Callable[[Robot], Run]) -> Band:
+    """The band about the run of a robot, from its slopes along all that may be off.
+
+    run_of: what robots beside it do, at the same times; their runs may be coarse, for only their differences count.
+    What is about to move, or to stop, has no slope: where it rests, the band has no width.
+    """
+    half = WIDTH * first_order_std(robot, lambda each: _predicted(run_of(each)))
+    at = _predicted(run)
+    return Band(_as_run(run, at - half, "low"), _as_run(run, at + half, "high"), 0)
 
 
 def _predicted(run: Run) -> FloatArray:

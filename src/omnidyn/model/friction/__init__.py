@@ -37,6 +37,11 @@ class Friction(Value):
         return all(law == type(law)() for law in self.laws[1:]) and self.axes.is_plain
 
     @property
+    def only_direction(self) -> bool:
+        """Whether all that can hold the robot follows the direction of travel."""
+        return not any((*self.axes.levels[2], *self.axes.hold_backward)) and self.wheels == WheelFriction()
+
+    @property
     def rigid(self) -> Friction:
         """The same levels without bristles or Karnopp's band: what these laws are where they are stiff or narrow."""
         bends = {name: law for name in type(self).model_fields if (law := getattr(self, name)).law != "coulomb"}

@@ -70,6 +70,18 @@ class DirectionFriction(Value):
     damping_speed: Annotated[Speed | None, Field(description="v_d [m/s]")] = None
     yaw_damping_speed: Annotated[Speed | None, Field(description="v_d [rad/s]")] = None
 
+    @property
+    def holds_all(self) -> bool:
+        """Whether there is no way, along or about, in which nothing holds."""
+        return min(*self.coulomb, self.yaw_coulomb) > 0.0
+
+    def held_share(self, applied: FloatArray) -> FloatArray:
+        """How much of what holds at rest a wrench takes: above 1 it gives way. Shape (*batch, 3) -> (*batch,)."""
+        hold = self.coulomb if self.breakaway is None else self.breakaway
+        yaw_hold = self.yaw_coulomb if self.yaw_breakaway is None else self.yaw_breakaway
+        along = np.hypot(applied[..., 0] / hold[0], applied[..., 1] / hold[1])
+        return np.maximum(along, np.abs(applied[..., 2]) / yaw_hold)
+
     def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
         """Add the ellipse, the same damping in every direction, and what resists turning; see FrictionLaw."""
         element[:N_AXES, VISCOUS] += [self.viscous, self.viscous, self.yaw_viscous / length**2]

@@ -5,7 +5,7 @@
 p are the numbers of a robot file that have a std, D their std, R their correlation ([correlation] of the file, 0 where
 it says nothing). What follows from them is computed once per drawn robot, and its interval is that of the results:
 propagation of distributions, JCGM 101:2008, sections 5 and 7. To first order it is the propagation of variances g' C g
-of JCGM 100:2008, 5.2; but a robot that sticks, or is about to, has no first order.
+of JCGM 100:2008, 5.2 (`first_order_std`); but a robot that sticks, or is about to, has no first order.
 
 The draws of w are a Latin hypercube (McKay, Beckman, Conover, Technometrics 21 (1979)): each share of each normal is
 hit once, which makes a hundred draws do for a 95 % interval. One seed gives the same robots, always.
@@ -27,6 +27,7 @@ from scipy.special import ndtri
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.beside import one_by_one
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import BREAKAWAY, Key
 from omnidyn.model.known.told import ANGLES, Told, is_log, numbers_told, told
@@ -34,6 +35,7 @@ from omnidyn.model.robot import Robot
 
 DRAWS = 100
 NOISE = 1e-13  # of an eigenvalue of a correlation: less is rounding, and numbers that are one stay one
+SMALL = 1e-5  # of a number: the most that it is off by where a slope is taken
 FURTHEST = math.log(1e4)  # of a logarithm: the span of a fit
 LOW = 0.025  # share of the results below a 95 % interval, and above it
 LEAST = 1e-6  # of value or std, that a friction stays above: 0 would switch a part of it off
@@ -54,16 +56,21 @@ def plausible(robot: Robot, count: int = DRAWS, seed: int = 0) -> list[Robot]:
     Raises InsufficientDataError where no number of the robot has a std, InputError for a strange count.
     """
     check_order("plausible(robot, count)", (robot, Robot), (count, object))
+    keys, known = _known(robot)
+    if not 1 <= count <= MOST_DRAWS:
+        raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="draws")
+    return [_drawn(robot, keys, known, off) for off in _errors(known, count, seed)]
+
+
+def _known(robot: Robot) -> tuple[list[Key], Told]:
+    """The numbers that have a std. Raises InsufficientDataError where there are none."""
     known = told(robot)
     if not known.keys:
         raise InsufficientDataError(
             "nothing says how far the numbers of this robot may be off", got=f"{robot.name} without any std",
             expected="{ value = .., std = .. } at the numbers of its file", remedy="let identify write it, or add std",
         )  # fmt: skip
-    if not 1 <= count <= MOST_DRAWS:
-        raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="draws")
-    keys = [Key.parse(key) for key in known.keys]
-    return [_drawn(robot, keys, known, off) for off in _errors(known, count, seed)]
+    return [Key.parse(key) for key in known.keys], known
 
 
 def interval_of(robot: Robot, function: Callable[[Robot], ArrayLike], count: int = DRAWS, seed: int = 0) -> Interval:
@@ -72,6 +79,24 @@ def interval_of(robot: Robot, function: Callable[[Robot], ArrayLike], count: int
     for each in plausible(robot, count, seed):
         ends.add(np.asarray(function(each), dtype=float))
     return ends.interval
+
+
+def first_order_std(robot: Robot, function: Callable[[Robot], FloatArray]) -> FloatArray:
+    """The std of a function of the robot, each element for itself, from its slopes along all that may be off.
+
+    Numbers that a log tells only together, such as two inertias of which it sees the sum, have stds beyond all measure,
+    and the sum has not: slopes keep to it, draws on the scales of the numbers do not. Raises what `plausible` raises.
+    """
+    keys, known = _known(robot)
+    size = np.where(known.value == 0.0, known.std, abs(known.value))
+    ways = (_root(known.correlation) * known.std[:, None]).T
+    ways = ways[ways.any(axis=1)]
+    shares = [SMALL / max(float((abs(way[size > 0.0]) / size[size > 0.0]).max()), SMALL) for way in ways]
+    moved = [_aside(robot, keys, known, share * way) for share, way in zip(shares, ways, strict=True)]
+    ends, total = one_by_one(function, [each for pair in moved for each in pair]), 0.0
+    for share in shares:
+        total = total + ((next(ends) - next(ends)) / share) ** 2
+    return np.sqrt(total)
 
 
 class Ends:
@@ -118,12 +143,32 @@ class Ends:
 def _errors(known: Told, count: int, seed: int) -> FloatArray:
     """Errors of the numbers on their scales. Shape (count, keys)."""
     scale = known.std / np.where(known.log, known.value, 1.0)
-    values, vectors = np.linalg.eigh(known.correlation)
-    root = vectors * np.sqrt(np.where(values > NOISE, values, 0.0))
+    root = _root(known.correlation)
     random = np.random.default_rng(seed)
     place = np.stack([random.permutation(count) for _ in known.keys], axis=1)
     normal = ndtri((place + 0.5) / count)
     return normal @ root.T * scale
+
+
+def _root(correlation: FloatArray) -> FloatArray:
+    """S of S S' = R. Shape (keys, keys)."""
+    values, vectors = np.linalg.eigh(correlation)
+    return vectors * np.sqrt(np.where(values > NOISE, values, 0.0))
+
+
+def _aside(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> list[Robot]:
+    """Two robots, one as far off as that from the other: on one side, for at 0, or at the end of a range, another
+    engine may run. It is the side on which a robot file may be."""
+    for side in (1.0, -1.0):
+        moved = []
+        for far in (side, 2.0 * side):
+            changed = robot
+            for key, value in zip(keys, (known.value + far * off).tolist(), strict=True):
+                changed = key.set(changed, value, checked=False)
+            moved.append(_holding(changed))
+        if not _out_of_range(moved[1], robot):
+            break
+    return moved
 
 
 def _drawn(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> Robot:
