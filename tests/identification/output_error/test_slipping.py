@@ -37,7 +37,7 @@ def log(seed, seconds, noisy=True):
     noise = {name: noisy * NOISE[name] * rng.normal(size=each.shape) for name, each in seen.items()}
     rows = min(len(each) for each in seen.values())
     return Run(
-        t=DT * np.arange(rows), voltage=np.concatenate([voltage, voltage[-1:]])[:rows],
+        t=np.arange(rows) * DT, voltage=np.concatenate([voltage, voltage[-1:]])[:rows],
         **{name: (each + noise[name])[:rows] for name, each in seen.items()},
     )  # fmt: skip
 
