@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.layout import BODY_SIZE, ELEMENT_SIZE, N_AXES, SLIDE, SLIDE_X, SLIDE_Y, VISCOUS
+from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import discretise, is_decoupled, motor_wrench, state_space
@@ -42,8 +42,8 @@ class Numbers(NamedTuple):
 
 def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     """The numbers of a robot for steps of dt [s]; friction: whether dry friction is among them."""
-    body, element, directions = _tables(robot)
-    viscous = (directions.T * element[:, VISCOUS]) @ directions
+    own, directions = _friction(robot)
+    viscous = (directions.T * own.element["viscous"]) @ directions
     motors = motor_wrench(robot)
     rates = per_mass(robot, motors.braking - viscous).T + 0.0
     decay, phi, psi = _held(robot, rates, dt)
@@ -57,9 +57,9 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     push = np.ascontiguousarray(per_mass(robot, motors.driving).T)
     levels = np.zeros((0, LEVEL_SIZE))
     if friction:
-        linear[0, ELLIPSE : ELLIPSE + 2] = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2
-        linear[0, ELLIPSE + 2] = SLOW[0] * max(body[SLIDE_X], body[SLIDE_Y])
-        levels = _levels(robot, element, directions)
+        linear[0, ELLIPSE : ELLIPSE + 2] = own.body.coulomb**2
+        linear[0, ELLIPSE + 2] = SLOW[0] * own.body.coulomb.max()
+        levels = _levels(robot, own.element["coulomb"], directions)
     return Numbers(linear, push, np.asarray(np.linalg.pinv(push), dtype=float), levels)
 
 
@@ -75,12 +75,12 @@ def emf(robot: Robot) -> FloatArray:
     return np.ascontiguousarray(robot.wheels.wrench_matrix.T * per_rim[:, None])
 
 
-def _tables(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Body and elements of all friction, in SI, and the direction of each element."""
-    body, element = np.zeros(BODY_SIZE), np.zeros((N_AXES + robot.wheels.count, ELEMENT_SIZE))
+def _friction(robot: Robot) -> tuple[Plant, FloatArray]:
+    """All friction, in SI, and the direction of each element."""
+    own = blank_plant(robot.wheels.count)
     for law in robot.friction.rigid.laws:
-        law.add_to(body, element, 1.0)
-    return body, element, np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
+        law.add_to(own, 1.0)
+    return own, np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
 
 
 def _held(robot: Robot, rates: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -97,13 +97,13 @@ def _held(robot: Robot, rates: FloatArray, dt: float) -> tuple[FloatArray, Float
     return whole[:3, :3], whole[:3, 3:6], whole[:3, 6:]
 
 
-def _levels(robot: Robot, element: FloatArray, directions: FloatArray) -> FloatArray:
+def _levels(robot: Robot, coulomb: FloatArray, directions: FloatArray) -> FloatArray:
     """The parts of dry friction that act on one scalar speed each, those of level 0 left out."""
-    kept = np.nonzero(element[:, SLIDE] + element[:, SLIDE + 1] > 0.0)[0]
+    kept = np.nonzero(coulomb.sum(axis=1) > 0.0)[0]
     table = np.zeros((len(kept), LEVEL_SIZE))
     table[:, GX : GX + 3] = directions[kept]
     table[:, ACROSS : ACROSS + 3] = per_mass(robot, directions[kept])
-    table[:, FORWARD], table[:, BACKWARD] = element[kept, SLIDE], element[kept, SLIDE + 1]
+    table[:, FORWARD], table[:, BACKWARD] = coulomb[kept].T
     table[:, WIDTH] = np.where(kept < N_AXES, SLOW[np.minimum(kept, 2)], SLOW[0])
     table[:, SOFT] = table[:, WIDTH] * np.where(kept < N_AXES, SOFTER[np.minimum(kept, 2)], SOFTER[0])
     return table
