@@ -48,8 +48,7 @@ def _slope(work):
 @part
 def _kink_of_element(plant, stage, e, x):
     """Step along the Newton direction after which a sliding element's speed is 0; inf where it never is."""
-    own = plant.element[e]
-    work = stage.work
+    own, work = plant.element[e], stage.work
     sign, g0, g1, g2 = stage.each[e].sign, own.g[0], own.g[1], own.g[2]
     speed = g0 * x[0] + g1 * x[1] + g2 * x[2]
     dw = g0 * work.newton[0] + g1 * work.newton[1] + g2 * work.newton[2]

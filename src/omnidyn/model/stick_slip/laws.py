@@ -10,15 +10,14 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.friction.bristle import bend_rate, damping_at, level_at
-from omnidyn.model.friction.stribeck import fall
+from omnidyn.model.friction.bristle import bristle_force, damping_at
+from omnidyn.model.friction.stribeck import excess, fall
 
 
 @part
 def _along(plant, stage, e, force, slope):
     """Take a force along element e, and its slope, off residual and Jacobian."""
-    own = plant.element[e]
-    work = stage.work
+    own, work = plant.element[e], stage.work
     g0, g1, g2 = own.g[0], own.g[1], own.g[2]
     work.residual[0] -= force * g0
     work.residual[1] -= force * g1
@@ -35,29 +34,6 @@ def speed_of(plant, stage, e, x):
     """Speed of element e [m/s]; exactly 0 while it is stuck."""
     own = plant.element[e]
     return own.g[0] * x[0] + own.g[1] * x[1] + own.g[2] * x[2] if stage.each[e].sign != 0.0 else 0.0
-
-
-@part
-def _excess(plant, stage, e, speed):
-    """(force, slope) by which what falls resists more than its Coulomb level, against the sign of element e."""
-    own, at = plant.element[e], stage.each[e]
-    sign, side = at.sign, 0 if at.sign > 0.0 else 1
-    f, slope = fall(max(sign * speed, 0.0) * own.fall, own.exponent)
-    more = at.hold[side] - own.coulomb[side]
-    return -sign * more * f, -more * slope * own.fall
-
-
-@part
-def bristle_force(plant, e, speed, aimed, tau):
-    """(force, slope, z) of the bristle of element e at the end of a stage of length tau from z* = aimed."""
-    own = plant.element[e]
-    side = 0 if speed >= 0.0 else 1
-    g, dg = level_at(speed, own.bristle_coulomb[side], own.bristle_breakaway[side], own.fall, own.exponent)
-    rate, slope = bend_rate(aimed, speed, tau, own.stiffness, g, dg, own.dahl_exponent)
-    damping, fades = damping_at(speed, own.damping, own.fade)
-    bent = aimed + tau * rate
-    force = -own.stiffness * bent - damping * rate
-    return force, -(own.stiffness * tau + damping) * slope - fades * rate, bent
 
 
 @part
@@ -130,13 +106,14 @@ def _add_plane_bristle(plant, stage, x):
 def add_laws(plant, stage, x):
     """What laws beyond Coulomb's add to a residual and its Jacobian; what bends is left in `bend`."""
     for e in range(len(plant.element)):
-        at = stage.each[e]
-        if plant.element[e].stiffness > 0.0:
-            force, slope, bent = bristle_force(plant, e, speed_of(plant, stage, e, x), at.aimed_bend, stage.task.tau)
+        own, at = plant.element[e], stage.each[e]
+        if own.stiffness > 0.0:
+            speed = speed_of(plant, stage, e, x)
+            force, slope, bent = bristle_force(own, speed, at.aimed_bend, stage.task.tau)
             at.bend = bent
             _along(plant, stage, e, force, slope)
-        elif plant.element[e].fall > 0.0 and (at.sign == 1.0 or at.sign == -1.0):
-            force, slope = _excess(plant, stage, e, speed_of(plant, stage, e, x))
+        elif own.fall > 0.0 and (at.sign == 1.0 or at.sign == -1.0):
+            force, slope = excess(own, at, speed_of(plant, stage, e, x))
             _along(plant, stage, e, force, slope)
     if plant.body.stiffness > 0.0:
         _add_plane_bristle(plant, stage, x)
@@ -155,10 +132,10 @@ def push_of_laws(plant, stage, x, push):
         own, at = plant.element[e], stage.each[e]
         speed, force = speed_of(plant, stage, e, x), 0.0
         if own.stiffness > 0.0:
-            force = bristle_force(plant, e, speed, at.aimed_bend, 0.0)[0]
+            force = bristle_force(own, speed, at.aimed_bend, 0.0)[0]
         elif own.fall > 0.0 and (at.sign == 1.0 or at.sign == -1.0):
             sign, side = at.sign, 0 if at.sign > 0.0 else 1
-            force = _excess(plant, stage, e, speed)[0] + sign * (at.hold[side] - own.coulomb[side])
+            force = excess(own, at, speed)[0] + sign * (at.hold[side] - own.coulomb[side])
         push[0] += force * own.g[0]
         push[1] += force * own.g[1]
         push[2] += force * own.g[2]

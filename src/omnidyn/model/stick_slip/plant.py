@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.model.friction.stribeck import steepest
+from omnidyn.model.friction.bristle import fade_of
+from omnidyn.model.friction.stribeck import BENDS, steepest, steepest_of
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import added_mass
 from omnidyn.model.motor import DYNAMIC
@@ -51,26 +52,18 @@ def _check_band(robot: Robot, plant: Plant) -> None:
         )  # fmt: skip
 
 
-BENDS = 1.5  # a bristle follows what falls late: so much steeper at the most
-FADES = 0.75  # times the damping: the steepest way in which one that fades lets go
-
-
 def _bound_laws(plant: Plant) -> None:
     """What the solvers must know beforehand of what falls with the speed, and of what bends."""
     body, steep = plant.body, 0.0
     for row in plant.element[(plant.element["fall"] > 0.0) | (plant.element["stiffness"] > 0.0)]:
-        more = max((row.breakaway - row.coulomb).max(), 0.0)
-        bends = max((row.bristle_breakaway - row.bristle_coulomb).max(), 0.0)
-        rate = (more + BENDS * bends) * row.fall * (steepest(0.0, row.exponent) if row.fall > 0.0 else 0.0)
-        steep += (rate + (FADES * row.damping if row.fade > 0.0 else 0.0)) * float(row.g @ row.g)
+        steep += (steepest_of(row) + fade_of(row)) * float(row.g @ row.g)
     if body.fall > 0.0:
         more = (body.breakaway - body.coulomb).max()
         bends = float((body.bristle_breakaway - body.bristle_coulomb).max())
         round_ = body.coulomb[0] == body.coulomb[1] and body.breakaway[0] == body.breakaway[1]
         rate = more * (1.0 if round_ else 2.0) + 2.0 * BENDS * bends  # an ellipse falls faster than its levels do
         steep += rate * body.fall * steepest(0.0, body.exponent)
-    steep += FADES * body.damping if body.fade > 0.0 else 0.0
-    body.steep = steep / body.mass
+    body.steep = (steep + fade_of(body)) / body.mass
     body.bristles = plant.element["bristle_breakaway"].max(axis=1).sum() + body.bristle_breakaway.sum()
     body.laws = float(body.steep > 0.0 or body.stiffness > 0.0 or bool(np.any(plant.element["stiffness"] > 0.0)))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.friction.stribeck import fall, steepest
+from omnidyn.model.friction.stribeck import fall, steepness_left
 from omnidyn.model.stick_slip.forces import forces_at_work
 
 MONOTONE = 0.5  # of 1/STEEP: a stage so short has one solution, that of an implicit Euler step included
@@ -35,19 +35,13 @@ def _steep_near(plant, x, reach):
             g0, g1, g2 = own.g[0], own.g[1], own.g[2]
             size = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2)
             least = abs(g0 * x[0] + g1 * x[1] + g2 * x[2]) - size * reach
-            share = max(share, _share_left(least * own.fall, own.exponent))
+            share = max(share, steepness_left(least * own.fall, own.exponent))
         if own.fade > 0.0:
             share = 1.0
     if body.fall > 0.0:
         least = math.hypot(x[0], x[1]) - reach
-        share = max(share, _share_left(least * body.fall, body.exponent))
+        share = max(share, steepness_left(least * body.fall, body.exponent))
     return share * body.steep
-
-
-@part
-def _share_left(u, exponent):
-    """The steepest fall at u Stribeck speeds and beyond, over the steepest of all."""
-    return 1.0 if u <= 0.0 else steepest(u, exponent) / steepest(0.0, exponent)
 
 
 @part
