@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from omnidyn.arguments import check_order
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.layout import LENGTH, N_AXES
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.mass import masses_couple, per_mass
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.robot import Robot
@@ -86,7 +86,7 @@ def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
     twists = np.broadcast_to(twist, (*batch, 3)).reshape(-1, 3)
     volts = np.array(np.broadcast_to(voltage, (*batch, n)), dtype=float).reshape(-1, n)  # writable: one kernel for all
     numbers = plant(robot.rigid.replace(motor=robot.motor.replace(electrical=QUASI_STATIC)))
-    return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body[LENGTH]]).reshape(
+    return (accelerations(numbers, moving_states(numbers, twists), volts) / [1.0, 1.0, numbers.body.length]).reshape(
         *batch, 3
     )
 

@@ -1,46 +1,180 @@
-"""The layout of the two tables that a Plant is: names of the entries of `body` and of the columns of `element`.
+"""The named parts that the compiled solvers work in: the constants of a robot, and a stage of one of its steps.
+
+    plant.body.mass, plant.element[e].coulomb[side]      constants: a Plant. No solver writes into one that it is given
+    stage.task.tau, stage.each[e].sign                   the problem of one stage, and what its solution leaves
+    stage.work.jacobian[a, b]                            room to work in
 
 Yaw is measured as length, rho = sqrt(I/M) of the body, so that the body has the mass M in all directions and all
 forces are in newtons. What spins adds its own mass, which couples the directions where wheels differ.
 An element is where dry friction acts on one scalar speed: rows 0..2 are the body axes, 3.. the wheels. The ellipse of
-the direction of travel acts on (v_x, v_y) as a whole.
+the direction of travel acts on (v_x, v_y) as a whole: what it needs stands in `body` and `task`. Pairs of levels are
+against forward and against backward motion; of the ellipse, along x and along y.
+
+Each part is a NumPy record, or an array of them. In a kernel a record is one pointer, its fields are constant offsets,
+so that a part is cheap to hand on; the plants of many robots are one longer array. (Tried on the kernel of
+`accelerations`: named tuples of one array for each field took 2.5 times as long to compile, 19 s against 7.5 s, and 1.6
+times as long to solve. Tables with numbered columns took as long as records do.)
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
 N_AXES, YAW = 3, 2  # the first rows are the body axes; the row of yaw
+OPEN = 0.0  # branch of a current that is still to be found
 
-# Body: entries of a vector. The first are the robot's, the rest belong to the problem being solved.
-MASS, LENGTH, TURNING = 0, 1, 2  # M of the body [kg]; rho [m]; M/rho where the body frame turns, else 0
-SLIDE_X, SLIDE_Y, HOLD_X, HOLD_Y = 3, 4, 5, 6  # the ellipse, Coulomb and breakaway levels [N]
-ELLIPSE = 7  # its sign: 1 slides, 0 stuck, 2 there is none
-TAU, GOAL, PUSH = 8, 9, 12  # length of the stage [s]; x* [m/s], 3 entries; constant wrench [N], 3 entries
-MEMORY = 15  # [s] in which the slowest motion fades to 1/e, dry friction apart; (+1) where motors let go
-SPIN = 17  # [kg] what rotors and wheels add to the mass: entries xx, yy, zz, xy, xz, yz of a symmetric matrix
-LAWS = 23  # 0 where no level depends on the speed and nothing has a memory: then what follows is not read
-STEEP = 24  # [1/s] bound of the rate at which friction that falls with the speed lets a body run away
-BRISTLES = 25  # the sum of the levels of all bristles [N]; 0 where there are none
-GATHERS = 26  # 1 where an axis gathers momentum in Karnopp's band
-FALL_XY = 27  # of the ellipse, what FALL and its neighbours are of an element; its bristle bends along x and y
-ROOM, FACING = 40, 42  # [N] constant force along x and y of the room; heading at the start of a step [rad]
-BODY_SIZE = 43
 
-# Element: columns of a table with one row per element.
-GX, GY, GZ, VISCOUS = 0, 1, 2, 3  # local speed = g . x; [N s/m]
-SLIDE, HOLD = 4, 6  # Coulomb and breakaway level [N]: against forward motion, and (+1) against backward motion
-ACTIVE = 8  # 1 when the element can stick
-THRUST, EMF = 9, 10  # of a motor, at the rim of its wheel: force per ampere [N/A]; back-EMF [V s/m]
-RESISTANCE, INDUCTANCE, DROP, LIMIT, EFFICIENCY = 11, 12, 13, 14, 15  # of a motor and its gear
-SIGN = 16  # 1 and -1 slide forward and backward, 0 stuck, 2 no dry friction
-VOLTAGE, BOUND, NOW, CURRENT = 17, 18, 19, 20  # applied [V]; current limit in force [A]; i* and i at the solution [A]
-LOSS, FOUND, BEFORE = 21, 23, 24  # gear loss at rest [N], forward and (+1) backward; marks of the solver
-BRANCH = 25  # of the current, as winding_branch tells it; OPEN: found at the solution
-FALL, EXPONENT = 26, 27  # Stribeck: 1/speed [s/m], 0 where the level does not fall; exponent
-STIFF, DAMP, FADE, SHAPE = 28, 29, 30, 31  # of a bristle: [N/m], 0 where there is none; [N s/m]; 1/speed; Dahl's
-BEND_SLIDE, BEND_HOLD = 32, 34  # levels of a bristle [N], as SLIDE and HOLD are of what sticks
-AIMED, BENT = 36, 37  # [m] z* and z at the solution; in Karnopp's band the speed gathered against it [m/s]
-BAND = 38  # Karnopp's speed [m/s], 0 for none
-KEEP = BEND_SLIDE  # what the band keeps at rest [N], forward and (+1) backward: no bristle is there
-ELEMENT_SIZE = 40
-OPEN = 0.0
-# of the ellipse, in the body: the columns above, from FALL_XY on
-EXPONENT_XY, STIFF_XY, DAMP_XY, FADE_XY = FALL_XY + 1, FALL_XY + 2, FALL_XY + 3, FALL_XY + 4
-BEND_SLIDE_XY, BEND_HOLD_XY, AIMED_XY, BENT_XY = FALL_XY + 5, FALL_XY + 7, FALL_XY + 9, FALL_XY + 11
+def _record(**fields: Any) -> np.dtype[Any]:
+    """The type of a part: its fields with their shapes, () for one number."""
+    return np.dtype((np.record, np.dtype([(name, "f8", shape) for name, shape in fields.items()], align=True)))
+
+
+BODY = _record(
+    mass=(),  # M of the body [kg]
+    spin=(3, 3),  # [kg] what rotors and wheels add to it
+    length=(),  # rho [m]
+    turning=(),  # M/rho where the body frame turns, else 0
+    room=(2,),  # [N] constant force along x and y of the room
+    active=(),  # 1 where there is an ellipse
+    coulomb=(2,),  # of the ellipse [N]
+    breakaway=(2,),  # [N]
+    fall=(),  # the rest of the ellipse as of an element; its bristle bends along x and y
+    exponent=(),
+    stiffness=(),
+    damping=(),
+    fade=(),
+    bristle_coulomb=(2,),
+    bristle_breakaway=(2,),
+    memory=(2,),  # [s] in which the slowest motion fades to 1/e, dry friction apart; and where motors let go
+    laws=(),  # 0 where no level depends on the speed and nothing has a memory: then what follows is not read
+    steep=(),  # [1/s] bound of the rate at which friction that falls with the speed lets a body run away
+    bristles=(),  # the sum of the levels of all bristles [N]; 0 where there are none
+    gathers=(),  # 1 where an axis gathers momentum in Karnopp's band
+)
+ELEMENT = _record(
+    g=(3,),  # local speed = g . x
+    viscous=(),  # [N s/m]
+    coulomb=(2,),  # [N]
+    breakaway=(2,),  # [N]
+    active=(),  # 1 when the element can stick
+    fall=(),  # Stribeck: 1/speed [s/m], 0 where the level does not fall
+    exponent=(),
+    stiffness=(),  # of a bristle [N/m], 0 where there is none
+    damping=(),  # [N s/m]
+    fade=(),  # 1/speed [s/m] at which the damping fades, 0 where it does not
+    dahl_exponent=(),
+    bristle_coulomb=(2,),  # levels of a bristle [N], as `coulomb` and `breakaway` are of what sticks
+    bristle_breakaway=(2,),
+    band=(),  # Karnopp's speed [m/s], 0 for none
+    thrust=(),  # of a motor, at the rim of its wheel: force per ampere [N/A]
+    emf=(),  # back-EMF [V s/m]
+    resistance=(),
+    inductance=(),
+    drop=(),
+    limit=(),
+    efficiency=(),  # of its gear
+)
+TASK = _record(
+    tau=(),  # length of the stage [s]
+    goal=(3,),  # x* [m/s]
+    push=(3,),  # constant wrench [N]
+    facing=(),  # heading at the start of a step [rad]
+    ellipse=(),  # 1 slides, 0 stuck, 2 there is none
+    hold=(2,),  # what the ellipse holds at rest [N]
+    aimed_bend=(2,),  # z* of its bristle [m]
+    bend=(2,),  # and z at the solution
+)
+EACH = _record(
+    sign=(),  # 1 and -1 slide forward and backward, 0 stuck, 2 no dry friction
+    hold=(2,),  # what it holds at rest [N]
+    loss=(2,),  # gear loss at rest [N]
+    voltage=(),  # applied [V]
+    bound=(),  # current limit in force [A]
+    aimed_current=(),  # i* [A]
+    current=(),  # i at the solution [A]
+    branch=(),  # of the current, as winding_branch tells it; OPEN: found at the solution
+    aimed_bend=(),  # z* [m]; in Karnopp's band the speed gathered against it [m/s]
+    bend=(),  # z at the solution
+    found=(),  # marks of the solver
+    before=(),
+)
+WORK = _record(
+    residual=(3,),  # (M/tau)(x - x*) minus all forces but those of stuck elements [N]
+    jacobian=(3, 3),  # its slopes by x
+    close=(3,),  # how much of it is rounding
+    newton=(3,),  # Newton's step
+    trial=(3,),  # a point on the way
+    worst=(3,),  # direction in which what is stuck holds least
+    basis=(3, 3),  # rows: the velocities that what is stuck allows
+    row=(3, 3),  # Gauss-Jordan rows of what it forbids
+    pivot=(3,),
+    spare=(3,),
+    matrix=(3, 4),  # of Newton's step within the active set
+)
+
+
+class Plant(NamedTuple):
+    """The constants of a robot. body: a record BODY; element: shape (3 + wheels,), of ELEMENT.
+
+    Of many robots: one more axis in front.
+    """
+
+    body: Any
+    element: Any
+
+    @property
+    def wheels(self) -> int:
+        """Number of wheels."""
+        return self.element.shape[-1] - N_AXES
+
+    def copy(self) -> Plant:
+        """The same numbers in arrays of their own."""
+        return Plant(self.body.copy(), self.element.copy())
+
+
+class Stage(NamedTuple):
+    """A stage of a step: task, a record TASK; each, shape (3 + wheels,), of EACH; work, a record WORK."""
+
+    task: Any
+    each: Any
+    work: Any
+
+
+class Problem(NamedTuple):
+    """A plant and a stage of it."""
+
+    plant: Plant
+    stage: Stage
+
+    def copy(self) -> Problem:
+        """The same numbers in arrays of their own."""
+        return Problem(self.plant.copy(), Stage(*(part.copy() for part in self.stage)))
+
+
+def blank_plant(wheels: int) -> Plant:
+    """A plant of zeros."""
+    return Plant(np.zeros(1, BODY)[0], np.zeros(N_AXES + wheels, ELEMENT))
+
+
+def many(plants: Sequence[Plant]) -> Plant:
+    """Plants of as many elements each, as one. Python hands arrays of records to a kernel, and be it of one: a record
+    takes it twenty times as long."""
+    return Plant(np.array([each.body for each in plants], BODY), np.array([each.element for each in plants], ELEMENT))
+
+
+def new_stage(plant: Plant) -> Stage:
+    """A stage of a plant: all that can stick is stuck, nothing drives; of many plants, as many stages."""
+    stage = Stage(
+        np.zeros(plant.body.shape, TASK)[()], np.zeros(plant.element.shape, EACH), np.zeros(plant.body.shape, WORK)[()]
+    )
+    body, element = plant
+    stage.task["ellipse"], stage.each["sign"] = 2.0 - 2.0 * body["active"], 2.0 - 2.0 * element["active"]
+    stage.task["hold"], stage.each["hold"], stage.each["bound"] = (
+        body["breakaway"],
+        element["breakaway"],
+        element["limit"],
+    )
+    return stage

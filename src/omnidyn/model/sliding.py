@@ -9,22 +9,7 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.friction.stribeck import fallen
-from omnidyn.model.layout import (
-    BODY_SIZE,
-    ELEMENT_SIZE,
-    EXPONENT,
-    EXPONENT_XY,
-    FALL,
-    FALL_XY,
-    HOLD,
-    HOLD_X,
-    HOLD_Y,
-    N_AXES,
-    SLIDE,
-    SLIDE_X,
-    SLIDE_Y,
-    VISCOUS,
-)
+from omnidyn.model.layout import N_AXES, blank_plant
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
@@ -64,14 +49,14 @@ class Levels(NamedTuple):
 
 def levels_of(robot: Robot) -> Levels:
     """The friction of a robot, all its parts put together, yaw in radians. Bristles as they are once they have bent."""
-    body, element = np.zeros(BODY_SIZE), np.zeros((N_AXES + robot.wheels.count, ELEMENT_SIZE))
+    own = blank_plant(robot.wheels.count)
     for law in robot.friction.rigid.laws:
-        law.add_to(body, element, 1.0)
+        law.add_to(own, 1.0)
+    body, element = own
     directions = np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
     return Levels(
-        directions, element[:, VISCOUS], element[:, SLIDE : SLIDE + 2].T, element[:, HOLD : HOLD + 2].T,
-        body[[SLIDE_X, SLIDE_Y]], body[[HOLD_X, HOLD_Y]], np.append(element[:, FALL], body[FALL_XY]),
-        np.append(element[:, EXPONENT], body[EXPONENT_XY]),
+        directions, element["viscous"], element["coulomb"].T, element["breakaway"].T, body.coulomb, body.breakaway,
+        np.append(element["fall"], body.fall), np.append(element["exponent"], body.exponent),
     )  # fmt: skip
 
 

@@ -14,29 +14,11 @@ from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.frames import AXES
 from omnidyn.model.friction.kinds import BENDING
-from omnidyn.model.layout import (
-    BEND_HOLD,
-    BEND_HOLD_XY,
-    BEND_SLIDE,
-    BEND_SLIDE_XY,
-    FALL,
-    FALL_XY,
-    GX,
-    HOLD,
-    HOLD_X,
-    LENGTH,
-    N_AXES,
-    SHAPE,
-    SLIDE,
-    SLIDE_X,
-    STIFF,
-    STIFF_XY,
-    VISCOUS,
-)
+from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import sliding_wrench, top_speeds
-from omnidyn.model.stick_slip.plant import Plant, plant
+from omnidyn.model.stick_slip.plant import plant
 from omnidyn.simulation.simulate import simulate
 
 if TYPE_CHECKING:
@@ -107,7 +89,7 @@ def _axis(robot: Robot, numbers: Plant, k: int, top: float, pattern: FloatArray,
     side = np.geomspace(SLOWEST, 1.0, POINTS // 2) * top
     speed = np.concatenate([-side[::-1], side])
     force = -sliding_wrench(robot, speed[:, None] * np.eye(N_AXES)[k])[:, k]
-    unit = float(numbers.body[LENGTH]) if k == 2 else 1.0
+    unit = float(numbers.body.length) if k == 2 else 1.0
     way, loop, bends = _loop(numbers, k, unit)
     rate, breakaway = _ramps(robot, numbers, k, pattern, volts, bends > 0.0)
     return AxisFriction(
@@ -118,24 +100,27 @@ def _axis(robot: Robot, numbers: Plant, k: int, top: float, pattern: FloatArray,
 def _parts(numbers: Plant, k: int) -> list[tuple[float, FloatArray, float, float]]:
     """(lever, level at the least speed forward and backward [N], stiffness, shape) of what acts along k.
 
-    As the tables of a plant count them: a torque over rho.
+    As a plant counts them: a torque over rho.
     """
     found = []
     for row in numbers.element:
-        g, falls = float(row[GX + k]), row[FALL] > 0.0
+        g = float(row.g[k])
         if g == 0.0:
             continue
-        rigid = row[HOLD : HOLD + 2] if falls else row[SLIDE : SLIDE + 2]
-        soft = row[BEND_HOLD : BEND_HOLD + 2] if falls else row[BEND_SLIDE : BEND_SLIDE + 2]
-        level, stiff = (soft, row[STIFF]) if row[STIFF] > 0.0 else (rigid, 0.0)
-        found.append((g, level if g > 0.0 else level[::-1], float(stiff), float(row[SHAPE])))
+        level = _slowest(row, row.stiffness > 0.0)
+        found.append((g, level if g > 0.0 else level[::-1], float(row.stiffness), float(row.dahl_exponent)))
     if k < 2:
         body = numbers.body
-        falls = body[FALL_XY] > 0.0
-        rigid, soft = (HOLD_X, BEND_HOLD_XY) if falls else (SLIDE_X, BEND_SLIDE_XY)
-        level = body[(soft if body[STIFF_XY] > 0.0 else rigid) + k]
-        found.append((1.0, np.array([level, level]), float(body[STIFF_XY]), 1.0))
+        level = _slowest(body, body.stiffness > 0.0)[k]
+        found.append((1.0, np.array([level, level]), float(body.stiffness), 1.0))
     return [each for each in found if each[1].any()]
+
+
+def _slowest(row: Any, bends: bool) -> FloatArray:
+    """The pair of levels [N] at the least speed, of a record of an element or of the body."""
+    if bends:
+        return row.bristle_breakaway if row.fall > 0.0 else row.bristle_coulomb
+    return row.breakaway if row.fall > 0.0 else row.coulomb
 
 
 def _loop(numbers: Plant, k: int, unit: float) -> tuple[FloatArray, FloatArray, float]:
@@ -181,11 +166,11 @@ def _holds(numbers: Plant, k: int, unit: float) -> tuple[float, float]:
     """What resists being moved along axis k from rest, forward and backward; the direction of travel and wheels too."""
     total = np.zeros(2)
     for row in numbers.element:
-        g = float(row[GX + k])
-        level = row[HOLD : HOLD + 2] + row[BEND_HOLD : BEND_HOLD + 2]
+        g = float(row.g[k])
+        level = row.breakaway + row.bristle_breakaway
         total += abs(g) * (level if g > 0.0 else level[::-1])
     if k < 2:
-        total += numbers.body[HOLD_X + k] + numbers.body[BEND_HOLD_XY + k]
+        total += numbers.body.breakaway[k] + numbers.body.bristle_breakaway[k]
     return float(total[0] * unit), float(total[1] * unit)
 
 
@@ -193,13 +178,13 @@ def _ramps(
     robot: Robot, numbers: Plant, k: int, pattern: FloatArray, volts: float, bends: bool
 ) -> tuple[FloatArray, FloatArray]:
     """(rate, the most that dry friction resists) of forces that rise; NaN where the motors cannot break it loose."""
-    unit = float(numbers.body[LENGTH])
+    unit = float(numbers.body.length)
     reach = BEYOND * volts * float(np.abs(pattern).max())
     limit = float(np.min(robot.motor.voltage_limit))
     if not np.isfinite(reach) or reach > limit:
         return np.full(len(RAMPS), np.nan), np.full(len(RAMPS), np.nan)
     full = float(drive_wrench(robot, np.zeros(3), BEYOND * volts * pattern)[k])
-    found, per_speed = [], float(numbers.element[:, GX + k] ** 2 @ numbers.element[:, VISCOUS])
+    found, per_speed = [], float(numbers.element["g"][:, k] ** 2 @ numbers.element["viscous"])
     viscous = per_speed * (1.0 if k < 2 else unit**2)
     for length in RAMPS if bends else ():
         rise = (np.arange(RAMP_ROWS) + 0.5) / RAMP_ROWS

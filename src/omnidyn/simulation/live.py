@@ -15,7 +15,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.actuation import clip_voltage, reaching
 from omnidyn.model.drive import DUTY, SPEED
-from omnidyn.model.layout import LENGTH, N_AXES
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
@@ -23,7 +23,7 @@ from omnidyn.model.stick_slip.release import start_state
 from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import ExactMarch, why_not_exact
-from omnidyn.simulation.implicit.march import run_implicit
+from omnidyn.simulation.implicit.march import room, run_implicit
 from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
@@ -120,11 +120,12 @@ class LiveRobot:
         """The implicit engine, the speed loop of the firmware included."""
         robot, n = self.robot, self.robot.wheels.count
         slips = robot.wheels.traction_mu is not None
-        numbers, units = plant(robot), np.array([1.0, 1.0, plant(robot).body[LENGTH]])
+        numbers = plant(robot)
+        units = np.array([1.0, 1.0, numbers.body.length])
         limit = robot.motor.current_limit
         most = per_wheel(np.inf if limit is None else limit, n)
         state = start_state(numbers, self.twist, np.zeros(n))
-        wheels = slip_plant(robot) if slips else None
+        wheels, work = slip_plant(robot) if slips else None, room(numbers)
         if wheels is not None:
             units, state = np.ones(N_AXES), rolling(wheels, self.twist)
         loop: Loop = no_loop(n)
@@ -147,7 +148,7 @@ class LiveRobot:
                 out = run_slipping(wheels, volts, bound, dts, state, self.pose, given, tol)
                 self._turning = out.state[-1, N_AXES:] / robot.wheels.radii
             else:
-                out = run_implicit(numbers, volts, bound, dts, state, self.pose, given, tol)
+                out = run_implicit(numbers, volts, bound, dts, state, self.pose, given, tol, work)
             state, now, asked = out.state[-1], now + length, volts[-1]
             if period and self._fresh:
                 self.voltage, self._fresh = volts[0].copy(), False

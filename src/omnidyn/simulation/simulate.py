@@ -13,7 +13,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.actuation import reaching
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.fitted.log_effects import LogEffects
-from omnidyn.model.layout import LENGTH, N_AXES, ROOM
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import DYNAMIC, settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
@@ -135,7 +135,7 @@ def _implicit(
     if robot.wheels.traction_mu is not None:
         return _slipping(robot, given, acting, (twist, pose), tol, view)
     numbers = plant(robot)
-    numbers.body[ROOM : ROOM + 2] += (0.0, 0.0) if view.room is None else view.room
+    numbers.body.room += (0.0, 0.0) if view.room is None else view.room
     dt, voltage, loop, keep = _on_grid(robot, acting)
     bound = current_bounds(robot, acting, len(dt))
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
@@ -200,7 +200,7 @@ def implicit_run(
     how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
     stopped, rows = capped(outcome), len(outcome.iterations)
     warnings = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
-    twists = outcome.state[:, :N_AXES] / [1.0, 1.0, plant(robot).body[LENGTH]]
+    twists = outcome.state[:, :N_AXES] / [1.0, 1.0, plant(robot).body.length]
     done = Done(voltage, twists, outcome.pose, outcome, asked=asked)
     return as_run(robot, given, acting or given, done, how, warnings, view)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.compiled.kernel import part
-from omnidyn.model.layout import GX, GY, GZ, N_AXES
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.release import SIGNS
 from omnidyn.simulation.commands import loop_gains
@@ -55,9 +55,9 @@ def passed(voltage, dead):
 
 
 @part
-def seen_speed(element, e, state, radius, moves):
-    """Speed of the wheel of element e as the encoder shows it [rad/s]: exactly 0 where it sticks."""
-    rim = element[e, GX] * state[0] + element[e, GY] * state[1] + element[e, GZ] * state[2]
+def seen_speed(g, state, radius, moves):
+    """Speed of a wheel, its local direction g, as the encoder shows it [rad/s]: exactly 0 where it sticks."""
+    rim = g[0] * state[0] + g[1] * state[1] + g[2] * state[2]
     return rim / radius if moves else 0.0
 
 
@@ -79,13 +79,10 @@ def tick_answer(kp, ki, limit, period, error, total, takes, side):
 
 
 @part
-def close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total):
-    """One tick of all wheels: row k of the voltages, and the integrals in place."""
-    for w in range(len(kp)):
-        if not tick[k]:
-            voltage[k, w] = voltage[k - 1, w]
-            continue
-        e = N_AXES + w
-        error = command[k, w] - seen_speed(element, e, state, radius[w], state[SIGNS + e] != 0.0)
-        takes, side = tick_branch(kp[w], ki[w], limit[w], period, error, total[w])
-        voltage[k, w], total[w] = tick_answer(kp[w], ki[w], limit[w], period, error, total[w], takes, side)
+def close_loop(plant, state, loop, command, voltage):
+    """One tick of all wheels under set points (n,): the voltages (n,), and the integrals in place."""
+    for w in range(len(loop.kp)):
+        kp, ki, limit, e = loop.kp[w], loop.ki[w], loop.limit[w], N_AXES + w
+        error = command[w] - seen_speed(plant.element[e].g, state, loop.radius[w], state[SIGNS + e] != 0.0)
+        takes, side = tick_branch(kp, ki, limit, loop.period, error, loop.sum[w])
+        voltage[w], loop.sum[w] = tick_answer(kp, ki, limit, loop.period, error, loop.sum[w], takes, side)

@@ -12,40 +12,10 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, lsq_linear, minimize
 
-from omnidyn.model.layout import (
-    BOUND,
-    CURRENT,
-    DROP,
-    EFFICIENCY,
-    ELLIPSE,
-    EMF,
-    GOAL,
-    GX,
-    GZ,
-    HOLD,
-    HOLD_X,
-    HOLD_Y,
-    INDUCTANCE,
-    LENGTH,
-    MASS,
-    N_AXES,
-    NOW,
-    PUSH,
-    RESISTANCE,
-    SIGN,
-    SLIDE,
-    SLIDE_X,
-    SLIDE_Y,
-    TAU,
-    THRUST,
-    TURNING,
-    VISCOUS,
-    VOLTAGE,
-)
+from omnidyn.model.layout import N_AXES, Problem, new_stage
 from omnidyn.model.stick_slip.inclusion import CAP, solve
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import put, start_state
-from omnidyn.model.stick_slip.workspace import workspace
 from tests.support.mixed_robots import random_robot
 
 PROBLEMS = 25  # for each of the 100 robots
@@ -57,68 +27,72 @@ def problem(seed, turning=True):
     """(plant, x): a random robot in the middle of a random stage, from a random first guess."""
     random = np.random.default_rng(seed)
     robot = random_robot(seed // PROBLEMS)
-    p = plant(robot)
-    body, element = p.body, p.element
+    own = plant(robot)
+    p = Problem(own, new_stage(own))
+    task, each = p.stage.task, p.stage.each
     scale = 10.0 ** random.uniform(-3.0, 0.5)
     twist = scale * random.normal(size=3) * [1.0, 1.0, 8.0] * (random.random(3) < 0.8)
     if random.random() < 0.3:
         twist[:] = 0.0
-    state = start_state(p, twist, np.zeros(p.wheels))
-    put(body, element, state)
-    body[TAU] = 10.0 ** random.uniform(-5.0, -2.3)
-    body[GOAL : GOAL + 3] = state[:3] + scale * 0.2 * random.normal(size=3) * (random.random(3) < 0.7)
-    body[PUSH : PUSH + 3] = random.normal(size=3) * (random.random() < 0.2)
+    state = start_state(own, twist, np.zeros(own.wheels))
+    put(p.stage, state)
+    task.tau = 10.0 ** random.uniform(-5.0, -2.3)
+    task.goal[:] = state[:3] + scale * 0.2 * random.normal(size=3) * (random.random(3) < 0.7)
+    task.push[:] = random.normal(size=3) * (random.random() < 0.2)
     if not turning:
-        body[TURNING] = 0.0
-    wheels = element[N_AXES:]
-    wheels[:, VOLTAGE] = np.round(random.uniform(-6.0, 6.0) * random.normal(size=p.wheels), 3).clip(-6.0, 6.0)
-    wheels[:, VOLTAGE] *= random.random(p.wheels) < 0.8
-    wheels[:, NOW] = random.normal(size=p.wheels)
+        own.body.turning = 0.0
+    wheels = each[N_AXES:]
+    wheels["voltage"] = np.round(random.uniform(-6.0, 6.0) * random.normal(size=own.wheels), 3).clip(-6.0, 6.0)
+    wheels["voltage"] *= random.random(own.wheels) < 0.8
+    wheels["aimed_current"] = random.normal(size=own.wheels)
     if random.random() < 0.2:
-        wheels[random.integers(p.wheels), BOUND] = 0.0  # a motor that coasts
+        wheels["bound"][random.integers(own.wheels)] = 0.0  # a motor that coasts
     return p, state[:3].copy()
 
 
-def current(e, tau, speed):
+def current(e, at, tau, speed):
     """clip((L i + tau (u - E s -+ V_d))/(L + tau R)) of one motor."""
-    flux = e[INDUCTANCE] * e[NOW] + tau * (e[VOLTAGE] - e[EMF] * speed)
-    i = np.sign(flux) * max(abs(flux) - tau * e[DROP], 0.0) / (e[INDUCTANCE] + tau * e[RESISTANCE])
-    return min(max(i, -e[BOUND]), e[BOUND])
+    flux = e.inductance * at.aimed_current + tau * (at.voltage - e.emf * speed)
+    i = np.sign(flux) * max(abs(flux) - tau * e.drop, 0.0) / (e.inductance + tau * e.resistance)
+    return min(max(i, -at.bound), at.bound)
 
 
-def force(e, tau, speed, sign, wheel):
+def force(e, at, tau, speed, sign, wheel):
     """All that acts along element e at `speed` with `sign` of motion: motor and gear, viscous and dry friction."""
-    total = -e[VISCOUS] * speed
+    total = -e.viscous * speed
     if sign != 0.0:
-        total -= e[SLIDE] if sign > 0.0 else -e[SLIDE + 1]
+        total -= e.coulomb[0] if sign > 0.0 else -e.coulomb[1]
     if wheel:
-        i = current(e, tau, speed)
-        factor = 1.0 if i * sign == 0.0 else (e[EFFICIENCY] if i * sign > 0.0 else 1.0 / e[EFFICIENCY])
-        total += e[THRUST] * i * factor
+        i = current(e, at, tau, speed)
+        factor = 1.0 if i * sign == 0.0 else (e.efficiency if i * sign > 0.0 else 1.0 / e.efficiency)
+        total += e.thrust * i * factor
     return total
 
 
 def residual_and_sets(p, x):
     """(what the stuck must balance, generators (k, 3), lower (k,), upper (k,), ellipse stuck) at a claimed solution."""
-    body, tau = p.body, p.body[TAU]
-    rest = body[MASS] / tau * (x - body[GOAL : GOAL + 3]) - body[PUSH : PUSH + 3]
-    turn = body[MASS] / body[LENGTH] if body[TURNING] else 0.0
+    body, task, tau = p.plant.body, p.stage.task, p.stage.task.tau
+    rest = body.mass / tau * (x - task.goal) - task.push
+    turn = body.mass / body.length if body.turning else 0.0
     rest -= turn * np.array([x[2] * x[1], -x[2] * x[0], 0.0])
     rows, low, high = [], [], []
-    for k, e in enumerate(p.element):
-        g, sign, wheel = e[GX : GZ + 1], e[SIGN], k >= N_AXES
-        dry = e[HOLD] > 0.0 or e[HOLD + 1] > 0.0 or (wheel and e[EFFICIENCY] < 1.0)
+    for k, (e, at) in enumerate(zip(p.plant.element, p.stage.each, strict=True)):
+        g, sign, wheel = e.g, at.sign, k >= N_AXES
+        dry = e.breakaway[0] > 0.0 or e.breakaway[1] > 0.0 or (wheel and e.efficiency < 1.0)
         assert (sign == 2.0) == (not dry)
         if sign == 0.0 and dry:
             rows.append(g)
-            plain = (force(e, tau, 0.0, 1.0, wheel) + e[SLIDE], force(e, tau, 0.0, -1.0, wheel) - e[SLIDE + 1])
-            low.append(plain[0] - e[HOLD])
-            high.append(plain[1] + e[HOLD + 1])
+            plain = (
+                force(e, at, tau, 0.0, 1.0, wheel) + e.coulomb[0],
+                force(e, at, tau, 0.0, -1.0, wheel) - e.coulomb[1],
+            )
+            low.append(plain[0] - e.breakaway[0])
+            high.append(plain[1] + e.breakaway[1])
         else:
-            rest -= g * force(e, tau, g @ x, np.sign(g @ x) if dry else 0.0, wheel)
-    ellipse = body[HOLD_X] > 0.0 and body[ELLIPSE] == 0.0
-    if body[HOLD_X] > 0.0 and not ellipse:
-        c = body[[SLIDE_X, SLIDE_Y]]
+            rest -= g * force(e, at, tau, g @ x, np.sign(g @ x) if dry else 0.0, wheel)
+    ellipse = body.breakaway[0] > 0.0 and task.ellipse == 0.0
+    if body.breakaway[0] > 0.0 and not ellipse:
+        c = body.coulomb
         rest[:2] += c**2 * x[:2] / np.hypot(*(c * x[:2]))
     return rest, np.array(rows).reshape(-1, 3), np.array(low), np.array(high), ellipse
 
@@ -129,7 +103,7 @@ def distance(p, x):
     if not len(g) and not ellipse:
         return np.abs(rest).max()
     if ellipse:  # rest = g . f + S p, |p| <= 1: the least |p|, the third row met by weight
-        weight, hold = 1e5, p.body[[HOLD_X, HOLD_Y]]
+        weight, hold = 1e5, p.plant.body.breakaway
         scale = np.array([1.0 / hold[0], 1.0 / hold[1], weight])
         if not len(g):
             return max((np.hypot(*(rest[:2] / hold)) - 1.0) * hold.max(), abs(rest[2]))
@@ -147,15 +121,15 @@ def distance(p, x):
 
 def faults(p, x, count):
     """What is wrong with a claimed solution, in words; empty when the conditions (1) and (2) hold."""
-    g = p.element[:, GX : GZ + 1]
-    sign, speeds, size = p.element[:, SIGN], g @ x, np.abs(g) @ np.abs(x)
-    inertia = p.body[MASS] / p.body[TAU] * np.abs(p.body[GOAL : GOAL + 3]).max()
+    g = p.plant.element["g"]
+    sign, speeds, size = p.stage.each["sign"], g @ x, np.abs(g) @ np.abs(x)
+    inertia = p.plant.body.mass / p.stage.task.tau * np.abs(p.stage.task.goal).max()
     found = {
         "hit its cap": count >= CAP,
         "stuck, but moves": (np.abs(speeds[sign == 0.0]) > 4e-16 * size[sign == 0.0]).any(),
         "a sign against its speed": (speeds * sign <= 0.0)[np.abs(sign) == 1.0].any(),
         "an axis stuck, but not 0.0": (x[sign[:N_AXES] == 0.0] != 0.0).any(),
-        "an ellipse stuck, but not 0.0": p.body[ELLIPSE] == 0.0 and (x[:2] != 0.0).any(),
+        "an ellipse stuck, but not 0.0": p.stage.task.ellipse == 0.0 and (x[:2] != 0.0).any(),
         "forces out of balance": distance(p, x) > 1e-6 + 1e-11 * inertia,
     }
     return [words for words, wrong in found.items() if wrong]
@@ -167,11 +141,11 @@ def test_solutions_satisfy_the_law(part):
     per_part, wrong = ROBOTS * PROBLEMS // 10, {}
     for seed in range(part * per_part, (part + 1) * per_part):
         p, x = problem(seed)
-        COUNTS.append(solve(p.body, p.element, x, workspace()))
+        COUNTS.append(solve(*p, x))
         found = faults(p, x, COUNTS[-1])
-        for e in p.element[N_AXES:]:
-            speed = e[GX : GZ + 1] @ x if e[SIGN] != 0.0 else 0.0
-            if abs(e[CURRENT] - current(e, p.body[TAU], speed)) > 1e-12 * (1.0 + abs(e[CURRENT])):
+        for e, at in zip(p.plant.element[N_AXES:], p.stage.each[N_AXES:], strict=True):
+            speed = e.g @ x if at.sign != 0.0 else 0.0
+            if abs(at.current - current(e, at, p.stage.task.tau, speed)) > 1e-12 * (1.0 + abs(at.current)):
                 found.append("another current")
         if found:
             wrong[seed] = found
@@ -193,23 +167,23 @@ def potential(p, x):
 
     The work of the motors is the integral of their force over speed, by Gauss-Legendre between all its kinks.
     """
-    body, tau = p.body, p.body[TAU]
-    d = x - body[GOAL : GOAL + 3]
-    total = body[MASS] / (2 * tau) * d @ d - body[PUSH : PUSH + 3] @ x
-    total += np.hypot(body[SLIDE_X] * x[0], body[SLIDE_Y] * x[1])
+    body, task, tau = p.plant.body, p.stage.task, p.stage.task.tau
+    d = x - task.goal
+    total = body.mass / (2 * tau) * d @ d - task.push @ x
+    total += np.hypot(body.coulomb[0] * x[0], body.coulomb[1] * x[1])
     nodes, weights = np.polynomial.legendre.leggauss(2)
-    for k, e in enumerate(p.element):
-        speed = e[GX : GZ + 1] @ x
+    for k, (e, at) in enumerate(zip(p.plant.element, p.stage.each, strict=True)):
+        speed = e.g @ x
         cuts = [0.0, speed]
         if k >= N_AXES:
-            below, top = e[INDUCTANCE] + tau * e[RESISTANCE], min(e[BOUND], 1e9)
-            for flux in (-tau * e[DROP] - below * top, -tau * e[DROP], tau * e[DROP], tau * e[DROP] + below * top):
-                cut = (e[VOLTAGE] + (e[INDUCTANCE] * e[NOW] - flux) / tau) / e[EMF]
+            below, top = e.inductance + tau * e.resistance, min(at.bound, 1e9)
+            for flux in (-tau * e.drop - below * top, -tau * e.drop, tau * e.drop, tau * e.drop + below * top):
+                cut = (at.voltage + (e.inductance * at.aimed_current - flux) / tau) / e.emf
                 cuts += [cut] if min(0.0, speed) < cut < max(0.0, speed) else []
         cuts = sorted(cuts, reverse=bool(speed < 0.0))
         for a, b in pairwise(cuts):
             points = 0.5 * (a + b) + 0.5 * (b - a) * nodes
-            values = [force(e, tau, s, np.sign(speed), k >= N_AXES) for s in points]
+            values = [force(e, at, tau, s, np.sign(speed), k >= N_AXES) for s in points]
             total -= 0.5 * (b - a) * (weights @ values)
     return total
 
@@ -220,7 +194,7 @@ def test_the_solution_is_the_minimum_of_the_potential(seed):
     random = np.random.default_rng(seed)
     for draw in range(3):
         p, x = problem(seed * PROBLEMS + draw, turning=False)
-        solve(p.body, p.element, x, workspace())
+        solve(*p, x)
         least = potential(p, x)
         for scale in 10.0 ** np.arange(-7.0, 1.0):
             for change in scale * random.normal(size=(8, 3)):
@@ -238,16 +212,16 @@ def test_the_first_guess_does_not_matter(seed):
     random = np.random.default_rng(seed)
     p, x = problem(seed)
     base = p.copy()
-    solve(p.body, p.element, x, workspace())
+    solve(*p, x)
     for _ in range(20):
         q, y = base.copy(), random.normal(size=3)
-        state = start_state(q, y / [1.0, 1.0, q.body[LENGTH]], np.zeros(q.wheels))
-        put(q.body, q.element, state)
+        state = start_state(q.plant, y / [1.0, 1.0, q.plant.body.length], np.zeros(q.plant.wheels))
+        put(q.stage, state)
         y = state[:3].copy()
-        solve(q.body, q.element, y, workspace())
+        solve(*q, y)
         np.testing.assert_allclose(y, x, rtol=1e-10, atol=1e-13)
         np.testing.assert_array_equal(y == 0.0, x == 0.0)
-        np.testing.assert_array_equal(q.element[:, SIGN], p.element[:, SIGN])
+        np.testing.assert_array_equal(q.stage.each["sign"], p.stage.each["sign"])
 
 
 def test_what_rounds_along_one_axis_blurs_no_friction_along_another(axebot):
@@ -259,17 +233,18 @@ def test_what_rounds_along_one_axis_blurs_no_friction_along_another(axebot):
         friction=axebot.friction.replace(axes=axebot.friction.axes.replace(coulomb=(2.2, 1.5, 1e-7)))
     )
     for sign, tau in product([1.0, -1.0], [1e-6, 1e-7, 1e-8, 1e-9]):
-        p = plant(small)
-        p.body[TAU] = tau
-        p.element[N_AXES:, VOLTAGE] = [-1.0, -4.0, 5.0]
-        p.element[N_AXES:, BOUND] = np.inf
-        x = start_state(p, np.array([0.6, 0.5, 0.0]), np.zeros(3))[:3]
-        x[2] = sign * 0.5 * tau * p.element[2, SLIDE] / p.body[MASS]
-        p.body[GOAL : GOAL + 3] = x
-        p.element[:N_AXES, SIGN] = np.sign(x)
-        p.element[2, SIGN] = -sign  # the first guess slides the wrong way
+        own = plant(small)
+        stage = new_stage(own)
+        stage.task.tau = tau
+        stage.each["voltage"][N_AXES:] = [-1.0, -4.0, 5.0]
+        stage.each["bound"][N_AXES:] = np.inf
+        x = start_state(own, np.array([0.6, 0.5, 0.0]), np.zeros(3))[:3]
+        x[2] = sign * 0.5 * tau * own.element[2].coulomb[0] / own.body.mass
+        stage.task.goal[:] = x
+        stage.each["sign"][:N_AXES] = np.sign(x)
+        stage.each["sign"][2] = -sign  # the first guess slides the wrong way
         x[2] = -x[2]
-        assert solve(p.body, p.element, x, workspace()) < CAP
-        assert p.element[2, SIGN] == 0.0
+        assert solve(own, stage, x) < CAP
+        assert stage.each["sign"][2] == 0.0
         assert x[2] == 0.0
         assert abs(x[0] - 0.6) < 100.0 * tau

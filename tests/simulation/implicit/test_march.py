@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
-from omnidyn.model.layout import BOUND, N_AXES
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import new_state
@@ -36,7 +36,7 @@ def truth_of(seed):
 def cost(robot, voltage, dt, tol):
     """What a run of the kernel takes, in words; it prices a solved step, of which an accepted one takes three."""
     numbers = plant(robot)
-    bound = np.tile(numbers.element[N_AXES:, BOUND], (len(voltage), 1))
+    bound = np.tile(numbers.element["limit"][N_AXES:], (len(voltage), 1))
     dt = np.broadcast_to(dt, len(voltage)).copy()
     begin = time.process_time()
     loop = no_loop(robot.wheels.count)

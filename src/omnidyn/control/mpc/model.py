@@ -10,28 +10,13 @@ PSI = integral of PHI, both from 0 to dt.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.layout import (
-    BODY_SIZE,
-    ELEMENT_SIZE,
-    EXPONENT,
-    EXPONENT_XY,
-    FALL,
-    FALL_XY,
-    HOLD,
-    HOLD_X,
-    HOLD_Y,
-    N_AXES,
-    SLIDE,
-    SLIDE_X,
-    SLIDE_Y,
-    VISCOUS,
-)
+from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import discretise, is_decoupled, motor_wrench, state_space
@@ -59,8 +44,8 @@ class Numbers(NamedTuple):
 
 def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     """The numbers of a robot for steps of dt [s]; friction: whether dry friction is among them."""
-    body, element, directions = _tables(robot)
-    viscous = (directions.T * element[:, VISCOUS]) @ directions
+    own, directions = _friction(robot)
+    viscous = (directions.T * own.element["viscous"]) @ directions
     motors = motor_wrench(robot)
     rates = per_mass(robot, motors.braking - viscous).T + 0.0
     decay, phi, psi = _held(robot, rates, dt)
@@ -74,11 +59,11 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     push = np.ascontiguousarray(per_mass(robot, motors.driving).T)
     levels = np.zeros((0, LEVEL_SIZE))
     if friction:
-        linear[0, ELLIPSE : ELLIPSE + 2] = body[SLIDE_X], body[SLIDE_Y]
-        more = body[HOLD_X] - body[SLIDE_X], body[HOLD_Y] - body[SLIDE_Y]
-        linear[0, ELLIPSE_FALL:LINEAR_SIZE] = body[FALL_XY], body[EXPONENT_XY], *more
-        linear[0, ELLIPSE + 2] = SLOW[0] * max(body[SLIDE_X], body[SLIDE_Y])
-        levels = _levels(robot, element, directions)
+        body = own.body
+        linear[0, ELLIPSE : ELLIPSE + 2] = body.coulomb
+        linear[0, ELLIPSE + 2] = SLOW[0] * body.coulomb.max()
+        linear[0, ELLIPSE_FALL:LINEAR_SIZE] = body.fall, body.exponent, *(body.breakaway - body.coulomb)
+        levels = _levels(robot, own.element, directions)
     return Numbers(linear, push, np.asarray(np.linalg.pinv(push), dtype=float), levels)
 
 
@@ -94,12 +79,12 @@ def emf(robot: Robot) -> FloatArray:
     return np.ascontiguousarray(robot.wheels.wrench_matrix.T * per_rim[:, None])
 
 
-def _tables(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Body and elements of all friction, in SI, and the direction of each element."""
-    body, element = np.zeros(BODY_SIZE), np.zeros((N_AXES + robot.wheels.count, ELEMENT_SIZE))
+def _friction(robot: Robot) -> tuple[Plant, FloatArray]:
+    """All friction, in SI, and the direction of each element."""
+    own = blank_plant(robot.wheels.count)
     for law in robot.friction.rigid.laws:
-        law.add_to(body, element, 1.0)
-    return body, element, np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
+        law.add_to(own, 1.0)
+    return own, np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
 
 
 def _held(robot: Robot, rates: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -116,15 +101,16 @@ def _held(robot: Robot, rates: FloatArray, dt: float) -> tuple[FloatArray, Float
     return whole[:3, :3], whole[:3, 3:6], whole[:3, 6:]
 
 
-def _levels(robot: Robot, element: FloatArray, directions: FloatArray) -> FloatArray:
+def _levels(robot: Robot, element: Any, directions: FloatArray) -> FloatArray:
     """The parts of dry friction that act on one scalar speed each, those of level 0 left out."""
-    kept = np.nonzero(element[:, SLIDE] + element[:, SLIDE + 1] > 0.0)[0]
+    coulomb = element["coulomb"]
+    kept = np.nonzero(coulomb.sum(axis=1) > 0.0)[0]
     table = np.zeros((len(kept), LEVEL_SIZE))
     table[:, GX : GX + 3] = directions[kept]
     table[:, ACROSS : ACROSS + 3] = per_mass(robot, directions[kept])
-    table[:, FORWARD], table[:, BACKWARD] = element[kept, SLIDE], element[kept, SLIDE + 1]
-    table[:, FALLING], table[:, POWER] = element[kept, FALL], element[kept, EXPONENT]
-    table[:, MORE_FORWARD : MORE_BACKWARD + 1] = element[kept, HOLD : HOLD + 2] - element[kept, SLIDE : SLIDE + 2]
+    table[:, FORWARD], table[:, BACKWARD] = coulomb[kept].T
+    table[:, FALLING], table[:, POWER] = element["fall"][kept], element["exponent"][kept]
+    table[:, MORE_FORWARD : MORE_BACKWARD + 1] = (element["breakaway"] - coulomb)[kept]
     table[:, WIDTH] = np.where(kept < N_AXES, SLOW[np.minimum(kept, 2)], SLOW[0])
     table[:, SOFT] = table[:, WIDTH] * np.where(kept < N_AXES, SOFTER[np.minimum(kept, 2)], SOFTER[0])
     return table

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.model.friction.kinds import Kind, Numbers, Spread, refuse_mixtures, spread_on
 from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
-from omnidyn.model.layout import BAND, N_AXES, VISCOUS
+from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.value import Levels, Value, number, per_axis_number
 
 Level = Annotated[Levels, per_axis_number(0.0, 1e6)]
@@ -80,16 +80,16 @@ class AxesFriction(Value):
         coulomb = np.array(self.coulomb)
         return np.array(self.viscous), coulomb, coulomb if self.breakaway is None else np.array(self.breakaway)
 
-    def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
+    def add_to(self, plant: Plant, length: float) -> None:
         """Add the levels of the three axes; see FrictionLaw."""
         viscous, coulomb, breakaway = self.levels
         units = np.array([1.0, 1.0, length])
-        rows = element[:N_AXES]
-        rows[:, VISCOUS] += viscous / units**2
+        rows = plant.element[:N_AXES]
+        rows["viscous"] += viscous / units**2
         slide, hold = np.stack([coulomb, self.backward], 1), np.stack([breakaway, self.hold_backward], 1)
-        spread_on(body, rows, self._spread(units), slide / units[:, None], hold / units[:, None])
+        spread_on(plant.body.mass, rows, self._spread(units), slide / units[:, None], hold / units[:, None])
         if self.law == "karnopp":
-            rows[:, BAND] = np.array(self.karnopp_speed) * units
+            rows["band"] = np.array(self.karnopp_speed) * units
 
     def _spread(self, units: FloatArray) -> Spread:
         """The numbers of its law as rows of the table count them."""

@@ -18,10 +18,12 @@ z' = (s - k z*)/(1 + tau k), k = sigma0 |s|/g.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.stribeck import fall
 
+FADES = 0.75  # times the damping: the steepest way in which one that fades lets go
 ROUNDS = 60  # of Newton's steps for a general exponent; bisection needs no more
 
 
@@ -89,3 +91,20 @@ def damping_at(speed, damping, inverse):
     u = speed * inverse
     value = damping * math.exp(-u * u)
     return value, -2.0 * u * inverse * value
+
+
+@part
+def bristle_force(own, speed, aimed, tau):
+    """(force, slope, z) at the end of a stage of length tau from z* = aimed; own: the record ELEMENT, see layout.py."""
+    side = 0 if speed >= 0.0 else 1
+    g, dg = level_at(speed, own.bristle_coulomb[side], own.bristle_breakaway[side], own.fall, own.exponent)
+    rate, slope = bend_rate(aimed, speed, tau, own.stiffness, g, dg, own.dahl_exponent)
+    damping, fades = damping_at(speed, own.damping, own.fade)
+    bent = aimed + tau * rate
+    force = -own.stiffness * bent - damping * rate
+    return force, -(own.stiffness * tau + damping) * slope - fades * rate, bent
+
+
+def fade_of(own: Any) -> float:
+    """A bound of how steeply a damping that fades lets go [N s/m]; own: the record of an element, or of the body."""
+    return FADES * own.damping if own.fade > 0.0 else 0.0

@@ -12,7 +12,7 @@ box of eqs (4)-(6) misses.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -20,23 +20,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from omnidyn.arrays import FloatArray
 from omnidyn.model.friction.kinds import BENDING, DAHL, LUGRE, Spread, refuse_mixtures, spread_on
 from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
-from omnidyn.model.layout import (
-    BEND_HOLD_XY,
-    BEND_SLIDE_XY,
-    DAMP_XY,
-    EXPONENT_XY,
-    FADE_XY,
-    FALL_XY,
-    HOLD_X,
-    HOLD_Y,
-    MASS,
-    N_AXES,
-    SLIDE_X,
-    SLIDE_Y,
-    STIFF_XY,
-    VISCOUS,
-    YAW,
-)
+from omnidyn.model.layout import N_AXES, YAW, Plant
 from omnidyn.model.value import Value, number, to_list
 
 Level = Annotated[float, number(0.0, 1e6)]
@@ -82,34 +66,34 @@ class DirectionFriction(Value):
         along = np.hypot(applied[..., 0] / hold[0], applied[..., 1] / hold[1])
         return np.maximum(along, np.abs(applied[..., 2]) / yaw_hold)
 
-    def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
+    def add_to(self, plant: Plant, length: float) -> None:
         """Add the ellipse, the same damping in every direction, and what resists turning; see FrictionLaw."""
-        element[:N_AXES, VISCOUS] += [self.viscous, self.viscous, self.yaw_viscous / length**2]
-        self._add_plane(body)
+        plant.element["viscous"][:N_AXES] += [self.viscous, self.viscous, self.yaw_viscous / length**2]
+        self._add_plane(plant.body)
         yaw_hold = self.yaw_coulomb if self.yaw_breakaway is None else self.yaw_breakaway
         slide, hold = np.full((1, 2), self.yaw_coulomb / length), np.full((1, 2), yaw_hold / length)
-        spread_on(body, element[YAW : YAW + 1], self._turning(length), slide, hold)
+        spread_on(plant.body.mass, plant.element[YAW : YAW + 1], self._turning(length), slide, hold)
 
-    def _add_plane(self, body: FloatArray) -> None:
+    def _add_plane(self, body: Any) -> None:
         hold = self.coulomb if self.breakaway is None else self.breakaway
         if self.law in BENDING:
-            body[BEND_SLIDE_XY : BEND_SLIDE_XY + 2] += self.coulomb
-            body[BEND_HOLD_XY : BEND_HOLD_XY + 2] += hold
+            body.bristle_coulomb += self.coulomb
+            body.bristle_breakaway += hold
             if any(self.coulomb):
                 self._add_bristle(body)
         else:
-            body[[SLIDE_X, SLIDE_Y]] += self.coulomb
-            body[[HOLD_X, HOLD_Y]] += hold
+            body.coulomb += self.coulomb
+            body.breakaway += hold
         if self.stribeck_speed is not None and hold != self.coulomb:
-            body[FALL_XY], body[EXPONENT_XY] = 1.0 / self.stribeck_speed, self.stribeck_exponent
+            body.fall, body.exponent = 1.0 / self.stribeck_speed, self.stribeck_exponent
 
-    def _add_bristle(self, body: FloatArray) -> None:
+    def _add_bristle(self, body: Any) -> None:
         assert self.stiffness is not None
-        body[STIFF_XY] = self.stiffness
+        body.stiffness = self.stiffness
         if self.law == LUGRE:
-            critical = max(2.0 * float(np.sqrt(self.stiffness * body[MASS])) - self.viscous, 0.0)
-            body[DAMP_XY] = critical if self.damping is None else self.damping
-            body[FADE_XY] = 0.0 if self.damping_speed is None else 1.0 / self.damping_speed
+            critical = max(2.0 * float(np.sqrt(self.stiffness * body.mass)) - self.viscous, 0.0)
+            body.damping = critical if self.damping is None else self.damping
+            body.fade = 0.0 if self.damping_speed is None else 1.0 / self.damping_speed
 
     def _turning(self, length: float) -> Spread:
         """The law about yaw in the units of the table."""

@@ -1,4 +1,4 @@
-"""The kinds of law that a friction table may choose, and how their numbers get into the tables of a plant.
+"""The kinds of law that a friction table may choose, and how their numbers get into a plant.
 
     coulomb   C in motion, S >= C at rest; with stribeck_speed the level falls from S to C (stribeck.py)
     karnopp   the same, at rest below a speed Dv (karnopp_speed, 1e-4 m/s): a device of solvers that cannot stick. It
@@ -17,22 +17,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.layout import (
-    BEND_HOLD,
-    BEND_SLIDE,
-    DAMP,
-    EXPONENT,
-    FADE,
-    FALL,
-    GX,
-    GZ,
-    HOLD,
-    MASS,
-    SHAPE,
-    SLIDE,
-    STIFF,
-    VISCOUS,
-)
 
 Kind = Literal["coulomb", "karnopp", "dahl", "lugre"]
 COULOMB, KARNOPP, DAHL, LUGRE = "coulomb", "karnopp", "dahl", "lugre"
@@ -41,7 +25,7 @@ Numbers = FloatArray | tuple[float, ...] | float | None
 
 
 class Spread(NamedTuple):
-    """The numbers of a law in the units of a plant's table, one or one per row; None where it has none."""
+    """The numbers of a law in the units of a plant, one or one per row; None where it has none."""
 
     law: str
     stribeck_speed: Numbers
@@ -52,38 +36,37 @@ class Spread(NamedTuple):
     dahl_exponent: float
 
 
-def spread_on(body: FloatArray, rows: FloatArray, law: Spread, slide: FloatArray, hold: FloatArray) -> None:
-    """Add a law to rows of the element table, in place. slide, hold: levels forward and backward, shape (rows, 2)."""
+def spread_on(mass: float, rows: Any, law: Spread, slide: FloatArray, hold: FloatArray) -> None:
+    """Add a law to elements of a plant, in place. slide, hold: levels forward and backward, shape (rows, 2)."""
     used = np.any(hold > 0.0, axis=1)
     if law.law in BENDING:
-        rows[:, BEND_SLIDE : BEND_SLIDE + 2] += slide
-        rows[:, BEND_HOLD : BEND_HOLD + 2] += hold
-        put(rows, used, STIFF, law.stiffness)
-        rows[used, SHAPE] = law.dahl_exponent if law.law == DAHL else 1.0
+        rows["bristle_coulomb"] += slide
+        rows["bristle_breakaway"] += hold
+        put(rows, used, "stiffness", law.stiffness)
+        rows["dahl_exponent"][used] = law.dahl_exponent if law.law == DAHL else 1.0
         if law.law == LUGRE and used.any():
-            put(rows, used, DAMP, critical(body, rows, law) if law.damping is None else law.damping)
-            put(rows, used, FADE, _inverse(law.damping_speed))
+            put(rows, used, "damping", critical(mass, rows, law) if law.damping is None else law.damping)
+            put(rows, used, "fade", _inverse(law.damping_speed))
     else:
-        rows[:, SLIDE : SLIDE + 2] += slide
-        rows[:, HOLD : HOLD + 2] += hold
+        rows["coulomb"] += slide
+        rows["breakaway"] += hold
     falls = used & np.any(hold > slide, axis=1)
     if law.stribeck_speed is not None and falls.any():
-        put(rows, falls, FALL, _inverse(law.stribeck_speed))
-        rows[falls, EXPONENT] = law.stribeck_exponent
+        put(rows, falls, "fall", _inverse(law.stribeck_speed))
+        rows["exponent"][falls] = law.stribeck_exponent
 
 
-def put(rows: FloatArray, where: Any, column: int, value: Numbers) -> None:
-    """One number, or one per row, into a column of some rows."""
+def put(rows: Any, where: Any, field: str, value: Numbers) -> None:
+    """One number, or one per row, into a field of some rows."""
     if value is not None:
-        rows[where, column] = np.broadcast_to(value, len(rows))[where]
+        rows[field][where] = np.broadcast_to(value, len(rows))[where]
 
 
-def critical(body: FloatArray, rows: FloatArray, law: Spread) -> FloatArray:
+def critical(mass: float, rows: Any, law: Spread) -> FloatArray:
     """2 sqrt(sigma0 m) - viscous: the damping with which a bristle and the body on it do not swing."""
-    direction = rows[:, GX : GZ + 1]
-    mass = body[MASS] / np.maximum((direction**2).sum(axis=1), 1e-300)
+    seen = mass / np.maximum((rows["g"] ** 2).sum(axis=1), 1e-300)
     assert law.stiffness is not None
-    return np.maximum(2.0 * np.sqrt(np.asarray(law.stiffness) * mass) - rows[:, VISCOUS], 0.0)
+    return np.maximum(2.0 * np.sqrt(np.asarray(law.stiffness) * seen) - rows["viscous"], 0.0)
 
 
 def _inverse(value: Numbers) -> Numbers:

@@ -14,7 +14,7 @@ A law acts between body and floor. It must:
    inclusion of stick_slip/inclusion.py has one solution and says by itself what sticks. Where its force falls with the
    speed it is not convex: it then bounds the fall (`steepest`), and steps are so short that inertia outweighs it
    (stick_slip/step_bound.py). What it remembers is eliminated from a stage: its force is a function of the speed there;
-6. say so in two tables: `add_to` adds its levels, and the numbers of its kind, to those of the elements on which it
+6. say so in a plant: `add_to` adds its levels, and the numbers of its kind, to those of the elements on which it
    acts (model/layout.py). Solvers, step control, dead zone, feed-forward and derivatives take them from there; what has
    a memory has derivatives of it too; Karnopp's band has none, and is refused by name.
 """
@@ -23,17 +23,16 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from omnidyn.arrays import FloatArray
+from omnidyn.model.layout import Plant
 
 
 class FrictionLaw(Protocol):
     """What every family of friction provides: a frozen value type (its ranges checked) with this function."""
 
-    def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
-        """Add the levels to the tables of a plant, in place.
+    def add_to(self, plant: Plant, length: float) -> None:
+        """Add the levels to a plant, in place; its mass and the directions of its elements stand there already.
 
-        body: shape (BODY_SIZE,), element: shape (3 + wheels, ELEMENT_SIZE), entries named in layout.py; the mass and
-        the directions of the elements stand there already. `length` is rho [m] by which yaw is measured: a torque T
+        `length` is rho [m] by which yaw is measured: a torque T
         counts as T/rho [N], a damping D [N m s] as D/rho^2 [N s/m], a speed omega as rho omega [m/s].
         """
         ...

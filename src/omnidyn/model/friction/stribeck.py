@@ -11,6 +11,7 @@ a robot stick and slip. S = C is Coulomb's law, to the last bit. Source: Bo & Pa
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,7 @@ from omnidyn.compiled.kernel import part
 USUAL = 2.0
 LEAST, MOST = 0.3, 10.0  # of the exponent
 CHORD = 2.0**-16
+BENDS = 1.5  # a bristle follows what falls late: so much steeper at the most
 
 
 @part
@@ -46,6 +48,33 @@ def steepest(u, exponent):
         return -fall(u, exponent)[1]
     worst = ((exponent - 1.0) / exponent) ** (1.0 / exponent)
     return -fall(max(u, worst), exponent)[1]
+
+
+@part
+def steepness_left(u, exponent):
+    """The steepest fall at u Stribeck speeds and beyond, over the steepest of all."""
+    return 1.0 if u <= 0.0 else steepest(u, exponent) / steepest(0.0, exponent)
+
+
+@part
+def excess(own, at, speed):
+    """(force, slope) by which an element that slides resists more than its Coulomb level, against its sign.
+
+    own, at: the records ELEMENT and EACH of it, see layout.py.
+    """
+    sign, side = at.sign, 0 if at.sign > 0.0 else 1
+    f, slope = fall(max(sign * speed, 0.0) * own.fall, own.exponent)
+    more = at.hold[side] - own.coulomb[side]
+    return -sign * more * f, -more * slope * own.fall
+
+
+def steepest_of(own: Any) -> float:
+    """A bound of how steeply an element falls [N s/m], what it sticks with and its bristle; own: its record."""
+    if own.fall == 0.0:
+        return 0.0
+    more = max((own.breakaway - own.coulomb).max(), 0.0)
+    bends = max((own.bristle_breakaway - own.bristle_coulomb).max(), 0.0)
+    return (more + BENDS * bends) * own.fall * steepest(0.0, own.exponent)
 
 
 def fallen(speed: ArrayLike, inverse: ArrayLike, exponent: ArrayLike) -> FloatArray:

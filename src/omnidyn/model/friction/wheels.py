@@ -11,10 +11,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from omnidyn.arrays import FloatArray
 from omnidyn.model.friction.kinds import Spread, refuse_mixtures, spread_on
 from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
-from omnidyn.model.layout import N_AXES, VISCOUS
+from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.value import PerWheel, Value, number, per_wheel_number
 
 Level = Annotated[PerWheel, per_wheel_number(0.0, 1e6)]
@@ -60,10 +59,10 @@ class WheelFriction(Value):
             return self.breakaway_backward
         return self.backward if self.breakaway is None or self.coulomb_backward is not None else self.breakaway
 
-    def add_to(self, body: FloatArray, element: FloatArray, length: float) -> None:
+    def add_to(self, plant: Plant, length: float) -> None:
         """Add the levels of each wheel, forward and backward; see FrictionLaw."""
-        wheels = element[N_AXES:]
-        wheels[:, VISCOUS] += self.viscous
+        wheels = plant.element[N_AXES:]
+        wheels["viscous"] += self.viscous
         slide, hold = np.empty((len(wheels), 2)), np.empty((len(wheels), 2))
         slide[:, 0], slide[:, 1], hold[:, 0], hold[:, 1] = (
             self.coulomb, self.backward, self.hold_forward, self.hold_backward,
@@ -72,7 +71,7 @@ class WheelFriction(Value):
             self.law, self.stribeck_speed, self.stribeck_exponent, self.stiffness, self.damping, self.damping_speed,
             self.dahl_exponent,
         )  # fmt: skip
-        spread_on(body, wheels, law, slide, hold)
+        spread_on(plant.body.mass, wheels, law, slide, hold)
 
     @model_validator(mode="after")
     def _breakaway_at_least_coulomb(self) -> WheelFriction:

@@ -10,57 +10,60 @@ Source: Karnopp 1985, with the pseudo-momentum of Armstrong-Helouvry et al. 1994
 from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.layout import AIMED, BAND, BENT, HOLD, KEEP, MASS, N_AXES, SIGN, SPIN
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.stick_slip.forces import forces_at_work
-from omnidyn.model.stick_slip.workspace import RESIDUAL
 
 SIGNS = 3  # where the signs begin in a state
 FIRM = 4.0  # times all forces at work: what an axis in its band is held with, whatever drives it
 
 
 @part
-def hold_in_band(body, element):
+def hold_in_band(plant, stage):
     """Let what is in its band be held by all it takes: who leaves it is no matter of forces."""
+    element, each = plant.element, stage.each
     for a in range(N_AXES):
-        if element[a, BAND] > 0.0:
-            element[a, HOLD], element[a, HOLD + 1] = element[a, KEEP], element[a, KEEP + 1]
-    firm = FIRM * forces_at_work(body, element)
+        own = element[a]
+        if own.band > 0.0:
+            each[a].hold[0], each[a].hold[1] = own.breakaway[0], own.breakaway[1]
+    firm = FIRM * forces_at_work(plant, stage)
     for a in range(N_AXES):
-        if element[a, BAND] > 0.0 and element[a, SIGN] == 0.0:
-            element[a, HOLD] = element[a, HOLD + 1] = firm
+        at = each[a]
+        if element[a].band > 0.0 and at.sign == 0.0:
+            at.hold[0] = at.hold[1] = firm
 
 
 @part
-def aim_band(element, start, first, back):
+def aim_band(stage, start, first, back):
     """Set w* of a stage, as currents have their i*."""
     for a in range(N_AXES):
         w = start[first + a]
-        element[a, AIMED] = w + back * (element[a, BENT] - w) if back != 0.0 else w
+        stage.each[a].aimed_bend = w + back * (stage.each[a].bend - w) if back != 0.0 else w
 
 
 @part
-def gather(body, element, s, tau):
+def gather(plant, stage, tau):
     """w at the end of a stage that has been solved: what drives an axis at rest stands in the residual."""
     for a in range(N_AXES):
-        element[a, BENT] = 0.0
-        if element[a, BAND] > 0.0 and element[a, SIGN] == 0.0:
-            drive = -s[RESIDUAL, a]
-            excess = max(drive - element[a, KEEP], 0.0) - max(-drive - element[a, KEEP + 1], 0.0)
-            element[a, BENT] = element[a, AIMED] + tau * excess / (body[MASS] + body[SPIN + a])
+        own, at = plant.element[a], stage.each[a]
+        at.bend = 0.0
+        if own.band > 0.0 and at.sign == 0.0:
+            drive = -stage.work.residual[a]
+            excess = max(drive - own.breakaway[0], 0.0) - max(-drive - own.breakaway[1], 0.0)
+            at.bend = at.aimed_bend + tau * excess / (plant.body.mass + plant.body.spin[a, a])
 
 
 @part
-def keep_band(element, end, first):
+def keep_band(stage, end, first):
     """Into a state: what has gathered."""
     for a in range(N_AXES):
-        end[first + a] = element[a, BENT] if element[a, SIGN] == 0.0 else 0.0
+        end[first + a] = stage.each[a].bend if stage.each[a].sign == 0.0 else 0.0
 
 
 @part
-def cross_band(element, state, first):
+def cross_band(plant, state, first):
     """Let axes enter and leave their bands, in place."""
     for a in range(N_AXES):
-        width, sign = element[a, BAND], state[SIGNS + a]
+        width, sign = plant.element[a].band, state[SIGNS + a]
         if width == 0.0 or sign == 2.0:
             continue
         if sign == 0.0 and abs(state[first + a]) >= width:
@@ -71,11 +74,11 @@ def cross_band(element, state, first):
 
 
 @part
-def crosses(element, state, first):
+def crosses(plant, state, first):
     """Whether any axis of a state is to enter or to leave its band."""
     found = False
     for a in range(N_AXES):
-        width, sign = element[a, BAND], state[SIGNS + a]
+        width, sign = plant.element[a].band, state[SIGNS + a]
         if width > 0.0 and sign != 2.0:
             found |= abs(state[first + a]) >= width if sign == 0.0 else abs(state[a]) < width
     return found

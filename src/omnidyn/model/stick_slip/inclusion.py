@@ -11,7 +11,7 @@ faces (an active set: some stuck). Newton within one; on the way, stop at a kink
 its optimum ask whether the stuck elements can hold (can_hold.py), and if not, release along the direction that they
 cannot. A stuck element's speed is exactly 0: it is a flag, not a small number.
 
-The problem stands in a Plant (plant.py names its entries): `body` and `element`. `s` is the workspace of `workspace()`.
+The problem stands in a Plant, the constants, and in a Stage (layout.py names both).
 """
 
 from __future__ import annotations
@@ -21,29 +21,6 @@ import math
 import numpy as np
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.layout import (
-    BEFORE,
-    ELLIPSE,
-    FALL,
-    FALL_XY,
-    FOUND,
-    GOAL,
-    GX,
-    GY,
-    GZ,
-    HOLD,
-    HOLD_X,
-    HOLD_Y,
-    LAWS,
-    LOSS,
-    MASS,
-    SIGN,
-    SLIDE,
-    SLIDE_X,
-    SLIDE_Y,
-    SPIN,
-    TAU,
-)
 from omnidyn.model.stick_slip.active_set import (
     FLAT,
     absorb,
@@ -55,7 +32,6 @@ from omnidyn.model.stick_slip.active_set import (
 )
 from omnidyn.model.stick_slip.can_hold import worst_direction
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses
-from omnidyn.model.stick_slip.workspace import CLOSE, JACOBIAN, NEWTON, RESIDUAL, TRIAL, WORST
 
 AFRESH = 40  # after so many, begin again from rest: the problem has one solution, whatever the first guess
 CAP = 80  # Newton steps, kinks and releases of one solve; a solve that hits it is reported
@@ -64,28 +40,30 @@ TIE = 1e-12  # kinks as near as this are met together
 
 
 @part
-def _slope(s):
+def _slope(work):
     """Slope of the potential along the Newton direction at the last residual."""
-    return s[NEWTON, 0] * s[RESIDUAL, 0] + s[NEWTON, 1] * s[RESIDUAL, 1] + s[NEWTON, 2] * s[RESIDUAL, 2]
+    return work.newton[0] * work.residual[0] + work.newton[1] * work.residual[1] + work.newton[2] * work.residual[2]
 
 
 @part
-def _kink_of_element(element, e, x, s):
+def _kink_of_element(plant, stage, e, x):
     """Step along the Newton direction after which a sliding element's speed is 0; inf where it never is."""
-    sign, g0, g1, g2 = element[e, SIGN], element[e, GX], element[e, GY], element[e, GZ]
+    own, work = plant.element[e], stage.work
+    sign, g0, g1, g2 = stage.each[e].sign, own.g[0], own.g[1], own.g[2]
     speed = g0 * x[0] + g1 * x[1] + g2 * x[2]
-    dw = g0 * s[NEWTON, 0] + g1 * s[NEWTON, 1] + g2 * s[NEWTON, 2]
+    dw = g0 * work.newton[0] + g1 * work.newton[1] + g2 * work.newton[2]
     return max(-speed / dw, 0.0) if abs(sign) == 1.0 and sign * dw < 0.0 else np.inf
 
 
 @part
-def _kink_of_ellipse(body, x, s):
+def _kink_of_ellipse(plant, stage, x):
     """The same for the ellipse: only a line through its axis meets it."""
-    if body[ELLIPSE] != 1.0:
+    work = stage.work
+    if stage.task.ellipse != 1.0:
         return np.inf
-    cx, cy = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2
-    dd = cx * s[NEWTON, 0] ** 2 + cy * s[NEWTON, 1] ** 2
-    xd = cx * x[0] * s[NEWTON, 0] + cy * x[1] * s[NEWTON, 1]
+    cx, cy = plant.body.coulomb[0] ** 2, plant.body.coulomb[1] ** 2
+    dd = cx * work.newton[0] ** 2 + cy * work.newton[1] ** 2
+    xd = cx * x[0] * work.newton[0] + cy * x[1] * work.newton[1]
     xx = cx * x[0] * x[0] + cy * x[1] * x[1]
     if xd >= 0.0 or xx * dd - xd * xd > 1e-24 * xx * dd:
         return np.inf
@@ -93,67 +71,69 @@ def _kink_of_ellipse(body, x, s):
 
 
 @part
-def _next_kink(body, element, x, s, t):
-    """Smallest step from t on at which anything that slides comes to rest; FOUND marks what is met there.
+def _next_kink(plant, stage, x, t):
+    """Smallest step from t on at which anything that slides comes to rest; `found` marks what is met there.
 
     Returns (step, whether the ellipse is met).
     """
-    nearest = _kink_of_ellipse(body, x, s)
+    each = stage.each
+    nearest = _kink_of_ellipse(plant, stage, x)
     nearest = nearest if nearest >= t - TIE else np.inf
-    for e in range(len(element)):
-        when = _kink_of_element(element, e, x, s)
-        element[e, BEFORE] = when
+    for e in range(len(plant.element)):
+        when = _kink_of_element(plant, stage, e, x)
+        each[e].before = when
         nearest = when if t - TIE <= when < nearest else nearest
     if nearest > 1.0:
         return np.inf, False
     limit = nearest + TIE * max(1.0, nearest)
-    for e in range(len(element)):
-        element[e, FOUND] = 1.0 if t - TIE <= element[e, BEFORE] <= limit else 0.0
-    return nearest, t - TIE <= _kink_of_ellipse(body, x, s) <= limit
+    for e in range(len(plant.element)):
+        each[e].found = 1.0 if t - TIE <= each[e].before <= limit else 0.0
+    return nearest, t - TIE <= _kink_of_ellipse(plant, stage, x) <= limit
 
 
 @part
-def _jump(body, element, s, met):
+def _jump(plant, stage, met):
     """By how much the slope rises at a kink whose elements hold: slide level behind, hold level ahead."""
+    element, work = plant.element, stage.work
     total = 0.0
     for e in range(len(element)):
-        if element[e, FOUND] == 1.0:
-            dw = element[e, GX] * s[NEWTON, 0] + element[e, GY] * s[NEWTON, 1] + element[e, GZ] * s[NEWTON, 2]
+        own, at = element[e], stage.each[e]
+        if at.found == 1.0:
+            dw = own.g[0] * work.newton[0] + own.g[1] * work.newton[1] + own.g[2] * work.newton[2]
             behind, ahead = (1, 0) if dw > 0.0 else (0, 1)
-            slide = HOLD if element[e, FALL] > 0.0 else SLIDE  # what falls with the speed has not fallen yet
-            total += (element[e, slide + behind] + element[e, HOLD + ahead]) * abs(dw)
-            total += (element[e, LOSS] + element[e, LOSS + 1]) * abs(dw)
+            fallen = own.fall == 0.0  # what falls with the speed has not fallen yet
+            level = own.coulomb[behind] if fallen else at.hold[behind]
+            total += (level + at.hold[ahead]) * abs(dw)
+            total += (at.loss[0] + at.loss[1]) * abs(dw)
     if met:
-        x, y = (HOLD_X, HOLD_Y) if body[FALL_XY] > 0.0 else (SLIDE_X, SLIDE_Y)
-        total += math.hypot(body[x] * s[NEWTON, 0], body[y] * s[NEWTON, 1])
-        total += math.hypot(body[HOLD_X] * s[NEWTON, 0], body[HOLD_Y] * s[NEWTON, 1])
+        hold, slide = stage.task.hold, stage.task.hold if plant.body.fall > 0.0 else plant.body.coulomb
+        total += math.hypot(slide[0] * work.newton[0], slide[1] * work.newton[1])
+        total += math.hypot(hold[0] * work.newton[0], hold[1] * work.newton[1])
     return total
 
 
 @part
-def _holds_more(element):
+def _holds_more(plant, stage):
     """Whether an element met at a kink holds more than it slides with. It stops there, whatever else goes on along
     the way: passing would skip its breakaway. If it cannot hold, it is released from rest.
     """
+    element = plant.element
     for e in range(len(element)):
-        if (
-            element[e, FOUND] == 1.0
-            and element[e, FALL] == 0.0
-            and (element[e, HOLD] > element[e, SLIDE] or element[e, HOLD + 1] > element[e, SLIDE + 1])
-        ):
+        own, at = element[e], stage.each[e]
+        if at.found == 1.0 and own.fall == 0.0 and (at.hold[0] > own.coulomb[0] or at.hold[1] > own.coulomb[1]):
             return True
     return False
 
 
 @part
-def _at(x, s, t):
-    """Put x + t d into s[TRIAL]."""
+def _at(x, work, t):
+    """Put x + t d into work.trial."""
     for a in range(3):
-        s[TRIAL, a] = x[a] + t * s[NEWTON, a]
+        work.trial[a] = x[a] + t * work.newton[a]
 
 
 @part
-def _not_too_far(body, element, x, s, t, below):
+def _not_too_far(plant, stage, x, t, below):
     """1, or less where a full step past a sharp bend, of the ellipse or of a bristle, would climb again: secants.
 
     below: the slope at t. The residual that is left is that at the point found, except after the last secant.
@@ -161,9 +141,9 @@ def _not_too_far(body, element, x, s, t, below):
     """
     first, end = abs(below), 1.0
     for _ in range(20):
-        _at(x, s, end)
-        residual(body, element, s[TRIAL], s)
-        slope = _slope(s)
+        _at(x, stage.work, end)
+        residual(plant, stage, stage.work.trial[:])
+        slope = _slope(stage.work)
         if slope <= 0.9 * first or below >= 0.0:
             return end, True
         end = t + max(below / (below - slope), 0.1) * (end - t)
@@ -171,147 +151,153 @@ def _not_too_far(body, element, x, s, t, below):
 
 
 @part
-def _walk(body, element, x, s):
+def _walk(plant, stage, x):
     """Go along the Newton direction from x to the end, past kinks that give way, up to one that holds.
 
     Changes x and the signs in place. The slope of the potential along the way rises; where it is 0, stop.
     Returns (whether an element got stuck, whether the residual is that at the new x).
     """
+    body, task, work = plant.body, stage.task, stage.work
     t, stuck, known, passed = 0.0, False, False, False
-    for _ in range(2 * len(element)):
-        kink, met = _next_kink(body, element, x, s, t)
+    for _ in range(2 * len(plant.element)):
+        kink, met = _next_kink(plant, stage, x, t)
         if kink > 1.0:
-            if body[ELLIPSE] == 1.0 or body[LAWS] != 0.0:
+            if task.ellipse == 1.0 or body.laws != 0.0:
                 if passed:  # signs have changed: the residual is that of the other side
-                    _at(x, s, t)
-                    residual(body, element, s[TRIAL], s)
-                t, known = _not_too_far(body, element, x, s, t, _slope(s))
+                    _at(x, work, t)
+                    residual(plant, stage, work.trial[:])
+                t, known = _not_too_far(plant, stage, x, t, _slope(work))
             else:
                 t = 1.0
             break
-        _at(x, s, kink)
-        residual(body, element, s[TRIAL], s)
-        slope = _slope(s)
+        _at(x, work, kink)
+        residual(plant, stage, work.trial[:])
+        slope = _slope(work)
         if slope > 0.0 and kink > t:  # the least value lies before the kink: a secant, and Newton goes on from there
-            _at(x, s, t)
-            residual(body, element, s[TRIAL], s)
-            below = min(_slope(s), 0.0)
+            _at(x, work, t)
+            residual(plant, stage, work.trial[:])
+            below = min(_slope(work), 0.0)
             t += below / (below - slope) * (kink - t)
             break
-        t, stuck, passed = kink, met or _holds_more(element) or slope + _jump(body, element, s, met) >= 0.0, True
-        for e in range(len(element)):
-            if element[e, FOUND] == 1.0:
-                element[e, SIGN] = 0.0 if stuck else -element[e, SIGN]
+        t, stuck, passed = kink, met or _holds_more(plant, stage) or slope + _jump(plant, stage, met) >= 0.0, True
+        for e in range(len(plant.element)):
+            at = stage.each[e]
+            if at.found == 1.0:
+                at.sign = 0.0 if stuck else -at.sign
         if met and stuck:
-            body[ELLIPSE] = 0.0
+            task.ellipse = 0.0
         if stuck:
             break
-    cx, cy, before0, before1 = body[SLIDE_X] ** 2, body[SLIDE_Y] ** 2, x[0], x[1]
+    cx, cy, before0, before1 = body.coulomb[0] ** 2, body.coulomb[1] ** 2, x[0], x[1]
     for a in range(3):
-        x[a] += t * s[NEWTON, a]
-    if (
-        body[ELLIPSE] == 1.0 and cx * before0 * x[0] + cy * before1 * x[1] <= 0.0
-    ):  # past the tip of its cone: stop there
-        body[ELLIPSE], stuck = 0.0, True
+        x[a] += t * work.newton[a]
+    if task.ellipse == 1.0 and cx * before0 * x[0] + cy * before1 * x[1] <= 0.0:  # past the tip of its cone: stop there
+        task.ellipse, stuck = 0.0, True
     return stuck, known and not stuck
 
 
 @part
-def _rest(body, element, x):
+def _rest(stage, x):
     """Everything at rest and stuck: a first guess that misleads nobody."""
     x[0] = x[1] = x[2] = 0.0
-    for e in range(len(element)):
-        element[e, SIGN] = 2.0 if element[e, SIGN] == 2.0 else 0.0
-    body[ELLIPSE] = 2.0 if body[ELLIPSE] == 2.0 else 0.0
+    for e in range(len(stage.each)):
+        stage.each[e].sign = 2.0 if stage.each[e].sign == 2.0 else 0.0
+    stage.task.ellipse = 2.0 if stage.task.ellipse == 2.0 else 0.0
 
 
 @part
-def _stop_contradictions(element, x):
+def _stop_contradictions(plant, stage, x):
     """Hold every element whose sign is against its speed, which no solution may have. Returns whether there was one."""
+    element = plant.element
     found = False
     for e in range(len(element)):
-        sign = element[e, SIGN]
+        own = element[e]
+        sign = stage.each[e].sign
         if sign == 1.0 or sign == -1.0:
-            p0, p1, p2 = element[e, GX] * x[0], element[e, GY] * x[1], element[e, GZ] * x[2]
+            p0, p1, p2 = own.g[0] * x[0], own.g[1] * x[1], own.g[2] * x[2]
             if sign * (p0 + p1 + p2) < -FLAT * (abs(p0) + abs(p1) + abs(p2)):
-                element[e, SIGN], found = 0.0, True
+                stage.each[e].sign, found = 0.0, True
     return found
 
 
 @part
-def _release(body, element, x, s, slope):
-    """Let those stuck elements go that move along s[WORST], and take the step that a quadratic would."""
-    d0, d1, d2, curvature = s[WORST, 0], s[WORST, 1], s[WORST, 2], 0.0
+def _release(plant, stage, x, slope):
+    """Let those stuck elements go that move along work.worst, and take the step that a quadratic would."""
+    element, each, work = plant.element, stage.each, stage.work
+    d0, d1, d2, curvature = work.worst[0], work.worst[1], work.worst[2], 0.0
     for a in range(3):
         for b in range(3):
-            curvature += s[WORST, a] * s[JACOBIAN + a, b] * s[WORST, b]
+            curvature += work.worst[a] * work.jacobian[a, b] * work.worst[b]
     for e in range(len(element)):
-        g0, g1, g2 = element[e, GX], element[e, GY], element[e, GZ]
-        if element[e, SIGN] == 0.0 and moves_along(g0, g1, g2, d0, d1, d2):
-            element[e, SIGN] = 1.0 if g0 * d0 + g1 * d1 + g2 * d2 > 0.0 else -1.0
-    if body[ELLIPSE] == 0.0 and (abs(d0) > FLAT or abs(d1) > FLAT):
-        body[ELLIPSE] = 1.0
+        own = element[e]
+        g0, g1, g2 = own.g[0], own.g[1], own.g[2]
+        if each[e].sign == 0.0 and moves_along(g0, g1, g2, d0, d1, d2):
+            each[e].sign = 1.0 if g0 * d0 + g1 * d1 + g2 * d2 > 0.0 else -1.0
+    if stage.task.ellipse == 0.0 and (abs(d0) > FLAT or abs(d1) > FLAT):
+        stage.task.ellipse = 1.0
     t = -slope / curvature
     for e in range(len(element)):  # not past a kink of what slides: its sign would be wrong from there on
-        g0, g1, g2, sign = element[e, GX], element[e, GY], element[e, GZ], element[e, SIGN]
+        own = element[e]
+        g0, g1, g2, sign = own.g[0], own.g[1], own.g[2], each[e].sign
         speed, along = g0 * x[0] + g1 * x[1] + g2 * x[2], g0 * d0 + g1 * d1 + g2 * d2
         if (sign == 1.0 or sign == -1.0) and sign * along < 0.0 and sign * speed > 0.0:
             t = min(t, -0.9 * speed / along)
     for a in range(3):
-        x[a] += t * s[WORST, a]
+        x[a] += t * work.worst[a]
 
 
 @part
-def _set_close(body, element, s):
-    """Into s[CLOSE], per axis: the residual that is rounding. Its inertia M x*/tau rounds along its own axis alone.
+def _set_close(plant, stage):
+    """Into work.close, per axis: the residual that is rounding. Its inertia M x*/tau rounds along its own axis alone.
 
     A robot that drives fast and hardly turns may have a friction in yaw far below the rounding of its other axes.
     """
-    often, forces = 1.0 / body[TAU], forces_at_work(body, element)
-    x, y, z = often * abs(body[GOAL]), often * abs(body[GOAL + 1]), often * abs(body[GOAL + 2])
-    xx, yy, zz = body[MASS] + body[SPIN], body[MASS] + body[SPIN + 1], body[MASS] + body[SPIN + 2]
-    xy, xz, yz = abs(body[SPIN + 3]), abs(body[SPIN + 4]), abs(body[SPIN + 5])
-    s[CLOSE, 0] = TIGHT * (xx * x + xy * y + xz * z + forces)
-    s[CLOSE, 1] = TIGHT * (xy * x + yy * y + yz * z + forces)
-    s[CLOSE, 2] = TIGHT * (xz * x + yz * y + zz * z + forces)
+    body, task, work = plant.body, stage.task, stage.work
+    often, forces = 1.0 / task.tau, forces_at_work(plant, stage)
+    x, y, z = often * abs(task.goal[0]), often * abs(task.goal[1]), often * abs(task.goal[2])
+    xx, yy, zz = body.mass + body.spin[0, 0], body.mass + body.spin[1, 1], body.mass + body.spin[2, 2]
+    xy, xz, yz = abs(body.spin[0, 1]), abs(body.spin[0, 2]), abs(body.spin[1, 2])
+    work.close[0] = TIGHT * (xx * x + xy * y + xz * z + forces)
+    work.close[1] = TIGHT * (xy * x + yy * y + yz * z + forces)
+    work.close[2] = TIGHT * (xz * x + yz * y + zz * z + forces)
 
 
 @part
-def _close_along_worst(s):
-    """What of phi along s[WORST] is rounding."""
-    return abs(s[WORST, 0]) * s[CLOSE, 0] + abs(s[WORST, 1]) * s[CLOSE, 1] + abs(s[WORST, 2]) * s[CLOSE, 2]
+def _close_along_worst(work):
+    """What of phi along work.worst is rounding."""
+    return abs(work.worst[0]) * work.close[0] + abs(work.worst[1]) * work.close[1] + abs(work.worst[2]) * work.close[2]
 
 
 @part
-def solve(body, element, x, s):
+def solve(plant, stage, x):
     """Solve the inclusion in place, from a first guess x that has the signs. Returns the number of iterations.
 
-    The currents at the solution stand in CURRENT. A return of CAP means that the last digits are not there: say so.
+    The currents stand in `stage.each`. A return of CAP means that the last digits are not there: say so.
     """
-    set_losses(body, element)
-    _set_close(body, element, s)
+    set_losses(plant, stage)
+    _set_close(plant, stage)
     stale, known, rank = True, False, 0
     for iteration in range(CAP):
         if iteration == AFRESH:
-            _rest(body, element, x)
+            _rest(stage, x)
             stale = True
         if stale:
-            rank = find_active_set(body, element, s)
-            while rank > 0 and absorb(body, element, s, rank):
-                rank = find_active_set(body, element, s)
-            onto_active_set(x, s, rank)
+            rank = find_active_set(plant, stage)
+            while rank > 0 and absorb(plant, stage, rank):
+                rank = find_active_set(plant, stage)
+            onto_active_set(x, stage.work, rank)
             stale = known = False
         if not known:
-            residual(body, element, x, s)
-        if is_solved(s, rank):
-            found = worst_direction(body, element, s, rank) if rank > 0 else 0.0
-            if found < -_close_along_worst(s):
-                _release(body, element, x, s, found)
-            elif not _stop_contradictions(element, x):
-                onto_active_set(x, s, rank)
+            residual(plant, stage, x)
+        if is_solved(stage.work, rank):
+            found = worst_direction(plant, stage, rank) if rank > 0 else 0.0
+            if found < -_close_along_worst(stage.work):
+                _release(plant, stage, x, found)
+            elif not _stop_contradictions(plant, stage, x):
+                onto_active_set(x, stage.work, rank)
                 return iteration
             stale = True
         else:
-            newton_direction(s, rank)
-            stale, known = _walk(body, element, x, s)
+            newton_direction(stage.work, rank)
+            stale, known = _walk(plant, stage, x)
     return CAP

@@ -11,65 +11,42 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import branching_kernel, part
-from omnidyn.model.layout import (
-    BOUND,
-    BRISTLES,
-    DROP,
-    ELLIPSE,
-    EMF,
-    FALL,
-    FALL_XY,
-    GATHERS,
-    GOAL,
-    GX,
-    GY,
-    GZ,
-    HOLD,
-    HOLD_X,
-    HOLD_Y,
-    INDUCTANCE,
-    LAWS,
-    LENGTH,
-    N_AXES,
-    NOW,
-    PUSH,
-    RESISTANCE,
-    SIGN,
-    SLIDE,
-    SLIDE_X,
-    SLIDE_Y,
-    TAU,
-    TURNING,
-    VISCOUS,
-    VOLTAGE,
-)
+from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, many, new_stage
 from omnidyn.model.stick_slip.forces import residual, winding
 from omnidyn.model.stick_slip.inclusion import solve
 from omnidyn.model.stick_slip.laws import aim_bristles, push_of_laws
-from omnidyn.model.stick_slip.plant import Plant
-from omnidyn.model.stick_slip.workspace import RESIDUAL, workspace
 
 SIGNS = 3  # where the signs begin in a state
 
 
 def new_state(plant: Plant) -> FloatArray:
     """A state of rest without currents: every element that can stick is stuck."""
-    bends = np.zeros(len(plant.element) + 2 if plant.body[BRISTLES] + plant.body[GATHERS] > 0.0 else 0)
-    return np.concatenate([np.zeros(3), plant.element[:, SIGN], plant.body[[ELLIPSE]], np.zeros(plant.wheels), bends])
+    m, bends = len(plant.element), plant.body.bristles + plant.body.gathers > 0.0
+    state = np.zeros(SIGNS + m + 1 + plant.wheels + (m + 2 if bends else 0))
+    state[SIGNS : SIGNS + m], state[SIGNS + m] = 2.0 - 2.0 * plant.element["active"], 2.0 - 2.0 * plant.body.active
+    return state
 
 
-def with_given_currents(plant: Plant) -> Plant:
-    """The same plant, its currents given (NOW) instead of following from voltages, and nothing that feels the speed."""
+def with_given_currents(plant: Plant) -> Problem:
+    """The same plant, its currents given (i*) instead of following from voltages, and nothing that feels the speed.
+
+    An array of this one plant, and of a stage of it, for `settle` to work in.
+    """
     bare = plant.copy()
-    bare.body[TAU], bare.body[TURNING] = 1.0, 0.0
-    bare.element[:, [VISCOUS, EMF, RESISTANCE, DROP, VOLTAGE]] = 0.0
-    bare.element[:, INDUCTANCE], bare.element[:, BOUND] = 1.0, np.inf
-    falls = bare.element[:, FALL] > 0.0  # what falls with the speed starts at the level that holds
-    bare.element[falls, SLIDE : SLIDE + 2] = bare.element[falls, HOLD : HOLD + 2]
-    if bare.body[FALL_XY] > 0.0:
-        bare.body[[SLIDE_X, SLIDE_Y]] = bare.body[[HOLD_X, HOLD_Y]]
-    bare.body[[LAWS, FALL_XY]] = 0.0
-    return bare
+    body, element = bare
+    body.turning = body.laws = 0.0
+    for name in ("viscous", "emf", "resistance", "drop"):
+        element[name] = 0.0
+    element["inductance"], element["limit"] = 1.0, np.inf
+    falls = element["fall"] > 0.0  # what falls with the speed starts at the level that holds
+    element["coulomb"][falls] = element["breakaway"][falls]
+    if body.fall > 0.0:
+        body.coulomb[:] = body.breakaway
+    body.fall = 0.0
+    plants = many([bare])
+    stages = new_stage(plants)
+    stages.task["tau"] = 1.0
+    return Problem(plants, stages)
 
 
 def place_of_current(e, m):
@@ -81,19 +58,19 @@ current_entry = part(place_of_current)
 
 
 @part
-def put(body, element, state):
-    """Take the signs of a state into a plant."""
-    for e in range(len(element)):
-        element[e, SIGN] = state[SIGNS + e]
-    body[ELLIPSE] = state[SIGNS + len(element)]
+def put(stage, state):
+    """Take the signs of a state into a stage."""
+    for e in range(len(stage.each)):
+        stage.each[e].sign = state[SIGNS + e]
+    stage.task.ellipse = state[SIGNS + len(stage.each)]
 
 
 @part
-def take(body, element, state):
-    """Bring the signs of a plant back into a state."""
-    for e in range(len(element)):
-        state[SIGNS + e] = element[e, SIGN]
-    state[SIGNS + len(element)] = body[ELLIPSE]
+def take(stage, state):
+    """Bring the signs of a stage back into a state."""
+    for e in range(len(stage.each)):
+        state[SIGNS + e] = stage.each[e].sign
+    state[SIGNS + len(stage.each)] = stage.task.ellipse
 
 
 @part
@@ -116,9 +93,9 @@ def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> FloatAr
 def moving_states(plant: Plant, twists: FloatArray) -> FloatArray:
     """The states of a robot that moves with each of `twists` (k, 3) [m/s, m/s, rad/s], no currents. Shape (k, size)."""
     states = np.tile(new_state(plant), (len(twists), 1))
-    states[:, :3] = twists * [1.0, 1.0, plant.body[LENGTH]]
+    states[:, :3] = twists * [1.0, 1.0, plant.body.length]
     x, y, z = states[:, :3].T
-    local = [g[GX] * x + g[GY] * y + g[GZ] * z for g in plant.element]
+    local = [g[0] * x + g[1] * y + g[2] * z for g in plant.element["g"]]
     for e, speed in enumerate([*local, np.hypot(x, y)]):
         sign = states[:, SIGNS + e]
         moving = (speed != 0.0) & (sign != 2.0)
@@ -127,86 +104,90 @@ def moving_states(plant: Plant, twists: FloatArray) -> FloatArray:
 
 
 @part
-def settle_currents(element, state):
+def settle_currents(plant, stage, state):
     """Put into a state the currents that its voltages and speeds give at once, where windings have no inductance."""
+    element = plant.element
     m = len(element)
     for e in range(N_AXES, m):
-        if element[e, INDUCTANCE] == 0.0:
-            g0, g1, g2 = element[e, GX], element[e, GY], element[e, GZ]
+        own = element[e]
+        if own.inductance == 0.0:
+            g0, g1, g2 = own.g[0], own.g[1], own.g[2]
             speed = g0 * state[0] + g1 * state[1] + g2 * state[2] if state[SIGNS + e] != 0.0 else 0.0
             state[current_entry(e, m)] = winding(
-                speed, element[e, VOLTAGE], 0.0, 1.0, element[e, EMF], element[e, RESISTANCE], 0.0, element[e, DROP],
-                element[e, BOUND],
+                speed, stage.each[e].voltage, 0.0, 1.0, own.emf, own.resistance, 0.0, own.drop,
+                stage.each[e].bound,
             )[0]  # fmt: skip
 
 
 @part
-def _smooth_force(body, element, bare_body, bare_element, s, state):
-    """Put into the bare plant's PUSH all forces but those of stuck elements and of motors whose wheels are stuck."""
-    m = len(element)
+def _smooth_force(plant, stage, bare_plant, bare_stage, state):
+    """Put all forces but of what is stuck, and of motors whose wheels are, into the push on the bare plant."""
+    m = len(plant.element)
     for e in range(m):
-        bare_element[e, VISCOUS] = element[e, VISCOUS]
+        bare_plant.element[e].viscous = plant.element[e].viscous
         if e >= N_AXES:
             stuck = state[SIGNS + e] == 0.0
-            bare_element[e, NOW] = 0.0 if stuck else state[current_entry(e, m)]
-    bare_body[TURNING] = body[TURNING]
+            bare_stage.each[e].aimed_current = 0.0 if stuck else state[current_entry(e, m)]
+    bare_plant.body.turning = plant.body.turning
     for a in range(3):
-        bare_body[GOAL + a], bare_body[PUSH + a] = state[a], body[PUSH + a]
-    put(bare_body, bare_element, state)
-    if body[LAWS] != 0.0:
-        put(body, element, state)
-        aim_bristles(body, element, state, current_entry(m, m), 0.0)
-        push_of_laws(body, element, state, bare_body)
-    residual(bare_body, bare_element, state, s)
+        bare_stage.task.goal[a], bare_stage.task.push[a] = state[a], stage.task.push[a]
+    put(bare_stage, state)
+    if plant.body.laws != 0.0:
+        put(stage, state)
+        aim_bristles(plant, stage, state, current_entry(m, m), 0.0)
+        push_of_laws(plant, stage, state, bare_stage.task.push)
+    residual(bare_plant, bare_stage, state)
     for a in range(3):
-        bare_body[PUSH + a] = -s[RESIDUAL, a]
+        bare_stage.task.push[a] = -bare_stage.work.residual[a]
 
 
 @part
-def settle(body, element, bare_body, bare_element, s, state, acceleration):
+def settle(plant, stage, bare, state, acceleration):
     """Decide which stuck elements give way at once under the voltages, in place; the acceleration [m/s^2] beside it.
 
     The acceleration solves the same inclusion with speeds frozen: only elements at rest can choose their force.
     """
-    m = len(element)
-    settle_currents(element, state)
-    if body[GATHERS] > 0.0:  # who leaves his band is told by what has gathered there
+    m = len(plant.element)
+    settle_currents(plant, stage, state)
+    if plant.body.gathers > 0.0:  # who leaves his band is told by what has gathered there
         return 0
-    _smooth_force(body, element, bare_body, bare_element, s, state)
-    bare_body[TURNING] = 0.0
+    own, stages = bare.plant, bare.stage
+    bare_plant, bare_stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
+    _smooth_force(plant, stage, bare_plant, bare_stage, state)
+    bare_plant.body.turning = 0.0
     for e in range(m):
-        bare_element[e, VISCOUS] = 0.0
-        bare_element[e, SIGN] = 0.0 if state[SIGNS + e] == 0.0 else 2.0
+        bare_plant.element[e].viscous = 0.0
+        bare_stage.each[e].sign = 0.0 if state[SIGNS + e] == 0.0 else 2.0
         if e >= N_AXES:
             stuck = state[SIGNS + e] == 0.0
-            bare_element[e, NOW] = state[current_entry(e, m)] if stuck else 0.0
-    bare_body[ELLIPSE] = 0.0 if state[SIGNS + m] == 0.0 else 2.0
+            bare_stage.each[e].aimed_current = state[current_entry(e, m)] if stuck else 0.0
+    bare_stage.task.ellipse = 0.0 if state[SIGNS + m] == 0.0 else 2.0
     for a in range(3):
-        acceleration[a] = bare_body[GOAL + a] = 0.0
-    count = solve(bare_body, bare_element, acceleration, s)
+        acceleration[a] = bare_stage.task.goal[a] = 0.0
+    count = solve(bare_plant, bare_stage, acceleration)
     for e in range(m):
         if state[SIGNS + e] == 0.0:
-            state[SIGNS + e] = bare_element[e, SIGN]
+            state[SIGNS + e] = bare_stage.each[e].sign
     if state[SIGNS + m] == 0.0:
-        state[SIGNS + m] = bare_body[ELLIPSE]
+        state[SIGNS + m] = bare_stage.task.ellipse
     return count
 
 
 @branching_kernel
-def _accelerations(body, element, bare_body, bare_element, s, states, voltage, out):
+def _accelerations(own, stages, bare, states, voltage, out):
+    plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
     for k in range(len(states)):
-        for e in range(N_AXES, len(element)):
-            element[e, VOLTAGE] = voltage[k, e - N_AXES]
-        settle(body, element, bare_body, bare_element, s, states[k], out[k])
+        for e in range(N_AXES, len(plant.element)):
+            stage.each[e].voltage = voltage[k, e - N_AXES]
+        settle(plant, stage, bare, states[k], out[k])
 
 
-def accelerations(plant: Plant, states: FloatArray, voltage: FloatArray, bare: Plant | None = None) -> FloatArray:
+def accelerations(plant: Plant, states: FloatArray, voltage: FloatArray, bare: Problem | None = None) -> FloatArray:
     """Acceleration of x [m/s^2] in each state under its voltages [V]. Shapes (k, size), (k, wheels) -> (k, 3).
 
-    The signs in `states` are changed in place to those of what gives way. bare: the plant `with_given_currents`, where
-    many ask.
+    The signs in `states` are changed in place to those of what gives way. bare: `with_given_currents`, where many ask.
     """
-    out = np.zeros((len(states), 3))
-    given = with_given_currents(plant) if bare is None else bare.copy()
-    _accelerations(*plant.copy(), *given, workspace(), states, voltage, out)
+    out, given = np.zeros((len(states), 3)), with_given_currents(plant) if bare is None else bare.copy()
+    own = many([plant])
+    _accelerations(own, new_stage(own), given, states, voltage, out)
     return out

@@ -15,35 +15,13 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
-from omnidyn.model.layout import (
-    BOUND,
-    BRISTLES,
-    DROP,
-    EFFICIENCY,
-    FACING,
-    GATHERS,
-    INDUCTANCE,
-    LAWS,
-    LENGTH,
-    MASS,
-    MEMORY,
-    N_AXES,
-    NOW,
-    PUSH,
-    RESISTANCE,
-    ROOM,
-    STEEP,
-    TAU,
-    THRUST,
-    VOLTAGE,
-)
+from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, many, new_stage
 from omnidyn.model.stick_slip.band import band_error, cross_band, crosses
+from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
-from omnidyn.model.stick_slip.plant import Plant
-from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, settle, sticks, with_given_currents
+from omnidyn.model.stick_slip.release import SIGNS, current_entry, new_state, put, settle, sticks, with_given_currents
 from omnidyn.model.stick_slip.step_bound import MONOTONE, bristle_error, bristle_turns, growth, longest_step
-from omnidyn.model.stick_slip.workspace import copy_row, workspace
 from omnidyn.simulation.implicit.step import GAMMA, step
 from omnidyn.simulation.speed_loop import Loop, close_loop, passed
 
@@ -76,26 +54,33 @@ def begun(rows: int, state: FloatArray, pose: FloatArray) -> Outcome:
     return out
 
 
-def room(state: FloatArray) -> FloatArray:
-    """Room for states: after a whole step, after one and two half steps, within a step, and after it has settled."""
-    return np.zeros((5, len(state)))
+class Room(NamedTuple):
+    """What a run works in; it may serve one run after another, not two at a time."""
+
+    own: Problem  # an array of one plant, and of a stage of it
+    bare: Problem  # the same, its currents given
+    spare: FloatArray  # (5, ..) states after a whole step, one and two half steps, within a step, and as it settles
+
+
+def room(plant: Plant) -> Room:
+    """Room for runs of a plant."""
+    own = many([plant])
+    return Room(Problem(own, new_stage(own)), with_given_currents(plant), np.zeros((5, len(new_state(plant)))))
 
 
 def run_implicit(
     plant: Plant, voltage: FloatArray, bound: FloatArray, dt: FloatArray, state: FloatArray, pose: FloatArray,
-    loop: Loop, tol: float,
+    loop: Loop, tol: float, work: Room | None = None,
 ) -> Outcome:  # fmt: skip
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: one fixed step per row.
 
-    voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,).
+    voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,). work: `room` of
+    this plant, where it serves many runs.
     Raises InputError where motion is so fast beside its duration that no patience would do.
     """
-    plant, bare, out, spare = plant.copy(), with_given_currents(plant), begun(len(dt), state, pose), room(state)
+    out = begun(len(dt), state, pose)
     most = (MOST[0] + MOST[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
-    row = _march(
-        *plant, *bare, workspace(), spare, voltage, bound, dt, *loop, tol, most, out.pose, out.state, out.iterations,
-        out.steps,
-    )  # fmt: skip
+    row = _march(work or room(plant), voltage, bound, dt, loop, tol, most, out)
     if row < len(dt):
         raise InputError(
             "this robot moves too fast to be followed", got=f"more than {most:.2g} steps up to row {row}",
@@ -126,18 +111,19 @@ def advance_pose(pose, x0, xm, x1, length, h, rule):
 
 
 @part
-def pull(body, ahead):
+def pull(plant, stage, ahead):
     """Turn the force of the room into the axes of a body that has turned by `ahead` [rad] since the step began."""
-    if body[ROOM] != 0.0 or body[ROOM + 1] != 0.0:
-        cos, sin = math.cos(body[FACING] + ahead), math.sin(body[FACING] + ahead)
-        body[PUSH] = cos * body[ROOM] + sin * body[ROOM + 1]
-        body[PUSH + 1] = cos * body[ROOM + 1] - sin * body[ROOM]
+    body, task = plant.body, stage.task
+    if body.room[0] != 0.0 or body.room[1] != 0.0:
+        cos, sin = math.cos(task.facing + ahead), math.sin(task.facing + ahead)
+        task.push[0] = cos * body.room[0] + sin * body.room[1]
+        task.push[1] = cos * body.room[1] - sin * body.room[0]
 
 
 @part
-def _turned(body, state, h):
+def _turned(plant, state, h):
     """How far a body turns [rad] in h [s] at the rate of a state."""
-    return h / body[LENGTH] * state[2]
+    return h / plant.body.length * state[2]
 
 
 @part
@@ -153,81 +139,84 @@ def _event(a, b, m):
 
 
 @part
-def _error(body, element, one, two):
+def _error(plant, one, two):
     """Estimated error of `two`, half steps against one whole step, in m/s."""
+    body = plant.body
     worst = max(abs(two[0] - one[0]), abs(two[1] - one[1]))
-    worst = max(worst, YAW_SHARE * abs(two[2] - one[2]) / body[LENGTH])
-    first = current_entry(N_AXES, len(element))
-    for e in range(N_AXES, len(element)):
-        if element[e, INDUCTANCE] > 0.0:
+    worst = max(worst, YAW_SHARE * abs(two[2] - one[2]) / body.length)
+    first = current_entry(N_AXES, len(plant.element))
+    for e in range(N_AXES, len(plant.element)):
+        if plant.element[e].inductance > 0.0:
             worst = max(worst, CURRENT_SHARE * abs(two[first + e - N_AXES] - one[first + e - N_AXES]))
-    if body[BRISTLES] > 0.0:
-        worst = max(worst, bristle_error(body, element, one, two, current_entry(len(element), len(element))))
-    if body[GATHERS] > 0.0:
-        worst = max(worst, band_error(one, two, current_entry(len(element), len(element))))
+    if body.bristles > 0.0:
+        worst = max(worst, bristle_error(plant, one, two, current_entry(len(plant.element), len(plant.element))))
+    if body.gathers > 0.0:
+        worst = max(worst, band_error(one, two, current_entry(len(plant.element), len(plant.element))))
     return worst / 3.0
 
 
 @part
-def _unresolved(body, element, state, h):
+def _unresolved(plant, stage, state, h):
     """A bound of how far a start, a stop or a reversal inside a step of length h can lead astray [m/s]."""
-    put(body, element, state)
-    body[TAU] = h
-    for e in range(N_AXES, len(element)):
-        element[e, NOW] = state[current_entry(e, len(element))]
-    return 2.0 * h * forces_at_work(body, element) / body[MASS] * max(1.0, YAW_SHARE / body[LENGTH])
+    put(stage, state)
+    stage.task.tau = h
+    for e in range(N_AXES, len(plant.element)):
+        stage.each[e].aimed_current = state[current_entry(e, len(plant.element))]
+    return 2.0 * h * forces_at_work(plant, stage) / plant.body.mass * max(1.0, YAW_SHARE / plant.body.length)
 
 
 @part
-def _reverses(body, element, a, b, h):
+def _reverses(plant, a, b, h):
     """A bound of how far currents that leave or meet 0 inside a step of length h can lead astray [m/s]; else 0.
 
     A voltage drop bends such a current by 2 V_d/L. In the first gamma/2 of a step doubling is blind to the bend: every
     first stage ends behind it. The current, wrong by 2 h V_d/L, goes on pushing for L/R.
     """
+    element = plant.element
     worst, first = 0.0, current_entry(N_AXES, len(element))
     for e in range(N_AXES, len(element)):
+        own = element[e]
         i, j = a[first + e - N_AXES], b[first + e - N_AXES]
-        if element[e, DROP] > 0.0 and element[e, INDUCTANCE] > 0.0 and i * j <= 0.0 and i != j:
-            push = element[e, THRUST] / element[e, EFFICIENCY] / element[e, RESISTANCE] / body[MASS]
-            each = push * max(1.0, YAW_SHARE / body[LENGTH]) + CURRENT_SHARE / element[e, INDUCTANCE]
-            worst = max(worst, 2.0 * h * element[e, DROP] * each)
+        if own.drop > 0.0 and own.inductance > 0.0 and i * j <= 0.0 and i != j:
+            push = own.thrust / own.efficiency / own.resistance / plant.body.mass
+            off = push * max(1.0, YAW_SHARE / plant.body.length) + CURRENT_SHARE / own.inductance
+            worst = max(worst, 2.0 * h * own.drop * off)
     return worst
 
 
 @part
-def _share(body, element, state, tol):
+def _share(plant, stage, state, tol):
     """What may go wrong per second [m/s/s], so that all together stays within tol: tol over the memory of the robot.
 
     A motor at its limit, or without current under its voltage drop, makes nothing fade.
     """
-    memory, first = body[MEMORY], current_entry(N_AXES, len(element))
-    for e in range(N_AXES, len(element)):
+    memory, first = plant.body.memory[0], current_entry(N_AXES, len(plant.element))
+    for e in range(N_AXES, len(plant.element)):
         i = abs(state[first + e - N_AXES])
-        if i >= element[e, BOUND] or (i == 0.0 and element[e, DROP] > 0.0):
-            memory = body[MEMORY + 1]
+        if i >= stage.each[e].bound or (i == 0.0 and plant.element[e].drop > 0.0):
+            memory = plant.body.memory[1]
     return tol / min(max(memory, FORGETS[0]), FORGETS[1])
 
 
 @part
-def _beyond(body, element, state, end, h, tol, ratio):
+def _beyond(plant, stage, state, end, h, tol, ratio):
     """The ratio of the error of a step to what it may be, where friction falls with the speed or bends."""
-    m = len(element)
-    if body[STEEP] > 0.0:
-        ratio *= growth(body, element, state, end, h)
-    if body[BRISTLES] > 0.0:
-        ratio = max(ratio, bristle_turns(body, element, state, end, current_entry(m, m), h) / tol)
+    m = len(plant.element)
+    if plant.body.steep > 0.0:
+        ratio *= growth(plant, stage, state, end, h)
+    if plant.body.bristles > 0.0:
+        ratio = max(ratio, bristle_turns(plant, state, end, current_entry(m, m), h) / tol)
     return ratio
 
 
 @part
-def in_one_row(body, dt):
+def in_one_row(plant, dt):
     """Into how many fixed steps a row is cut: one, but where friction falls so fast that a stage had two solutions."""
-    return max(1, math.ceil(dt * body[STEEP] / MONOTONE))
+    return max(1, math.ceil(dt * plant.body.steep / MONOTONE))
 
 
 @part
-def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
+def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
     """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
 
     spare[1] and spare[2] receive the states in the middle and at the end. Returns its length and the one to try next.
@@ -235,31 +224,32 @@ def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
     what holds and what drives differ by no more than rounding, something gives way and sticks again in every step, for
     as long as that lasts: after MANY, such steps grow all the same. What moves there is slower than rounding, too.
     """
-    one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(element)
-    rate = _share(body, element, state, tol)
-    if body[STEEP] > 0.0:
-        _unresolved(body, element, state, h)  # poses the problem whose forces bound the speeds of the step
-        h = longest_step(body, element, state, h)
+    body = plant.body
+    one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(plant.element)
+    rate = _share(plant, stage, state, tol)
+    if body.steep > 0.0:
+        _unresolved(plant, stage, state, h)  # poses the problem whose forces bound the speeds of the step
+        h = longest_step(plant, stage, state, h)
     while True:
         if left - h < 1e-9 * dt:
             h = left
-        pull(body, _turned(body, state, 0.5 * h))  # as in the middle of the step: second order, as the step is
-        first = step(body, element, s, state, one, inner, h)
-        pull(body, _turned(body, state, 0.25 * h))
-        second = step(body, element, s, state, middle, inner, 0.5 * h)
-        pull(body, _turned(body, state, 0.25 * h) + _turned(body, middle, 0.5 * h))
-        third = step(body, element, s, middle, two, inner, 0.5 * h)
+        pull(plant, stage, _turned(plant, state, 0.5 * h))  # as in the middle of the step: second order, as the step is
+        first = step(plant, stage, state, one, inner, h)
+        pull(plant, stage, _turned(plant, state, 0.25 * h))
+        second = step(plant, stage, state, middle, inner, 0.5 * h)
+        pull(plant, stage, _turned(plant, state, 0.25 * h) + _turned(plant, middle, 0.5 * h))
+        third = step(plant, stage, middle, two, inner, 0.5 * h)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
-        ratio = _error(body, element, one, two) / max(rate * max(h, SHORT), ROUNDING)
-        if body[LAWS] != 0.0:
-            ratio = _beyond(body, element, state, two, h, tol, ratio)
-        astray = max(_reverses(body, element, state, middle, h), _reverses(body, element, middle, two, h))
+        ratio = _error(plant, one, two) / max(rate * max(h, SHORT), ROUNDING)
+        if body.laws != 0.0:
+            ratio = _beyond(plant, stage, state, two, h, tol, ratio)
+        astray = max(_reverses(plant, state, middle, h), _reverses(plant, middle, two, h))
         if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
-            astray = max(astray, _unresolved(body, element, state, h))
-        if body[GATHERS] > 0.0 and (
-            crosses(element, middle, current_entry(m, m)) or crosses(element, two, current_entry(m, m))
+            astray = max(astray, _unresolved(plant, stage, state, h))
+        if body.gathers > 0.0 and (
+            crosses(plant, middle, current_entry(m, m)) or crosses(plant, two, current_entry(m, m))
         ):
-            astray = max(astray, _unresolved(body, element, state, h))
+            astray = max(astray, _unresolved(plant, stage, state, h))
         counts[2] += 1
         if astray > 0.0:
             lasts = counts[2] > MANY and h <= SHORTEST * 2.0 ** ((counts[2] - MANY) // AGAIN)
@@ -274,64 +264,67 @@ def find_step(body, element, s, spare, state, h, left, dt, tol, counts):
 
 
 @part
-def _row(body, element, bare_body, bare_element, s, spare, state, dt, tol, most, h, pose, counts):
+def _row(plant, stage, bare, spare, state, dt, tol, most, h, pose, counts):
     """Advance over one row of held voltage with adaptive steps, `most` of them at the most.
 
     Returns the step length to begin the next row with.
     """
-    middle, two, inner, m, left = spare[1], spare[2], spare[3], len(element), dt
-    body[FACING] = pose[2]
-    pull(body, 0.0)
-    if body[GATHERS] > 0.0:
-        cross_band(element, state, current_entry(m, m))
-    counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
+    body = plant.body
+    middle, two, inner, m, left = spare[1], spare[2], spare[3], len(plant.element), dt
+    stage.task.facing = pose[2]
+    pull(plant, stage, 0.0)
+    if body.gathers > 0.0:
+        cross_band(plant, state, current_entry(m, m))
+    counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
     while left > 0.0 and counts[1] <= most:
-        taken, h = find_step(body, element, s, spare, state, h, left, dt, tol, counts)
-        advance_pose(pose, state, middle, two, body[LENGTH], taken, SIMPSON)
+        taken, h = find_step(plant, stage, spare, state, h, left, dt, tol, counts)
+        advance_pose(pose, state, middle, two, body.length, taken, SIMPSON)
         copy_row(state, two)
-        body[FACING] = pose[2]
-        if body[GATHERS] > 0.0:
-            cross_band(element, state, current_entry(m, m))
+        stage.task.facing = pose[2]
+        if body.gathers > 0.0:
+            cross_band(plant, state, current_entry(m, m))
         if sticks(state, m):  # a step so short sees no release within its rounding
-            pull(body, 0.0)
-            counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
+            pull(plant, stage, 0.0)
+            counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
         left = left - taken if taken < left else 0.0
     return h
 
 
 @branching_kernel
-def _march(
-    body, element, bare_body, bare_element, s, spare, voltage, bound, dt, kp, ki, limit, radius, command, tick, period,
-    total, dead, tol, most, poses, states, iterations, steps,
-):  # fmt: skip
+def _march(room, voltage, bound, dt, loop, tol, most, out):
     """All rows; see run_implicit. Returns how many of them were done before `most` steps were."""
-    state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(3, np.int64)
+    own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
+    plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
+    state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
     h = dt[0]
     for k in range(len(dt)):
         counts[0] = counts[1] = 0
-        if len(command) > 0:
-            close_loop(element, state, k, voltage, kp, ki, limit, radius, command, tick, period, total)
+        if len(loop.command) > 0:
+            if loop.tick[k]:
+                close_loop(plant, state, loop, loop.command[k], voltage[k])
+            else:
+                copy_row(voltage[k], voltage[k - 1])
         for w in range(voltage.shape[1]):
-            element[N_AXES + w, VOLTAGE], element[N_AXES + w, BOUND] = passed(voltage[k, w], dead), bound[k, w]
+            stage.each[N_AXES + w].voltage, stage.each[N_AXES + w].bound = passed(voltage[k, w], loop.dead), bound[k, w]
         if tol > 0.0:
-            h = _row(body, element, bare_body, bare_element, s, spare, state, dt[k], tol, most, h, pose, counts)
+            h = _row(plant, stage, bare, spare, state, dt[k], tol, most, h, pose, counts)
             most -= counts[1]
             if most < 0.0:
                 return k
         else:
-            pieces = in_one_row(body, dt[k])
+            pieces = in_one_row(plant, dt[k])
             for _ in range(pieces):
-                body[FACING] = pose[2]
-                pull(body, _turned(body, state, 0.5 * dt[k] / pieces))
-                count = step(body, element, s, state, spare[2], spare[3], dt[k] / pieces)
+                stage.task.facing = pose[2]
+                pull(plant, stage, _turned(plant, state, 0.5 * dt[k] / pieces))
+                count = step(plant, stage, state, spare[2], spare[3], dt[k] / pieces)
                 counts[0], counts[1] = max(counts[0], count), pieces
-                advance_pose(pose, state, spare[3], spare[2], body[LENGTH], dt[k] / pieces, STAGES)
+                advance_pose(pose, state, spare[3], spare[2], plant.body.length, dt[k] / pieces, STAGES)
                 copy_row(state, spare[2])
-                if body[GATHERS] > 0.0:
-                    cross_band(element, state, current_entry(len(element), len(element)))
-        iterations[k], steps[k] = counts[0], counts[1]
-        copy_row(states[k + 1], state)
-        copy_row(poses[k + 1], pose)
+                if plant.body.gathers > 0.0:
+                    cross_band(plant, state, current_entry(len(plant.element), len(plant.element)))
+        out.iterations[k], out.steps[k] = counts[0], counts[1]
+        copy_row(out.state[k + 1], state)
+        copy_row(out.pose[k + 1], pose)
     return len(dt)
 
 

@@ -13,28 +13,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.layout import (
-    BRISTLES,
-    CURRENT,
-    ELLIPSE,
-    FALL,
-    FALL_XY,
-    GATHERS,
-    GOAL,
-    HOLD,
-    HOLD_X,
-    HOLD_Y,
-    INDUCTANCE,
-    MASS,
-    N_AXES,
-    NOW,
-    RESISTANCE,
-    SIGN,
-    SLIDE,
-    SLIDE_X,
-    SLIDE_Y,
-    TAU,
-)
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.stick_slip.band import aim_band, gather, hold_in_band, keep_band
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import solve
@@ -47,107 +26,114 @@ STIFF = GAMMA / (1.0 - 2.0 * GAMMA)  # tau R/L from which SDIRK2 passes the end 
 
 
 @part
-def _aim(body, element, start, end, back):
+def _aim(plant, stage, start, end, back):
     """Set x* and i* of a stage: start + back (end - start), `end` holding x and the plant the currents of stage 1."""
-    m = len(element)
+    m = len(plant.element)
     for a in range(3):
-        body[GOAL + a] = start[a] + back * (end[a] - start[a])
+        stage.task.goal[a] = start[a] + back * (end[a] - start[a])
     for e in range(N_AXES, m):
         i = start[current_entry(e, m)]
-        element[e, NOW] = i + back * (element[e, CURRENT] - i) if back != 0.0 else i
-    if body[BRISTLES] > 0.0:
-        aim_bristles(body, element, start, current_entry(m, m), back)
-    if body[GATHERS] > 0.0:
-        aim_band(element, start, current_entry(m, m), back)
+        stage.each[e].aimed_current = i + back * (stage.each[e].current - i) if back != 0.0 else i
+    if plant.body.bristles > 0.0:
+        aim_bristles(plant, stage, start, current_entry(m, m), back)
+    if plant.body.gathers > 0.0:
+        aim_band(stage, start, current_entry(m, m), back)
 
 
 @part
-def _hold_as(body, x, y):
+def _hold_as(stage, x, y):
     """Set what the ellipse holds; returns what it held before."""
-    before = body[HOLD_X], body[HOLD_Y]
-    body[HOLD_X], body[HOLD_Y] = x, y
+    task = stage.task
+    before = task.hold[0], task.hold[1]
+    task.hold[0], task.hold[1] = x, y
     return before
 
 
 @part
-def _stop_ellipse(body, state):
+def _stop_ellipse(stage, state):
     state[0] = state[1] = 0.0
-    body[ELLIPSE] = 0.0
+    stage.task.ellipse = 0.0
 
 
 @part
-def _stage(body, element, s, start, end):
+def _stage(plant, stage, start, end):
     """Solve one stage in place, from the guess `end`; `start` is the state before the step. Returns the iterations."""
-    if body[ELLIPSE] != 1.0:
-        count = solve(body, element, end, s)
-        if body[GATHERS] > 0.0:
-            gather(body, element, s, body[TAU])
+    body, task = plant.body, stage.task
+    if task.ellipse != 1.0:
+        count = solve(plant, stage, end)
+        if body.gathers > 0.0:
+            gather(plant, stage, task.tau)
         return count
     # A body that slides meets the Coulomb level; only when it would go through rest can breakaway hold it. What falls
     # with the speed has no such gap.
-    falls = body[FALL_XY] > 0.0
-    x, y = _hold_as(body, body[HOLD_X if falls else SLIDE_X], body[HOLD_Y if falls else SLIDE_Y])
-    reach = body[TAU] / body[MASS] * forces_at_work(body, element)
-    if math.hypot(body[GOAL], body[GOAL + 1]) <= reach:
-        _stop_ellipse(body, end)  # it could stop in this stage: a first guess, which solve takes back if wrong
-    count = solve(body, element, end, s)
-    _hold_as(body, x, y)
-    if not falls and body[ELLIPSE] == 1.0 and end[0] * start[0] + end[1] * start[1] < 0.0:
-        _stop_ellipse(body, end)
-        count = max(count, solve(body, element, end, s))
+    falls = body.fall > 0.0
+    level = task.hold if falls else body.coulomb
+    x, y = _hold_as(stage, level[0], level[1])
+    reach = task.tau / body.mass * forces_at_work(plant, stage)
+    if math.hypot(task.goal[0], task.goal[1]) <= reach:
+        _stop_ellipse(stage, end)  # it could stop in this stage: a first guess, which solve takes back if wrong
+    count = solve(plant, stage, end)
+    _hold_as(stage, x, y)
+    if not falls and task.ellipse == 1.0 and end[0] * start[0] + end[1] * start[1] < 0.0:
+        _stop_ellipse(stage, end)
+        count = max(count, solve(plant, stage, end))
     return count
 
 
 @part
-def _slips_back(body, element, start):
+def _slips_back(plant, stage, start):
     """Whether an element that holds more than it slides with has stopped or reversed since `start`."""
-    for e in range(len(element)):
-        gap = element[e, HOLD] > element[e, SLIDE] or element[e, HOLD + 1] > element[e, SLIDE + 1]
-        if gap and element[e, FALL] == 0.0:
+    body, task = plant.body, stage.task
+    for e in range(len(plant.element)):
+        own, at = plant.element[e], stage.each[e]
+        gap = at.hold[0] > own.coulomb[0] or at.hold[1] > own.coulomb[1]
+        if gap and own.fall == 0.0:
             before = start[SIGNS + e]
-            if before != 0.0 and before != element[e, SIGN]:
+            if before != 0.0 and before != at.sign:
                 return True
-    before = start[SIGNS + len(element)]
-    if body[FALL_XY] > 0.0:
+    before = start[SIGNS + len(plant.element)]
+    if body.fall > 0.0:
         return False
-    return (body[HOLD_X] > body[SLIDE_X] or body[HOLD_Y] > body[SLIDE_Y]) and before == 1.0 and body[ELLIPSE] == 0.0
+    return (task.hold[0] > body.coulomb[0] or task.hold[1] > body.coulomb[1]) and before == 1.0 and task.ellipse == 0.0
 
 
 @part
-def _torn_loose(body, element, start):
+def _torn_loose(plant, stage, start):
     """Whether something at rest gave way in a step so long, h R/L > 1 + sqrt 2, that its currents overshoot."""
-    m, stiff, released = len(element), False, start[SIGNS + len(element)] == 0.0 and body[ELLIPSE] == 1.0
+    element = plant.element
+    m, stiff, released = len(element), False, start[SIGNS + len(element)] == 0.0 and stage.task.ellipse == 1.0
     for e in range(m):
-        released |= start[SIGNS + e] == 0.0 and element[e, SIGN] != 0.0
-        if e >= N_AXES and element[e, INDUCTANCE] > 0.0:
-            stiff |= body[TAU] * element[e, RESISTANCE] > STIFF * element[e, INDUCTANCE]
+        own = element[e]
+        released |= start[SIGNS + e] == 0.0 and stage.each[e].sign != 0.0
+        if e >= N_AXES and own.inductance > 0.0:
+            stiff |= stage.task.tau * own.resistance > STIFF * own.inductance
     return stiff and released
 
 
 @part
-def _begin(body, element, start, end, tau):
+def _begin(plant, stage, start, end, tau):
     """Make ready for a first stage of length tau from `start`."""
     for j in range(len(start)):
         end[j] = start[j]
-    put(body, element, start)
-    body[TAU] = tau
-    _aim(body, element, start, end, 0.0)
-    if body[GATHERS] > 0.0:
-        hold_in_band(body, element)
+    put(stage, start)
+    stage.task.tau = tau
+    _aim(plant, stage, start, end, 0.0)
+    if plant.body.gathers > 0.0:
+        hold_in_band(plant, stage)
 
 
 @part
-def first_stage(body, element, s, start, end, middle, h):
+def first_stage(plant, stage, start, end, middle, h):
     """Stage 1 of a step of length h from `start`, into `end`; `middle` receives x there. Returns the iterations."""
-    _begin(body, element, start, end, GAMMA * h)
-    count = _stage(body, element, s, start, end)
+    _begin(plant, stage, start, end, GAMMA * h)
+    count = _stage(plant, stage, start, end)
     for a in range(3):
         middle[a] = end[a]
     return count
 
 
 @part
-def last_stage(body, element, s, start, end, h):
+def last_stage(plant, stage, start, end, h):
     """The stage that ends a step whose first stage has just been solved, into `end`; the plant keeps its solution.
 
     Where breakaway exceeds Coulomb and something stops or reverses, one implicit Euler stage takes the place of both:
@@ -155,27 +141,27 @@ def last_stage(body, element, s, start, end, h):
     in a step too long for the currents.
     Returns (iterations, b): x* = start + b (x of stage 1 - start), b = 0 for the Euler stage.
     """
-    m, count, back = len(element), 0, BACK
-    euler = _slips_back(body, element, start)
+    m, count, back = len(plant.element), 0, BACK
+    euler = _slips_back(plant, stage, start)
     if not euler:
-        _aim(body, element, start, end, BACK)
-        count = _stage(body, element, s, start, end)
-        euler = _slips_back(body, element, start) or _torn_loose(body, element, start)
+        _aim(plant, stage, start, end, BACK)
+        count = _stage(plant, stage, start, end)
+        euler = _slips_back(plant, stage, start) or _torn_loose(plant, stage, start)
     if euler:
-        _begin(body, element, start, end, h)
-        count, back = max(count, _stage(body, element, s, start, end)), 0.0
-    take(body, element, end)
+        _begin(plant, stage, start, end, h)
+        count, back = max(count, _stage(plant, stage, start, end)), 0.0
+    take(stage, end)
     for e in range(N_AXES, m):
-        end[current_entry(e, m)] = element[e, CURRENT]
-    if body[BRISTLES] > 0.0:
-        keep_bristles(body, element, end, current_entry(m, m))
-    if body[GATHERS] > 0.0:
-        keep_band(element, end, current_entry(m, m))
+        end[current_entry(e, m)] = stage.each[e].current
+    if plant.body.bristles > 0.0:
+        keep_bristles(plant, stage, end, current_entry(m, m))
+    if plant.body.gathers > 0.0:
+        keep_band(stage, end, current_entry(m, m))
     return count, back
 
 
 @part
-def step(body, element, s, start, end, middle, h):
+def step(plant, stage, start, end, middle, h):
     """One SDIRK2 step of length h from `start` to `end`; `middle` receives x at t + gamma h. Returns the iterations."""
-    first = first_stage(body, element, s, start, end, middle, h)
-    return max(first, last_stage(body, element, s, start, end, h)[0])
+    first = first_stage(plant, stage, start, end, middle, h)
+    return max(first, last_stage(plant, stage, start, end, h)[0])

@@ -15,12 +15,10 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.keys import DEAD_BAND, LATENCY
-from omnidyn.model.layout import LENGTH, N_AXES
+from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.model.stick_slip.plant import Plant
-from omnidyn.model.stick_slip.release import start_state, with_given_currents
-from omnidyn.model.stick_slip.workspace import workspace
+from omnidyn.model.stick_slip.release import start_state
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands, current_bounds
 from omnidyn.simulation.implicit.march import Outcome, begun, room
@@ -118,8 +116,8 @@ def differentiate(
     robot, keys, robots, numbers, plants = ready.robot, ready.keys, ready.robots, ready.numbers, ready.plants
     if given.set_point is not None:
         refuse_rate(keys)
-    directions, length = directions_of(numbers, plants, rates), numbers.body[LENGTH]
-    stretch = difference(np.array([p.body[LENGTH] for p in plants]))
+    directions, length = directions_of(numbers, plants, rates), numbers.body.length
+    stretch = difference(np.array([p.body.length for p in plants]))
     first = np.zeros((len(keys), width(numbers)))
     first[:, 2] = start[0][2] * stretch
     bound = current_bounds(robot, given, len(given.dt))
@@ -167,14 +165,13 @@ def run_with_derivatives(
     With `seen`, the run is sampled there instead: the derivatives by row are left out, both arrays are empty.
     """
     assert given.voltage is not None
-    rows, bare = len(given.dt), with_given_currents(numbers)
     state = start_state(numbers, start[0], np.zeros(numbers.wheels))
-    out, kept = begun(rows, state, start[1]), rows + 1 if seen is None else 0
+    out, kept = begun(len(given.dt), state, start[1]), len(given.dt) + 1 if seen is None else 0
     ds, dposes = np.zeros((kept, *first.shape)), np.zeros((kept, len(first), 3))
     ds[:1] = first
     march_with_derivatives(
-        *numbers.copy(), *bare, workspace(), room(state), directions, given.voltage, bound, given.dt, tol, out.pose,
-        out.state, out.iterations, out.steps, first, ds, dposes, seen or NO_SAMPLES,
+        room(numbers), directions, given.voltage, bound, given.dt, tol, out, first, ds,
+        dposes, seen or NO_SAMPLES,
     )  # fmt: skip
     return out, ds, dposes
 

@@ -4,34 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.friction.kinds import KARNOPP
 from omnidyn.model.keys import ROTOR, WHEEL, Key
-from omnidyn.model.layout import (
-    ACTIVE,
-    BEND_HOLD,
-    BEND_SLIDE,
-    EFFICIENCY,
-    ELLIPSE,
-    GX,
-    GZ,
-    HOLD,
-    SLIDE,
-    SLIDE_X,
-    SLIDE_Y,
-    STIFF,
-    STIFF_XY,
-)
+from omnidyn.model.layout import Plant, Stage, many, new_stage
 from omnidyn.model.robot import Robot
-from omnidyn.model.stick_slip.plant import Plant, plant
+from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import new_state
-from omnidyn.model.stick_slip.workspace import workspace
 from omnidyn.model.surroundings.floor import refuse_slope
 from omnidyn.model.wheels import refuse_slip
 
@@ -41,11 +26,10 @@ EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10; a
 class Directions(NamedTuple):
     """Plants a little up (2k) and down (2k + 1) each of the K parameters, and room to work in."""
 
-    body: FloatArray  # (2 K, BODY_SIZE)
-    element: FloatArray  # (2 K, elements, ELEMENT_SIZE)
+    plants: Plant  # 2 K + 1 of them
+    stages: Stage  # one of each plant
     arm: FloatArray  # (elements, K, 3) derivative of the directions g_e
     voltage: FloatArray  # (K, rows, n) derivative of the applied voltage
-    workspace: FloatArray  # (2, ...) two workspace arrays
     lift: FloatArray  # (3, 6) rows of the elimination: stuck direction, and what it is made of
     held: IntArray  # (2, 3) which elements span what is stuck; pivots
     point: FloatArray  # (5, 3) points, accelerations
@@ -89,13 +73,12 @@ def directions_of(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Dir
 
     rates: derivatives of the applied voltages, shape (K, rows, n).
     """
-    body = np.array([*(p.body for p in plants), numbers.body])
-    element = np.array([*(p.element for p in plants), numbers.element])
+    own = many([*plants, numbers])
     count, n = len(plants) // 2, numbers.wheels
-    arm = np.ascontiguousarray(np.swapaxes(difference(element[:-1, :, GX : GZ + 1]), 0, 1))
+    arm = np.ascontiguousarray(np.swapaxes(difference(own.element["g"][:-1]), 0, 1))
     work = np.zeros((4, count, width(numbers)))
     return Directions(
-        body=body, element=element, arm=arm, voltage=rates, workspace=np.array([workspace(), workspace()]),
+        plants=own, stages=new_stage(own), arm=arm, voltage=rates,
         lift=np.zeros((3, 6)), held=np.zeros((2, 3), np.int64), point=np.zeros((5, 3)), aim=work[0], middle=work[1],
         half=work[2], state=np.zeros((2, len(new_state(numbers)))), gained=np.zeros(3), carry=np.zeros((3, n)),
         kept=work[3],
@@ -133,16 +116,20 @@ def refuse_band(robot: Robot) -> None:
 
 def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
     """Dry friction, or a gear loss, of 0 is not a number to differentiate by: where it is off nothing can stick."""
-    levels = np.r_[SLIDE : HOLD + 2, EFFICIENCY]
-    off = (numbers.element[:, levels] != up.element[:, levels]).any(axis=1) & (numbers.element[:, ACTIVE] == 0.0)
-    bends = slice(BEND_SLIDE, BEND_HOLD + 2)
-    off |= (numbers.element[:, bends] != up.element[:, bends]).any(axis=1) & (numbers.element[:, STIFF] == 0.0)
-    ellipse = numbers.body[ELLIPSE] == 2.0 and up.body[SLIDE_X] + up.body[SLIDE_Y] > 0.0
-    if off.any() or ellipse or (numbers.body[STIFF_XY] == 0.0 and up.body[STIFF_XY] > 0.0):
+    before, after = numbers.element, up.element
+    off = _differ(before, after, "coulomb", "breakaway", "efficiency") & (before["active"] == 0.0)
+    off |= _differ(before, after, "bristle_coulomb", "bristle_breakaway") & (before["stiffness"] == 0.0)
+    ellipse = numbers.body.breakaway[0] == 0.0 and up.body.coulomb.sum() > 0.0
+    if off.any() or ellipse or (numbers.body.stiffness == 0.0 and up.body.stiffness > 0.0):
         raise InputError(
             "cannot differentiate with respect to what is off", got=key, expected="a level that is not 0, a loss",
             remedy="give it a value first", where="keys",
         )  # fmt: skip
+
+
+def _differ(before: Any, after: Any, *names: str) -> BoolArray:
+    """Which elements differ in one of these fields. Shape (elements,)."""
+    return np.any([(before[name] != after[name]).reshape(len(before), -1).any(axis=1) for name in names], axis=0)
 
 
 def _scale(robot: Robot, key: str) -> float:

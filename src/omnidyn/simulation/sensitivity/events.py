@@ -5,38 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.layout import (
-    BOUND,
-    BRANCH,
-    BRISTLES,
-    CURRENT,
-    DROP,
-    EFFICIENCY,
-    ELLIPSE,
-    EMF,
-    GOAL,
-    GX,
-    GZ,
-    HOLD,
-    HOLD_X,
-    HOLD_Y,
-    INDUCTANCE,
-    MASS,
-    N_AXES,
-    NOW,
-    OPEN,
-    PUSH,
-    RESISTANCE,
-    SIGN,
-    TAU,
-    VOLTAGE,
-)
+from omnidyn.model.layout import N_AXES, OPEN, Plant, Stage
 from omnidyn.model.stick_slip.active_set import find_active_set, newton_direction
 from omnidyn.model.stick_slip.can_hold import worst_direction
+from omnidyn.model.stick_slip.copies import copy_row, copy_table
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses, winding
 from omnidyn.model.stick_slip.laws import aim_bristles
 from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, settle, sticks
-from omnidyn.model.stick_slip.workspace import NEWTON, WORST, copy_row, copy_table
 from omnidyn.simulation.implicit.march import SHORTEST
 from omnidyn.simulation.implicit.step import step
 from omnidyn.simulation.sensitivity.directions import EPS
@@ -50,26 +25,26 @@ SOON = 1e-6  # of L/R: a time in which a current hardly changes
 
 
 @part
-def _at_instant(body, element, state, x, delay):
+def _at_instant(plant, stage, state, x, delay):
     """Pose the problem of the instant: x and the currents of `state` as they are, nothing moves during `delay` [s]."""
-    m = len(element)
-    body[TAU] = delay
+    m = len(plant.element)
+    stage.task.tau = delay
     for a in range(3):
-        body[GOAL + a] = x[a]
+        stage.task.goal[a] = x[a]
     for e in range(N_AXES, m):
-        element[e, NOW] = state[current_entry(e, m)]
-    if body[BRISTLES] > 0.0:
-        aim_bristles(body, element, state, current_entry(m, m), 0.0)
+        stage.each[e].aimed_current = state[current_entry(e, m)]
+    if plant.body.bristles > 0.0:
+        aim_bristles(plant, stage, state, current_entry(m, m), 0.0)
 
 
 @part
-def _acceleration(body, element, s, state, x, out):
+def _acceleration(plant, stage, state, x, out):
     """Acceleration at x [m/s^2] with the signs that the plant has: what is stuck stays."""
-    _at_instant(body, element, state, x, SHORTEST)
-    residual(body, element, x, s)
-    newton_direction(s, find_active_set(body, element, s))
+    _at_instant(plant, stage, state, x, SHORTEST)
+    residual(plant, stage, x)
+    newton_direction(stage.work, find_active_set(plant, stage))
     for a in range(3):
-        out[a] = s[NEWTON, a] / SHORTEST
+        out[a] = stage.work.newton[a] / SHORTEST
 
 
 @part
@@ -82,7 +57,7 @@ def differ(a, b, m):
 
 
 @part
-def _leap(body, element, s, along, start, end, h, gained, d):
+def _leap(plant, stage, along, start, end, h, gained, d):
     """Derivatives d, in place, over a short step in which something stops, reverses or is released.
 
     `start` and `end`: states whose signs are those of the next moment; gained: acceleration at the end. The instant
@@ -90,24 +65,24 @@ def _leap(body, element, s, along, start, end, h, gained, d):
     dt = -(g . dx + dg . x)/(g . f-); a release is where the gap phi of what is stuck reaches 0; a stop is left to the
     stage at the end.
     """
-    m, before, after = len(element), along.point[2], along.point[3]
-    put(body, element, start)
-    _acceleration(body, element, s, start, start, before)
-    _release_shift(body, element, s, along, start, end, before, after, d)
+    m, before, after = len(plant.element), along.point[2], along.point[3]
+    put(stage, start)
+    _acceleration(plant, stage, start, start, before)
+    _release_shift(plant, stage, along, start, end, before, after, d)
     for e in range(m):
         if start[SIGNS + e] * end[SIGNS + e] == -1.0:
-            element[e, SIGN] = end[SIGNS + e]
-            _acceleration(body, element, s, start, end, after)
-            _reverse(element[e, GX : GZ + 1], along.arm[e], start, before, after, d)
+            stage.each[e].sign = end[SIGNS + e]
+            _acceleration(plant, stage, start, end, after)
+            _reverse(plant.element[e].g[:], along.arm[e], start, before, after, d)
     crosses = start[SIGNS + m] == 1.0 and end[SIGNS + m] == 1.0 and (start[0] != 0.0 or start[1] != 0.0)
     if crosses and start[0] * end[0] + start[1] * end[1] <= 0.0:
         after[0], after[1] = start[0], start[1]  # along its line
         _reverse(after, along.arm[0], start, before, gained, d)
-    put(body, element, end)
-    if body[ELLIPSE] != 1.0 or end[0] != 0.0 or end[1] != 0.0:
-        _at_instant(body, element, start, start, h)
+    put(stage, end)
+    if stage.task.ellipse != 1.0 or end[0] != 0.0 or end[1] != 0.0:
+        _at_instant(plant, stage, start, start, h)
         copy_table(along.aim, d)
-        stage_derivatives(body, element, s, along, end, along.aim, d)
+        stage_derivatives(plant, stage, along, end, along.aim, d)
 
 
 @part
@@ -129,29 +104,28 @@ def _reverse(g, arms, start, before, after, d):
 
 
 @part
-def _release_shift(body, element, s, along, start, end, before, after, d):
+def _release_shift(plant, stage, along, start, end, before, after, d):
     """What a release between two states does to d; `before` becomes the acceleration after it."""
-    m, some, jump = len(element), False, 0.0
+    m, some, jump = len(plant.element), False, 0.0
     for e in range(m + 1):
         if start[SIGNS + e] == 0.0 and end[SIGNS + e] != 0.0:
             some = True
             if e < m:
-                element[e, SIGN] = end[SIGNS + e]
+                stage.each[e].sign = end[SIGNS + e]
             else:
-                body[ELLIPSE] = 1.0
+                stage.task.ellipse = 1.0
     if not some:
         return
-    _acceleration(body, element, s, start, end, after)
+    _acceleration(plant, stage, start, end, after)
     for c in range(3):
         jump = max(jump, abs(before[c] - after[c]))
-    force = forces_at_work(body, element)
-    if jump * body[MASS] > 1e-6 * force and _weakest(body, element, along, start, force):
-        later = _later(body, element, along, start, before)
+    force = forces_at_work(plant, stage)
+    if jump * plant.body.mass > 1e-6 * force and _weakest(plant, stage, along, start, force):
+        later = _later(plant, stage, along, start, before)
         there = 0.0 < abs(later) < np.inf
         for k in range(len(d) if there else 0):
-            up = _gap(along.body[2 * k], along.element[2 * k], along, start, d[k], EPS)
-            down = _gap(along.body[2 * k + 1], along.element[2 * k + 1], along, start, d[k], -EPS)
-            shift = -(up - down) / (2.0 * EPS)
+            shift = -(_gap_beside(along, 2 * k, start, d[k], EPS) - _gap_beside(along, 2 * k + 1, start, d[k], -EPS))
+            shift /= 2.0 * EPS
             for c in range(3):
                 d[k, c] += (before[c] - after[c]) * shift / later
     for c in range(3):
@@ -159,102 +133,118 @@ def _release_shift(body, element, s, along, start, end, before, after, d):
 
 
 @part
-def _least_gap(body, element, s, x):
+def _least_gap(plant, stage, x):
     """phi, at x, of the direction in which the stuck elements hold least; see `worst_direction`."""
-    set_losses(body, element)
-    residual(body, element, x, s)
-    return worst_direction(body, element, s, find_active_set(body, element, s))
+    set_losses(plant, stage)
+    residual(plant, stage, x)
+    return worst_direction(plant, stage, find_active_set(plant, stage))
 
 
 @part
-def _weakest(body, element, along, start, force):
+def _copy_problem(along, stage):
+    """Give the stage of the robot's own plant, of those taken along, the problem of another one."""
+    along.stages.task[-1] = stage.task
+    for e in range(len(stage.each)):
+        along.stages.each[-1, e] = stage.each[e]
+
+
+@part
+def _weakest(plant, stage, along, start, force):
     """Direction in which the stuck elements of `start` give way, times a small force, into along.point[4].
 
     Found with levels that are a little too low. False where they hold all the same: there is no such direction.
     """
-    b, el, s, push = along.body[-1], along.element[-1], along.workspace[0], along.point[4]
-    copy_row(b, body)
-    copy_table(el, element)
-    put(b, el, start)
-    b[HOLD_X], b[HOLD_Y] = b[HOLD_X] * (1.0 - MARGIN), b[HOLD_Y] * (1.0 - MARGIN)
-    for e in range(len(el)):
-        el[e, HOLD], el[e, HOLD + 1] = el[e, HOLD] * (1.0 - MARGIN), el[e, HOLD + 1] * (1.0 - MARGIN)
-    _at_instant(b, el, start, start, SHORTEST)
-    found = _least_gap(b, el, s, start)
+    own, push = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.point[4]
+    _copy_problem(along, stage)
+    put(own, start)
+    own.task.hold[0], own.task.hold[1] = own.task.hold[0] * (1.0 - MARGIN), own.task.hold[1] * (1.0 - MARGIN)
+    for e in range(len(own.each)):
+        hold = own.each[e].hold
+        hold[0], hold[1] = hold[0] * (1.0 - MARGIN), hold[1] * (1.0 - MARGIN)
+    _at_instant(plant, own, start, start, SHORTEST)
+    found = _least_gap(plant, own, start)
     for a in range(3):
-        push[a] = MARGIN * force * s[WORST, a]
+        push[a] = MARGIN * force * own.work.worst[a]
     return found < 0.0
 
 
 @part
-def _gap(body, element, along, start, d, eps):
+def _gap(plant, stage, along, start, d, eps):
     """phi of what is stuck in `start`, at the state changed by eps d, under the additional push along.point[4] [N]."""
-    m, s, point = len(element), along.workspace[0], along.point[0]
-    put(body, element, start)
+    m, point = len(plant.element), along.point[0]
+    put(stage, start)
     for a in range(3):
         point[a] = start[a] + eps * d[a]
-    _at_instant(body, element, start, point, SHORTEST)
+    _at_instant(plant, stage, start, point, SHORTEST)
     for a in range(3):
-        body[PUSH + a] = along.point[4, a]
+        stage.task.push[a] = along.point[4, a]
     for w in range(m - N_AXES):
-        element[N_AXES + w, NOW] += eps * d[3 + w]
-        element[N_AXES + w, BRANCH] = OPEN
-    found = _least_gap(body, element, s, point)
+        stage.each[N_AXES + w].aimed_current += eps * d[3 + w]
+        stage.each[N_AXES + w].branch = OPEN
+    found = _least_gap(plant, stage, point)
     for a in range(3):
-        body[PUSH + a] = 0.0
+        stage.task.push[a] = 0.0
     return found
 
 
 @part
-def _later(body, element, along, start, acceleration):
+def _gap_beside(along, j, start, d, eps):
+    """`_gap` of the plant j of those taken along."""
+    plant = Plant(along.plants.body[j], along.plants.element[j])
+    return _gap(plant, Stage(along.stages.task[j], along.stages.each[j], along.stages.work[j]), along, start, d, eps)
+
+
+@part
+def _later(plant, stage, along, start, acceleration):
     """Time derivative of phi while what is stuck in `start` still holds."""
-    b, el, rate, m = along.body[-1], along.element[-1], along.aim[0], len(element)
-    copy_row(b, body)
-    copy_table(el, element)
-    put(b, el, start)
+    own, rate = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.aim[0]
+    m, each = len(plant.element), own.each
+    _copy_problem(along, stage)
+    put(own, start)
     for w in range(3 + m - N_AXES):
         rate[w] = acceleration[w] if w < 3 else 0.0
     for side in range(2):  # a stage back in time, too: the currents' slope to second order
         delay = DELAY * (1 - 2 * side)
-        _at_instant(b, el, start, start, delay)
-        residual(b, el, start, along.workspace[0])
+        _at_instant(plant, own, start, start, delay)
+        residual(plant, own, start)
         for w in range(m - N_AXES):
-            if el[N_AXES + w, INDUCTANCE] > 0.0:
-                rate[3 + w] += 0.5 * (el[N_AXES + w, CURRENT] - el[N_AXES + w, NOW]) / delay
-    up = _gap(b, el, along, start, rate, DELAY)
-    return (up - _gap(b, el, along, start, rate, -DELAY)) / (2.0 * DELAY)
+            e = N_AXES + w
+            if plant.element[e].inductance > 0.0:
+                rate[3 + w] += 0.5 * (each[e].current - each[e].aimed_current) / delay
+    up = _gap(plant, own, along, start, rate, DELAY)
+    return (up - _gap(plant, own, along, start, rate, -DELAY)) / (2.0 * DELAY)
 
 
 @part
-def bends(element, a, b):
+def bends(plant, stage, a, b):
     """Whether a current meets or leaves its limit between two states, or 0 against a drop or behind a lossy gear.
 
     The derivative bends there.
     """
-    first = current_entry(N_AXES, len(element))
-    for w in range(len(element) - N_AXES):
-        i, j, row = a[first + w], b[first + w], element[N_AXES + w]
-        if (abs(i) >= row[BOUND]) != (abs(j) >= row[BOUND]):
+    first = current_entry(N_AXES, len(plant.element))
+    for w in range(len(plant.element) - N_AXES):
+        i, j, own, bound = a[first + w], b[first + w], plant.element[N_AXES + w], stage.each[N_AXES + w].bound
+        if (abs(i) >= bound) != (abs(j) >= bound):
             return True
-        if (np.sign(i) != np.sign(j)) & ((row[DROP] > 0.0) | (row[EFFICIENCY] != 1.0)):
+        if (np.sign(i) != np.sign(j)) & ((own.drop > 0.0) | (own.efficiency != 1.0)):
             return True
     return False
 
 
 @part
-def _reach(body, element, s, first, last, middle, left, near):
+def _reach(plant, stage, first, last, middle, left, near):
     """Length of the next piece from `first`, of the `left`: up to where a current bends, or else `near`, across that.
 
     `last` and `middle` are room to work in.
     """
-    step(body, element, s, first, last, middle, left)
-    if left <= near or not bends(element, first, last):
+    step(plant, stage, first, last, middle, left)
+    if left <= near or not bends(plant, stage, first, last):
         return left
     low, high = 0.0, left
     while high - low > near:
         between = 0.5 * (low + high)
-        step(body, element, s, first, last, middle, between)
-        if bends(element, first, last):
+        step(plant, stage, first, last, middle, between)
+        if bends(plant, stage, first, last):
             high = between
         else:
             low = between
@@ -262,68 +252,69 @@ def _reach(body, element, s, first, last, middle, left, near):
 
 
 @part
-def _pass_zero(element, along, start, end, first, last, at_end, d):
+def _pass_zero(plant, stage, along, start, end, first, last, at_end, d):
     """Currents of windings that pass through 0 against a voltage drop: d+ = d- i'+ / i'-, each once in a half step.
 
     start, end: of the half step; first, last: of a piece of it, whose derivatives before it are along.kept.
     """
-    m = len(element)
+    m = len(plant.element)
     for w in range(m - N_AXES):
-        e, row = N_AXES + w, element[N_AXES + w]
+        e, own, volts = N_AXES + w, plant.element[N_AXES + w], stage.each[N_AXES + w].voltage
         j = current_entry(e, m)
         side = np.sign(start[j])
-        if row[INDUCTANCE] == 0.0 or row[DROP] == 0.0 or side == 0.0 or np.sign(end[j]) == side:
+        if own.inductance == 0.0 or own.drop == 0.0 or side == 0.0 or np.sign(end[j]) == side:
             continue
         if np.sign(first[j]) != side or (np.sign(last[j]) == side and not at_end):
             continue
-        speed = row[GX] * last[0] + row[GX + 1] * last[1] + row[GZ] * last[2] if last[SIGNS + e] != 0.0 else 0.0
-        tau = SOON * row[INDUCTANCE] / row[RESISTANCE]
-        little = 4.0 * side * SOON * (abs(row[VOLTAGE] - row[EMF] * speed) + row[DROP]) / row[RESISTANCE]
-        after = _soon(row, speed, 0.0, tau)
+        speed = own.g[0] * last[0] + own.g[1] * last[1] + own.g[2] * last[2] if last[SIGNS + e] != 0.0 else 0.0
+        tau = SOON * own.inductance / own.resistance
+        little = 4.0 * side * SOON * (abs(volts - own.emf * speed) + own.drop) / own.resistance
+        after = _soon(plant, stage, e, speed, 0.0, tau)
         if after != 0.0:
-            ratio = after / (_soon(row, speed, little, tau) - little)
+            ratio = after / (_soon(plant, stage, e, speed, little, tau) - little)
             for k in range(len(d)):
                 d[k, 3 + w] = along.kept[k, 3 + w] * ratio
 
 
 @part
-def _soon(row, speed, now, tau):
+def _soon(plant, stage, e, speed, now, tau):
     """Current of a motor a short time after it was `now`."""
+    own = plant.element[e]
     return winding(
-        speed, row[VOLTAGE], now, tau, row[EMF], row[RESISTANCE], row[INDUCTANCE], row[DROP], row[BOUND]
+        speed, stage.each[e].voltage, now, tau, own.emf, own.resistance, own.inductance, own.drop, stage.each[e].bound
     )[0]  # fmt: skip
 
 
 @part
-def half_derivatives(body, element, bare_body, bare_element, s, along, start, end, middle, h, d0, d1):
+def half_derivatives(plant, stage, bare, along, start, end, middle, h, d0, d1):
     """Derivatives over a half step that has been accepted.
 
     A reversal often comes to rest for one step and is released by the next: `settle` says what holds and what does not.
     """
-    first, last, m = along.state[0], along.state[1], len(element)
+    first, last, m = along.state[0], along.state[1], len(plant.element)
     copy_row(first, start)
     copy_row(last, end)
     copy_table(d1, d0)
     if sticks(start, m):
-        settle(body, element, bare_body, bare_element, s, first, along.gained)
+        settle(plant, stage, bare, first, along.gained)
     if sticks(end, m):
-        settle(body, element, bare_body, bare_element, s, last, along.gained)
+        settle(plant, stage, bare, last, along.gained)
     if differ(start, end, m) or differ(start, first, m) or differ(end, last, m):
         if not sticks(end, m):
-            settle(body, element, bare_body, bare_element, s, last, along.gained)
-        _leap(body, element, s, along, first, last, h, along.gained, d1)
+            settle(plant, stage, bare, last, along.gained)
+        _leap(plant, stage, along, first, last, h, along.gained, d1)
         return
-    if not bends(element, start, end):
-        step_with_derivatives(body, element, s, along, start, last, middle, h, d1, d1)
+    if not bends(plant, stage, start, end):
+        step_with_derivatives(plant, stage, along, start, last, middle, h, d1, d1)
         return
     copy_row(first, start)
     left = h
     for piece in range(PIECES):
-        length = _reach(body, element, s, first, last, middle, left, NEAR * h) if piece < PIECES - 1 else left
+        length = _reach(plant, stage, first, last, middle, left, NEAR * h) if piece < PIECES - 1 else left
         left = left - length if length < left else 0.0
         copy_table(along.kept, d1)
-        step_with_derivatives(body, element, s, along, first, last, middle, length, d1, d1)
-        _pass_zero(element, along, start, end, first, last, left == 0.0, d1)
+        step_with_derivatives(plant, stage, along, first, last, middle, length, d1, d1)
+        _pass_zero(plant, stage, along, start, end, first, last, left == 0.0, d1)
         if left == 0.0:
             return
         copy_row(first, last)

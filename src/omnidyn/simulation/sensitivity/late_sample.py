@@ -14,10 +14,10 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.frames import body_to_world
-from omnidyn.model.layout import LENGTH, N_AXES
+from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.model.stick_slip.plant import Plant, plant
+from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands, current_bounds
 from omnidyn.simulation.implicit.march import capped
@@ -138,7 +138,7 @@ def late_samples(
     """
     numbers, plants = _plants(robot, directions)
     rates = np.zeros((len(directions), *voltage.shape))
-    first, length = np.zeros((len(directions), width(numbers))), numbers.body[LENGTH]
+    first, length = np.zeros((len(directions), width(numbers))), numbers.body.length
     stretch = _stretch(plants)
     for k, one in enumerate(directions):
         rates[k] = 0.0 if one.voltage is None else one.voltage
@@ -174,7 +174,7 @@ def looped_samples(
         rests = seen.t - own < -MEET
         for part in (seen.state, seen.pace, seen.way, seen.dstate, seen.dway):
             part[c, rests] = 0.0
-    return _looks(robot, directions, seen, (numbers.body[LENGTH], _stretch(plants)), _in_force(found))
+    return _looks(robot, directions, seen, (numbers.body.length, _stretch(plants)), _in_force(found))
 
 
 def held(t: FloatArray, commands: int, late: Sequence[float]) -> FloatArray:
@@ -209,7 +209,7 @@ def _plants(robot: Robot, directions: Sequence[Direction]) -> tuple[Plant, list[
 
 def _stretch(plants: Sequence[Plant]) -> FloatArray:
     """Derivative of the length that omega is scaled by. Shape (K,)."""
-    return difference(np.array([p.body[LENGTH] for p in plants]))
+    return difference(np.array([p.body.length for p in plants]))
 
 
 def _room(robot: Robot, t: FloatArray, late: Sequence[float], keys: int, travel: int) -> Samples:

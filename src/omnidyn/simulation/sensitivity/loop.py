@@ -14,11 +14,10 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
-from omnidyn.model.layout import LENGTH, N_AXES
+from omnidyn.model.layout import N_AXES, Plant, Stage
 from omnidyn.model.robot import Robot
-from omnidyn.model.stick_slip.plant import Plant
-from omnidyn.model.stick_slip.release import SIGNS, start_state, with_given_currents
-from omnidyn.model.stick_slip.workspace import copy_row, copy_table, workspace
+from omnidyn.model.stick_slip.copies import copy_row, copy_table
+from omnidyn.model.stick_slip.release import SIGNS, start_state
 from omnidyn.simulation.commands import Commands, current_bounds, loop_gains, on_ticks
 from omnidyn.simulation.implicit.march import SIMPSON, Outcome, advance_pose, begun, room
 from omnidyn.simulation.sensitivity.directions import EPS, Directions
@@ -84,17 +83,17 @@ def run_loop_with_derivatives(
     )  # fmt: skip
     found.dstate[:1] = first
     march_loop(
-        *numbers.copy(), *with_given_currents(numbers), workspace(), room(state), along, loop, extra, bound, dt,
+        room(numbers), along, loop, extra, bound, dt,
         first, tol, settled, found,
     )  # fmt: skip
     return found
 
 
 @part
-def _tick_derivatives(element, along, loop, extra, state, d, row, w):
+def _tick_derivatives(plant, along, loop, extra, state, d, row, w):
     """Derivatives of the voltage and the integral of wheel w; extra.total[0] is the integral before the tick."""
     e, moves = N_AXES + w, state[SIGNS + N_AXES + w] != 0.0
-    error = loop.command[row, w] - seen_speed(element, e, state, loop.radius[w], moves)
+    error = loop.command[row, w] - seen_speed(plant.element[e].g, state, loop.radius[w], moves)
     total, period = extra.total[0, w], loop.period
     takes, side = tick_branch(loop.kp[w], loop.ki[w], loop.limit[w], period, error, total)
     point = along.point[0]
@@ -104,7 +103,7 @@ def _tick_derivatives(element, along, loop, extra, state, d, row, w):
             sign, g = 1.0 - 2.0 * up, extra.gain[2 * k + up]
             for a in range(3):
                 point[a] = state[a] + sign * EPS * d[k, a]
-            seen = seen_speed(along.element[2 * k + up], e, point, g[3, w], moves)
+            seen = seen_speed(along.plants.element[2 * k + up, e].g, point, g[3, w], moves)
             own = loop.command[row, w] + sign * EPS * extra.command[k, row, w] - seen
             before = total + sign * EPS * extra.sum[k, w]
             u, after = tick_answer(g[0, w], g[1, w], g[2, w], period, own, before, takes, side)
@@ -113,17 +112,12 @@ def _tick_derivatives(element, along, loop, extra, state, d, row, w):
 
 
 @part
-def _tick(element, along, loop, extra, state, d, row, voltage, flag):
-    """One tick, or none, of all wheels, with derivatives; voltage (1, n), flag (1,) and command (1, n) of this tick."""
-    if not flag[0]:
-        return
+def _tick(plant, along, loop, extra, state, d, row, voltage):
+    """One tick of all wheels, with derivatives, under row `row` of the set points; voltage (n,)."""
     copy_row(extra.total[0], loop.sum)
     for w in range(len(loop.kp)):
-        _tick_derivatives(element, along, loop, extra, state, d, row, w)
-    close_loop(
-        element, state, 0, voltage, loop.kp, loop.ki, loop.limit, loop.radius, loop.command[row : row + 1], flag,
-        loop.period, loop.sum,
-    )  # fmt: skip
+        _tick_derivatives(plant, along, loop, extra, state, d, row, w)
+    close_loop(plant, state, loop, loop.command[row], voltage)
 
 
 @part
@@ -153,15 +147,15 @@ def _as_before(loop, extra, state, d, settled):
 
 
 @branching_kernel
-def march_loop(
-    body, element, bare_body, bare_element, s, spare, along, loop, extra, bound, dt, first, tol, settled, found
-):
+def march_loop(room, along, loop, extra, bound, dt, first, tol, settled, found):
     """All rows, cut at the ticks. See run_loop_with_derivatives."""
-    out, seen, keep, edges, m = found.outcome, found.seen, found.keep, found.edges, len(element)
+    out, seen, keep, edges, m = found.outcome, found.seen, found.keep, found.edges, room.own.plant.element.shape[1]
+    own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
+    plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
     state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
     motors, dmotors = np.zeros(len(bound)), np.zeros((len(first), len(bound)))
-    voltage, row, still, kept = np.zeros((1, len(bound))), 0, False, len(found.dstate) > 0
+    voltage, row, still, kept = np.zeros(len(bound)), 0, False, len(found.dstate) > 0
     for j in range(len(dt)):
         if j == keep[row + 1]:
             row += 1
@@ -171,22 +165,22 @@ def march_loop(
             still = still and not changed
         if loop.tick[j] and not still:
             still = settled > 0.0 and j > keep[row] and _as_before(loop, extra, state, d, settled)
-            _tick(element, along, loop, extra, state, d, row, voltage, loop.tick[j : j + 1])
-        _pass_on(loop, voltage[0], extra.voltage, motors, dmotors)
+            _tick(plant, along, loop, extra, state, d, row, voltage)
+        _pass_on(loop, voltage, extra.voltage, motors, dmotors)
         copy_row(found.voltage[j], motors)
         for k in range(len(d)):
             copy_row(found.dvoltage[k, j], dmotors[k])
         if not still:
-            apply_row(element, along, motors, bound, dmotors)
+            apply_row(stage, along, motors, bound, dmotors)
             h = row_with_derivatives(
-                body, element, bare_body, bare_element, s, spare, along, state, dt[j], tol, h, pose, d, dnext, dpose,
+                plant, stage, bare, spare, along, state, dt[j], tol, h, pose, d, dnext, dpose,
                 counts, kept, seen, edges[j],
             )  # fmt: skip
             out.iterations[row] = max(out.iterations[row], counts[0])
             out.steps[row] += counts[1]
         elif kept:
             pose_derivatives(along, pose, dpose, state, state, state, d, d, d, dt[j], SIMPSON)
-            advance_pose(pose, state, state, state, body[LENGTH], dt[j], SIMPSON)
+            advance_pose(pose, state, state, state, plant.body.length, dt[j], SIMPSON)
         else:
             take_samples(seen, along, edges[j], dt[j], m, state, state, state, 0.5, d, d, d, 0.5)
         if j + 1 == keep[row + 1]:

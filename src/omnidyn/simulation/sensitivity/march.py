@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from omnidyn.compiled.kernel import branching_kernel, part
-from omnidyn.model.layout import BOUND, LENGTH, LIMIT, N_AXES, VOLTAGE
+from omnidyn.model.layout import N_AXES, Plant, Stage
+from omnidyn.model.stick_slip.copies import copy_row, copy_table
 from omnidyn.model.stick_slip.release import current_entry, settle, sticks
-from omnidyn.model.stick_slip.workspace import copy_row, copy_table
 from omnidyn.simulation.implicit.march import SIMPSON, STAGES, advance_pose, find_step, in_one_row
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
@@ -26,7 +26,7 @@ def pose_derivatives(along, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
     """
     place, a, b, c = along.point[0], along.point[1], along.point[2], along.point[3]
     place[:] = 0.0
-    advance_pose(place, x0, xm, x1, along.body[-1, LENGTH], h, rule)
+    advance_pose(place, x0, xm, x1, along.plants.body[-1].length, h, rule)
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     x, y = cos * place[0] - sin * place[1], sin * place[0] + cos * place[1]
     for k in range(len(dpose)):
@@ -35,10 +35,10 @@ def pose_derivatives(along, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
             for j in range(3):
                 a[j], b[j], c[j] = x0[j] + eps * d0[k, j], xm[j] + eps * dm[k, j], x1[j] + eps * d1[k, j]
             place[:] = 0.0
-            advance_pose(place, a, b, c, along.body[2 * k + side, LENGTH], h, rule)
+            advance_pose(place, a, b, c, along.plants.body[2 * k + side].length, h, rule)
             for j in range(3):
-                along.workspace[side, 0, j] = place[j] / (2.0 * EPS)
-        up, down = along.workspace[0, 0], along.workspace[1, 0]
+                along.stages.work[side].residual[j] = place[j] / (2.0 * EPS)
+        up, down = along.stages.work[0].residual, along.stages.work[1].residual
         dx, dy, turn = up[0] - down[0], up[1] - down[1], up[2] - down[2]
         dpose[k, 0] += cos * dx - sin * dy - dpose[k, 2] * y
         dpose[k, 1] += sin * dx + cos * dy + dpose[k, 2] * x
@@ -53,16 +53,16 @@ def _middle_currents(start, middle, end, m):
 
 
 @part
-def _is_smooth(element, start, one, middle, two, settled, m):
+def _is_smooth(plant, stage, start, one, middle, two, settled, m):
     """Whether nothing happens in a step: no stop, reversal or release, and no current meets or leaves its limit."""
     if differ(start, one, m) or differ(start, middle, m) or differ(middle, two, m) or differ(two, settled, m):
         return False
-    return not bends(element, start, middle) and not bends(element, middle, two)
+    return not bends(plant, stage, start, middle) and not bends(plant, stage, middle, two)
 
 
 @part
 def row_with_derivatives(
-    body, element, bare_body, bare_element, s, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
+    plant, stage, bare, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
     seen, begin,
 ):  # fmt: skip
     """One row with derivatives, in place: adaptive steps, or for a tol of 0 one fixed step. Returns the next h.
@@ -74,40 +74,40 @@ def row_with_derivatives(
     counts[0] = counts[1] = 0
     if tol > 0.0:
         return _adaptive(
-            body, element, bare_body, bare_element, s, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts,
+            plant, stage, bare, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts,
             kept, seen, begin + dt,
         )  # fmt: skip
-    pieces = in_one_row(body, dt)
+    pieces = in_one_row(plant, dt)
     for j in range(pieces):
         h, at = dt / pieces, begin + j * dt / pieces
-        count = _fixed(body, element, s, spare, along, state, h, pose, d, dnext, dpose, kept, seen, at)
+        count = _fixed(plant, stage, spare, along, state, h, pose, d, dnext, dpose, kept, seen, at)
         counts[0], counts[1] = max(counts[0], count), pieces
     return h
 
 
 @part
 def _adaptive(
-    body, element, bare_body, bare_element, s, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
+    plant, stage, bare, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
     seen, end,
 ):  # fmt: skip
     """`implicit._row` with derivatives: the half steps that count are done again with theirs. end: of the row [s]."""
-    one, middle, two, inner, settled, m, left = spare[0], spare[1], spare[2], spare[3], spare[4], len(element), dt
-    counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, state, inner))
+    one, middle, two, inner, settled, m, left = spare[0], spare[1], spare[2], spare[3], spare[4], len(plant.element), dt
+    counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
     while left > 0.0:
-        taken, h = find_step(body, element, s, spare, state, h, left, dt, tol, counts)
+        taken, h = find_step(plant, stage, spare, state, h, left, dt, tol, counts)
         copy_row(settled, two)
         if sticks(settled, m):
-            counts[0] = max(counts[0], settle(body, element, bare_body, bare_element, s, settled, along.gained))
+            counts[0] = max(counts[0], settle(plant, stage, bare, settled, along.gained))
         node, half, dhalf = 0.5, 0.5 * taken, along.half
-        if not kept and _is_smooth(element, state, one, middle, two, settled, m):
-            step_with_derivatives(body, element, s, along, state, one, inner, taken, d, dnext)
+        if not kept and _is_smooth(plant, stage, state, one, middle, two, settled, m):
+            step_with_derivatives(plant, stage, along, state, one, inner, taken, d, dnext)
             node, dhalf = GAMMA, along.middle
         else:
-            half_derivatives(body, element, bare_body, bare_element, s, along, state, middle, inner, half, d, dhalf)
-            half_derivatives(body, element, bare_body, bare_element, s, along, middle, two, inner, half, dhalf, dnext)
+            half_derivatives(plant, stage, bare, along, state, middle, inner, half, d, dhalf)
+            half_derivatives(plant, stage, bare, along, middle, two, inner, half, dhalf, dnext)
         if kept:
             pose_derivatives(along, pose, dpose, state, middle, two, d, along.half, dnext, taken, SIMPSON)
-            advance_pose(pose, state, middle, two, body[LENGTH], taken, SIMPSON)
+            advance_pose(pose, state, middle, two, plant.body.length, taken, SIMPSON)
         else:
             take_samples(seen, along, end - left, taken, m, state, middle, two, 0.5, d, dhalf, dnext, node)
         copy_row(state, settled)
@@ -117,14 +117,14 @@ def _adaptive(
 
 
 @part
-def _fixed(body, element, s, spare, along, state, dt, pose, d, dnext, dpose, kept, seen, begin):
+def _fixed(plant, stage, spare, along, state, dt, pose, d, dnext, dpose, kept, seen, begin):
     """One fixed step with derivatives. Returns the iterations."""
-    middle, end, m = spare[3], spare[2], len(element)
-    count = step_with_derivatives(body, element, s, along, state, end, middle, dt, d, dnext)
+    middle, end, m = spare[3], spare[2], len(plant.element)
+    count = step_with_derivatives(plant, stage, along, state, end, middle, dt, d, dnext)
     _middle_currents(state, middle, end, m)
     if kept:
         pose_derivatives(along, pose, dpose, state, middle, end, d, along.middle, dnext, dt, STAGES)
-        advance_pose(pose, state, middle, end, body[LENGTH], dt, STAGES)
+        advance_pose(pose, state, middle, end, plant.body.length, dt, STAGES)
     else:
         take_samples(seen, along, begin, dt, m, state, middle, end, GAMMA, d, along.middle, dnext, GAMMA)
     copy_row(state, end)
@@ -133,37 +133,38 @@ def _fixed(body, element, s, spare, along, state, dt, pose, d, dnext, dpose, kep
 
 
 @part
-def apply_row(element, along, voltage, bound, dvoltage):
+def apply_row(stage, along, voltage, bound, dvoltage):
     """Apply voltages and current limits (n,) of a row, and to the plants of each parameter what they change to."""
     for w in range(len(bound)):
         e = N_AXES + w
-        element[e, VOLTAGE], element[e, BOUND] = voltage[w], bound[w]
-        for j in range(len(along.element) - 1):
-            along.element[j, e, BOUND] = along.element[j, e, LIMIT] if bound[w] > 0.0 else 0.0
+        stage.each[e].voltage, stage.each[e].bound = voltage[w], bound[w]
+        for j in range(len(along.plants.body) - 1):
+            along.stages.each[j, e].bound = along.plants.element[j, e].limit if bound[w] > 0.0 else 0.0
         for k in range(len(dvoltage)):
-            along.element[2 * k, e, VOLTAGE] = voltage[w] + EPS * dvoltage[k, w]
-            along.element[2 * k + 1, e, VOLTAGE] = voltage[w] - EPS * dvoltage[k, w]
+            along.stages.each[2 * k, e].voltage = voltage[w] + EPS * dvoltage[k, w]
+            along.stages.each[2 * k + 1, e].voltage = voltage[w] - EPS * dvoltage[k, w]
 
 
 @branching_kernel
 def march_with_derivatives(
-    body, element, bare_body, bare_element, s, spare, along, voltage, bound, dt, tol, poses, states, iterations, steps,
-    first, ds, dposes, seen,
+    room, along, voltage, bound, dt, tol, out, first, ds, dposes, seen
 ):  # fmt: skip
     """All rows; see run_with_derivatives. ds and dposes may be empty: the derivatives then are in `seen`."""
-    state, pose, counts = states[0].copy(), poses[0].copy(), np.zeros(3, np.int64)
+    own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
+    plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
+    state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
     kept, begin = len(ds) > 0, 0.0
     for r in range(len(dt)):
-        apply_row(element, along, voltage[r], bound[r], along.voltage[:, r])
+        apply_row(stage, along, voltage[r], bound[r], along.voltage[:, r])
         h = row_with_derivatives(
-            body, element, bare_body, bare_element, s, spare, along, state, dt[r], tol, h, pose, d, dnext, dpose,
+            plant, stage, bare, spare, along, state, dt[r], tol, h, pose, d, dnext, dpose,
             counts, kept, seen, begin,
         )  # fmt: skip
         begin += dt[r]
-        iterations[r], steps[r] = counts[0], counts[1]
-        copy_row(states[r + 1], state)
-        copy_row(poses[r + 1], pose)
+        out.iterations[r], out.steps[r] = counts[0], counts[1]
+        copy_row(out.state[r + 1], state)
+        copy_row(out.pose[r + 1], pose)
         if kept:
             copy_table(ds[r + 1], d)
             copy_table(dposes[r + 1], dpose)

@@ -24,9 +24,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import part
-from omnidyn.model.layout import LENGTH
+from omnidyn.model.stick_slip.copies import copy_row, copy_table
 from omnidyn.model.stick_slip.release import current_entry
-from omnidyn.model.stick_slip.workspace import copy_row, copy_table
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
 
@@ -108,7 +107,7 @@ def _mixed(weight, a, b, c):
 @part
 def _stretch(along, k):
     """Derivative of the length by which omega is scaled."""
-    return (along.body[2 * k, LENGTH] - along.body[2 * k + 1, LENGTH]) / (2.0 * EPS)
+    return (along.plants.body[2 * k].length - along.plants.body[2 * k + 1].length) / (2.0 * EPS)
 
 
 @part
@@ -119,7 +118,7 @@ def go_on(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
     """
     if len(way) == PLACE:
         _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
-    length, area, darea = along.body[-1, LENGTH], _areas(share, node), _areas(share, dnode)
+    length, area, darea = along.plants.body[-1].length, _areas(share, node), _areas(share, dnode)
     turn = h / length * _mixed(area, x0[2], xm[2], x1[2])
     way[0] += turn
     for k in range(len(dway)):
@@ -134,7 +133,7 @@ def go_on(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
 @part
 def _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
     """Move the place, and its derivatives, on; the heading is still that at the start of the step."""
-    length = along.body[-1, LENGTH]
+    length = along.plants.body[-1].length
     for point in range(3):
         at = 0.5 * point * share
         rule = h * share * (4.0 if point == 1 else 1.0) / 6.0

@@ -14,35 +14,9 @@ currents do: z* is moved with its derivative, and the differences are of z at th
 from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.layout import (
-    AIMED,
-    AIMED_XY,
-    BEND_HOLD,
-    BEND_HOLD_XY,
-    BENT,
-    BENT_XY,
-    BRANCH,
-    BRISTLES,
-    CURRENT,
-    EFFICIENCY,
-    ELLIPSE,
-    EMF,
-    GOAL,
-    GX,
-    GZ,
-    INDUCTANCE,
-    N_AXES,
-    NOW,
-    PUSH,
-    SIGN,
-    STIFF,
-    STIFF_XY,
-    TAU,
-    THRUST,
-)
+from omnidyn.model.layout import N_AXES, Plant, Stage
 from omnidyn.model.stick_slip.active_set import FLAT, find_active_set, newton_direction
 from omnidyn.model.stick_slip.forces import gear, motor_branch, motor_current, residual
-from omnidyn.model.stick_slip.workspace import JACOBIAN, NEWTON, RESIDUAL
 from omnidyn.simulation.implicit.step import first_stage, last_stage
 from omnidyn.simulation.sensitivity.directions import EPS
 
@@ -77,51 +51,56 @@ def _hold(along, rank, e, g0, g1, g2):
 
 
 @part
-def _holders(body, element, along):
+def _holders(plant, stage, along):
     """Elements that span what is stuck, body axes first so that their zeros stay exact. Returns the rank."""
+    element = plant.element
     rank = 0
-    if body[ELLIPSE] == 0.0:
+    if stage.task.ellipse == 0.0:
         rank = _hold(along, rank, 0, 1.0, 0.0, 0.0)
         rank = _hold(along, rank, 1, 0.0, 1.0, 0.0)
     for e in range(len(element)):
-        if element[e, SIGN] == 0.0:
-            rank = _hold(along, rank, e, element[e, GX], element[e, GX + 1], element[e, GZ])
+        own = element[e]
+        if stage.each[e].sign == 0.0:
+            rank = _hold(along, rank, e, own.g[0], own.g[1], own.g[2])
     return rank
 
 
 @part
-def _same_problem(body, element, along, k, aim):
-    """Give the two plants of parameter k the stage at hand: signs, branches, i*; x* and z* with derivative `aim`."""
+def _same_problem(plant, stage, along, k, aim):
+    """Give the two stages of parameter k the problem at hand: signs, branches, i*; x* and z* with derivative `aim`."""
+    task, each, m = stage.task, stage.each, len(plant.element)
     for side in range(2):
-        b, el, eps = along.body[2 * k + side], along.element[2 * k + side], EPS * (1 - 2 * side)
-        b[TAU], b[ELLIPSE], m = body[TAU], body[ELLIPSE], len(element)
+        own, eps = along.stages.task[2 * k + side], EPS * (1 - 2 * side)
+        own.tau, own.ellipse = task.tau, task.ellipse
         for a in range(3):
-            b[GOAL + a], b[PUSH + a] = body[GOAL + a] + eps * aim[a], body[PUSH + a]
-        for e in range(len(element)):
-            el[e, SIGN] = element[e, SIGN]
-            el[e, NOW] = element[e, NOW]
+            own.goal[a], own.push[a] = task.goal[a] + eps * aim[a], task.push[a]
+        for e in range(m):
+            at = each[e]
+            one = along.stages.each[2 * k + side, e]
+            one.sign, one.aimed_current = at.sign, at.aimed_current
             if e >= N_AXES:
-                el[e, BRANCH] = along.carry[2, e - N_AXES]
-            if element[e, STIFF] > 0.0:
-                el[e, AIMED] = element[e, AIMED] + eps * aim[m + e]
-        if body[STIFF_XY] > 0.0:
+                one.branch = along.carry[2, e - N_AXES]
+            if plant.element[e].stiffness > 0.0:
+                one.aimed_bend = at.aimed_bend + eps * aim[m + e]
+        if plant.body.stiffness > 0.0:
             for a in range(2):
-                b[AIMED_XY + a] = body[AIMED_XY + a] + eps * aim[2 * m + a]
+                own.aimed_bend[a] = task.aimed_bend[a] + eps * aim[2 * m + a]
 
 
 @part
-def _carry(body, element, along, x):
+def _carry(plant, stage, along, x):
     """Into along.carry: di/di* of a stage, the force that goes with it, by the slope of `winding`, and its branch.
 
     Not by differences: i* may be nearer to 0 or to the limit than they reach.
     """
-    for e in range(N_AXES, len(element)):
-        row, w = element[e], e - N_AXES
-        speed = row[GX] * x[0] + row[GX + 1] * x[1] + row[GZ] * x[2] if row[SIGN] != 0.0 else 0.0
-        branch = motor_branch(element, e, speed, body[TAU])
-        i, slope = motor_current(element, e, branch, speed, body[TAU])
-        gain = row[THRUST] if row[SIGN] == 2.0 else gear(i, row[SIGN], row[THRUST], row[EFFICIENCY])
-        along.carry[0, w] = -slope * row[INDUCTANCE] / (body[TAU] * row[EMF])
+    task = stage.task
+    for e in range(N_AXES, len(plant.element)):
+        own, sign, w = plant.element[e], stage.each[e].sign, e - N_AXES
+        speed = own.g[0] * x[0] + own.g[1] * x[1] + own.g[2] * x[2] if sign != 0.0 else 0.0
+        branch = motor_branch(plant, stage, e, speed, task.tau)
+        i, slope = motor_current(plant, stage, e, branch, speed, task.tau)
+        gain = own.thrust if sign == 2.0 else gear(i, sign, own.thrust, own.efficiency)
+        along.carry[0, w] = -slope * own.inductance / (task.tau * own.emf)
         along.carry[1, w], along.carry[2, w] = gain * along.carry[0, w], branch
 
 
@@ -142,87 +121,99 @@ def _active_set_shift(along, k, rank, x, r0, r1, r2, shift, force):
 
 
 @part
-def stage_derivatives(body, element, s, along, x, aim, out):
-    """Derivatives (K, D) of a stage solved at x, for the derivatives `aim` of x*, i* and z*."""
-    residual(body, element, x, s)
-    rank, holders = find_active_set(body, element, s), _holders(body, element, along)
-    r0, r1, r2 = s[RESIDUAL, 0], s[RESIDUAL, 1], s[RESIDUAL, 2]
-    _carry(body, element, along, x)
-    up, down, shift, force = along.workspace[0], along.workspace[1], along.point[0], along.point[1]
-    for k in range(len(out)):
-        _same_problem(body, element, along, k, aim[k])
-        residual(along.body[2 * k], along.element[2 * k], x, up)
-        residual(along.body[2 * k + 1], along.element[2 * k + 1], x, down)
-        _active_set_shift(along, k, holders, x, r0, r1, r2, shift, force)
-        for e in range(N_AXES, len(element)):
-            pull = along.carry[1, e - N_AXES] * aim[k, 3 + e - N_AXES]
-            for a in range(3):
-                force[a] -= pull * element[e, GX + a]
-        for a in range(3):
-            total = (up[RESIDUAL, a] - down[RESIDUAL, a]) / (2.0 * EPS) + force[a]
-            for b in range(3):
-                total += s[JACOBIAN + a, b] * shift[b]
-            s[RESIDUAL, a] = total
-        newton_direction(s, rank)
-        for a in range(3):
-            out[k, a] = shift[a] + s[NEWTON, a]
-        _inner_derivatives(body, element, along, k, x, aim[k], out[k])
+def _residual_beside(along, j, x):
+    """The residual at x of the plant and the stage j of those taken along."""
+    plant = Plant(along.plants.body[j], along.plants.element[j])
+    residual(plant, Stage(along.stages.task[j], along.stages.each[j], along.stages.work[j]), x)
 
 
 @part
-def _inner_derivatives(body, element, along, k, x, aim, out):
+def stage_derivatives(plant, stage, along, x, aim, out):
+    """Derivatives (K, D) of a stage solved at x, for the derivatives `aim` of x*, i* and z*."""
+    work = stage.work
+    residual(plant, stage, x)
+    rank, holders = find_active_set(plant, stage), _holders(plant, stage, along)
+    r0, r1, r2 = work.residual[0], work.residual[1], work.residual[2]
+    _carry(plant, stage, along, x)
+    shift, force = along.point[0], along.point[1]
+    for k in range(len(out)):
+        _same_problem(plant, stage, along, k, aim[k])
+        _residual_beside(along, 2 * k, x)
+        _residual_beside(along, 2 * k + 1, x)
+        up, down = along.stages.work[2 * k].residual, along.stages.work[2 * k + 1].residual
+        _active_set_shift(along, k, holders, x, r0, r1, r2, shift, force)
+        for e in range(N_AXES, len(plant.element)):
+            pull = along.carry[1, e - N_AXES] * aim[k, 3 + e - N_AXES]
+            for a in range(3):
+                force[a] -= pull * plant.element[e].g[a]
+        for a in range(3):
+            total = (up[a] - down[a]) / (2.0 * EPS) + force[a]
+            for b in range(3):
+                total += work.jacobian[a, b] * shift[b]
+            work.residual[a] = total
+        newton_direction(work, rank)
+        for a in range(3):
+            out[k, a] = shift[a] + work.newton[a]
+        _inner_derivatives(plant, along, k, x, aim[k], out[k])
+
+
+@part
+def _inner_derivatives(plant, along, k, x, aim, out):
     """Derivative of what is eliminated, at the solution: of currents with inductance (the others follow at once), and
     of what bends."""
-    some, m = body[BRISTLES] > 0.0, len(element)
-    for e in range(N_AXES, len(element)):
-        some |= element[e, INDUCTANCE] > 0.0
+    some, m = plant.body.bristles > 0.0, len(plant.element)
+    for e in range(N_AXES, len(plant.element)):
+        some |= plant.element[e].inductance > 0.0
     if not some:
         return
-    point = along.point[0]
+    point, task, each = along.point[0], along.stages.task, along.stages.each
     for side in range(2):
         for a in range(3):
             point[a] = x[a] + EPS * (1 - 2 * side) * out[a]
-        residual(along.body[2 * k + side], along.element[2 * k + side], point, along.workspace[side])
-    for e in range(N_AXES, len(element)):
-        change = along.element[2 * k, e, CURRENT] - along.element[2 * k + 1, e, CURRENT]
+        _residual_beside(along, 2 * k + side, point)
+    for e in range(N_AXES, len(plant.element)):
+        change = each[2 * k, e].current - each[2 * k + 1, e].current
         out[3 + e - N_AXES] = change / (2.0 * EPS) + along.carry[0, e - N_AXES] * aim[3 + e - N_AXES]
-    if body[BRISTLES] > 0.0:
+    if plant.body.bristles > 0.0:
         for e in range(m):
-            out[m + e] = (along.element[2 * k, e, BENT] - along.element[2 * k + 1, e, BENT]) / (2.0 * EPS)
+            out[m + e] = (each[2 * k, e].bend - each[2 * k + 1, e].bend) / (2.0 * EPS)
         for a in range(2):
-            out[2 * m + a] = (along.body[2 * k, BENT_XY + a] - along.body[2 * k + 1, BENT_XY + a]) / (2.0 * EPS)
+            out[2 * m + a] = (task[2 * k].bend[a] - task[2 * k + 1].bend[a]) / (2.0 * EPS)
 
 
 @part
-def _aim_within(body, element, along, k, aim):
+def _aim_within(plant, stage, along, k, aim):
     """Derivatives of z* beyond stage 1, in place, where `aim_bristles` cut it off at what its level can bend."""
-    m, up, down = len(element), along.element[2 * k], along.element[2 * k + 1]
+    body, element = plant.body, plant.element
+    m, up, down = len(element), along.plants.element[2 * k], along.plants.element[2 * k + 1]
     for e in range(m):
-        for side in range(2 if element[e, STIFF] > 0.0 else 0):
+        own = element[e]
+        for side in range(2 if own.stiffness > 0.0 else 0):
             sign = 1.0 - 2.0 * side
-            if sign * element[e, AIMED] >= element[e, BEND_HOLD + side] / element[e, STIFF]:
-                most = up[e, BEND_HOLD + side] / up[e, STIFF] - down[e, BEND_HOLD + side] / down[e, STIFF]
+            if sign * stage.each[e].aimed_bend >= own.bristle_breakaway[side] / own.stiffness:
+                most = up[e].bristle_breakaway[side] / up[e].stiffness
+                most -= down[e].bristle_breakaway[side] / down[e].stiffness
                 aim[m + e] = sign * most / (2.0 * EPS)
-    for a in range(2 if body[STIFF_XY] > 0.0 else 0):
-        if abs(body[AIMED_XY + a]) >= body[BEND_HOLD_XY + a] / body[STIFF_XY]:
-            one, other = along.body[2 * k], along.body[2 * k + 1]
-            most = one[BEND_HOLD_XY + a] / one[STIFF_XY] - other[BEND_HOLD_XY + a] / other[STIFF_XY]
-            aim[2 * m + a] = (most if body[AIMED_XY + a] > 0.0 else -most) / (2.0 * EPS)
+    for a in range(2 if body.stiffness > 0.0 else 0):
+        if abs(stage.task.aimed_bend[a]) >= body.bristle_breakaway[a] / body.stiffness:
+            one, other = along.plants.body[2 * k], along.plants.body[2 * k + 1]
+            most = one.bristle_breakaway[a] / one.stiffness - other.bristle_breakaway[a] / other.stiffness
+            aim[2 * m + a] = (most if stage.task.aimed_bend[a] > 0.0 else -most) / (2.0 * EPS)
 
 
 @part
-def step_with_derivatives(body, element, s, along, start, end, middle, h, d0, d1):
+def step_with_derivatives(plant, stage, along, start, end, middle, h, d0, d1):
     """`implicit_step.step` with derivatives: d0 at its start; along.middle at stage 1 and d1 at its end are filled.
 
     d1 may be d0.
     """
-    first = first_stage(body, element, s, start, end, middle, h)
-    stage_derivatives(body, element, s, along, end, d0, along.middle)
-    last, back = last_stage(body, element, s, start, end, h)
+    first = first_stage(plant, stage, start, end, middle, h)
+    stage_derivatives(plant, stage, along, end, d0, along.middle)
+    last, back = last_stage(plant, stage, start, end, h)
     for k in range(len(d0)):
         for j in range(d0.shape[1]):
             along.aim[k, j] = d0[k, j] + back * (along.middle[k, j] - d0[k, j])
-        if body[BRISTLES] > 0.0 and back != 0.0:
-            _aim_within(body, element, along, k, along.aim[k])
-    stage_derivatives(body, element, s, along, end, along.aim, d1)
+        if plant.body.bristles > 0.0 and back != 0.0:
+            _aim_within(plant, stage, along, k, along.aim[k])
+    stage_derivatives(plant, stage, along, end, along.aim, d1)
     return max(first, last)

@@ -8,7 +8,7 @@ import numpy as np
 
 from omnidyn.model.friction.kinds import BENDING, LUGRE
 from omnidyn.model.keys import Key
-from omnidyn.model.layout import DAMP, DAMP_XY, LENGTH, N_AXES, YAW
+from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 
@@ -29,10 +29,10 @@ def with_damping(robot: Robot, names: Sequence[str]) -> Robot:
         ):
             continue
         numbers = plant(robot)
-        length, rows = float(numbers.body[LENGTH]), numbers.element[:, DAMP]
+        length, rows = float(numbers.body.length), numbers.element["damping"]
         values = {
             ("axes", "damping"): tuple((rows[:N_AXES] * [1.0, 1.0, length**2]).tolist()),
-            ("direction", "damping"): float(numbers.body[DAMP_XY]),
+            ("direction", "damping"): float(numbers.body.damping),
             ("direction", "yaw_damping"): float(rows[YAW]) * length**2,
             ("wheels", "damping"): float(np.mean(rows[N_AXES:])),
         }

@@ -1,20 +1,8 @@
-"""The workspace array of the solvers: rows of four numbers, named here, so that no solve allocates anything."""
+"""Copies of vectors and tables within kernels."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import part
-
-RESIDUAL, NEWTON, TRIAL, WORST, SPARE, LINE = 0, 1, 2, 3, 4, 5
-BASIS, ROW, JACOBIAN, MATRIX = 6, 9, 12, 15  # three rows each
-PIVOT, CLOSE, ROWS = 18, 19, 20
-
-
-def workspace() -> FloatArray:
-    """A fresh workspace array."""
-    return np.zeros((ROWS, 4))
 
 
 @part
