@@ -41,7 +41,7 @@ def without_a_fall(solution: Solution, known: Trust) -> tuple[Trust, Intervals, 
         known = _without(known, v)
         steep = 1.0 if known.blind[c] else known.rise(np.eye(len(known.std))[c]) / RISE
         low, high = _likely(solution, s, v, float(values[c]), LIMIT * steep)
-        low = min(low, float(values[c] - known.quantile * known.std[c]))
+        low = max(min(low, float(values[c] - known.quantile * known.std[c])), 0.0)
         told = f"it lies between that and {high:.3g}, at which the robot would have been held"
         found[problem.names[s]] = None if high == np.inf else (high - low) / (2.0 * known.quantile), (low, high)
         words.append(
@@ -64,7 +64,7 @@ def _not_seen(solution: Solution, known: Trust) -> list[tuple[int, int, int]]:
         v, way = problem.where(name), np.zeros(len(values))
         way[[s, c]] = 1.0, -1.0
         spread = np.sqrt(way @ np.where(np.isfinite(known.covariance), known.covariance, 0.0) @ way)
-        if known.blind[v] or name in ended or way @ values <= known.quantile * spread:
+        if known.open[v] or name in ended or way @ values <= known.quantile * spread:
             found.append((s, c, v))
     return found
 
