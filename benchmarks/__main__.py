@@ -24,6 +24,7 @@ NAMES = {
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
     "laws_identified": "Stribeck, Dahl, LuGre fitted back from logs of other integrators: coverage, std (an hour)",
+    "laws_ladder": "Stribeck, LuGre, slip under a plain file: found, named, taken by the ladder, held (40 minutes)",
     "groups": "two floors in one likelihood: coverage of their differences, bootstrap over runs (two minutes)",
     "outputs": "output error from counts of encoders, from positions, and on a tilted floor (eight minutes)",
     "identify": "output error on simulated logs: coverage, starts, nuisances, time beside peers (ten minutes)",

@@ -20,6 +20,7 @@ NUISANCES = ("gain", "fade", "tilt", "push", "latency", "dead_band")
 USUAL = ("latency", "dead_band")  # what a default fit has
 SHAPES = {f"friction.{shape}": shape for shape in (BOX, ELLIPSE, WHEELS)}
 FRAME, LIMIT, FRICTION = "body.rotating_frame", "motor.current_limit_A", ("friction",)
+FALL = "friction.axes.stribeck_speed"
 # Where a number begins that is off in the file.
 STARTS = {"motor.voltage_drop_V": 0.3, "motor.gear_efficiency": 0.95}
 
@@ -36,6 +37,12 @@ def refitted(key: str, case: Case, run: Run) -> Any:
         if key == FRAME:
             body = robot.body.replace(rotating_frame=True)
             return identify(run, robot.replace(body=body), free=FRICTION)
+        if key == FALL:
+            axes = robot.friction.axes
+            hold = tuple(1.5 * level for level in axes.coulomb)
+            axes = axes.replace(breakaway=hold, stribeck_speed=(0.05, 0.05, 0.5))
+            falling = robot.replace(friction=robot.friction.replace(axes=axes))
+            return identify(run, falling, free=(*FRICTION, "friction.axes.breakaway", FALL))
         if key.partition(".")[0] in NUISANCES:
             return identify(run, robot, free=FRICTION, nuisances=tuple(dict.fromkeys((*USUAL, key))))
         return _with_number(key, case, run, robot)

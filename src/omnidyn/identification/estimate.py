@@ -104,10 +104,10 @@ class Estimate(Shown):
         return f"{words}; not {named}" if missing else words
 
     def _shares(self) -> dict[str, float]:
-        """Name -> std over value: 0 at a bound, infinite for what the data do not determine."""
+        """Name -> std over value: infinite for what the data do not determine, 0 for what they do at a bound."""
         return {
-            name: 0.0 if name in self.at_bound
-            else math.inf if name in self.unidentifiable or not value else self.std[name] / abs(value)
+            name: math.inf if name in self.unidentifiable
+            else 0.0 if name in self.at_bound else self.std[name] / abs(value) if value else math.inf
             for name, value in self.value.items()
         }  # fmt: skip
 

@@ -16,7 +16,6 @@ MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explai
 # What robots do that no law holds yet: key -> words.
 UNOFFERED = {
     "friction one way": "friction that is another one backward than forward",
-    "friction over speed": "friction that falls with the speed",
     "drag": "drag that grows with the square of the speed",
     "turns of the wheels": "something that comes back with the turns of the wheels",
     "sag": "a supply that sags under load",

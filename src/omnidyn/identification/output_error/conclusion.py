@@ -22,6 +22,7 @@ from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH,
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.output_error.solve.ordered import Order
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trades import trades
 from omnidyn.identification.output_error.trust.alone import from_the_log_alone, given
@@ -223,6 +224,9 @@ def intervals(
             high = inner + max(half, pushed + half) if below else inner
         low, high = (max(low, p.low), min(high, max(p.high, inner))) if not p.log else (low, high)
         ci95[p.name] = (p.outer(low), p.outer(high))
+    for s, c in Order(problem).pairs:
+        name, least = problem.parameters[s].name, ci95[problem.parameters[c].name][0]
+        ci95[name] = max(ci95[name][0], least), ci95[name][1]  # breakaway is never below Coulomb friction
     return std, ci95
 
 

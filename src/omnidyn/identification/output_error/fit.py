@@ -43,6 +43,7 @@ from omnidyn.identification.output_error.solve.progress import Best, Progress
 from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
+from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, trust
@@ -159,10 +160,12 @@ class Fit:
         loss = loss_words(self.question.loss)
         if len(self.groups) == 1:
             group = self.groups[0]
-            words = [*warnings, *group.warnings, *hints]
+            known, held, told = without_a_fall(solution, known) if done else (known, {}, [])
+            words = [*warnings, *told, *group.warnings, *hints]
             estimate = conclude(
-                solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels, again.intervals
-            )
+                solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels,
+                held | dict(again.intervals)
+            )  # fmt: skip
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
         engine, estimates, alones = solver.engine, {}, []
         assert isinstance(engine, JointEngine)

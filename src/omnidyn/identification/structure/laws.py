@@ -12,6 +12,7 @@ from omnidyn.identification.structure.candidates import CHANGE, STEP, Candidate,
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.friction.kinds import COULOMB, LUGRE
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.motor import per_wheel
@@ -20,6 +21,10 @@ from omnidyn.model.robot import Robot
 LOSS, SHARE = 0.05, 0.03  # of a gear; of the robot's mass that rotors may be, each a small one to try
 LIMITS = (0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of the largest current, at which a limit is tried
 ABOVE = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb friction
+SPEEDS = (0.01, 0.03, 0.1, 0.3)  # of the fastest speed, over which the level may fall
+BENDS = (2e-4, 1e-3, 5e-3)  # [m] by which bristles may bend before they slip
+USUAL_FALL, USUAL_SPEED = 1.3, 0.05  # breakaway over Coulomb friction, and [m/s] over which it falls to it
+FALL, BRISTLE = "stribeck_speed", "stiffness"  # numbers that laws begin with, in the table of the friction
 
 
 def candidates(bench: Workbench) -> Iterator[Candidate]:
@@ -93,6 +98,78 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
         yield Candidate(BODY_AXES, _in_place(along_axes), as_it_is("Coulomb friction on each axis by itself, a box"))
     if friction.wheels == WheelFriction():
         yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
+    for table, force in ((BODY_AXES, _of_axes), (DIRECTION, _of_travel), (WHEELS, _of_rims)):
+        law = table_of(friction, table)
+        if law.stribeck_speed is None and np.any(law.coulomb):
+            words = as_it_is("friction that falls with the speed from breakaway, above Coulomb friction (Stribeck)")
+            yield Candidate(f"{table}.{FALL}", _falling(force), words, 0.0)
+    if boxed and axes.law == COULOMB and axes.coulomb_backward is None:
+        yield Candidate(f"{BODY_AXES}.{BRISTLE}", _bending, as_it_is("friction that bends before it slips (LuGre)"))
+
+
+def table_of(friction: Friction, table: str) -> Any:
+    """The friction of a table, such as "friction.axes"."""
+    return getattr(friction, table.rpartition(".")[2])
+
+
+def _falling(force: Callable[[Motion, float], FloatArray]) -> Callable[[Workbench], list[Trial]]:
+    """A level that is larger at rest by a share of Coulomb friction, a number for each part of `force`: to first order,
+    where the robot moves. Tried with several speeds over which it falls [m/s at the rims]."""
+
+    def trials(bench: Workbench) -> list[Trial]:
+        top = max(float(np.abs(m.twist @ bench.robot.wheels.wrench_matrix).max()) for m in bench.motions)
+        speeds = [share * top for share in SPEEDS if top > 0.0]
+        shown = bench.by_forces([lambda m, v=v: force(m, v) for v in speeds])
+        return [Trial(own, v) for own, v in zip(shown, speeds, strict=True)]
+
+    return trials
+
+
+def arm(robot: Robot) -> float:
+    """What a speed about yaw [rad/s] is times, to be one of the rims [m]."""
+    return float(np.mean(robot.wheels.robot_radius))
+
+
+def _of_axes(motion: Motion, over: float) -> FloatArray:
+    speed, level = motion.twist * [1.0, 1.0, arm(motion.robot)], motion.robot.friction.axes.coulomb
+    return np.eye(N_AXES) * (-np.sign(speed) * np.exp(-((speed / over) ** 2)) * level)[:, None, :]
+
+
+def _of_travel(motion: Motion, over: float) -> FloatArray:
+    """Along the direction of travel, and about yaw."""
+    law, yaw = motion.robot.friction.direction, motion.twist[:, YAW]
+    weighed = motion.twist[:, :YAW] * law.coulomb
+    fall = np.exp(-((np.linalg.norm(motion.twist[:, :YAW], axis=1, keepdims=True) / over) ** 2))
+    along = fall * weighed * law.coulomb / np.maximum(np.linalg.norm(weighed, axis=1, keepdims=True), 1e-12)
+    about = np.sign(yaw) * np.exp(-((arm(motion.robot) * yaw / over) ** 2)) * law.yaw_coulomb
+    zero = np.zeros_like(yaw)
+    return -np.stack([np.column_stack([along, zero]), np.column_stack([zero, zero, about])], axis=1)
+
+
+def _of_rims(motion: Motion, over: float) -> FloatArray:
+    g, rim = motion.robot.wheels.wrench_matrix, motion.twist @ motion.robot.wheels.wrench_matrix
+    level = per_wheel(motion.robot.friction.wheels.coulomb, g.shape[1])
+    return -((np.sign(rim) * np.exp(-((rim / over) ** 2)) * level) @ g.T)[:, None, :]
+
+
+def _bending(bench: Workbench) -> list[Trial]:
+    """LuGre's bristles in the place of friction that holds exactly, at several lengths by which they bend."""
+    return [
+        Trial(bench.change(bench.robot.model_copy(update={"friction": bristled(bench.robot, z)})), z) for z in BENDS
+    ]
+
+
+def bristled(robot: Robot, bend: float) -> Friction:
+    """The friction of the axes with LuGre's bristles, that bend by a length [m at the rims] before they slip; where the
+    level does not fall yet, it falls as much and as fast as is usual."""
+    axes, units = robot.friction.axes, np.array([1.0, 1.0, arm(robot)])
+    coulomb = np.array(axes.coulomb)
+    falls = {} if axes.stribeck_speed is not None else {
+        "breakaway": tuple((USUAL_FALL * coulomb).tolist()), FALL: tuple((USUAL_SPEED / units).tolist())
+    }  # fmt: skip
+    stiffness = np.maximum(coulomb * units / bend, 1e-3)
+    other = axes.replace(law=LUGRE, stiffness=tuple(stiffness.tolist()), **falls)
+    return robot.friction.model_copy(update={"axes": other})
 
 
 def along_travel(friction: Friction) -> Friction:

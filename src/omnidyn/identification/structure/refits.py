@@ -31,7 +31,7 @@ from omnidyn.identification.output_error.problem.problem import Parts, Point, Pr
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.candidates import CHANGE, Candidate, Fitted, Trial
-from omnidyn.identification.structure.switches import Switch, switches, told
+from omnidyn.identification.structure.switches import Switch, simpler_first, switches, told
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
 BEST = 3  # candidates that are fitted beside the shapes
@@ -86,7 +86,7 @@ def refits(
 def _asked(ranked: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, Remedy]]:
     """What to fit: the best that a robot file or a fit can hold, and every shape."""
     known = {one.key: one for one in candidates}
-    best = [each for each in ranked if each.offered and each.key != CHANGE][:BEST]
+    best = simpler_first([each for each in ranked if each.offered and each.key != CHANGE])[:BEST]
     yield from ((known[each.key], each) for each in best)
     for key in SHAPES:
         if key in known and key not in {each.key for each in best}:

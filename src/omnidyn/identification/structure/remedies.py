@@ -118,7 +118,7 @@ def remedies(
         both = np.concatenate([known, at])
         fitted = blocks.fitted(blocks.total, both) / blocks.size[both]
         size, step = fitted[len(known) :], fitted[: len(known)]
-        if k == 1 and size[0] < one.least:
+        if size.max() < one.least:
             continue
         own = Tried(one, trial, at, float(chi2), size, step)
         if one.key not in best or chi2 - penalty * own.numbers > best[one.key].chi2 - penalty * best[one.key].numbers:

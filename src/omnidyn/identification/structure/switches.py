@@ -6,8 +6,9 @@ but for what has a prior: that would move with it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,21 +18,34 @@ from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
+from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.laws import along_axes, along_travel
+from omnidyn.identification.structure.laws import (
+    BRISTLE,
+    FALL,
+    along_axes,
+    along_travel,
+    arm,
+    bristled,
+    table_of,
+)
 from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
+from omnidyn.model.friction.kinds import DAHL, LUGRE
 from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
-from omnidyn.model.robot import Robot
+from omnidyn.model.robot import Prior, Robot
 
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
+FALLS, BRISTLES = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS)), f"{BODY_AXES}.{BRISTLE}"
 LOSS = 0.01  # of a gear, from which its fit begins at least
+UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
+ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {
     "wheels.wheel_radius_m": ("wheels", ("wheel_radius",)), "motor.resistance_ohm": ("motor", ("resistance",)),
@@ -62,6 +76,14 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
         return []
 
 
+def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
+    """Without bristles behind a fall that explains more: they have that fall too, and their turn after it; a fit of
+    bristles to a log without any takes long."""
+    found = [remedy.key for remedy in remedies]
+    falls = [found.index(key) for key in FALLS if key in found]
+    return [r for k, r in enumerate(remedies) if r.key != BRISTLES or k < min(falls, default=len(found))]
+
+
 def told(words: str, before: Mapping[str, float], after: Mapping[str, float]) -> str:
     """What was switched on, with its values where they are numbers of their own: before, after: what was fitted."""
     new = [name for name in after if name not in before and not name.startswith(FRICTION)]
@@ -86,6 +108,10 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         yield Switch(robot.replace(friction=along_axes(friction)), _of_another_shape(asked), words)
     elif key == WHEELS:
         yield from _at_wheels(robot, asked, words)
+    elif key in FALLS:
+        yield _falling(remedy, robot, asked)
+    elif key == BRISTLES:
+        yield _bending(remedy, robot, asked)
     elif key == LIMIT:
         limited = robot.replace(motor=robot.motor.replace(current_limit=remedy.at))
         yield Switch(limited, _free(asked, key), words)
@@ -147,6 +173,45 @@ def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
     changed = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=levels)))
     return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
+
+
+def _falling(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
+    """Levels and speeds from which a fit finds how friction falls: those of the first step; with bristles it is LuGre's
+    law."""
+    table, own = remedy.key.rpartition(".")[0], table_of(robot.friction, remedy.key.rpartition(".")[0])
+    above, about = np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at / arm(robot)
+    changes: dict[str, Any]
+    if table == BODY_AXES:
+        levels, speeds = above * own.coulomb, (remedy.at, remedy.at, about)
+        changes = {"breakaway": tuple(levels.tolist()), FALL: speeds}
+    elif table == DIRECTION:
+        changes = {"breakaway": tuple((above[0] * np.array(own.coulomb)).tolist()), FALL: remedy.at}
+        if own.yaw_coulomb > 0.0:
+            changes |= {"yaw_breakaway": float(above[1] * own.yaw_coulomb), f"yaw_{FALL}": about}
+    else:
+        levels = above[0] * per_wheel(own.coulomb, robot.wheels.count)
+        changes = {"breakaway": tuple(levels.tolist()) if np.ndim(own.coulomb) else float(levels[0]), FALL: remedy.at}
+    law = own.replace(**changes, law=LUGRE if own.law == DAHL else own.law)
+    changed = robot.replace(friction=robot.friction.replace(**{table.rpartition(".")[2]: law}))
+    return _rough(changed, asked, [f"{table}.{name}" for name in changes], remedy.words)
+
+
+def _bending(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
+    """LuGre's law, with the critical damping to begin from."""
+    bent = robot.replace(friction=bristled(robot, remedy.at))
+    keys = [f"{BODY_AXES}.{name}" for name in ("breakaway", FALL, BRISTLE, "damping")]
+    return _rough(with_damping(bent, keys), asked, keys, remedy.words)
+
+
+def _rough(robot: Robot, asked: Question, names: Sequence[str], words: str) -> Switch:
+    """What a law begins with, free; what of it must be positive stays where it begins if a log says nothing of it."""
+    own = {Key.parse(key).axis for key in asked.free or ()}  # of an axis that never moved nothing is asked
+    keys = [key for name in names for key in expand_keys(name, robot) if Key.parse(key).axis in own | {None}]
+    rough = {
+        key: Prior(std=UNSURE * float(Key.parse(key).get(robot)), source="where the search began", origin="guess")
+        for key in keys if not Key.parse(key).level
+    }  # fmt: skip
+    return Switch(robot.replace(priors={**robot.priors, **rough}), _free(asked, *keys), words)
 
 
 def _at_wheels(robot: Robot, asked: Question, words: str) -> Iterator[Switch]:

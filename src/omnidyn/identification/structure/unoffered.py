@@ -17,7 +17,6 @@ from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.layout import N_AXES
 
 Force = Callable[[Motion, float], FloatArray]
-WIDTHS = (0.03, 0.1, 0.3)  # of the fastest speed, over which friction may fall
 WAVES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0, 12.0, 24.0)  # a turn of a wheel
 
 
@@ -25,7 +24,6 @@ def unoffered(bench: Workbench) -> Iterator[Candidate]:
     """All of them."""
     for key, force, sizes in (
         ("friction one way", _one_way, (0.0,)),
-        ("friction over speed", _falling, WIDTHS),
         ("drag", _drag, (0.0,)),
         ("turns of the wheels", _waves, WAVES),
         ("sag", _sag, (0.0,)),
@@ -51,11 +49,6 @@ def _along_axes(values: FloatArray) -> FloatArray:
 
 def _one_way(motion: Motion, _: float) -> FloatArray:
     return _along_axes((motion.twist != 0.0).astype(float))
-
-
-def _falling(motion: Motion, width: float) -> FloatArray:
-    top = np.maximum(np.abs(motion.twist).max(axis=0), 1e-9)
-    return _along_axes(-np.sign(motion.twist) * np.exp(-np.abs(motion.twist) / (width * top)))
 
 
 def _drag(motion: Motion, _: float) -> FloatArray:

@@ -40,6 +40,15 @@ def coulomb_below(name: str, robot: Robot | None = None) -> str:
     return f"{found}{at}{group}"
 
 
+def speed_of(name: str, names: Sequence[str]) -> str:
+    """Of `names`, the speed over which this breakaway falls; "" where it is not among them."""
+    key, at, group = name.partition(AT)
+    own = Key.parse(key)
+    yaw = "yaw_" if own.field.startswith("yaw_") else ""
+    list_, end = f"{own.table}.{yaw}stribeck_speed", "" if own.index is None else f"[{own.index}]"
+    return next((each for each in (f"{list_}{end}{at}{group}", f"{list_}{at}{group}") if each in names), "")
+
+
 def kept_in_order(p: Parameter, robot: Robot, names: Sequence[str]) -> Parameter:
     """The parameter with the bound that the other level is, where that one is not free (`names`) and they fall."""
     if falls(p.name, robot) and coulomb_below(p.name, robot) not in names:

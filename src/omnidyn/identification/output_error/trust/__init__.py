@@ -1,2 +1,2 @@
 """How sure: uncertainty, rounding, support (of nuisances), resampling,
-breakaway."""
+breakaway, no_fall."""

@@ -4,8 +4,9 @@ A step fits the logs anew with each of the best remedies of the diagnosis, and w
 them. Where none of these leaves only noise, it tries what a diagnosis near the best point tells little of: other shapes
 of friction, a limit; and, once it has found the best, the same without the step before. Of those that predict blocks of
 the logs which they were not fitted to better than what stands, by more than a standard error, and that BIC prefers
-though they are the best of many, the simplest within a standard error of the best is taken. Then the fit is diagnosed
-again. What no robot file holds is never taken; nor is what explains less than such a cause would.
+though they are the best of many, the simplest within a standard error of the best is taken, unless BIC prefers the best
+by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor is what explains less than such a
+cause would.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from omnidyn.identification.structure.candidates import CHANGE
 from omnidyn.identification.structure.diagnosis import Examined, examine
 from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
 from omnidyn.identification.structure.motion import motions
-from omnidyn.identification.structure.switches import LIMIT, Switch, switches, told
+from omnidyn.identification.structure.switches import LIMIT, Switch, simpler_first, switches, told
 from omnidyn.model.friction import WheelFriction
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.robot import Robot
@@ -40,6 +41,7 @@ TRIED = 3  # remedies that are fitted in a step
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of BIC, from which one of two models is the better one; of a first step's chi squared
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
 CLEAR = 1.0  # standard errors of its gain by which a step must pay
+BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,7 @@ def climb(fit: Fit, solution: Solution, runs: Sequence[Run], progress: Progress)
 def offered(lack: LackOfFit) -> list[Remedy]:
     """The remedies that are worth a fit, best first: those that a robot file or a fit can hold, and nothing else is the
     same as; and what the first of them cannot be told from."""
-    able = [r for r in lack.remedies if r.offered and r.key != CHANGE and not r.rivals]
+    able = simpler_first([r for r in lack.remedies if r.offered and r.key != CHANGE and not r.rivals])
     same = [r for r in able[TRIED:] if r.key in able[0].same_as]
     return [*able[:TRIED], *same[: TRIED - 1]]
 
@@ -208,9 +210,9 @@ def _why_other(k: int, taken: int | None, alike: Sequence[int], same: Sequence[i
 
 
 def _is_alike(best: Errors, other: Errors) -> bool:
-    """Whether another model predicts as well as the best one, within a standard error."""
+    """Whether another model predicts as well as the best one, within a standard error, and is about as likely."""
     gain, std = best.gain(other)
-    return best is other or gain <= CLEAR * std
+    return best is other or (gain <= CLEAR * std and other.bic() - best.bic() < BY_FAR)
 
 
 def _is_same(one: Errors, other: Errors) -> bool:

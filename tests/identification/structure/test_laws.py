@@ -1,0 +1,43 @@
+"""Laws of friction that the robot file lacks: named, taken by the ladder, and what holds with them.
+
+Logs of the integrators of tests/reference, which share no code with simulation/.
+"""
+
+import numpy as np
+import pytest
+
+from benchmarks.laws_ladder import of_law, right
+from omnidyn.identification.structure.laws import arm, bristled
+from omnidyn.model.friction import AxesFriction, Friction
+from omnidyn.model.friction.kinds import LUGRE
+from omnidyn.model.robot_file import load_robot
+
+
+@pytest.mark.parametrize("name", ["Stribeck", "LuGre"])
+def test_a_law_that_the_file_lacks_is_named_and_taken(name):
+    """Its fall is 10 standard errors of breakaway: found, first or second, the first step, and only noise is left."""
+    log, early = of_law(name, 10.0, 0)
+    assert log.found
+    assert early
+    assert log.cause
+    assert log.after == [True, True]
+    assert log.words.endswith("the residuals hold nothing but noise")
+
+
+def test_the_law_that_is_right_is_kept():
+    log, _ = right(1)
+    assert log.steps == 0
+    assert log.before == log.after == [True, True]
+
+
+def test_bristles_begin_as_long_as_they_are_said_to_bend():
+    """On every axis, at the rims; a fall that is there stays."""
+    axes = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))
+    robot = load_robot("axebot").replace(friction=Friction(axes=axes))
+    bent = bristled(robot, 1e-3).axes
+    assert bent.law == LUGRE
+    lengths = np.array(axes.coulomb) / np.array(bent.stiffness) * [1.0, 1.0, arm(robot)]
+    assert lengths == pytest.approx([1e-3] * 3)
+    falling = axes.replace(breakaway=(2.8, 1.9, 0.13), stribeck_speed=(0.02, 0.02, 0.2))
+    again = bristled(robot.replace(friction=Friction(axes=falling)), 1e-3).axes
+    assert (again.breakaway, again.stribeck_speed) == (falling.breakaway, falling.stribeck_speed)
