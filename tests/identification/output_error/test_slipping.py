@@ -7,11 +7,13 @@ from omnidyn import check
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.slipping import SlipEngine
 from omnidyn.identification.output_error.prepare import make_engine, make_problem, read_records
+from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
+from omnidyn.model.surroundings.floor import GRAVITY
 from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.run import Run
 from omnidyn.simulation.slip.loads import wheel_loads
@@ -101,3 +103,18 @@ def test_a_speed_loop_with_wheels_that_slip_is_refused():
     looped = ROBOT.replace(drive=ROBOT.drive.replace(kind="speed", kp=0.1, ki=1.0, rate=100.0))
     with pytest.raises(UnsupportedError, match="slip"):
         fit_output_error(run.replace(voltage=None, wheel_speed_command=run.wheel_speed), looped)
+
+
+def test_what_an_axis_has_held_is_no_more_than_the_floor_takes():
+    """Driven along x far beyond the grip of a robot that something holds; without slip, the drive itself."""
+    volts = np.array([6.0, 0.0, -6.0]) * np.sign(AXEBOT.wheels.wrench_matrix[0])
+    turning = np.random.default_rng(3).normal(size=(300, 3)) * [1e-4, 1e-4, 1e-3]
+    turning[100:200, 2] += 1.0
+    run = Run(t=DT * np.arange(300), voltage=np.tile(volts, (300, 1)), twist=turning)
+    (free,) = read_records([run], AXEBOT, Question(outputs=("twist",)))
+    drive = motion([free], AXEBOT).held
+    assert np.isfinite(drive).all()
+    (slips,) = read_records([run], ROBOT, Question(outputs=("twist",)))
+    held = motion([slips], ROBOT).held
+    assert held[0] <= MU * ROBOT.body.mass * GRAVITY
+    assert held[0] < drive[0]

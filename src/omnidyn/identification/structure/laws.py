@@ -13,6 +13,8 @@ from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import COULOMB, LUGRE
+from omnidyn.model.friction.stribeck import USUAL as EXPONENT
+from omnidyn.model.friction.stribeck import fallen
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.motor import per_wheel
@@ -132,16 +134,16 @@ def arm(robot: Robot) -> float:
 
 def _of_axes(motion: Motion, over: float) -> FloatArray:
     speed, level = motion.twist * [1.0, 1.0, arm(motion.robot)], motion.robot.friction.axes.coulomb
-    return np.eye(N_AXES) * (-np.sign(speed) * np.exp(-((speed / over) ** 2)) * level)[:, None, :]
+    return np.eye(N_AXES) * (-np.sign(speed) * fallen(speed, 1.0 / over, EXPONENT) * level)[:, None, :]
 
 
 def _of_travel(motion: Motion, over: float) -> FloatArray:
     """Along the direction of travel, and about yaw."""
     law, yaw = motion.robot.friction.direction, motion.twist[:, YAW]
     weighed = motion.twist[:, :YAW] * law.coulomb
-    fall = np.exp(-((np.linalg.norm(motion.twist[:, :YAW], axis=1, keepdims=True) / over) ** 2))
+    fall = fallen(np.linalg.norm(motion.twist[:, :YAW], axis=1, keepdims=True), 1.0 / over, EXPONENT)
     along = fall * weighed * law.coulomb / np.maximum(np.linalg.norm(weighed, axis=1, keepdims=True), 1e-12)
-    about = np.sign(yaw) * np.exp(-((arm(motion.robot) * yaw / over) ** 2)) * law.yaw_coulomb
+    about = np.sign(yaw) * fallen(arm(motion.robot) * yaw, 1.0 / over, EXPONENT) * law.yaw_coulomb
     zero = np.zeros_like(yaw)
     return -np.stack([np.column_stack([along, zero]), np.column_stack([zero, zero, about])], axis=1)
 
@@ -149,7 +151,7 @@ def _of_travel(motion: Motion, over: float) -> FloatArray:
 def _of_rims(motion: Motion, over: float) -> FloatArray:
     g, rim = motion.robot.wheels.wrench_matrix, motion.twist @ motion.robot.wheels.wrench_matrix
     level = per_wheel(motion.robot.friction.wheels.coulomb, g.shape[1])
-    return -((np.sign(rim) * np.exp(-((rim / over) ** 2)) * level) @ g.T)[:, None, :]
+    return -((np.sign(rim) * fallen(rim, 1.0 / over, EXPONENT) * level) @ g.T)[:, None, :]
 
 
 def _bending(bench: Workbench) -> list[Trial]:

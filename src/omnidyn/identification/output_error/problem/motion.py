@@ -74,6 +74,8 @@ def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot:
         for first, last in record.pieces:
             wrench = reaching(robot, record.voltage[first:last]) @ drive.T @ mass
             most = np.maximum(most, np.where(known, np.abs(wrench).max(axis=0), 0.0))
+    if robot.wheels.traction_mu is None:
+        return most
     return np.minimum(most, np.abs(robot.wheels.wrench_matrix) @ grips(robot))  # beyond it wheels slip
 
 
