@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
@@ -46,14 +46,14 @@ class WhitenedEngine(OfRows):
     """engine: which simulates. models: the memory of each column; one that is not named has none.
 
     Memory is counted in rows of the column's own, and a column keeps its rate: a channel that only every fifth row
-    has is not missing four. What is missing beside that costs what it would have told, no more. Errors that add up do
-    so while a robot moves: of rows at rest, by the first point that is asked for, the first counts for all.
+    has is not missing four. What is missing beside that costs what it would have told, no more.
     """
 
     def __init__(self, engine: RowEngine[Problem], models: Mapping[Column, AutoRegression]):
         self.engine, self.models, self.problem = engine, dict(models), engine.problem
-        self._still: dict[tuple[int, int, Column], IntArray] = {}
-        self._filters = {column: model.filter for column, model in self.models.items() if model.remembers}
+        self._filters = {
+            column: (model.coefficients, model.covariance) for column, model in self.models.items() if model.order
+        }
 
     def on(self, problem: Problem) -> WhitenedEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
@@ -71,14 +71,10 @@ class WhitenedEngine(OfRows):
             if column not in self._filters:
                 continue
             rows, steps = known_rows(piece, residual[c], slopes[c])
-            series = np.column_stack([residual[c, rows], slopes[c, rows]])
-            if self.models[column].adds_up:
-                still = self._still.setdefault((id(piece.record), piece.first, column), rows[~changed(series)])
-                moving = ~np.isin(rows, still)
-                rows, steps, series = rows[moving], steps[moving], series[moving]
             if rows.size < residual.shape[1]:
                 left = np.setdiff1d(np.arange(residual.shape[1]), rows)
                 residual[c, left], slopes[c, left] = np.nan, 0.0
+            series = np.column_stack([residual[c, rows], slopes[c, rows]])
             new = innovations(series, steps, *self._filters[column])
             residual[c, rows], slopes[c, rows] = new[:, 0], new[:, 1:]
         return residual, slopes, at
@@ -112,11 +108,6 @@ def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:
     steps = np.concatenate([[0], np.maximum(np.round(apart / usual), 1.0)]).astype(np.intp)
     steps[steps > FORGOTTEN] = 0
     return rows, steps
-
-
-def changed(series: FloatArray) -> BoolArray:
-    """Whether a row of a series (n, K) is another than the one before, (n,); the first one is."""
-    return np.append(True, (np.diff(series, axis=0) != 0.0).any(axis=1))[: len(series)]
 
 
 def without_gaps(series: FloatArray, steps: IntArray) -> list[FloatArray]:

@@ -41,7 +41,6 @@ from omnidyn.identification.output_error.memory.whitened import (
     spacing,
     without_gaps,
 )
-from omnidyn.identification.output_error.problem.outputs import TRAVEL
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust, widened
@@ -101,7 +100,7 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
     if solution.solver.tick.any():
         solution = _as_readings(solution)
     solver, models = solution.solver, _memory(solution, None)
-    if not any(model.remembers for model in models.values()):
+    if not any(model.order for model in models.values()):
         return None
     now, moved, blocked = solution.state.point, np.inf, None
     for each in range(ROUNDS):
@@ -182,9 +181,7 @@ def _memory(solution: Solution, covariance: FloatArray | None) -> dict[Column, A
         for column, residual, slopes, steps in _columns(solver.problem.pieces[k], parts):
             more = [] if taken is None else [slopes @ taken[k][parts[2]]]
             series[column] += without_gaps(np.column_stack([residual, *more]), steps)
-    return {
-        column: autoregression(own, may_add_up=column[0] in TRAVEL) for column, own in series.items() if own
-    }  # fmt: skip
+    return {column: autoregression(own) for column, own in series.items() if own}
 
 
 def _columns(piece: Piece, parts: Parts) -> Iterator[tuple[Column, FloatArray, FloatArray, IntArray]]:
@@ -296,11 +293,9 @@ def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trus
     order = f"{least} to {most}" if most > least else f"{most}"
     longest = max(models, key=lambda column: models[column].memory)
     model, lasts = models[longest], models[longest].memory * spacing(pieces, longest)[0]
-    adding = ", ".join(dict.fromkeys(column[0] for column, each in models.items() if each.adds_up))
-    stays = f" ({adding}: of its changes, for errors of it add up, as what pushes and slips leave does)" * bool(adding)
     yield (
         f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
-        f"errors of each output are fitted as an autoregression of order {order}{stays}, with a memory of up to "
+        f"errors of each output are fitted as an autoregression of order {order}, with a memory of up to "
         f"{lasts:.2g} s; {widened(known)}"
     )
     if model.rows < FEW * model.memory:
