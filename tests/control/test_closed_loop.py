@@ -5,6 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.control.closed_loop import NOISE
+from omnidyn.control.controllers import ControllerFile
 from omnidyn.errors import InputError
 from omnidyn.model.robot_file import load_robot
 from tests.support.friction_shapes import shaped
@@ -168,3 +169,12 @@ def test_who_knows_of_a_delay_is_in_motion_on_time(name):
     assert not late.run.twist[0].any()
     assert np.allclose(late.run.twist[1], ready.run.twist[1], rtol=0.02, atol=1e-3)
     assert late.rmse_position == pytest.approx(ready.rmse_position, rel=0.05)
+
+
+def test_a_controller_as_read_from_a_file_is_taken_and_what_is_none_is_said():
+    settled = {"duration": 1.0}
+    named = omnidyn.track(load_robot("axebot"), "eight", "mpc", **settled)
+    read = omnidyn.track(load_robot("axebot"), "eight", ControllerFile("mpc"), **settled)
+    assert read.rmse_position == named.rmse_position
+    with pytest.raises(InputError, match=r"no controller; got int; expected a Controller"):
+        omnidyn.track(load_robot("axebot"), "eight", 3)

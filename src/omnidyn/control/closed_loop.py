@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import OK, Controller
-from omnidyn.control.controllers import controller_named
+from omnidyn.control.controllers import ControllerFile, controller_named
 from omnidyn.control.feedforward import DT, check_dt
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
@@ -69,15 +69,15 @@ class Circumstances:
 
 
 def track(
-    robot: Robot, path: Path | Run | str, controller: Controller | str = "pid", *, plant: Robot | None = None,
-    dt: float = DT, duration: float | None = None, skip: float = SKIP, noise: float = 0.0, delay: int = 0,
-    seed: int = 0, push: tuple[float, float, float] = (0.0, 0.0, 0.0), supply: float | None = None,
+    robot: Robot, path: Path | Run | str, controller: Controller | ControllerFile | str = "pid", *,
+    plant: Robot | None = None, dt: float = DT, duration: float | None = None, skip: float = SKIP, noise: float = 0.0,
+    delay: int = 0, seed: int = 0, push: tuple[float, float, float] = (0.0, 0.0, 0.0), supply: float | None = None,
 ) -> Tracking:  # fmt: skip
     """Drive a simulated robot along a path with a controller, and see how near it comes.
 
     robot: that the controller believes to drive. path: a Path, or what `path` takes. controller: a Controller, or the
-    name of one ("feedforward", "speed", "pid", ..), or a controller file. plant: the robot that is driven in truth; the
-    same by default. It starts on the path, at rest.
+    name of one ("feedforward", "speed", "pid", ..), or a controller file, by path or as read. plant: the robot that is
+    driven in truth; the same by default. It starts on the path, at rest.
     dt: time between two steps [s]. duration: that is tracked [s]; that of the path by default. skip: errors before it
     count for nothing [s]: the start from rest is no error of tracking.
     noise: std of the measured speeds [m/s]; on omega 4 times as many rad/s, on x and y 0.2 s, on the heading 0.4 s
@@ -94,6 +94,13 @@ def track(
     follow = path if isinstance(path, Path) else path_named(path)
     if isinstance(controller, str):
         controller = controller_named(controller, robot, supply=supply, **told_of_loop(robot, around))
+    elif isinstance(controller, ControllerFile):
+        controller = controller.make(robot, supply=supply, **told_of_loop(robot, around))
+    elif not hasattr(controller, "step"):
+        raise InputError(
+            "no controller", got=type(controller).__name__, expected="a Controller, or the name of one",
+            remedy='controller="pid", or one made for the robot, such as Mpc(robot)', where="controller",
+        )  # fmt: skip
     return tracked(plant or robot, follow, controller, around)
 
 

@@ -17,6 +17,7 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, State
 from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import refuse_slip
 from omnidyn.run import Run, as_list
 
 
@@ -68,6 +69,8 @@ def solved(fit: Fit, runs: Sequence[Run], progress: Progress) -> Answer:
             remedy="climb it with the logs of one group, and fit the groups with the robot that it writes",
             where="ladder",
         )  # fmt: skip
+    for group in fit.groups:
+        refuse_slip(group.robot.wheels, "the ladder knows")
     from omnidyn.identification.structure.ladder.climb import climb  # here, for it takes time to load
 
     best, solution, ladder = climb(fit, fit.solve(progress), runs, progress)

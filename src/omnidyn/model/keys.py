@@ -192,7 +192,10 @@ class Key:
         place = _places()[self.name]
         content: Any = reduce(getattr, place.path, robot)
         if content is None:
-            raise InputError("not a number of this robot", expected="a number that it has", where=str(self))
+            raise InputError(
+                "not a number of this robot", got="none in its file", expected="a number that it has",
+                remedy="enter a first value in the robot file", where=str(self),
+            )  # fmt: skip
         if self.index is None and isinstance(content, tuple):
             raise InputError(
                 "needs an index", got=str(self), expected=f"an entry, such as {self.name}[{len(content) - 1}]"

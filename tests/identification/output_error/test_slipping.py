@@ -118,3 +118,10 @@ def test_what_an_axis_has_held_is_no_more_than_the_floor_takes():
     held = motion([slips], ROBOT).held
     assert held[0] <= MU * ROBOT.body.mass * GRAVITY
     assert held[0] < drive[0]
+
+
+def test_a_ladder_is_refused_before_anything_is_fitted():
+    steps = []
+    with pytest.raises(UnsupportedError, match="the ladder knows no wheels that slip"):
+        fit_output_error(log(2, 1.5), ROBOT, ladder=True, watch=steps.append)
+    assert not steps

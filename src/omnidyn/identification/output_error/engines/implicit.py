@@ -142,8 +142,14 @@ class ImplicitEngine:
         t = piece.record.t[piece.first : piece.last + 1]
         voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
         travel = travel_of(piece.record.columns)
-        seen, _ = late_samples(robot, t, voltage, directions, state[:N_AXES], late, self.tol, travel)
-        return seen, at, factors
+        return self._sampled(robot, t, voltage, directions, state[:N_AXES], late, travel), at, factors
+
+    def _sampled(
+        self, robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
+        late: Sequence[float], travel: int,
+    ) -> list[LateSample]:  # fmt: skip
+        """The run under these voltages, seen with every latency."""
+        return late_samples(robot, t, voltage, directions, start, late, self.tol, travel)[0]
 
     def _shown(self, seen: list[LateSample], number: int, name: str, facing: float) -> Shown:
         """What a channel of m columns shows at latency `number`, from the start; facing: the heading there [rad]."""

@@ -91,6 +91,7 @@ def _likely(solution: Solution, s: int, v: int, coulomb: float, limit: float) ->
     best, most = min(tried, key=lambda level: tried[level]), min(tried.values()) + limit
 
     def end(way: int, last: float) -> float:
+        """Where likely levels end, upward (1) or downward (-1), looked for no further than `last`."""
         inside, share = best, way * STEP
         while cost(outside := way * min(way * best * (1.0 + share), way * last)) <= most:
             if outside == last:
