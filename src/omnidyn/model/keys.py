@@ -193,7 +193,7 @@ class Key:
         content: Any = reduce(getattr, place.path, robot)
         if content is None:
             raise InputError(
-                "not a number of this robot", got="none in its file", expected="a number that it has",
+                "not a number of this robot", expected="a number that it has",
                 remedy="enter a first value in the robot file", where=str(self),
             )  # fmt: skip
         if self.index is None and isinstance(content, tuple):
