@@ -66,6 +66,8 @@ def test_a_bend_of_the_line_is_no_dead_band():
     assert fit.value["dead_band"] > 0.01
     assert not fit.dead_band_seen
     assert any("bends" in words for words in fit.warnings)
+    low, high = fit.ci95["slope"]  # known only together with the dead band
+    assert low <= SLOPE <= high
 
 
 @pytest.mark.parametrize("seed", range(4))

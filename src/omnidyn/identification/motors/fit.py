@@ -81,15 +81,21 @@ def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
 
 
 def _with_bend(fit: MotorEstimate, bent: Bend | None) -> MotorEstimate:
-    """The fit with an interval of the dead band that holds the one with a smooth bend of the line fitted too."""
+    """The fit with an interval of the dead band that holds the one with a smooth bend of the line fitted too.
+
+    The slope goes with the dead band, as the two are correlated.
+    """
     if bent is None or not bent.needed:
         return fit
     std = float(np.hypot(max(fit.std[BAND], bent.std), fit.value[BAND] - bent.value))
+    along = fit.correlation * fit.std[SLOPE] / fit.std[BAND]
+    slope = float(np.hypot(fit.std[SLOPE], along * np.sqrt(std**2 - fit.std[BAND] ** 2)))
+    ends = sorted(fit.value[SLOPE] + along * (end - fit.value[BAND]) for end in bent.ci95)
     words = (
         f"the line of speed over input bends: with a smooth bend fitted too (error {bent.left:.3g} of that without), "
-        f"the dead band is {bent.value:.3g} +- {bent.std:.2g} {fit.unit}: the interval spans both"
+        f"the dead band is {bent.value:.3g} +- {bent.std:.2g} {fit.unit}: the interval spans both, and the slope goes with it"
     )
-    return _widened(fit, {BAND: std}, {BAND: bent.ci95}, words)
+    return _widened(fit, {BAND: std, SLOPE: slope}, {BAND: bent.ci95, SLOPE: (ends[0], ends[1])}, words)
 
 
 def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
