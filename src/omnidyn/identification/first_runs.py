@@ -27,7 +27,8 @@ from omnidyn.simulation.simulate import simulate
 ROWS, HOLD, DT = 200, 40, 0.01  # rows of a run; rows and [s] that a command holds
 NOISE = {"twist": 0.005, "current": 0.05, "pose": 0.002}  # [m/s, rad/s], [A], [m, rad]
 TWIST, VOLTAGE = (0.4, 0.4, 2.0), 10.0  # the largest commands [m/s, m/s, rad/s], [V]
-MEMORY: FloatArray = 0.9 ** np.arange(40.0)  # of errors that remember: what is left of one in the rows after it
+# Of errors that remember, beside noise that does not: what is left of one in the rows after it.
+MEMORY: FloatArray = 0.95 ** np.arange(80.0) + 3.0 * (np.arange(80) == 0)
 TICK = 2.0 * np.pi / 200.0  # of a counted angle [rad]
 
 
@@ -68,7 +69,7 @@ def needed_late() -> None:
     _run(load_robot("mecanum"))
     row_terms(np.zeros((1, 2)), np.ones(1), 0.0, None, np.ones(1), False)
     row_squares(np.zeros((1, 2, 1)), np.zeros((1, 2)))
-    autoregression([np.random.default_rng(2).standard_normal((ROWS, 1))])
+    autoregression([np.convolve(np.random.default_rng(2).standard_normal(ROWS), MEMORY)[:ROWS, None]])
 
 
 def _run(robot: Robot) -> Run:

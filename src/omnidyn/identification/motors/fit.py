@@ -93,7 +93,8 @@ def _with_bend(fit: MotorEstimate, bent: Bend | None) -> MotorEstimate:
     ends = sorted(fit.value[SLOPE] + along * (end - fit.value[BAND]) for end in bent.ci95)
     words = (
         f"the line of speed over input bends: with a smooth bend fitted too (error {bent.left:.3g} of that without), "
-        f"the dead band is {bent.value:.3g} +- {bent.std:.2g} {fit.unit}: the interval spans both, and the slope goes with it"
+        f"the dead band is {bent.value:.3g} +- {bent.std:.2g} {fit.unit}: the interval spans both, and the "
+        "slope goes with it"
     )
     return _widened(fit, {BAND: std, SLOPE: slope}, {BAND: bent.ci95, SLOPE: (ends[0], ends[1])}, words)
 

@@ -21,23 +21,28 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel
+from omnidyn.identification.output_error.memory.mixed import coefficients, mixed
 
 ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tried
 SHARE = 0.1  # of the rows that may be coefficients
 PATIENCE = 15  # orders without a better one, after which none is looked for
 FOLLOWED = 20_000  # rows after which a memory is as good as endless
+MIXED = 2  # order from which on white noise beside errors that remember is asked for
+BLOCK, MORE = 50, 1.5  # rows; standard errors above the power of white noise from which on the same is asked
 ANYWHERE = 1e8  # times the variance of what is new: where errors that add up may begin
 
 
 @dataclass(frozen=True, eq=False)
 class AutoRegression:
     """partial (p,): partial correlations, each within -1 to 1, so that the series is stationary. variance: of what is
-    new in a row. rows: that it was fitted to. adds_up: whether all this is of the changes from row to row."""
+    new in a row. rows: that it was fitted to. adds_up: whether all this is of the changes from row to row. slopes
+    (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself, see mixed.py."""
 
     partial: FloatArray
     variance: float
     rows: int
     adds_up: bool = False
+    slopes: FloatArray | None = None
 
     @property
     def order(self) -> int:
@@ -47,7 +52,7 @@ class AutoRegression:
     @property
     def coefficients(self) -> FloatArray:
         """phi, shape (p,), by Levinson's recursion."""
-        return _steps(self.partial)[-1]
+        return coefficients(self.partial)
 
     @property
     def remembers(self) -> bool:
@@ -90,7 +95,7 @@ class AutoRegression:
         """
         if not self.order:
             return math.inf
-        spread = float(np.linalg.solve(self.covariance, np.ones(self.order)).sum()) / max(self.rows, 1)
+        spread = float(self._scattered(np.ones((self.order, 1)))[0]) / max(self.rows, 1)
         return 0.5 * (1.0 - float(self.coefficients.sum())) ** 2 / max(spread, 1e-300)
 
     @property
@@ -130,7 +135,14 @@ class AutoRegression:
         slope = -(wide[at + lag] + wide[at - lag])  # of w_k by phi_i
         slope[:, 0] = -2.0 * a[1:]
         by_phi = slope @ reach
-        return total + (by_phi * np.linalg.solve(self.covariance, by_phi)).sum(axis=0) / rows
+        return total + self._scattered(by_phi) / rows
+
+    def _scattered(self, by_phi: FloatArray) -> FloatArray:
+        """Variance, times rows, of what has the slopes by_phi (p, K) by phi. Shape (K,)."""
+        by, known = by_phi, self.covariance
+        if self.slopes is not None:
+            by, known = self.slopes.T @ by_phi, self.slopes.T @ known @ self.slopes
+        return (by * np.linalg.solve(known, by)).sum(axis=0)
 
 
 def _steps(partial: FloatArray) -> list[FloatArray]:
@@ -163,7 +175,7 @@ def autoregression(
 
 
 def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegression, float]:
-    """(the autoregression of series as they are, its BIC)."""
+    """(the autoregression of series as they are, its BIC); by two numbers where that says as much: mixed.py."""
     rows = sum(len(each) for each in stretches)
     if not rows:
         return AutoRegression(np.zeros(0), 0.0, 0), 0.0
@@ -171,7 +183,22 @@ def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegr
     ends = np.cumsum([0, *map(len, stretches)])
     ahead = np.ascontiguousarray(np.concatenate(stretches), dtype=float)
     partial, order, variance, cost = _burg(ahead, ahead.copy(), ends, limit, PATIENCE)
-    return AutoRegression(partial[:order], variance, rows), cost + rows * _log_variance(stretches)
+    cost += rows * _log_variance(stretches)
+    if most is None and (order >= MIXED or _slow(stretches)):
+        both, slopes, new, own = mixed(stretches)
+        if own < cost:
+            return AutoRegression(both, new, rows, slopes=slopes), own
+    return AutoRegression(partial[:order], variance, rows), cost
+
+
+def _slow(stretches: Sequence[FloatArray]) -> bool:
+    """Whether what is slow may have more power than white noise gives it: by sums of BLOCK rows, their squares."""
+    sums = [each[: len(each) // BLOCK * BLOCK].reshape(-1, BLOCK, each.shape[1]).sum(axis=1) for each in stretches]
+    blocks = sum(map(len, sums))
+    expected = BLOCK * math.exp(_log_variance(stretches)) * blocks
+    return blocks > 0 and sum(float((each**2).sum()) for each in sums) > expected * (
+        1.0 + MORE * math.sqrt(2.0 / blocks)
+    )
 
 
 def _log_variance(stretches: Sequence[FloatArray]) -> float:

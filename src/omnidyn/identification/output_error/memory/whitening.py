@@ -289,13 +289,19 @@ def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegressi
 def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trust) -> Iterator[str]:
     """What a reader should know of the memory: what it is, logs too short for it, stamps that are not even."""
     pieces = found.solver.problem.pieces
-    least, most = (way(model.order for model in models.values()) for way in (min, max))
-    order = f"{least} to {most}" if most > least else f"{most}"
+    orders = sorted({model.order for model in models.values() if model.slopes is None})
+    ways = (
+        [f"an autoregression of order {' to '.join(map(str, dict.fromkeys((orders[0], orders[-1]))))}"]
+        if orders
+        else []
+    )
+    if any(model.slopes is not None for model in models.values()):
+        ways.append("white noise beside errors that remember")
     longest = max(models, key=lambda column: models[column].memory)
     model, lasts = models[longest], models[longest].memory * spacing(pieces, longest)[0]
     yield (
         f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
-        f"errors of each output are fitted as an autoregression of order {order}, with a memory of up to "
+        f"errors of each output are fitted as {' or '.join(ways)}, with a memory of up to "
         f"{lasts:.2g} s; {widened(known)}"
     )
     if model.rows < FEW * model.memory:
