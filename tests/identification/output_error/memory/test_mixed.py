@@ -38,7 +38,7 @@ def test_the_autoregression_that_tells_the_same_has_its_partial_correlations():
     impulse = lfilter([1.0, -0.8], [1.0, -0.95], np.eye(1, 4000)[0])
     lags = np.array([impulse[: 4000 - k] @ impulse[k:] for k in range(13)])
     own = [np.linalg.solve(toeplitz(lags[:p]), lags[1 : p + 1])[-1] for p in range(1, 13)]
-    np.testing.assert_allclose(partials(0.95, 0.8, 12), own, rtol=1e-9)
+    np.testing.assert_allclose(partials(np.array([0.95, 0.8]), 12), own, rtol=1e-9)
 
 
 @pytest.mark.parametrize("z, share", [(0.9, 0.1), (0.95, 0.3), (0.99, 0.05)])

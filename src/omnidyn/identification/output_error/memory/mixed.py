@@ -37,12 +37,12 @@ def mixed(stretches: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, floa
         size = max(square / rows, 1e-300)
         return rows * math.log(size) + logs, gradient / size, curved / size, size
 
-    at = min(map(np.array, STARTS), key=lambda each: looked(each)[0])
+    at: FloatArray = min(map(np.array, STARTS), key=lambda each: looked(each)[0])
     cost, gradient, curved, size = looked(at)
     damping = 1e-3
     for _ in range(ROUNDS):
         step = np.linalg.lstsq(curved + damping * np.diag(curved.diagonal()), gradient)[0]
-        trial = np.clip(at - step, -np.array(MOST), MOST)
+        trial: FloatArray = np.clip(at - step, -np.array(MOST), MOST).astype(float)
         new = looked(trial)
         if new[0] >= cost:
             damping *= 10.0
@@ -55,15 +55,17 @@ def mixed(stretches: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, floa
             break
     theta = max(abs(float(at[1])), 1e-9)
     count = int(np.clip(math.ceil(math.log(TAIL) / math.log(theta)), 2, LONGEST))
-    pairs = [
-        [coefficients(partials(*(at + side), count)) for side in (by, -by)] for by in STEP * (1.0 - at**2) * np.eye(2)
-    ]
-    slopes = np.transpose([(a - b) / (2.0 * STEP) for a, b in pairs])
-    return partials(*at, count), slopes, size, cost + 2.0 * math.log(rows)
+    ways = STEP * (1.0 - at**2) * np.eye(2)
+    slopes = [coefficients(partials(at + way, count)) - coefficients(partials(at - way, count)) for way in ways]
+    return partials(at, count), np.transpose(slopes) / (2.0 * STEP), size, cost + 2.0 * math.log(rows)
 
 
-def partials(phi: float, theta: float, count: int) -> FloatArray:
-    """The first partial correlations, by the Durbin-Levinson recursion of the autocovariance. Shape (count,)."""
+def partials(at: FloatArray, count: int) -> FloatArray:
+    """The first partial correlations, by the Durbin-Levinson recursion of the autocovariance. Shape (count,).
+
+    at: phi and theta.
+    """
+    phi, theta = at
     first = (1.0 - phi * theta) * (phi - theta) / (1.0 + theta * theta - 2.0 * phi * theta)
     lags = np.append(1.0, first * phi ** np.arange(count))
     found, known, left = np.zeros(count), np.zeros(0), 1.0

@@ -32,6 +32,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.beside import side_by_side
+from omnidyn.identification.output_error.memory.across import widening
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.near import near
 from omnidyn.identification.output_error.memory.whitened import (
@@ -229,8 +230,10 @@ def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegress
     """The trust in a fit by filtered rows. before: in the one by residuals as they are."""
     solver = found.solver
     known = trust(solver, found, WHITE)
-    known = replace(known, covariance=_observed(found, known))
     degrees = _degrees(found, known, models)
+    filtered = WhitenedEngine(below(solver), models).residuals(found.state.point)
+    wider = widening(solver.problem, filtered, found.state.variance, _of_pieces(found, known.plain))
+    known = replace(known, covariance=_observed(found, known) * np.outer(wider, wider))
     told = ~known.open & ~before.open
     plain = np.sqrt(np.diag(before.plain))
     ratio = known.std[told] / np.where(plain[told] > 0.0, plain[told], 1.0)
@@ -290,11 +293,8 @@ def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trus
     """What a reader should know of the memory: what it is, logs too short for it, stamps that are not even."""
     pieces = found.solver.problem.pieces
     orders = sorted({model.order for model in models.values() if model.slopes is None})
-    ways = (
-        [f"an autoregression of order {' to '.join(map(str, dict.fromkeys((orders[0], orders[-1]))))}"]
-        if orders
-        else []
-    )
+    order = " to ".join(str(each) for each in dict.fromkeys((*orders[:1], *orders[-1:])))
+    ways = [f"an autoregression of order {order}"] if orders else []
     if any(model.slopes is not None for model in models.values()):
         ways.append("white noise beside errors that remember")
     longest = max(models, key=lambda column: models[column].memory)
