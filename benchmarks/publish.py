@@ -11,8 +11,12 @@ from pathlib import Path
 from benchmarks.table import Table
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-FIGURES = "identify-figures.md"  # takes these and every `identify_...`, also one that it does not show yet:
-FAMILY = ("groups", "real_fit")
+FIGURES = "identify-figures.md"  # takes every `identify_...`, also one that it does not show yet
+PAGES = {  # and so do these take theirs
+    **dict.fromkeys(("groups", "real_fit"), FIGURES),
+    **dict.fromkeys(("first_minutes", "ten_robots", "outputs", "coloured", "wrong_worlds", "ladder", "blind",
+                     "laws_identified", "laws_ladder"), "trust-figures.md"),
+}  # fmt: skip
 VERSIONS = ("numpy", "scipy", "numba", "mujoco", "lmfit")
 
 
@@ -31,7 +35,8 @@ def page_of(name: str, docs: Path = DOCS) -> Path | None:
     for page in sorted(docs.glob("*.md")):
         if begin(name) in page.read_text("utf-8"):
             return page
-    return docs / FIGURES if name.startswith("identify_") or name in FAMILY else None
+    own = FIGURES if name.startswith("identify_") else PAGES.get(name)
+    return None if own is None else docs / own
 
 
 def publish(name: str, table: Table, docs: Path = DOCS) -> None:
