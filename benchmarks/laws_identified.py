@@ -98,15 +98,26 @@ def true_twist(name: str, number: int) -> FloatArray:
 
 
 @lru_cache(maxsize=64)
-def bound(name: str, number: int) -> FloatArray:
-    """The least std of each number, by differences of the integrator. Shape (P,)."""
+def least_covariance(name: str, number: int) -> FloatArray:
+    """The Cramer-Rao bound of all numbers together, by differences of the integrator. Shape (P, P)."""
     law, robot, columns = LAWS[name], robot_of(LAWS[name], TRUE), []
     for key in map(Key.parse, keys_of(law)):
         value = key.get(robot)
         up, down = (simulated(key.set(robot, value * by), law, number)[:, 0] for by in (1.001, 0.999))
         columns.append((up - down) / (0.002 * value * law.noise))
     slopes = np.stack(columns, axis=1)
-    return np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    return np.linalg.inv(slopes.T @ slopes)
+
+
+def bound(name: str, number: int) -> FloatArray:
+    """The least std of each number. Shape (P,)."""
+    return np.sqrt(np.diag(least_covariance(name, number)))
+
+
+def std_of_fall(name: str, number: int) -> float:
+    """The least std of what breakaway is above Coulomb friction."""
+    falls = np.array([{"breakaway": 1.0, "coulomb": -1.0}.get(each, 0.0) for each in LAWS[name].names])
+    return float(np.sqrt(falls @ least_covariance(name, number) @ falls))
 
 
 def fitted(name: str, seed: int) -> tuple[FloatArray, Sequence[bool]]:

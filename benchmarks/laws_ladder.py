@@ -1,7 +1,7 @@
 """A law that the robot file lacks: is it found, named and taken, and do the intervals hold with it?
 
 Stribeck and LuGre along x by the integrators of laws_identified, which share no code with simulation/, under the file
-of plain Coulomb friction; the fall as large as so many standard errors of breakaway, by differences of the same
+of plain Coulomb friction; the fall as large as so many of its standard errors, by differences of the same
 integrators; right logs of the same programs; Stribeck and wheels that slip from the simulator of wrong_worlds.
 OMNIDYN_BENCH_SHARE=0.2 does that share of the logs.
 """
@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.identify_log import SHARE
 from benchmarks.ladder import Climbed, climbed
-from benchmarks.laws_identified import DT, LAWS, PROGRAMS, ROWS, TRUE, Law, bound, program, robot_of, true_twist
+from benchmarks.laws_identified import DT, LAWS, PROGRAMS, ROWS, TRUE, Law, program, robot_of, std_of_fall, true_twist
 from benchmarks.table import Table, machine
 from benchmarks.wrong_worlds.remedies import FALL, FRICTION
 from omnidyn.arrays import FloatArray
@@ -31,7 +31,7 @@ from tests.reference import modes
 
 LOGS, WORLDS, RIGHT_LOGS = max(round(20 * SHARE), 2), max(round(10 * SHARE), 2), max(round(100 * SHARE), 5)
 FIRST_SEED = 7000  # of no log of laws_identified
-CLEAR = (5.0, 10.0, 30.0)  # standard errors by which breakaway exceeds Coulomb friction
+CLEAR = (5.0, 10.0, 30.0)  # standard errors (of their difference) by which breakaway exceeds Coulomb friction
 HELD, TAKEN, RICHER = 0.9, 0.95, 0.05
 BRISTLE = "friction.axes.stiffness"
 LAW_OF = {"Stribeck": (FALL,), "LuGre": (FALL, BRISTLE)}
@@ -73,9 +73,7 @@ def _show(*told: Any) -> None:
 def of_law(name: str, clear: float, seed: int) -> tuple[Climbed, bool]:
     """A log of a law, so noisy that its fall is `clear`: (what came of it, whether the law is first or second)."""
     number = seed % PROGRAMS
-    law = LAWS[name]
-    level = bound(name, number)[law.names.index("breakaway")]
-    noise = law.noise * (TRUE["breakaway"] - TRUE["coulomb"]) / level / clear
+    noise = LAWS[name].noise * (TRUE["breakaway"] - TRUE["coulomb"]) / std_of_fall(name, number) / clear
     return _on(true_twist(name, number), noise, seed, LAW_OF[name])
 
 

@@ -1,4 +1,4 @@
-"""The implicit engine: cost of a fixed step, iterations of its solver, and error against cost beside its peers.
+"""The implicit engine: cost of a fixed step and of each law, iterations of its solver, error against cost beside peers.
 
 One run, one thread. Whole call: simulate() from arrays to a Run, divided by its steps; kernel: the march alone.
 Peers solve the paper's law on the work item of tests/reference (10 s at 1 kHz, 50-digit truth every 10 ms). MuJoCo runs
@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.table import Table, Times, machine, one_core
 from benchmarks.tanh import run_tanh
-from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.stick_slip.plant import plant
@@ -34,6 +34,13 @@ QUOTED = [  # us/step, m/s, rad/s; EVIDENCE.md section 3
     ("Siconos EulerMoreau + Lemke, 1 ms (quoted)", 7.5, 3.3e-3, 3.0e-2),
     ("DART, joint Coulomb friction, 1 ms (quoted)", 7.5, 3.3e-3, 3.1e-2),
 ]
+FALLING: dict[str, Any] = {"breakaway": (2.8, 1.9, 0.13), "stribeck_speed": (0.02, 0.02, 0.2)}
+BENT = {"stiffness": (1e4, 1e4, 1e2)}
+LAWS: dict[str, dict[str, Any]] = {  # on the axes; breakaway above Coulomb friction where a law has it
+    "Coulomb": {}, "breakaway": {"breakaway": FALLING["breakaway"]}, "Stribeck": FALLING,
+    "Karnopp": {"law": "karnopp", "karnopp_speed": (2e-3, 2e-3, 2e-2), "breakaway": FALLING["breakaway"]},
+    "Dahl": {"law": "dahl", **BENT}, "LuGre": {"law": "lugre", **BENT, **FALLING},
+}  # fmt: skip
 COLUMNS = ["engine", "us/step", "cpu us/step", "kernel us/step", "error m/s", "error rad/s", "p50", "p99", "max"]
 NO_MUJOCO = "MuJoCo skipped: not installed here (python -m pip install -r benchmarks/peers.txt)"
 
@@ -66,6 +73,13 @@ def full() -> Robot:
             wheels=WheelFriction(coulomb=0.4, viscous=0.2),
         ),
     )
+
+
+def with_law(name: str) -> Robot:
+    """The paper's robot with a law on its axes, at the levels of Table 3."""
+    robot = paper()
+    levels = {"viscous": robot.friction.axes.viscous, "coulomb": robot.friction.axes.coulomb}
+    return robot.replace(friction=Friction(axes=AxesFriction(**levels, **LAWS[name])))
 
 
 def march(robot: Robot, voltage: np.ndarray, tol: float) -> Any:
@@ -172,6 +186,8 @@ def measure() -> Table:
         cells, _ = ours(full(), voltage, None, 50)
         words = "omnidyn fixed 1 ms, ellipse + wheels + rotating frame + current limit"
         add(words, cells, True, "<= 5 us", cells["cpu us/step"] <= GOAL_FULL)
+        for name in LAWS:
+            add(f"omnidyn fixed 1 ms, law: {name}", ours(with_law(name), voltage, None, 20)[0], True)
         for tol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
             cells, twist = ours(paper(), voltage, tol, 3)
             found = errors(twist, truth)

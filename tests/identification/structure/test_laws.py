@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from benchmarks.laws_ladder import of_law, right
-from omnidyn.identification.structure.laws import arm, bristled
-from omnidyn.model.friction import AxesFriction, Friction
+from omnidyn.identification.structure.laws import arm, bristled, may_fall
+from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import LUGRE
 from omnidyn.model.robot_file import load_robot
 
@@ -22,6 +22,30 @@ def test_a_law_that_the_file_lacks_is_named_and_taken(name):
     assert log.cause
     assert log.after == [True, True]
     assert log.words.endswith("the residuals hold nothing but noise")
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(2, id="two of three axes never moved"),
+        pytest.param(7, id="without the law viscous friction stands at its bound"),
+        pytest.param(9, id="only the law tells that something is left, and what it leaves has less memory"),
+    ],
+)
+def test_a_law_of_five_standard_errors_is_taken(seed):
+    """Logs in which it went unseen: numbers of axes at rest were counted, those at a bound not, noise was too long."""
+    log, early = of_law("Stribeck", 5.0, seed)
+    assert log.found
+    assert early
+    assert log.cause
+    assert log.words.endswith("the residuals hold nothing but noise")
+
+
+def test_what_may_fall_is_level_at_every_speed():
+    axes = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))
+    assert may_fall(Friction(axes=axes)) == ["friction.axes"]
+    falling = axes.replace(breakaway=(2.8, 1.9, 0.13), stribeck_speed=(0.02, 0.02, 0.2))
+    assert may_fall(Friction(axes=falling, wheels=WheelFriction(coulomb=0.4))) == ["friction.wheels"]
 
 
 def test_the_law_that_is_right_is_kept():

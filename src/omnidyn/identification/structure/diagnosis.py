@@ -7,7 +7,6 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import fdtrc
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
@@ -19,8 +18,8 @@ from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
 from omnidyn.identification.structure.candidates import Candidate, Trial
 from omnidyn.identification.structure.laws import candidates
-from omnidyn.identification.structure.linear import Rows
-from omnidyn.identification.structure.misfit import FALSE, Misfit, misfit, with_cause
+from omnidyn.identification.structure.linear import Linear, Rows
+from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.refits import refits
 from omnidyn.identification.structure.remedies import remedies
@@ -63,10 +62,9 @@ def examine(solution: Solution) -> Examined:
     tried = [each for each in tried if each[1]]
     ranked = remedies(seen.linear, tried, seen.shown)
     count = int(sum(there.sum() for there in rows.there))
-    degrees = min(seen.linear.degrees, float(count))
-    strong = [r for r in ranked if fdtrc(r.numbers, degrees, r.chi2 / r.numbers) * len(tried) < FALSE]
-    found = bool(seen.found or strong)
+    found = bool(seen.found) or any(_chance(seen.linear, tried, r) * len(tried) < FALSE for r in ranked)
     told, cause = _fitted(solution, problem, parts, seen, tried, ranked) if found else ((), None)
+    memory = memory_beside(rows, cause) if cause and not seen.found else seen.linear.memory
     seen = with_cause(seen, cause) if cause else seen
     names = [f"{name}[{i}]" for name, i in problem.columns]
     pictures = binned(rows, moved, int(np.argmax(seen.shares))) if found else ()
@@ -75,7 +73,13 @@ def examine(solution: Solution) -> Examined:
         pictures, {} if solver.nu else wild_samples(seen),
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
-    return Examined(diagnosis, seen.linear.memory, len(tried), count)
+    return Examined(diagnosis, memory, len(tried), count)
+
+
+def _chance(linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], best: Remedy) -> float:
+    """The chance that noise alone lets a remedy explain as much, by how well it is known along what that shows."""
+    shown = [trial.shown for one, trials in tried if one.key == best.key for trial in trials if trial.at == best.at]
+    return min(chance(linear, own) for own in shown)
 
 
 def _fitted(
@@ -84,12 +88,12 @@ def _fitted(
 ) -> tuple[tuple[Remedy, ...], list[FloatArray] | None]:  # fmt: skip
     """(the remedies, the best of them and other shapes as fits find them; what the first shows of each piece).
 
-    A size stays that of the first step.
+    A size stays that of the first step; so does all, where the numbers that a fit needs cost more than it explains.
     """
     near = {one.key: one for one in ranked}
     anew = refits(solution, problem, parts, ranked, [one for one, _ in tried])
     tried = [anew.get(one.key, (one, trials)) for one, trials in tried]
-    again = remedies(seen.linear, tried, seen.shown)
+    again = remedies(seen.linear, tried, seen.shown) or ranked
     shown = [
         trial.shown for one, trials in tried for trial in trials
         if again and one.key == again[0].key and (trial.fitted or trial.at == again[0].at)

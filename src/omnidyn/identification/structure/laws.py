@@ -26,6 +26,7 @@ ABOVE = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb fr
 SPEEDS = (0.01, 0.03, 0.1, 0.3)  # of the fastest speed, over which the level may fall
 BENDS = (2e-4, 1e-3, 5e-3)  # [m] by which bristles may bend before they slip
 USUAL_FALL, USUAL_SPEED = 1.3, 0.05  # breakaway over Coulomb friction, and [m/s] over which it falls to it
+FALL_WORDS = "friction that falls with the speed from breakaway, above Coulomb friction (Stribeck)"
 FALL, BRISTLE = "stribeck_speed", "stiffness"  # numbers that laws begin with, in the table of the friction
 
 
@@ -100,13 +101,16 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
         yield Candidate(BODY_AXES, _in_place(along_axes), as_it_is("Coulomb friction on each axis by itself, a box"))
     if friction.wheels == WheelFriction():
         yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
-    for table, force in ((BODY_AXES, _of_axes), (DIRECTION, _of_travel), (WHEELS, _of_rims)):
-        law = table_of(friction, table)
-        if law.stribeck_speed is None and np.any(law.coulomb):
-            words = as_it_is("friction that falls with the speed from breakaway, above Coulomb friction (Stribeck)")
-            yield Candidate(f"{table}.{FALL}", _falling(force), words, 0.0)
+    for table in may_fall(friction):
+        yield Candidate(f"{table}.{FALL}", _falling(FORCES[table]), as_it_is(FALL_WORDS), 0.0)
     if boxed and axes.law == COULOMB and axes.coulomb_backward is None:
         yield Candidate(f"{BODY_AXES}.{BRISTLE}", _bending, as_it_is("friction that bends before it slips (LuGre)"))
+
+
+def may_fall(friction: Friction) -> list[str]:
+    """The tables of friction whose level is the same at every speed."""
+    laws = ((table, table_of(friction, table)) for table in (BODY_AXES, DIRECTION, WHEELS))
+    return [table for table, law in laws if law.stribeck_speed is None and np.any(law.coulomb)]
 
 
 def table_of(friction: Friction, table: str) -> Any:
@@ -152,6 +156,9 @@ def _of_rims(motion: Motion, over: float) -> FloatArray:
     g, rim = motion.robot.wheels.wrench_matrix, motion.twist @ motion.robot.wheels.wrench_matrix
     level = per_wheel(motion.robot.friction.wheels.coulomb, g.shape[1])
     return -((np.sign(rim) * fallen(rim, 1.0 / over, EXPONENT) * level) @ g.T)[:, None, :]
+
+
+FORCES = {BODY_AXES: _of_axes, DIRECTION: _of_travel, WHEELS: _of_rims}  # of a fall, of each table
 
 
 def _bending(bench: Workbench) -> list[Trial]:

@@ -80,6 +80,16 @@ def with_cause(seen: Misfit, cause: Sequence[FloatArray]) -> Misfit:
     return replace(seen, shares=shares, explained=explained) if shares.sum() > seen.shares.sum() else seen
 
 
+def chance(linear: Linear, shown: Sequence[FloatArray]) -> float:
+    """The chance that noise alone follows what some columns show (C, rows, K) of each piece, as they do, or more."""
+    return _Asked.of(linear, shown, np.zeros(0, dtype=int)).score(np.arange(shown[0].shape[2]))[1]
+
+
+def memory_beside(rows: Rows, cause: Sequence[FloatArray]) -> Sequence[AutoRegression]:
+    """The memory of each column, of what is left beside what a cause shows (C, rows, K) of each piece."""
+    return _whitened(rows, cause)[0].memory
+
+
 def _likeliest(scores: Mapping[str, tuple[float, float, int]]) -> str:
     """The theme with the least chance of being noise, which is 0 to a float of more than one; "" of none."""
     return min(scores, key=lambda name: (scores[name][1], -scores[name][0]), default="")

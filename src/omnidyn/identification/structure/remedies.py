@@ -27,30 +27,32 @@ TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one mu
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A candidate at its best trial: where its columns stand, what it explains, its size, and how far the parameters
-    would follow it."""
+    """A candidate at its best trial: where its columns stand, how many of them show anything, what it explains, its
+    size, and how far the parameters would follow it."""
 
     candidate: Candidate
     trial: Trial
     at: IntArray
+    shows: int
     chi2: float
     size: FloatArray
     step: FloatArray
 
     @property
     def numbers(self) -> int:
-        """How many it fits."""
-        return self.trial.fitted.numbers if self.trial.fitted else len(self.at)
+        """How many it fits; one of an axis that never moved is none."""
+        return self.trial.fitted.numbers if self.trial.fitted else max(self.shows, 1)
 
 
 class Blocks:
-    """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n)."""
+    """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n); shows (n,): which columns are not all 0."""
 
     def __init__(self, linear: Linear, shown: Sequence[FloatArray]):
         e, j = linear.whole()
         z = linear.white(shown)
         every = np.column_stack([e, j, z])
         self.size = np.linalg.norm(every, axis=0)
+        self.shows = self.size > 0.0
         self.size[0] = 1.0
         self.size[self.size == 0.0] = 1.0
         every = every / self.size
@@ -120,7 +122,7 @@ def remedies(
         size, step = fitted[len(known) :], fitted[: len(known)]
         if size.max() < one.least:
             continue
-        own = Tried(one, trial, at, float(chi2), size, step)
+        own = Tried(one, trial, at, int(blocks.shows[at].sum()), float(chi2), size, step)
         if one.key not in best or chi2 - penalty * own.numbers > best[one.key].chi2 - penalty * best[one.key].numbers:
             best[one.key] = own
     ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * t.numbers, reverse=True)

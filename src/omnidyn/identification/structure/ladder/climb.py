@@ -2,17 +2,17 @@
 
 A step fits the logs anew with each of the best remedies of the diagnosis, and with what is the same as the first of
 them. Where none of these leaves only noise, it tries what a diagnosis near the best point tells little of: other shapes
-of friction, a limit; and, once it has found the best, the same without the step before. Of those that predict blocks of
-the logs which they were not fitted to better than what stands, by more than a standard error, and that BIC prefers
-though they are the best of many, the simplest within a standard error of the best is taken, unless BIC prefers the best
-by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor is what explains less than such a
-cause would.
+of friction, a usual fall, a limit; and, once it has found the best, the same without the step before. Of those that
+predict blocks of the logs which they were not fitted to better than what stands, by more than a standard error, and
+that BIC prefers though they are the best of many, the simplest within a standard error of the best is taken, unless BIC
+prefers the best by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor is what explains
+less than such a cause would.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,10 +29,12 @@ from omnidyn.identification.question import Question
 from omnidyn.identification.structure.candidates import CHANGE
 from omnidyn.identification.structure.diagnosis import Examined, examine
 from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
+from omnidyn.identification.structure.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.switches import LIMIT, Switch, simpler_first, switches, told
 from omnidyn.model.friction import WheelFriction
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -123,6 +125,8 @@ def unseen(lack: LackOfFit, stands: Model) -> list[Remedy]:
     found = [Remedy(shape[0], f"Coulomb friction of another shape, {shape[1]}", 0.0, 0.0)]
     if robot.friction.wheels == WheelFriction():
         found.append(Remedy(WHEELS, "friction at the wheels", 0.0, 0.0))
+    usual = Remedy("", FALL_WORDS, 0.0, 0.0, size=(USUAL_FALL - 1.0,) * N_AXES, at=USUAL_SPEED)
+    found += [replace(usual, key=f"{table}.{FALL}") for table in may_fall(robot.friction)]
     if limit is None:
         most = np.concatenate([np.abs(motion.current).max(axis=1) for motion in motions(problem, point)])
         levels = np.quantile(most[most > 0.0], LIMITS).tolist() if most.any() else []

@@ -51,7 +51,7 @@ def errors(
     solution: Solution, memory: Sequence[AutoRegression], margins: Sequence[FloatArray], more: int = 0
 ) -> Errors:
     """The errors of a fit. memory: of each column; margins: of each piece, see `margins_of`; more: numbers that are
-    fitted beside its parameters."""
+    fitted beside its parameters. One that a bound holds was fitted, too: it is no gain of the model without it."""
     problem = _from(solution.solver.problem, margins).shortened(MOST_ROWS)
     point = solution.state.point
     engine: RowEngine = solution.solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]
@@ -62,8 +62,7 @@ def errors(
     blocks = Blocks(linear, nothing)
     known = np.arange(1, 1 + blocks.count)
     seen = int(sum(there.sum() for there in rows.there))
-    free = int((~solution.held).sum())
-    return Errors(blocks.held_out(known), blocks.left(known), seen, free + more)
+    return Errors(blocks.held_out(known), blocks.left(known), seen, blocks.count + more)
 
 
 def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
