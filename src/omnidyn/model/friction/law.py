@@ -21,9 +21,29 @@ A law acts between body and floor. It must:
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 from omnidyn.model.layout import Plant
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A law that a table may choose by a word; kinds.py lists them.
+
+    word: in the robot file; name: what people call it. takes: the keys that it takes beside those of every law. falls:
+    whether its level may fall from breakaway with the speed. bends: whether it has bristles. usual: of a key that may
+    be left out, the number it is then, a function of (stiffness, mass, viscous). places: the tables that know it.
+    """
+
+    word: str
+    name: str
+    takes: tuple[str, ...] = ()
+    falls: bool = True
+    bends: bool = False
+    usual: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    places: tuple[str, ...] = ("axes", "direction", "wheels")
 
 
 class FrictionLaw(Protocol):

@@ -1,0 +1,77 @@
+"""Dahl's bristles: a spring before it slips, and one level.
+
+    z' = s |w|^a sgn w,  w = 1 - sigma0 z sgn(s)/C,   F = sigma0 z
+
+a = 1 usual, below 1 brittle, above 1 ductile. It never gives energy back. Source: Dahl 1976. a = 1 is LuGre's rate.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from omnidyn.compiled.kernel import part
+from omnidyn.model.friction import lugre
+from omnidyn.model.friction.law import Kind
+
+ROUNDS = 60  # of Newton's steps for a general exponent; bisection needs no more
+
+_linear = lugre.rate
+
+
+@part
+def rate(own, aimed, speed, tau, level, slope):
+    """(z', dz'/ds); see LAWS of bristle.py. r(z') = z' - s psi(z* + tau z') rises with z': Newton within a bracket."""
+    shape, stiffness = own.dahl_exponent, own.stiffness
+    if shape == 1.0:
+        return _linear(own, aimed, speed, tau, level, slope)
+    if speed == 0.0:
+        return 0.0, _left(aimed, 0.0, 0.0, stiffness, level, 1.0, shape)[0]
+    side = 1.0 if speed > 0.0 else -1.0
+    start = speed * _left(aimed, 0.0, tau, stiffness, level, side, shape)[0]
+    low, high, found = min(start, 0.0), max(start, 0.0), 0.5 * start
+    bend = tau * abs(speed) * stiffness / level
+    for _ in range(ROUNDS):
+        psi, steep = _left(aimed, found, tau, stiffness, level, side, shape)
+        off = found - speed * psi
+        if off > 0.0:
+            high = found
+        else:
+            low = found
+        new = found - off / (1.0 + bend * steep)
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - found) <= 1e-16 * abs(start):
+            break
+        found = new
+    psi, steep = _left(aimed, found, tau, stiffness, level, side, shape)
+    return found, psi / (1.0 + bend * steep)
+
+
+@part
+def _left(aimed, rate, tau, stiffness, level, side, shape):
+    """(|w|^a sgn w, a |w|^(a-1)) of what is left of the way to slipping."""
+    w = 1.0 - stiffness * (aimed + tau * rate) * side / level
+    size = abs(w) ** shape
+    return math.copysign(size, w), shape * size / max(abs(w), 1e-300)
+
+
+def slow(own: Any, left: float, far: float) -> float:
+    """What is left of the way to slipping, on a slow way: it decays by a power, for a = 1 by exp."""
+    a = float(own.dahl_exponent)
+    if a == 1.0:
+        return lugre.slow(own, left, far)
+    if left <= 0.0:
+        return left
+    below = left ** (1.0 - a) + (a - 1.0) * far
+    return below ** (1.0 / (1.0 - a)) if below > 0.0 else 0.0
+
+
+def linear(stiffness: Any, mass: Any, viscous: Any) -> float:
+    """a where a table has no key for it."""
+    return 1.0
+
+
+KIND = Kind(
+    "dahl", "Dahl", takes=("stiffness", "dahl_exponent"), falls=False, bends=True, usual={"dahl_exponent": linear}
+)
