@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import one_of, part, plain
-from omnidyn.model.friction import exponential
+from omnidyn.model.friction import exponential, lorentzian
 
-SHAPES = {"exponential": exponential}
+SHAPES = {"exponential": exponential, "lorentzian": lorentzian}
 """The shapes by their words in a robot file. A record has the number of its shape, in this order."""
 
 USUAL = 2.0
