@@ -12,7 +12,7 @@ from typing import Any
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction import lugre
-from omnidyn.model.friction.law import Kind
+from omnidyn.model.friction.law import Kind, Number
 
 ROUNDS = 60  # of Newton's steps for a general exponent; bisection needs no more
 
@@ -72,6 +72,5 @@ def linear(stiffness: Any, mass: Any, viscous: Any) -> float:
     return 1.0
 
 
-KIND = Kind(
-    "dahl", "Dahl", takes=("stiffness", "dahl_exponent"), falls=False, bends=True, usual={"dahl_exponent": linear}
-)
+TAKES = {"stiffness": lugre.STIFFNESS, "dahl_exponent": Number("dahl_exponent")}
+KIND = Kind("dahl", "Dahl", TAKES, falls=False, bends=True, usual={"dahl_exponent": linear})

@@ -11,36 +11,29 @@ Which law a table has is one word; what it takes, and what goes with what, is ch
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.friction import bristle
-from omnidyn.model.friction.law import Kind
+from omnidyn.model.friction.law import SPEED, Kind, Number
 from omnidyn.model.friction.stribeck import SHAPES
 
 AXES, DIRECTION, WHEELS = "axes", "direction", "wheels"
 COULOMB, KARNOPP, LUGRE = "coulomb", "karnopp", "lugre"
 _STICKING = (
     Kind(COULOMB, "Coulomb"),
-    Kind(KARNOPP, "Karnopp", takes=("karnopp_speed",), falls=False, places=(AXES,)),
+    Kind(KARNOPP, "Karnopp", takes={"karnopp_speed": Number("band", -1, units=SPEED)}, falls=False, places=(AXES,)),
 )
 KINDS = {each.word: each for each in (*_STICKING, *(law.KIND for law in bristle.LAWS))}
 
 
-class Number(NamedTuple):
-    """Where a number of a law stands in a record of a plant: the field; about yaw, over the length^power; inverse."""
-
-    field: str
-    power: int = 0
-    inverse: bool = False
-
-
-FALL = {"stribeck_speed": Number("fall", -1, True), "stribeck_exponent": Number("exponent"),
+FALL = {"stribeck_speed": Number("fall", -1, True, SPEED), "stribeck_exponent": Number("exponent"),
         "stribeck_shape": Number("form")}  # fmt: skip
-NUMBERS = {"stiffness": Number("stiffness", 2), "damping": Number("damping", 2),
-           "damping_speed": Number("fade", -1, True), "dahl_exponent": Number("dahl_exponent")}  # fmt: skip
+OF_LAWS = {key: number for each in KINDS.values() for key, number in each.takes.items()}
+NUMBERS = FALL | OF_LAWS
+"""Every number that a law takes, by its key without "yaw_"."""
 
 
 def words_of(place: str) -> tuple[str, ...]:
@@ -72,11 +65,10 @@ def _bend(
     kind: Kind, table: Any, rows: Any, used: Any, mass: Any, viscous: Any, units: FloatArray | float, yaw: str
 ) -> None:
     """The numbers of a law that bends; the ellipse has fields for those of LuGre alone."""
-    for key in kind.takes:
-        number = NUMBERS[key]
+    for key, number in kind.takes.items():
         value = _number(table, yaw, key, number, units)
         if value is None and key in kind.usual:
-            value = kind.usual[key](_number(table, yaw, "stiffness", NUMBERS["stiffness"], units), mass, viscous)
+            value = kind.usual[key](_number(table, yaw, "stiffness", kind.takes["stiffness"], units), mass, viscous)
         _put(rows, used, number.field, value)
     _put(rows, used, "law", bristle.NUMBER_OF[kind.word])
 
@@ -97,9 +89,6 @@ def _put(rows: Any, where: Any, field: str, value: Any) -> None:
     """One number, or one per row, into a field of some rows, where they have such a field."""
     if value is not None and field in rows.dtype.fields:
         rows[field] = np.where(where, value, rows[field])
-
-
-OF_LAWS = frozenset(key for each in KINDS.values() for key in each.takes)
 
 
 def refuse_mixtures(table: Any, yaw: str = "") -> None:

@@ -23,9 +23,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from omnidyn.model.layout import Plant
+
+SPEED = ("m/s", "rad/s")
+
+
+class Number(NamedTuple):
+    """A number that a law takes: the field of a plant's records in which it stands (layout.py), about yaw over the
+    length^power, or the inverse of it; and its units, along and about yaw."""
+
+    field: str
+    power: int = 0
+    inverse: bool = False
+    units: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True)
@@ -39,7 +51,7 @@ class Kind:
 
     word: str
     name: str
-    takes: tuple[str, ...] = ()
+    takes: Mapping[str, Number] = field(default_factory=dict)
     falls: bool = True
     bends: bool = False
     usual: Mapping[str, Callable[..., Any]] = field(default_factory=dict)

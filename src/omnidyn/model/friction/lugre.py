@@ -19,7 +19,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import part
-from omnidyn.model.friction.law import Kind
+from omnidyn.model.friction.law import SPEED, Kind, Number
 
 
 @part
@@ -42,4 +42,6 @@ def critical(stiffness: Any, mass: FloatArray | float, viscous: Any) -> Any:
     return None if stiffness is None else np.maximum(2.0 * np.sqrt(stiffness * mass) - viscous, 0.0)
 
 
-KIND = Kind("lugre", "LuGre", takes=("stiffness", "damping", "damping_speed"), bends=True, usual={"damping": critical})
+STIFFNESS = Number("stiffness", 2, units=("N/m", "N m/rad"))
+DAMPED = {"damping": Number("damping", 2, units=("N s/m", "N m s")), "damping_speed": Number("fade", -1, True, SPEED)}
+KIND = Kind("lugre", "LuGre", {"stiffness": STIFFNESS, **DAMPED}, bends=True, usual={"damping": critical})
