@@ -16,44 +16,57 @@ from omnidyn.model.friction.law import Kind, Number
 
 ROUNDS = 60  # of Newton's steps for a general exponent; bisection needs no more
 
-_linear = lugre.rate
+
+def rate_of(psi: Any) -> Any:
+    """The rate z' = s psi(w), w = sigma0 z sgn(s)/g, of a law whose psi falls with w.
+
+    psi(own, w) -> (psi, -psi'), a part. r(z') = z' - s psi(w(z* + tau z')) rises with z': Newton within a bracket.
+    """
+
+    def rate(own, aimed, speed, tau, level, slope):
+        stiffness = own.stiffness
+        if speed == 0.0:
+            return 0.0, psi(own, stiffness * aimed / level)[0]
+        side = 1.0 if speed > 0.0 else -1.0
+        start = speed * psi(own, stiffness * aimed * side / level)[0]
+        low, high, found = min(start, 0.0), max(start, 0.0), 0.5 * start
+        bend = tau * abs(speed) * stiffness / level
+        for _ in range(ROUNDS):
+            value, steep = psi(own, stiffness * (aimed + tau * found) * side / level)
+            off = found - speed * value
+            if off > 0.0:
+                high = found
+            else:
+                low = found
+            new = found - off / (1.0 + bend * steep)
+            if not low <= new <= high:
+                new = 0.5 * (low + high)
+            if abs(new - found) <= 1e-16 * abs(start):
+                break
+            found = new
+        w = stiffness * (aimed + tau * found) * side / level
+        value, steep = psi(own, w)
+        return found, (value + speed * steep * w * slope / level) / (1.0 + bend * steep)
+
+    return part(rate)
+
+
+@part
+def _psi(own, w):
+    left, a = 1.0 - w, own.dahl_exponent
+    size = abs(left) ** a
+    return math.copysign(size, left), a * size / max(abs(left), 1e-300)
+
+
+_linear, _by_newton = lugre.rate, rate_of(_psi)
 
 
 @part
 def rate(own, aimed, speed, tau, level, slope):
-    """(z', dz'/ds); see LAWS of bristle.py. r(z') = z' - s psi(z* + tau z') rises with z': Newton within a bracket."""
-    shape, stiffness = own.dahl_exponent, own.stiffness
-    if shape == 1.0:
+    """(z', dz'/ds); see LAWS of bristle.py."""
+    if own.dahl_exponent == 1.0:
         return _linear(own, aimed, speed, tau, level, slope)
-    if speed == 0.0:
-        return 0.0, _left(aimed, 0.0, 0.0, stiffness, level, 1.0, shape)[0]
-    side = 1.0 if speed > 0.0 else -1.0
-    start = speed * _left(aimed, 0.0, tau, stiffness, level, side, shape)[0]
-    low, high, found = min(start, 0.0), max(start, 0.0), 0.5 * start
-    bend = tau * abs(speed) * stiffness / level
-    for _ in range(ROUNDS):
-        psi, steep = _left(aimed, found, tau, stiffness, level, side, shape)
-        off = found - speed * psi
-        if off > 0.0:
-            high = found
-        else:
-            low = found
-        new = found - off / (1.0 + bend * steep)
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - found) <= 1e-16 * abs(start):
-            break
-        found = new
-    psi, steep = _left(aimed, found, tau, stiffness, level, side, shape)
-    return found, psi / (1.0 + bend * steep)
-
-
-@part
-def _left(aimed, rate, tau, stiffness, level, side, shape):
-    """(|w|^a sgn w, a |w|^(a-1)) of what is left of the way to slipping."""
-    w = 1.0 - stiffness * (aimed + tau * rate) * side / level
-    size = abs(w) ** shape
-    return math.copysign(size, w), shape * size / max(abs(w), 1e-300)
+    return _by_newton(own, aimed, speed, tau, level, slope)
 
 
 def slow(own: Any, left: float, far: float) -> float:
