@@ -64,6 +64,7 @@ MEANING = {
     "friction.axes.damping": "σ1 of LuGre's bristles; absent: critical, 2 √(σ0 M) - viscous",
     "friction.axes.damping_speed": "v_d, over which σ1 fades; absent: it does not",
     "friction.axes.dahl_exponent": "a of Dahl's law: below 1 brittle, above 1 ductile",
+    "friction.axes.elastic_share": "b, the share of its bend up to which an elasto-plastic bristle is a spring",
     "friction.direction.coulomb": "C along x and along y; equal for a disc",
     "friction.direction.breakaway": "S along x and along y, up to which it holds at rest; absent: as coulomb",
     "friction.direction.viscous": "B, the same in every direction",
@@ -94,6 +95,7 @@ MEANING = {
     "friction.wheels.damping": "σ1 of LuGre's bristles, at the rim; absent: critical",
     "friction.wheels.damping_speed": "v_d, over which σ1 fades; absent: it does not",
     "friction.wheels.dahl_exponent": "a of Dahl's law: below 1 brittle, above 1 ductile",
+    "friction.wheels.elastic_share": "b, the share of its bend up to which an elasto-plastic bristle is a spring",
     "floor.tilt_deg": "of the floor against the level",
     "floor.downhill_deg": "where it falls to, in the room, counter-clockwise from the x axis of the pose",
 }

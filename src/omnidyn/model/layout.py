@@ -69,6 +69,7 @@ ELEMENT = _record(
     damping=(),  # [N s/m]
     fade=(),  # 1/speed [s/m] at which the damping fades, 0 where it does not
     dahl_exponent=(),
+    elastic=(),  # share of its bend up to which a bristle is a spring
     bristle_coulomb=(2,),  # levels of a bristle [N], as `coulomb` and `breakaway` are of what sticks
     bristle_breakaway=(2,),
     band=(),  # Karnopp's speed [m/s], 0 for none

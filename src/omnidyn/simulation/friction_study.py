@@ -215,12 +215,14 @@ def _law(robot: Robot, k: int) -> str:
 
 def _notes(robot: Robot, axes: Sequence[AxisFriction]) -> list[str]:
     notes = ["a law that does not bend holds exactly; its breakaway is the same at every rate"]
-    if any(KINDS[getattr(robot.friction, name).law].bends for name in type(robot.friction).model_fields):
+    kinds = [KINDS[getattr(robot.friction, name).law] for name in type(robot.friction).model_fields]
+    if any(each.bends and each.drifts for each in kinds):
         notes.append(
             "a bristle never holds exactly: under a force that swings below breakaway the robot creeps on, which is "
             "what the law says"
         )
-        notes.append("in a fast ramp the damping of LuGre's bristles resists too")
+    if any(each.bends for each in kinds):
+        notes.append("in a fast ramp the damping of bristles resists too")
     weak = [each.axis for each in axes if np.isnan(each.rate).any()]
     if weak:
         notes.append(f"the motors cannot break it loose far enough along {', '.join(weak)}: no ramp is shown there")

@@ -45,6 +45,7 @@ class AxesFriction(Value):
     damping: Annotated[Level | None, Field(description="sigma1 [N s/m, N s/m, N m s]")] = None
     damping_speed: Annotated[Speeds | None, Field(description="v_d [m/s, m/s, rad/s]")] = None
     dahl_exponent: Annotated[Annotated[float, number(0.5, 4.0)], Field(description="a")] = 1.0
+    elastic_share: Annotated[Annotated[float, number(0.0, 0.99)], Field(description="b")] = 0.7
 
     @model_validator(mode="after")
     def _levels_in_order(self) -> AxesFriction:

@@ -21,10 +21,10 @@ import math
 from typing import Any
 
 from omnidyn.compiled.kernel import one_of, part
-from omnidyn.model.friction import dahl, lugre
+from omnidyn.model.friction import dahl, elastoplastic, lugre
 from omnidyn.model.friction.stribeck import fall
 
-LAWS = (dahl, lugre)
+LAWS = (dahl, lugre, elastoplastic)
 """The laws of those that bend. A record has the number of its law, in this order."""
 
 FADES = 0.75  # times the damping: the steepest way in which one that fades lets go

@@ -49,8 +49,9 @@ class Kind:
     """A law that a table may choose by a word; kinds.py lists them.
 
     word: in the robot file; name: what people call it. takes: the keys that it takes beside those of every law. falls:
-    whether its level may fall from breakaway with the speed. bends: whether it has bristles. usual: of a key that may
-    be left out, the number it is then, a function of (stiffness, mass, viscous). places: the tables that know it.
+    whether its level may fall from breakaway with the speed. bends: whether it has bristles; drifts: whether those do,
+    under a force that swings below breakaway. usual: of a key that may be left out, the number it is then, a function
+    of (stiffness, mass, viscous). places: the tables that know it.
     """
 
     word: str
@@ -58,6 +59,7 @@ class Kind:
     takes: Mapping[str, Number] = field(default_factory=dict)
     falls: bool = True
     bends: bool = False
+    drifts: bool = True
     usual: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     places: tuple[str, ...] = ("axes", "direction", "wheels")
 

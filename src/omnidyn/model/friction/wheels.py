@@ -42,6 +42,7 @@ class WheelFriction(Value):
     damping: Annotated[Level | None, Field(description="sigma1 [N s/m] at the rim")] = None
     damping_speed: Annotated[Speed | None, Field(description="v_d [m/s] of the rim")] = None
     dahl_exponent: Annotated[Annotated[float, number(0.5, 4.0)], Field(description="a")] = 1.0
+    elastic_share: Annotated[Annotated[float, number(0.0, 0.99)], Field(description="b")] = 0.7
 
     @property
     def backward(self) -> float | tuple[float, ...]:
