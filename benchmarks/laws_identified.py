@@ -17,7 +17,6 @@ from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import AxesFriction, Friction
-from omnidyn.model.friction.kinds import Kind
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -43,7 +42,7 @@ WIDEST = 1.3  # std over the bound
 class Law:
     """law: in the robot file. names: of its numbers along x, all free. noise: of the twist [m/s]."""
 
-    law: Kind
+    law: str
     names: tuple[str, ...]
     noise: float
 

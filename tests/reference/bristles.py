@@ -15,7 +15,7 @@ import math
 import numpy as np
 from scipy.integrate import DOP853
 
-from tests.reference.modes_plant import plant_of
+from tests.reference.modes_plant import left_at, plant_of
 
 
 class Bristles:
@@ -64,7 +64,8 @@ class Bristles:
             damping = max(2 * math.sqrt(stiff * mass) - viscous, 0.0) if law.law == "lugre" else 0.0
         fades, falls = pick(law.damping_speed) or math.inf, pick(law.stribeck_speed) or math.inf
         power = law.dahl_exponent if law.law == "dahl" and hasattr(law, "dahl_exponent") else 1.0
-        self.rows.append((d, slide, hold, back, hold_back, stiff, damping, fades, falls, law.stribeck_exponent, power))
+        fall = (falls, law.stribeck_exponent, law.stribeck_shape == "lorentzian")
+        self.rows.append((d, slide, hold, back, hold_back, stiff, damping, fades, fall, power))
 
     def rates(self, z, u):
         p, n = self.p, self.p.wheels
@@ -80,7 +81,8 @@ class Bristles:
             at += 1
         if self.way is not None:
             w = self.way
-            fallen = math.exp(-((math.hypot(v[0], v[1]) / (w.stribeck_speed or math.inf)) ** w.stribeck_exponent))
+            u = math.hypot(v[0], v[1]) / (w.stribeck_speed or math.inf)
+            fallen = left_at(u, w.stribeck_exponent, w.stribeck_shape == "lorentzian")
             c = np.array(w.coulomb) + (np.array(w.breakaway or w.coulomb) - w.coulomb) * fallen
             work = math.hypot(c[0] * v[0], c[1] * v[1])
             rate = v[:2] - w.stiffness * work * z[at : at + 2] / c**2
@@ -98,10 +100,10 @@ class Bristles:
         return out
 
     def _one(self, row, v, z, force):
-        d, slide, hold, back, hold_back, stiff, damping, fades, falls, exponent, power = row
+        d, slide, hold, back, hold_back, stiff, damping, fades, fall, power = row
         s = float(d @ v)
         low, high = (slide, hold) if s >= 0 else (back, hold_back)
-        g = low + (high - low) * math.exp(-((abs(s) / falls) ** exponent))
+        g = low + (high - low) * left_at(abs(s) / fall[0], *fall[1:])
         if power == 1.0:
             rate = s - stiff * abs(s) * z / g
         else:

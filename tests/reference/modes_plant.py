@@ -38,6 +38,8 @@ class Plant:
     exponent: np.ndarray  # (elements,)
     stribeck_ellipse: float = math.inf
     exponent_ellipse: float = 2.0
+    lorentzian: np.ndarray | None = None  # (elements,) whether it falls as 1/(1 + u^d), not as exp(-u^d)
+    lorentzian_ellipse: bool = False
 
     @property
     def slide_at_rest(self) -> np.ndarray:
@@ -70,6 +72,11 @@ class Plant:
         return (1 / self.eta - self.eta) / 2
 
 
+def left_at(u, exponent, lorentzian):
+    """What is left of a fall at u Stribeck speeds."""
+    return 1.0 / (1.0 + u**exponent) if lorentzian else np.exp(-(u**exponent))
+
+
 def plant_of(robot) -> Plant:
     """The numbers of an omnidyn Robot."""
     n = robot.wheels.count
@@ -95,20 +102,20 @@ def plant_of(robot) -> Plant:
     if axes.breakaway_backward is not None:
         hold_back = np.array(axes.breakaway_backward, dtype=float)
     falls = np.broadcast_to(np.asarray(axes.stribeck_speed or math.inf, dtype=float), (3,)).copy()
-    powers = [axes.stribeck_exponent] * 3
+    powers, tails = [axes.stribeck_exponent] * 3, [axes.stribeck_shape] * 3
     if way.yaw_stribeck_speed is not None:
-        falls[2], powers[2] = way.yaw_stribeck_speed, way.stribeck_exponent
+        falls[2], powers[2], tails[2] = way.yaw_stribeck_speed, way.stribeck_exponent, way.stribeck_shape
     rim_falls = each(rim.stribeck_speed, math.inf)
     b, efficiency = each(rim.viscous), each(m.gear_efficiency)
     rows = [
-        (np.eye(3)[k], (coulomb[k], back[k]), (breakaway[k], hold_back[k]), -1, "xyw"[k], falls[k], powers[k])
+        (np.eye(3)[k], (coulomb[k], back[k]), (breakaway[k], hold_back[k]), -1, "xyw"[k], falls[k], powers[k], tails[k])
         for k in range(3)
         if breakaway[k] > 0
     ]
     rows += [
         (
             *(G[:, k], (forward[k], backward[k]), (hold_forward[k], hold_backward[k]), k, f"wheel {k + 1}"),
-            *(rim_falls[k], rim.stribeck_exponent),
+            *(rim_falls[k], rim.stribeck_exponent, rim.stribeck_shape),
         )
         for k in range(n)
         if hold_forward[k] > 0 or hold_backward[k] > 0 or efficiency[k] < 1
@@ -140,4 +147,6 @@ def plant_of(robot) -> Plant:
         exponent=np.array([row[6] for row in rows], dtype=float),
         stribeck_ellipse=math.inf if way.stribeck_speed is None else way.stribeck_speed,
         exponent_ellipse=way.stribeck_exponent,
+        lorentzian=np.array([row[7] == "lorentzian" for row in rows], dtype=bool),
+        lorentzian_ellipse=way.stribeck_shape == "lorentzian",
     )

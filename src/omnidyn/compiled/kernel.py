@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numba
@@ -82,6 +82,35 @@ def part(function: Callable[..., Any]) -> Callable[..., Any]:
     one.
     """
     return _linked(function, counted=False)
+
+
+def one_of(functions: Sequence[Callable[..., Any]]) -> Any:
+    """A part that hands what it is given to one of several parts: its first argument is the number of it, from 0."""
+    last = functions[-1]
+
+    def only(number, *given):
+        return last(*given)
+
+    chosen = part(only)
+    for number in reversed(range(len(functions) - 1)):
+        chosen = _either(number, functions[number], chosen)
+    return chosen
+
+
+def _either(own: int, this: Callable[..., Any], others: Callable[..., Any]) -> Any:
+    """A part that is `this` for its own number, else what others are."""
+
+    def either(number, *given):
+        if number == own:
+            return this(*given)
+        return others(number, *given)
+
+    return part(either)
+
+
+def plain(function: Any) -> Callable[..., Any]:
+    """The Python function that was compiled: of NumPy's functions alone it takes arrays too."""
+    return getattr(function, "py_func", function)
 
 
 def maker(function: Callable[..., Any]) -> Callable[..., Any]:

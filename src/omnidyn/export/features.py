@@ -17,6 +17,7 @@ import numpy as np
 
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.friction.kinds import COULOMB, KINDS
 from omnidyn.model.mass import masses_couple, without_spin
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
@@ -24,6 +25,9 @@ from omnidyn.model.sliding import levels_of
 from omnidyn.model.statespace import is_decoupled, state_space
 
 SAYS, PARTLY, LEAVES_OUT, REFUSES = "says", "partly", "leaves out", "refuses"
+
+
+_BEND = ", ".join(f'"{law}"' for law in KINDS if law != COULOMB)
 
 
 class Feature(NamedTuple):
@@ -94,7 +98,7 @@ FEATURES = {
         "friction that falls with the speed (stribeck_speed)", lambda robot: bool(levels_of(robot).falls.any())
     ),
     "bends": Feature(
-        'friction that bends, or rests in a band (law = "dahl", "lugre", "karnopp")',
+        f"friction that bends, or rests in a band (law = {_BEND})",
         lambda robot: robot.rigid is not robot,
     ),
     "sides": Feature(

@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from omnidyn.errors import InputError
+from omnidyn.model.friction.kinds import NUMBERS
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.value import keys_of
@@ -114,14 +115,7 @@ class Key:
 
     def _unit_of_law(self) -> str:
         """The unit of what a law beyond Coulomb's takes."""
-        yaw = self.axis == YAW
-        if self.field.endswith("exponent"):
-            return ""
-        if self.field.endswith("speed"):
-            return "rad/s" if yaw else "m/s"
-        if self.field.endswith("stiffness"):
-            return "N m/rad" if yaw else "N/m"
-        return "N m s" if yaw else "N s/m"
+        return NUMBERS[self.field.removeprefix("yaw_")].units[self.axis == YAW]
 
     @property
     def words(self) -> str:

@@ -22,8 +22,8 @@ class Levels(NamedTuple):
 
     directions: of each element, its speed is direction . twist, shape (3 + wheels, 3). viscous: shape (3 + wheels,).
     slide, hold: against forward and backward motion, while sliding and from rest, shape (2, 3 + wheels).
-    ellipse_slide, ellipse_hold: along x and y [N], shape (2,). falls, exponent: of levels that fall with the speed,
-    1 over the Stribeck speed, 0 where they do not, shape (3 + wheels + 1,): the ellipse last.
+    ellipse_slide, ellipse_hold: along x and y [N], shape (2,). falls, exponent, shape: of levels that fall with the
+    speed, 1 over the Stribeck speed, 0 where they do not, shape (3 + wheels + 1,): the ellipse last.
     """
 
     directions: FloatArray
@@ -34,16 +34,18 @@ class Levels(NamedTuple):
     ellipse_hold: FloatArray
     falls: FloatArray
     exponent: FloatArray
+    shape: FloatArray
 
     def sliding(self, speed: FloatArray, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(slide, ellipse_slide) at the speeds of elements (*batch, 3 + wheels) and of a twist (*batch, 3)."""
         if not self.falls.any():
             return self.slide, self.ellipse_slide
-        left = np.where(self.falls[:-1] > 0.0, fallen(speed, self.falls[:-1], self.exponent[:-1]), 0.0)
+        falls, exponent, shape = self.falls, self.exponent, self.shape
+        left = np.where(falls[:-1] > 0.0, fallen(speed, falls[:-1], exponent[:-1], shape[:-1]), 0.0)
         slide = np.stack([low + (high - low) * left for low, high in zip(self.slide, self.hold, strict=True)])
-        if self.falls[-1] == 0.0:
+        if falls[-1] == 0.0:
             return slide, self.ellipse_slide
-        way = fallen(np.hypot(twist[..., 0], twist[..., 1]), self.falls[-1], self.exponent[-1])[..., None]
+        way = fallen(np.hypot(twist[..., 0], twist[..., 1]), falls[-1], exponent[-1], shape[-1])[..., None]
         return slide, self.ellipse_slide + (self.ellipse_hold - self.ellipse_slide) * way
 
 
@@ -57,6 +59,7 @@ def levels_of(robot: Robot) -> Levels:
     return Levels(
         directions, element["viscous"], element["coulomb"].T, element["breakaway"].T, body.coulomb, body.breakaway,
         np.append(element["fall"], body.fall), np.append(element["exponent"], body.exponent),
+        np.append(element["form"], body.form),
     )  # fmt: skip
 
 

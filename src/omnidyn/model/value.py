@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -92,6 +92,12 @@ def per_axis_number(low: float, high: float) -> Checked:
     """Three numbers: along x, along y, about yaw."""
     one = number(low, high).type
     return Checked(Annotated[tuple[one, one, one], BeforeValidator(to_list)])
+
+
+def word_of(*words: str) -> Checked:
+    """One of some words."""
+    choices: Any = Literal
+    return Checked(choices[words])
 
 
 PerWheel = float | tuple[float, ...]

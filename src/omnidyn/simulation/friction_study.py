@@ -13,7 +13,9 @@ from omnidyn.document import Document, Points, Table
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.frames import AXES
-from omnidyn.model.friction.kinds import BENDING
+from omnidyn.model.friction import lugre
+from omnidyn.model.friction.bristle import LAWS
+from omnidyn.model.friction.kinds import COULOMB, KINDS
 from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
@@ -97,8 +99,8 @@ def _axis(robot: Robot, numbers: Plant, k: int, top: float, pattern: FloatArray,
     )
 
 
-def _parts(numbers: Plant, k: int) -> list[tuple[float, FloatArray, float, float]]:
-    """(lever, level at the least speed forward and backward [N], stiffness, shape) of what acts along k.
+def _parts(numbers: Plant, k: int) -> list[tuple[float, FloatArray, Any, Any]]:
+    """(lever, level at the least speed forward and backward [N], record, its law) of what acts along k.
 
     As a plant counts them: a torque over rho.
     """
@@ -108,11 +110,11 @@ def _parts(numbers: Plant, k: int) -> list[tuple[float, FloatArray, float, float
         if g == 0.0:
             continue
         level = _slowest(row, row.stiffness > 0.0)
-        found.append((g, level if g > 0.0 else level[::-1], float(row.stiffness), float(row.dahl_exponent)))
+        found.append((g, level if g > 0.0 else level[::-1], row, LAWS[int(row.law)]))
     if k < 2:
         body = numbers.body
         level = _slowest(body, body.stiffness > 0.0)[k]
-        found.append((1.0, np.array([level, level]), float(body.stiffness), 1.0))
+        found.append((1.0, np.array([level, level]), body, lugre))
     return [each for each in found if each[1].any()]
 
 
@@ -126,23 +128,21 @@ def _slowest(row: Any, bends: bool) -> FloatArray:
 def _loop(numbers: Plant, k: int, unit: float) -> tuple[FloatArray, FloatArray, float]:
     """(way, force, the way that bristles bend before they slip) of a slow loop along axis k; empty where none bends."""
     parts = _parts(numbers, k)
-    bends = max((float(level.max()) / stiff / abs(g) for g, level, stiff, _ in parts if stiff > 0.0), default=0.0)
+    bent = [float(level.max() / own.stiffness) / abs(g) for g, level, own, _ in parts if own.stiffness > 0.0]
+    bends = max(bent, default=0.0)
     if bends == 0.0:
         return np.zeros(0), np.zeros(0), 0.0
     reach, step = BENT * bends, np.linspace(0.0, 1.0, POINTS)
     way = np.concatenate([reach * step, reach * (1.0 - 2.0 * step), reach * (2.0 * step - 1.0)])
     force = np.zeros(len(way))
-    for g, level, stiff, shape in parts:
-        force += abs(g) * _slow(way * abs(g), level, stiff, shape)
+    for g, level, own, law in parts:
+        force += abs(g) * _slow(way * abs(g), level, own, law)
     return way / unit, force * unit, bends / unit
 
 
-def _slow(way: FloatArray, level: FloatArray, stiff: float, shape: float) -> FloatArray:
-    """Force [N] of one part along a way [m] that is gone slowly, by the closed form of each half loop.
-
-    z' = dz/dx = w^a, w = 1 - sigma0 z sgn(x')/C: w decays by exp(-sigma0 x/C) for a = 1, else by a power.
-    """
-    out, z, before = np.zeros(len(way)), 0.0, way[0]
+def _slow(way: FloatArray, level: FloatArray, own: Any, law: Any) -> FloatArray:
+    """Force [N] of one part along a way [m] that is gone slowly, by the closed form of its law for each half loop."""
+    out, z, before, stiff = np.zeros(len(way)), 0.0, way[0], float(own.stiffness)
     for j, x in enumerate(way):
         gone = x - before
         limit = level[0] if gone >= 0.0 else level[1]
@@ -150,13 +150,8 @@ def _slow(way: FloatArray, level: FloatArray, stiff: float, shape: float) -> Flo
         if stiff == 0.0:
             out[j] = side * limit if gone != 0.0 else 0.0
         else:
-            w, far = 1.0 - stiff * z * side / limit, stiff * abs(gone) / limit
-            if shape == 1.0:
-                w *= np.exp(-far)
-            elif w > 0.0:
-                left = w ** (1.0 - shape) + (shape - 1.0) * far
-                w = left ** (1.0 / (1.0 - shape)) if left > 0.0 else 0.0
-            z = (1.0 - w) * side * limit / stiff
+            left, far = 1.0 - stiff * z * side / limit, stiff * abs(gone) / limit
+            z = (1.0 - law.slow(own, left, far)) * side * limit / stiff
             out[j] = stiff * z
         before = x
     return out
@@ -213,19 +208,21 @@ def _law(robot: Robot, k: int) -> str:
         speed = part.yaw_stribeck_speed if turning else part.stribeck_speed
         more = hold is not None and np.any(np.asarray(hold) > np.asarray(part.yaw_coulomb if turning else part.coulomb))
         falls = "Stribeck" if more and speed is not None else ("breakaway" if more else "")
-        words = {"coulomb": falls or "Coulomb", "lugre": "LuGre", "dahl": "Dahl", "karnopp": "Karnopp"}[part.law]
-        named.append(f"{words} ({name})")
+        words = falls if part.law == COULOMB else ""
+        named.append(f"{words or KINDS[part.law].name} ({name})")
     return " + ".join(named) or "viscous only"
 
 
 def _notes(robot: Robot, axes: Sequence[AxisFriction]) -> list[str]:
     notes = ["a law that does not bend holds exactly; its breakaway is the same at every rate"]
-    if any(getattr(robot.friction, name).law in BENDING for name in type(robot.friction).model_fields):
+    kinds = [KINDS[getattr(robot.friction, name).law] for name in type(robot.friction).model_fields]
+    if any(each.bends and each.drifts for each in kinds):
         notes.append(
             "a bristle never holds exactly: under a force that swings below breakaway the robot creeps on, which is "
             "what the law says"
         )
-        notes.append("in a fast ramp the damping of LuGre's bristles resists too")
+    if any(each.bends for each in kinds):
+        notes.append("in a fast ramp the damping of bristles resists too")
     weak = [each.axis for each in axes if np.isnan(each.rate).any()]
     if weak:
         notes.append(f"the motors cannot break it loose far enough along {', '.join(weak)}: no ramp is shown there")

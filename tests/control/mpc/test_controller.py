@@ -14,6 +14,7 @@ from omnidyn.control.paths.path import path
 from omnidyn.errors import InputError
 from omnidyn.model.friction import Friction
 from omnidyn.model.friction.direction import DirectionFriction
+from omnidyn.model.friction.stribeck import SHAPES
 from omnidyn.model.mass import per_mass
 from omnidyn.model.sliding import sliding_wrench
 from omnidyn.simulation.live import LiveRobot
@@ -219,12 +220,12 @@ def test_what_makes_no_settings(wrong):
         Settings(**wrong)
 
 
-def falling(robot, part="axes"):
+def falling(robot, part="axes", shape="exponential"):
     """The robot with friction that falls to the level it had, from 1.6 times that at rest."""
     own = getattr(robot.friction, part)
     speed = (0.1, 0.08, 1.0) if part == "axes" else 0.1
     more = (1.6 * np.asarray(own.coulomb)).tolist()
-    law = own.replace(breakaway=more, stribeck_speed=speed, stribeck_exponent=1.3)
+    law = own.replace(breakaway=more, stribeck_speed=speed, stribeck_exponent=1.3, stribeck_shape=shape)
     return robot.replace(friction=robot.friction.replace(**{part: law}))
 
 
@@ -234,9 +235,11 @@ def ellipse(robot):
     return robot.replace(friction=Friction(direction=along))
 
 
-@pytest.mark.parametrize("robot", [falling(ROBOT), falling(ellipse(ROBOT), "direction")])
-def test_friction_that_falls_is_predicted_as_the_law_has_it(robot):
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("robot, part", [(ROBOT, "axes"), (ellipse(ROBOT), "direction")])
+def test_friction_that_falls_is_predicted_as_the_law_has_it(robot, part, shape):
     """The force by the law's own numpy formula, its slope by central differences."""
+    robot = falling(robot, part, shape)
     own = numbers(robot, DT)
     one = np.ones(3)
 

@@ -7,7 +7,6 @@ import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.prepare import guesses
 from omnidyn.model.friction import AxesFriction, Friction
-from omnidyn.model.friction.kinds import Kind
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -18,7 +17,7 @@ BAND = "friction.axes.karnopp_speed"
 KEYS = tuple(f"friction.axes.{name}[0]" for name in ("viscous", "coulomb", "breakaway"))
 
 
-def robot_with(viscous=0.94, coulomb=2.2, law: Kind = "karnopp"):
+def robot_with(viscous=0.94, coulomb=2.2, law: str = "karnopp"):
     axes = AxesFriction(
         viscous=(viscous, 0.96, 0.01), coulomb=(coulomb, 1.5, 0.099), breakaway=(2.8, 1.9, 0.13), law=law
     )

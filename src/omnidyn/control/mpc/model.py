@@ -25,10 +25,10 @@ from omnidyn.simulation.exact.slopes import hold_slopes
 
 DECAY, PHI, PSI, FEED, TURNING, BY_MASS = 0, 9, 18, 27, 36, 45  # columns of `linear`, matrices row by row
 ELLIPSE, STEP = 54, 57  # levels Cx, Cy [N], and the width of their slope [N m/s]; dt [s]
-ELLIPSE_FALL, LINEAR_SIZE = 58, 62  # 1/v_s [s/m], the exponent, and how much more at rest, along x and y [N]
+ELLIPSE_FALL, LINEAR_SIZE = 58, 63  # 1/v_s [s/m], shape, exponent, and how much more at rest, along x and y [N]
 GX, ACROSS, FORWARD, BACKWARD = 0, 3, 6, 7  # columns of `levels`: direction g, M^-1 g, levels of both directions,
 WIDTH, SOFT = 8, 9  # speed below which the level falls to 0, and below which it has a slope
-FALLING, POWER, MORE_FORWARD, MORE_BACKWARD, LEVEL_SIZE = 10, 11, 12, 13, 14  # 1/v_s, d, and how much more at rest
+FALLING, SHAPE, POWER, MORE_FORWARD, MORE_BACKWARD, LEVEL_SIZE = 10, 11, 12, 13, 14, 15  # 1/v_s, d, more at rest
 SLOW = np.array([0.002, 0.002, 0.02])  # [m/s, m/s, rad/s] below which the predicted friction falls linearly to 0
 SOFTER = np.array([30.0, 30.0, 40.0])  # times as wide, it has a slope: how soon the program may count on friction
 
@@ -62,7 +62,7 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
         body = own.body
         linear[0, ELLIPSE : ELLIPSE + 2] = body.coulomb
         linear[0, ELLIPSE + 2] = SLOW[0] * body.coulomb.max()
-        linear[0, ELLIPSE_FALL:LINEAR_SIZE] = body.fall, body.exponent, *(body.breakaway - body.coulomb)
+        linear[0, ELLIPSE_FALL:LINEAR_SIZE] = body.fall, body.form, body.exponent, *(body.breakaway - body.coulomb)
         levels = _levels(robot, own.element, directions)
     return Numbers(linear, push, np.asarray(np.linalg.pinv(push), dtype=float), levels)
 
@@ -109,7 +109,8 @@ def _levels(robot: Robot, element: Any, directions: FloatArray) -> FloatArray:
     table[:, GX : GX + 3] = directions[kept]
     table[:, ACROSS : ACROSS + 3] = per_mass(robot, directions[kept])
     table[:, FORWARD], table[:, BACKWARD] = coulomb[kept].T
-    table[:, FALLING], table[:, POWER] = element["fall"][kept], element["exponent"][kept]
+    for column, field in ((FALLING, "fall"), (SHAPE, "form"), (POWER, "exponent")):
+        table[:, column] = element[field][kept]
     table[:, MORE_FORWARD : MORE_BACKWARD + 1] = (element["breakaway"] - coulomb)[kept]
     table[:, WIDTH] = np.where(kept < N_AXES, SLOW[np.minimum(kept, 2)], SLOW[0])
     table[:, SOFT] = table[:, WIDTH] * np.where(kept < N_AXES, SOFTER[np.minimum(kept, 2)], SOFTER[0])

@@ -35,6 +35,7 @@ from omnidyn.control.mpc.model import (
     PHI,
     POWER,
     PSI,
+    SHAPE,
     SOFT,
     STEP,
     TURNING,
@@ -48,12 +49,12 @@ NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @part
 def level_at(levels, e, speed):
-    """(the level of part e at a speed, what it grows by with the size of the speed): it falls by Stribeck's law."""
+    """(the level of part e at a speed, what it grows by with the size of the speed): it falls as Stribeck has it."""
     forward = speed >= 0.0
     level = levels[e, FORWARD] if forward else levels[e, BACKWARD]
     if levels[e, FALLING] == 0.0:
         return level, 0.0
-    left, slope = fall(abs(speed) * levels[e, FALLING], levels[e, POWER])
+    left, slope = fall(abs(speed) * levels[e, FALLING], levels[e, SHAPE], levels[e, POWER])
     more = levels[e, MORE_FORWARD] if forward else levels[e, MORE_BACKWARD]
     return level + more * left, more * slope * levels[e, FALLING]
 
@@ -87,9 +88,10 @@ def friction_at(linear, levels, scale, twist, narrow, soft):
         ax, ay, width = linear[0, ELLIPSE], linear[0, ELLIPSE + 1], narrow * linear[0, ELLIPSE + 2]
         bx = by = speed = 0.0  # by what of itself each level grows with the speed
         if linear[0, ELLIPSE_FALL] > 0.0:
-            more_x, more_y = linear[0, ELLIPSE_FALL + 2], linear[0, ELLIPSE_FALL + 3]
+            more_x, more_y = linear[0, ELLIPSE_FALL + 3], linear[0, ELLIPSE_FALL + 4]
             speed = math.hypot(twist[0], twist[1])
-            left, by_speed = fall(speed * linear[0, ELLIPSE_FALL], linear[0, ELLIPSE_FALL + 1])
+            shape, power = linear[0, ELLIPSE_FALL + 1], linear[0, ELLIPSE_FALL + 2]
+            left, by_speed = fall(speed * linear[0, ELLIPSE_FALL], shape, power)
             ax, ay, by_speed = ax + more_x * left, ay + more_y * left, by_speed * linear[0, ELLIPSE_FALL]
             bx, by = more_x * by_speed / ax, more_y * by_speed / ay
         qx, qy = ax * ax, ay * ay

@@ -35,7 +35,7 @@ from omnidyn.identification.structure.laws import (
     table_of,
 )
 from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
-from omnidyn.model.friction.kinds import DAHL, LUGRE
+from omnidyn.model.friction.kinds import KINDS, LUGRE
 from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
@@ -191,7 +191,8 @@ def _falling(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     else:
         levels = above[0] * per_wheel(own.coulomb, robot.wheels.count)
         changes = {"breakaway": tuple(levels.tolist()) if np.ndim(own.coulomb) else float(levels[0]), FALL: remedy.at}
-    law = own.replace(**changes, law=LUGRE if own.law == DAHL else own.law)
+    one_level = KINDS[own.law].bends and not KINDS[own.law].falls
+    law = own.replace(**changes, law=LUGRE if one_level else own.law)
     changed = robot.replace(friction=robot.friction.replace(**{table.rpartition(".")[2]: law}))
     return _rough(changed, asked, [f"{table}.{name}" for name in changes], remedy.words)
 

@@ -1,4 +1,8 @@
-"""Friction between robot and floor: a contract (law.py) and one file per place where it acts. The parts add up."""
+"""Friction between robot and floor: a contract (law.py) and one file per place where it acts. The parts add up.
+
+Where it acts: axes, direction, wheels. How it falls with the speed: stribeck, and a file per shape (exponential,
+lorentzian). What bends: bristle, and a file per law (dahl, lugre). kinds: what a table may choose.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ NONE = (0.0, 0.0, 0.0)
 
 
 class Friction(Value):
-    """All friction of a robot, by where it acts; what is absent is off. A field is all that a new law needs here."""
+    """All friction of a robot, by where it acts; what is absent is off. A field is all that a new place needs here."""
 
     axes: Annotated[AxesFriction, Field(description="on the body axes, eqs (4)-(6)")] = AxesFriction(
         viscous=NONE, coulomb=NONE

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.model.friction.kinds import Kind, Numbers, Spread, refuse_mixtures, spread_on
-from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
+from omnidyn.model.friction.kinds import AXES, KARNOPP, refuse_mixtures, spread_on, words_of
+from omnidyn.model.friction.stribeck import LEAST, MOST, SHAPES, USUAL
 from omnidyn.model.layout import N_AXES, Plant
-from omnidyn.model.value import Levels, Value, number, per_axis_number
+from omnidyn.model.value import Levels, Value, number, per_axis_number, word_of
 
 Level = Annotated[Levels, per_axis_number(0.0, 1e6)]
 Speeds = Annotated[Levels, per_axis_number(1e-7, 1e3)]
@@ -36,14 +36,16 @@ class AxesFriction(Value):
     breakaway: Annotated[Level | None, Field(description="S >= C [N, N, N m]")] = None
     coulomb_backward: Annotated[Level | None, Field(description="C backward [N, N, N m]")] = None
     breakaway_backward: Annotated[Level | None, Field(description="S backward [N, N, N m]")] = None
-    law: Annotated[Kind, Field(description="what kind of law")] = "coulomb"
+    law: Annotated[Annotated[str, word_of(*words_of(AXES))], Field(description="what kind of law")] = "coulomb"
     stribeck_speed: Annotated[Speeds | None, Field(description="v_s [m/s, m/s, rad/s]")] = None
     stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    stribeck_shape: Annotated[Annotated[str, word_of(*SHAPES)], Field(description="f of the fall")] = "exponential"
     karnopp_speed: Annotated[Speeds, Field(description="Dv [m/s, m/s, rad/s]")] = (1e-4, 1e-4, 1e-4)
     stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m, N/m, N m/rad]")] = None
     damping: Annotated[Level | None, Field(description="sigma1 [N s/m, N s/m, N m s]")] = None
     damping_speed: Annotated[Speeds | None, Field(description="v_d [m/s, m/s, rad/s]")] = None
     dahl_exponent: Annotated[Annotated[float, number(0.5, 4.0)], Field(description="a")] = 1.0
+    elastic_share: Annotated[Annotated[float, number(0.0, 0.99)], Field(description="b")] = 0.7
 
     @model_validator(mode="after")
     def _levels_in_order(self) -> AxesFriction:
@@ -87,20 +89,10 @@ class AxesFriction(Value):
         rows = plant.element[:N_AXES]
         rows["viscous"] += viscous / units**2
         slide, hold = np.stack([coulomb, self.backward], 1), np.stack([breakaway, self.hold_backward], 1)
-        spread_on(plant.body.mass, rows, self._spread(units), slide / units[:, None], hold / units[:, None])
-        if self.law == "karnopp":
+        slide, hold = slide / units[:, None], hold / units[:, None]
+        spread_on(self, rows, slide, hold, float(plant.body.mass), rows["viscous"], units)
+        if self.law == KARNOPP:
             rows["band"] = np.array(self.karnopp_speed) * units
-
-    def _spread(self, units: FloatArray) -> Spread:
-        """The numbers of its law as rows of the table count them."""
-
-        def over(value: Levels | None, power: int) -> Numbers:
-            return None if value is None else np.array(value) / units**power
-
-        return Spread(
-            self.law, over(self.stribeck_speed, -1), self.stribeck_exponent, over(self.stiffness, 2),
-            over(self.damping, 2), over(self.damping_speed, -1), self.dahl_exponent,
-        )  # fmt: skip
 
     def sliding_wrench(self, twist: ArrayLike) -> FloatArray:
         """-(B v + C sgn v) of the axes that move; 0 for an axis at rest. Shape (*batch, 3)."""

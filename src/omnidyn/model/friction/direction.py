@@ -12,16 +12,16 @@ box of eqs (4)-(6) misses.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.friction.kinds import BENDING, DAHL, LUGRE, Spread, refuse_mixtures, spread_on
-from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
+from omnidyn.model.friction.kinds import DIRECTION, refuse_mixtures, spread_on, words_of
+from omnidyn.model.friction.stribeck import LEAST, MOST, SHAPES, USUAL
 from omnidyn.model.layout import N_AXES, YAW, Plant
-from omnidyn.model.value import Value, number, to_list
+from omnidyn.model.value import Value, number, to_list, word_of
 
 Level = Annotated[float, number(0.0, 1e6)]
 Pair = Annotated[tuple[Level, Level], BeforeValidator(to_list)]
@@ -43,10 +43,11 @@ class DirectionFriction(Value):
     yaw_coulomb: Annotated[Level, Field(description="[N m]")] = 0.0
     yaw_breakaway: Annotated[Level | None, Field(description=">= yaw_coulomb [N m]")] = None
     yaw_viscous: Annotated[Level, Field(description="[N m s]")] = 0.0
-    law: Annotated[Literal["coulomb", "dahl", "lugre"], Field(description="what kind of law")] = "coulomb"
+    law: Annotated[Annotated[str, word_of(*words_of(DIRECTION))], Field(description="what kind of law")] = "coulomb"
     stribeck_speed: Annotated[Speed | None, Field(description="v_s [m/s]")] = None
     yaw_stribeck_speed: Annotated[Speed | None, Field(description="v_s [rad/s]")] = None
     stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    stribeck_shape: Annotated[Annotated[str, word_of(*SHAPES)], Field(description="f of the fall")] = "exponential"
     stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m]")] = None
     yaw_stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N m/rad]")] = None
     damping: Annotated[Level | None, Field(description="sigma1 [N s/m]")] = None
@@ -69,42 +70,12 @@ class DirectionFriction(Value):
     def add_to(self, plant: Plant, length: float) -> None:
         """Add the ellipse, the same damping in every direction, and what resists turning; see FrictionLaw."""
         plant.element["viscous"][:N_AXES] += [self.viscous, self.viscous, self.yaw_viscous / length**2]
-        self._add_plane(plant.body)
+        body, turning = plant.body, plant.element[YAW : YAW + 1]
+        hold = np.array(self.coulomb if self.breakaway is None else self.breakaway)
+        spread_on(self, body, np.array(self.coulomb), hold, float(body.mass), self.viscous)
         yaw_hold = self.yaw_coulomb if self.yaw_breakaway is None else self.yaw_breakaway
         slide, hold = np.full((1, 2), self.yaw_coulomb / length), np.full((1, 2), yaw_hold / length)
-        spread_on(plant.body.mass, plant.element[YAW : YAW + 1], self._turning(length), slide, hold)
-
-    def _add_plane(self, body: Any) -> None:
-        hold = self.coulomb if self.breakaway is None else self.breakaway
-        if self.law in BENDING:
-            body.bristle_coulomb += self.coulomb
-            body.bristle_breakaway += hold
-            if any(self.coulomb):
-                self._add_bristle(body)
-        else:
-            body.coulomb += self.coulomb
-            body.breakaway += hold
-        if self.stribeck_speed is not None and hold != self.coulomb:
-            body.fall, body.exponent = 1.0 / self.stribeck_speed, self.stribeck_exponent
-
-    def _add_bristle(self, body: Any) -> None:
-        assert self.stiffness is not None
-        body.stiffness = self.stiffness
-        if self.law == LUGRE:
-            critical = max(2.0 * float(np.sqrt(self.stiffness * body.mass)) - self.viscous, 0.0)
-            body.damping = critical if self.damping is None else self.damping
-            body.fade = 0.0 if self.damping_speed is None else 1.0 / self.damping_speed
-
-    def _turning(self, length: float) -> Spread:
-        """The law about yaw in the units of the table."""
-
-        def over(value: float | None, power: int) -> float | None:
-            return None if value is None else value / length**power
-
-        return Spread(
-            self.law, over(self.yaw_stribeck_speed, -1), self.stribeck_exponent, over(self.yaw_stiffness, 2),
-            over(self.yaw_damping, 2), over(self.yaw_damping_speed, -1), 1.0,
-        )  # fmt: skip
+        spread_on(self, turning, slide, hold, float(body.mass), turning["viscous"], length, "yaw_")
 
     @model_validator(mode="after")
     def _levels_in_order(self) -> DirectionFriction:
@@ -116,11 +87,5 @@ class DirectionFriction(Value):
         if self.yaw_breakaway is not None and self.yaw_breakaway < self.yaw_coulomb:
             raise ValueError(f"yaw_breakaway {self.yaw_breakaway} is below yaw_coulomb {self.yaw_coulomb}")
         refuse_mixtures(self)
-        turns = self.yaw_coulomb > 0.0
-        if self.law in BENDING and turns and self.yaw_stiffness is None:
-            raise ValueError(f'law = "{self.law}" needs yaw_stiffness [N m/rad] beside yaw_coulomb')
-        if self.law == DAHL and self.yaw_breakaway is not None:
-            raise ValueError('law = "dahl" has one level, yaw_coulomb: no yaw_breakaway')
-        if self.law == LUGRE and self.yaw_breakaway is not None and self.yaw_stribeck_speed is None:
-            raise ValueError('law = "lugre" with yaw_breakaway needs yaw_stribeck_speed')
+        refuse_mixtures(self, "yaw_")
         return self

@@ -4,98 +4,111 @@
     karnopp   the same, at rest below a speed Dv (karnopp_speed, 1e-4 m/s): a device of solvers that cannot stick. It
               has no meaning of its own: momentum gathers while the drive exceeds S, and motion begins at Dv. Here for
               comparison with such solvers; on the body axes only. Source: Karnopp 1985
-    dahl      a spring before it slips: stiffness, dahl_exponent (bristle.py)
-    lugre     bristles that bend, with damping and a Stribeck level: stiffness, damping, damping_speed (bristle.py)
+    dahl, lugre, ...  bristles, which bend before they slip: LAWS of bristle.py
 
 Which law a table has is one word; what it takes, and what goes with what, is checked here for all tables.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.model.friction import bristle
+from omnidyn.model.friction.law import SPEED, Kind, Number
+from omnidyn.model.friction.stribeck import SHAPES
 
-Kind = Literal["coulomb", "karnopp", "dahl", "lugre"]
-COULOMB, KARNOPP, DAHL, LUGRE = "coulomb", "karnopp", "dahl", "lugre"
-BENDING = (DAHL, LUGRE)
-Numbers = FloatArray | tuple[float, ...] | float | None
-
-
-class Spread(NamedTuple):
-    """The numbers of a law in the units of a plant, one or one per row; None where it has none."""
-
-    law: str
-    stribeck_speed: Numbers
-    stribeck_exponent: float
-    stiffness: Numbers
-    damping: Numbers
-    damping_speed: Numbers
-    dahl_exponent: float
+AXES, DIRECTION, WHEELS = "axes", "direction", "wheels"
+COULOMB, KARNOPP, LUGRE = "coulomb", "karnopp", "lugre"
+_STICKING = (
+    Kind(COULOMB, "Coulomb"),
+    Kind(KARNOPP, "Karnopp", takes={"karnopp_speed": Number("band", -1, units=SPEED)}, falls=False, places=(AXES,)),
+)
+KINDS = {each.word: each for each in (*_STICKING, *(law.KIND for law in bristle.LAWS))}
 
 
-def spread_on(mass: float, rows: Any, law: Spread, slide: FloatArray, hold: FloatArray) -> None:
-    """Add a law to elements of a plant, in place. slide, hold: levels forward and backward, shape (rows, 2)."""
-    used = np.any(hold > 0.0, axis=1)
-    if law.law in BENDING:
-        rows["bristle_coulomb"] += slide
-        rows["bristle_breakaway"] += hold
-        put(rows, used, "stiffness", law.stiffness)
-        rows["dahl_exponent"][used] = law.dahl_exponent if law.law == DAHL else 1.0
-        if law.law == LUGRE and used.any():
-            put(rows, used, "damping", critical(mass, rows, law) if law.damping is None else law.damping)
-            put(rows, used, "fade", _inverse(law.damping_speed))
-    else:
-        rows["coulomb"] += slide
-        rows["breakaway"] += hold
-    falls = used & np.any(hold > slide, axis=1)
-    if law.stribeck_speed is not None and falls.any():
-        put(rows, falls, "fall", _inverse(law.stribeck_speed))
-        rows["exponent"][falls] = law.stribeck_exponent
+FALL = {"stribeck_speed": Number("fall", -1, True, SPEED), "stribeck_exponent": Number("exponent"),
+        "stribeck_shape": Number("form")}  # fmt: skip
+OF_LAWS = {key: number for each in KINDS.values() for key, number in each.takes.items()}
+NUMBERS = FALL | OF_LAWS
+"""Every number that a law takes, by its key without "yaw_"."""
 
 
-def put(rows: Any, where: Any, field: str, value: Numbers) -> None:
-    """One number, or one per row, into a field of some rows."""
-    if value is not None:
-        rows[field][where] = np.broadcast_to(value, len(rows))[where]
+def words_of(place: str) -> tuple[str, ...]:
+    """The words of the laws that a table knows: "axes", "direction" or "wheels"."""
+    return tuple(each.word for each in KINDS.values() if place in each.places)
 
 
-def critical(mass: float, rows: Any, law: Spread) -> FloatArray:
-    """2 sqrt(sigma0 m) - viscous: the damping with which a bristle and the body on it do not swing."""
-    seen = mass / np.maximum((rows["g"] ** 2).sum(axis=1), 1e-300)
-    assert law.stiffness is not None
-    return np.maximum(2.0 * np.sqrt(np.asarray(law.stiffness) * seen) - rows["viscous"], 0.0)
+def spread_on(
+    table: Any, rows: Any, slide: FloatArray, hold: FloatArray, mass: FloatArray | float, viscous: Any,
+    units: FloatArray | float = 1.0, yaw: str = "",
+) -> None:  # fmt: skip
+    """Add the law of a table to records of a plant, in place: to elements, or to the ellipse.
+
+    slide, hold: levels of each pair, shape (rows, 2), of the ellipse (2,). mass [kg]: what each moves; viscous [N s/m]:
+    what resists it too. units: the length [m] by which each is yaw, else 1. yaw: how keys about yaw begin.
+    """
+    kind = KINDS[table.law]
+    rows["bristle_coulomb" if kind.bends else "coulomb"] += slide
+    rows["bristle_breakaway" if kind.bends else "breakaway"] += hold
+    if kind.bends:
+        _bend(kind, table, rows, np.any(slide > 0.0, axis=-1), mass, viscous, units, yaw)
+    if getattr(table, f"{yaw}stribeck_speed") is not None:
+        falls = np.any(hold > slide, axis=-1)
+        for key, number in FALL.items():
+            _put(rows, falls, number.field, _number(table, yaw, key, number, units))
 
 
-def _inverse(value: Numbers) -> Numbers:
-    return None if value is None else 1.0 / np.asarray(value)
+def _bend(
+    kind: Kind, table: Any, rows: Any, used: Any, mass: Any, viscous: Any, units: FloatArray | float, yaw: str
+) -> None:
+    """The numbers of a law that bends; the ellipse has fields for those of LuGre alone."""
+    for key, number in kind.takes.items():
+        value = _number(table, yaw, key, number, units)
+        if value is None and key in kind.usual:
+            value = kind.usual[key](_number(table, yaw, "stiffness", kind.takes["stiffness"], units), mass, viscous)
+        _put(rows, used, number.field, value)
+    _put(rows, used, "law", bristle.NUMBER_OF[kind.word])
 
 
-TAKES = {
-    COULOMB: frozenset[str](), KARNOPP: frozenset({"karnopp_speed"}), DAHL: frozenset({"stiffness", "dahl_exponent"}),
-    LUGRE: frozenset({"stiffness", "damping", "damping_speed"}),
-}  # fmt: skip
-OF_LAWS = frozenset().union(*TAKES.values())
+def _number(table: Any, yaw: str, key: str, number: Number, units: FloatArray | float) -> Any:
+    """A number of a table in the units of a plant; None where it has none."""
+    value = getattr(table, f"{yaw}{key}", getattr(table, key, None))
+    if value is None:
+        return None
+    if isinstance(value, str):
+        return list(SHAPES).index(value)
+    if number.power:
+        value = np.asarray(value) / units**number.power
+    return 1.0 / value if number.inverse else value
 
 
-def refuse_mixtures(table: Any) -> None:
-    """Raises ValueError for numbers that the law of a table does not take, or lacks."""
-    law, fields = table.law, type(table).model_fields
-    for name in fields:
+def _put(rows: Any, where: Any, field: str, value: Any) -> None:
+    """One number, or one per row, into a field of some rows, where they have such a field."""
+    if value is not None and field in rows.dtype.fields:
+        rows[field] = np.where(where, value, rows[field])
+
+
+def refuse_mixtures(table: Any, yaw: str = "") -> None:
+    """Raises ValueError for numbers that the law of a table does not take, or lacks. yaw: how keys about yaw begin."""
+    kind, fields = KINDS[table.law], type(table).model_fields
+    law, coulomb, breakaway = f'law = "{kind.word}"', f"{yaw}coulomb", f"{yaw}breakaway"
+    speed, stiffness = f"{yaw}stribeck_speed", f"{yaw}stiffness"
+    for name in () if yaw else fields:
         plain = name.removeprefix("yaw_")
-        if plain in OF_LAWS and plain not in TAKES[law] and getattr(table, name) != fields[name].default:
-            wanted = " or ".join(f'"{each}"' for each in TAKES if plain in TAKES[each])
-            raise ValueError(f'{name} is of law = {wanted}; this table has law = "{law}"')
-    bends = law in BENDING and any(np.ravel(table.coulomb))
-    if bends and table.stiffness is None:
-        raise ValueError(f'law = "{law}" needs stiffness: the Coulomb level over the distance it bends before it slips')
-    if law == DAHL and (table.breakaway is not None or table.stribeck_speed is not None):
-        raise ValueError(
-            'law = "dahl" has one level, coulomb: no breakaway and no stribeck_speed; law = "lugre" has both'
-        )
-    if law == LUGRE and table.breakaway is not None and table.stribeck_speed is None:
-        raise ValueError('law = "lugre" with a breakaway needs stribeck_speed: how fast the level falls from it')
-    if law == KARNOPP and table.stribeck_speed is not None:
-        raise ValueError('law = "karnopp" slides with coulomb at once: leave stribeck_speed out, or the law')
+        if plain in OF_LAWS and plain not in kind.takes and getattr(table, name) != fields[name].default:
+            wanted = " or ".join(f'"{each.word}"' for each in KINDS.values() if plain in each.takes)
+            raise ValueError(f"{name} is of law = {wanted}; this table has {law}")
+    if kind.bends and np.any(getattr(table, coulomb)) and getattr(table, stiffness) is None:
+        words = "the Coulomb level over the distance it bends before it slips"
+        raise ValueError(f"{law} needs {stiffness} beside {coulomb}: {words}")
+    holds, falls = getattr(table, breakaway) is not None, getattr(table, speed) is not None
+    if kind.bends and not kind.falls and (holds or falls):
+        other = " or ".join(f'law = "{each.word}"' for each in KINDS.values() if each.bends and each.falls)
+        raise ValueError(f"{law} has one level, {coulomb}: no {breakaway} and no {speed}; {other} has both")
+    if kind.bends and holds and not falls:
+        raise ValueError(f"{law} with a {breakaway} needs {speed}: how fast the level falls from it")
+    if not kind.falls and falls:
+        raise ValueError(f"{law} slides with {coulomb} at once: leave {speed} out, or the law")

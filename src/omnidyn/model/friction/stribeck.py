@@ -1,59 +1,67 @@
 """Stribeck's fall: dry friction that is largest at rest and falls to the Coulomb level as the speed grows.
 
-    F = [C + (S - C) f(|v|/v_s)] sgn v,   f(u) = exp(-u^d);   at rest any force up to S
+    F = [C + (S - C) f(p)] sgn v,   p = (|v|/v_s)^d;   at rest any force up to S
 
 C the Coulomb level, S >= C breakaway, v_s the Stribeck speed (1e-3 to 5e-2 m/s), d the exponent: 2 (the usual one), 1
 (Tustin 1947), 0.5 to 2 measured. Meaningful where surfaces are lubricated, and at low speed on most floors: what makes
 a robot stick and slip. S = C is Coulomb's law, to the last bit. Source: Bo & Pavelescu 1982; Armstrong-Helouvry et al.
 1994. Below a speed of v_s/65536 an exponent under 1 falls along a chord: its slope at rest would be infinite.
+
+f is one of SHAPES, each a file: `left(p)` gives (f, df/dp), f(0) = 1, from there down to 0, in NumPy's functions, so
+that it takes numbers in a kernel and arrays outside; `steepest(d)`, for d >= 1, the one p at which f falls most steeply
+with |v|. All else is derived from these two, here.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.kernel import part
+from omnidyn.compiled.kernel import one_of, part, plain
+from omnidyn.model.friction import exponential, lorentzian
+
+SHAPES = {"exponential": exponential, "lorentzian": lorentzian}
+"""The shapes by their words in a robot file. A record has the number of its shape, in this order."""
 
 USUAL = 2.0
 LEAST, MOST = 0.3, 10.0  # of the exponent
 CHORD = 2.0**-16
 BENDS = 1.5  # a bristle follows what falls late: so much steeper at the most
 
+_left = one_of([each.left for each in SHAPES.values()])
+_steepest = one_of([each.steepest for each in SHAPES.values()])
+
 
 @part
-def fall(u, exponent):
+def fall(u, shape, exponent):
     """(f, f') at u = |v|/v_s >= 0."""
     if exponent == 2.0:
-        value = math.exp(-u * u)
-        return value, -2.0 * u * value
+        value, slope = _left(shape, u * u)
+        return value, 2.0 * u * slope
     if exponent < 1.0 and u < CHORD:
-        slope = (math.exp(-(CHORD**exponent)) - 1.0) / CHORD
+        slope = (_left(shape, CHORD**exponent)[0] - 1.0) / CHORD
         return 1.0 + slope * u, slope
     if u == 0.0:
-        return 1.0, (-1.0 if exponent == 1.0 else 0.0)
+        return 1.0, (_left(shape, 0.0)[1] if exponent == 1.0 else 0.0)
     power = u**exponent
-    value = math.exp(-power)
-    return value, -exponent * power / u * value
+    value, slope = _left(shape, power)
+    return value, exponent * power / u * slope
 
 
 @part
-def steepest(u, exponent):
+def steepest(u, shape, exponent):
     """The largest -f' at u and beyond; u = 0: of all."""
-    if exponent < 1.0:
-        return -fall(u, exponent)[1]
-    worst = ((exponent - 1.0) / exponent) ** (1.0 / exponent)
-    return -fall(max(u, worst), exponent)[1]
+    worst = 0.0 if exponent < 1.0 else _steepest(shape, exponent) ** (1.0 / exponent)
+    return -fall(max(u, worst), shape, exponent)[1]
 
 
 @part
-def steepness_left(u, exponent):
+def steepness_left(u, shape, exponent):
     """The steepest fall at u Stribeck speeds and beyond, over the steepest of all."""
-    return 1.0 if u <= 0.0 else steepest(u, exponent) / steepest(0.0, exponent)
+    return 1.0 if u <= 0.0 else steepest(u, shape, exponent) / steepest(0.0, shape, exponent)
 
 
 @part
@@ -63,7 +71,7 @@ def excess(own, at, speed):
     own, at: the records ELEMENT and EACH of it, see layout.py.
     """
     sign, side = at.sign, 0 if at.sign > 0.0 else 1
-    f, slope = fall(max(sign * speed, 0.0) * own.fall, own.exponent)
+    f, slope = fall(max(sign * speed, 0.0) * own.fall, own.form, own.exponent)
     more = at.hold[side] - own.coulomb[side]
     return -sign * more * f, -more * slope * own.fall
 
@@ -74,13 +82,23 @@ def steepest_of(own: Any) -> float:
         return 0.0
     more = max((own.breakaway - own.coulomb).max(), 0.0)
     bends = max((own.bristle_breakaway - own.bristle_coulomb).max(), 0.0)
-    return (more + BENDS * bends) * own.fall * steepest(0.0, own.exponent)
+    return (more + BENDS * bends) * own.fall * steepest(0.0, own.form, own.exponent)
 
 
-def fallen(speed: ArrayLike, inverse: ArrayLike, exponent: ArrayLike) -> FloatArray:
+def fallen(speed: ArrayLike, inverse: ArrayLike, exponent: ArrayLike, shape: ArrayLike = 0.0) -> FloatArray:
     """f at a speed [m/s or rad/s] of any sign; inverse: 1/v_s, 0 for a level that nobody looks at. Any shape."""
     u, d = np.abs(np.asarray(speed, dtype=float)) * inverse, np.asarray(exponent, dtype=float)
     with np.errstate(under="ignore"):
-        value = np.exp(-(u**d))
-    chord = 1.0 - (1.0 - np.exp(-(CHORD**d))) * u / CHORD
+        value = _fallen(shape, u**d)
+        chord = 1.0 - (1.0 - _fallen(shape, CHORD**d)) * u / CHORD
     return np.where((d < 1.0) & (u < CHORD), chord, value)
+
+
+def _fallen(shape: ArrayLike, p: Any) -> FloatArray:
+    """f(p), each of its own shape."""
+    first, *others = (plain(each.left) for each in SHAPES.values())
+    found = first(p)[0]
+    for number, left in enumerate(others, start=1):
+        if np.any(np.equal(shape, number)):
+            found = np.where(np.equal(shape, number), left(p)[0], found)
+    return found

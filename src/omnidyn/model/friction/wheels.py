@@ -6,15 +6,15 @@ at rest    -S_forward <= f_i <= S_backward
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from omnidyn.model.friction.kinds import Spread, refuse_mixtures, spread_on
-from omnidyn.model.friction.stribeck import LEAST, MOST, USUAL
+from omnidyn.model.friction.kinds import WHEELS, refuse_mixtures, spread_on, words_of
+from omnidyn.model.friction.stribeck import LEAST, MOST, SHAPES, USUAL
 from omnidyn.model.layout import N_AXES, Plant
-from omnidyn.model.value import PerWheel, Value, number, per_wheel_number
+from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, word_of
 
 Level = Annotated[PerWheel, per_wheel_number(0.0, 1e6)]
 Speed = Annotated[PerWheel, per_wheel_number(1e-7, 1e3)]
@@ -34,13 +34,15 @@ class WheelFriction(Value):
     breakaway: Annotated[Level | None, Field(description=">= coulomb [N]")] = None
     breakaway_backward: Annotated[Level | None, Field(description=">= coulomb_backward [N]")] = None
     viscous: Annotated[Level, Field(description="b [N s/m] at the rim")] = 0.0
-    law: Annotated[Literal["coulomb", "dahl", "lugre"], Field(description="what kind of law")] = "coulomb"
+    law: Annotated[Annotated[str, word_of(*words_of(WHEELS))], Field(description="what kind of law")] = "coulomb"
     stribeck_speed: Annotated[Speed | None, Field(description="v_s [m/s] of the rim")] = None
     stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    stribeck_shape: Annotated[Annotated[str, word_of(*SHAPES)], Field(description="f of the fall")] = "exponential"
     stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m] at the rim")] = None
     damping: Annotated[Level | None, Field(description="sigma1 [N s/m] at the rim")] = None
     damping_speed: Annotated[Speed | None, Field(description="v_d [m/s] of the rim")] = None
     dahl_exponent: Annotated[Annotated[float, number(0.5, 4.0)], Field(description="a")] = 1.0
+    elastic_share: Annotated[Annotated[float, number(0.0, 0.99)], Field(description="b")] = 0.7
 
     @property
     def backward(self) -> float | tuple[float, ...]:
@@ -67,11 +69,8 @@ class WheelFriction(Value):
         slide[:, 0], slide[:, 1], hold[:, 0], hold[:, 1] = (
             self.coulomb, self.backward, self.hold_forward, self.hold_backward,
         )  # fmt: skip
-        law = Spread(
-            self.law, self.stribeck_speed, self.stribeck_exponent, self.stiffness, self.damping, self.damping_speed,
-            self.dahl_exponent,
-        )  # fmt: skip
-        spread_on(plant.body.mass, wheels, law, slide, hold)
+        seen = plant.body.mass / np.maximum((wheels["g"] ** 2).sum(axis=1), 1e-300)
+        spread_on(self, wheels, slide, hold, seen, wheels["viscous"])
 
     @model_validator(mode="after")
     def _breakaway_at_least_coulomb(self) -> WheelFriction:

@@ -40,7 +40,7 @@ def speed_of(plant, stage, e, x):
 def _levels_xy(body, x, y, slide, hold):
     """(Cx, Cy, their slopes by |v|, |v|) of an ellipse that falls from `hold` to `slide`."""
     size = math.hypot(x, y)
-    f, slope = fall(size * body.fall, body.exponent)
+    f, slope = fall(size * body.fall, body.form, body.exponent)
     more_x, more_y, slope = hold[0] - slide[0], hold[1] - slide[1], slope * body.fall
     return slide[0] + more_x * f, slide[1] + more_y * f, more_x * slope, more_y * slope, size
 

@@ -62,7 +62,7 @@ def _bound_laws(plant: Plant) -> None:
         bends = float((body.bristle_breakaway - body.bristle_coulomb).max())
         round_ = body.coulomb[0] == body.coulomb[1] and body.breakaway[0] == body.breakaway[1]
         rate = more * (1.0 if round_ else 2.0) + 2.0 * BENDS * bends  # an ellipse falls faster than its levels do
-        steep += rate * body.fall * steepest(0.0, body.exponent)
+        steep += rate * body.fall * steepest(0.0, body.form, body.exponent)
     body.steep = (steep + fade_of(body)) / body.mass
     body.bristles = plant.element["bristle_breakaway"].max(axis=1).sum() + body.bristle_breakaway.sum()
     body.laws = float(body.steep > 0.0 or body.stiffness > 0.0 or bool(np.any(plant.element["stiffness"] > 0.0)))

@@ -35,12 +35,12 @@ def _steep_near(plant, x, reach):
             g0, g1, g2 = own.g[0], own.g[1], own.g[2]
             size = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2)
             least = abs(g0 * x[0] + g1 * x[1] + g2 * x[2]) - size * reach
-            share = max(share, steepness_left(least * own.fall, own.exponent))
+            share = max(share, steepness_left(least * own.fall, own.form, own.exponent))
         if own.fade > 0.0:
             share = 1.0
     if body.fall > 0.0:
         least = math.hypot(x[0], x[1]) - reach
-        share = max(share, steepness_left(least * body.fall, body.exponent))
+        share = max(share, steepness_left(least * body.fall, body.form, body.exponent))
     return share * body.steep
 
 
@@ -63,7 +63,7 @@ def growth(plant, stage, start, end, h):
             for a in range(3):
                 g = g0 if a == 0 else (g1 if a == 1 else g2)
                 gain += g * (end[a] - start[a]) / h
-            worst = max(worst, _grown(plant, speed * own.fall, own.exponent, more * size, abs(gain)))
+            worst = max(worst, _grown(plant, speed * own.fall, own.form, own.exponent, more * size, abs(gain)))
     if body.fall > 0.0:
         more = max(stage.task.hold[0] - body.coulomb[0], stage.task.hold[1] - body.coulomb[1])
         more = max(
@@ -72,14 +72,14 @@ def growth(plant, stage, start, end, h):
             body.bristle_breakaway[1] - body.bristle_coulomb[1],
         )
         u, gain = math.hypot(start[0], start[1]), math.hypot(end[0] - start[0], end[1] - start[1]) / h
-        worst = max(worst, _grown(plant, u * body.fall, body.exponent, more, gain))
+        worst = max(worst, _grown(plant, u * body.fall, body.form, body.exponent, more, gain))
     return worst
 
 
 @part
-def _grown(plant, u, exponent, more, gain):
+def _grown(plant, u, shape, exponent, more, gain):
     """The growth of one element: more [N] can be lost, `gain` [m/s^2] is its acceleration."""
-    left = more * fall(u, exponent)[0] / plant.body.mass
+    left = more * fall(u, shape, exponent)[0] / plant.body.mass
     return min(1.0 + left / max(gain, 1e-300), GROWS) if left > 1e-6 * gain else 1.0
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omnidyn.model.friction.kinds import BENDING, LUGRE
+from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import Key
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.robot import Robot
@@ -24,7 +24,7 @@ def with_damping(robot: Robot, names: Sequence[str]) -> Robot:
         if (
             field not in ("damping", "yaw_damping")
             or law is None
-            or law.law != LUGRE
+            or "damping" not in KINDS[law.law].takes
             or getattr(law, field) is not None
         ):
             continue
@@ -46,7 +46,7 @@ def bending_keys(robot: Robot) -> list[str]:
     found = []
     for table in type(robot.friction).model_fields:
         law = getattr(robot.friction, table)
-        if law.law in BENDING:
+        if KINDS[law.law].bends:
             names = (f"{yaw}{name}" for yaw in ("", "yaw_") for name in ("stiffness", "damping"))
             found += [f"friction.{table}.{name}" for name in names if getattr(law, name, None) is not None]
     return found

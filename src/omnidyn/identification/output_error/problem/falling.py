@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from omnidyn.identification.output_error.problem.parameters import AT, Parameter
-from omnidyn.model.friction.kinds import COULOMB as PLAIN
-from omnidyn.model.friction.kinds import LUGRE
+from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BREAKAWAY, COULOMB, Key, find_key
 from omnidyn.model.robot import Robot
 
@@ -25,7 +24,7 @@ def falls(name: str, robot: Robot) -> bool:
         return False
     law = getattr(robot.friction, key.table.rpartition(".")[2])
     speed = "yaw_stribeck_speed" if key.field.startswith("yaw_") else "stribeck_speed"
-    return law.law in (PLAIN, LUGRE) and getattr(law, speed, None) is not None
+    return KINDS[law.law].falls and getattr(law, speed, None) is not None
 
 
 def coulomb_below(name: str, robot: Robot | None = None) -> str:
