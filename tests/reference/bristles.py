@@ -81,8 +81,8 @@ class Bristles:
             at += 1
         if self.way is not None:
             w = self.way
-            u = math.hypot(v[0], v[1]) / (w.stribeck_speed or math.inf)
-            fallen = left_at(u, w.stribeck_exponent, w.stribeck_shape == "lorentzian")
+            slow = math.hypot(v[0], v[1]) / (w.stribeck_speed or math.inf)
+            fallen = left_at(slow, w.stribeck_exponent, w.stribeck_shape == "lorentzian")
             c = np.array(w.coulomb) + (np.array(w.breakaway or w.coulomb) - w.coulomb) * fallen
             work = math.hypot(c[0] * v[0], c[1] * v[1])
             rate = v[:2] - w.stiffness * work * z[at : at + 2] / c**2
