@@ -127,7 +127,10 @@ def open_regular(path: str | os.PathLike) -> Iterator[BinaryIO]:
                 raise InputError("cannot read it", got=kind, expected="a file", where=str(path))
             yield file
     except FileNotFoundError:
-        raise InputError("no such file", remedy="check the spelling and the folder", where=str(path)) from None
+        remedy = "check the spelling and the folder"
+        if "=" in "".join(path.parts[:1]):  # `--assume d=V a=rad`: one of two
+            remedy = "if it is a value of an option, write the option before it too, as before the first one"
+        raise InputError("no such file", remedy=remedy, where=str(path)) from None
     except IsADirectoryError:
         raise InputError("cannot read it", got="a folder", expected="a file", where=str(path)) from None
     except (PermissionError, NotADirectoryError) as error:

@@ -137,6 +137,7 @@ def test_without_inputs_it_is_steady_state_and_says_why(call):
     code, _, err = call("inputless.csv", "--robot", "axebot")
     assert code in (3, 4)
     assert "omnidyn: steady-state, not output-error: inputless.csv holds no voltage and no duty" in err
+    assert err.count("columns of") == 1
 
 
 def test_a_new_robot_is_fitted_to_its_logs_by_default(tmp_path, monkeypatch, capsys):

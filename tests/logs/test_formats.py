@@ -133,6 +133,8 @@ def test_what_is_no_file_is_refused_by_every_reader(tmp_path, read):  # 1, 2
         read(tmp_path / "empty.csv")
     with pytest.raises(InputError, match=r"nothing\.csv: no such file; check the spelling"):
         read(tmp_path / "nothing.csv")
+    with pytest.raises(InputError, match=r"a=ticks/1440: no such file; .*write the option before it too"):
+        read("a=ticks/1440")
     with pytest.raises(InputError, match="cannot read it; got a folder"):
         read(tmp_path)
     with pytest.raises(InputError, match="cannot open it; got embedded null byte"):

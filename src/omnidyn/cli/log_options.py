@@ -202,14 +202,16 @@ class Maps:
         """
         from omnidyn.logs.columns.mapping import save_map
 
-        lines = (*columns.lines(), *(f"doubt: {words}" for words in columns.doubts))
-        if lines in self.said:
+        taken, told = tuple(columns.lines()), tuple(f"doubt: {words}" for words in columns.doubts)
+        if (taken, told) in self.said:
             return
         if self.save and not self.said:
             save_map(columns, self.save, self.force)
-        self.said.add(lines)
-        say(f"omnidyn: columns of {path}:")
-        for line in lines if doubts else columns.lines():
+        again = (path, taken) in self.said  # read for another method, which has more doubts
+        self.said |= {(taken, told), (path, taken)}
+        if not again:
+            say(f"omnidyn: columns of {path}:")
+        for line in (*(() if again else taken), *(told if doubts else ())):
             say(f"omnidyn:   {line}")
         if doubts and columns.passed_over:
             say(f"omnidyn:   not used: {', '.join(columns.passed_over)}")
