@@ -19,22 +19,17 @@ from omnidyn.simulation.speed_loop import no_loop
 from tests.reference import bristles
 from tests.reference.modes import reference
 from tests.reference.modes_plant import plant_of
+from tests.support.events import meet_events, of_error
 from tests.support.mixed_robots import random_robot, random_voltages, with_bristles, with_stribeck
 
 AXEBOT = load_robot("axebot")
 VISCOUS, COULOMB, BREAKAWAY = (0.94, 0.96, 0.01), (2.2, 1.5, 0.099), (2.8, 1.9, 0.13)
 FALL = (0.02, 0.02, 0.2)
-ROWS = 7
 EAGER = range(1, 40, 2)  # robots with breakaway above coulomb
 
 
 def axes(**numbers):
     return AXEBOT.replace(friction=Friction(axes=AxesFriction(viscous=VISCOUS, coulomb=COULOMB, **numbers)))
-
-
-def of_error(run, twist):
-    """The largest error of a run [m/s], yaw counted by a tenth."""
-    return float((np.abs(run.twist - twist) * [1.0, 1.0, 0.1]).max())
 
 
 def program(rows, scale, seed=0):
@@ -50,16 +45,7 @@ def program(rows, scale, seed=0):
 @pytest.mark.parametrize("seed", EAGER)
 def test_what_falls_with_the_speed_against_events(seed):
     """Twenty robots, everything mixed: within tol [m/s], 10 tol [rad/s], and at rest in the same rows."""
-    robot = with_stribeck(random_robot(seed), seed)
-    voltage, dt = (part[:ROWS] for part in random_voltages(robot, seed))
-    truth = reference(robot, voltage, dt)
-    assert truth.margin > 1e-9
-    for tol in (1e-5, 1e-7):
-        run = simulate(robot, voltage, dt, tol=tol)
-        assert of_error(run, truth.twist) <= tol
-        assert np.abs(run.pose - truth.pose).max() <= tol
-        assert ((run.twist == 0.0) == truth.stuck[:, :3]).all()
-        assert not run.warnings
+    meet_events(with_stribeck(random_robot(seed), seed), seed)
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -11,12 +11,12 @@ from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
 from tests.reference import bristles
 from tests.reference.modes import reference
+from tests.support.events import meet_events, of_error
 from tests.support.mixed_robots import random_robot, random_voltages, with_bristles, with_stribeck
 
 AXEBOT = load_robot("axebot")
 OTHERS = [shape for shape in SHAPES if shape != "exponential"]
 LEVELS = {"viscous": (0.94, 0.96, 0.01), "coulomb": (2.2, 1.5, 0.099), "breakaway": (2.8, 1.9, 0.13)}
-ROWS = 7
 
 
 def axes(**numbers):
@@ -37,25 +37,11 @@ def program(rows, seed, every=1):
     return np.repeat(levels, 20, axis=0)[:rows:every]
 
 
-def of_error(run, twist):
-    """The largest error of a run [m/s], yaw counted by a tenth."""
-    return float((np.abs(run.twist - twist) * [1.0, 1.0, 0.1]).max())
-
-
 @pytest.mark.parametrize("shape", OTHERS)
 @pytest.mark.parametrize("seed", range(1, 29, 2))
 def test_it_falls_against_events(shape, seed):
     """Fourteen robots, axes, direction, wheels and all mixtures: within tol, and at rest in the same rows."""
-    robot = shaped(with_stribeck(random_robot(seed), seed), shape)
-    voltage, dt = (part[:ROWS] for part in random_voltages(robot, seed))
-    truth = reference(robot, voltage, dt)
-    assert truth.margin > 1e-9
-    for tol in (1e-5, 1e-7):
-        run = simulate(robot, voltage, dt, tol=tol)
-        assert of_error(run, truth.twist) <= tol
-        assert np.abs(run.pose - truth.pose).max() <= tol
-        assert ((run.twist == 0.0) == truth.stuck[:, :3]).all()
-        assert not run.warnings
+    meet_events(shaped(with_stribeck(random_robot(seed), seed), shape), seed)
 
 
 @pytest.mark.parametrize("shape", OTHERS)

@@ -24,6 +24,7 @@ def rate_of(psi: Any) -> Any:
     """
 
     def rate(own, aimed, speed, tau, level, slope):
+        """(z', dz'/ds); see LAWS of bristle.py."""
         stiffness = own.stiffness
         if speed == 0.0:
             return 0.0, psi(own, stiffness * aimed / level)[0]
