@@ -33,6 +33,7 @@ NAMES = {
     "control": "tracking on the eight references of the peers, seven conditions, every controller (three minutes)",
     "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
+    "forces": "a right robot under random forces of the floor: what is found, what intervals hold (ten minutes)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
     "first_minutes": "CSV to report of a robot of `init`, whole commands: nothing compiled, and compiled (3 minutes)",
     "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
