@@ -16,8 +16,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.memory.innovations import innovations
-from omnidyn.identification.output_error.memory.whitened import known_rows
+from omnidyn.identification.output_error.memory.whitened import known_rows, moving_rows
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 from omnidyn.identification.structure.rounding import anew, of_rounding
 
@@ -32,7 +31,7 @@ class Rows:
     """The rows of a fit as they are: of each piece residuals (C, rows), and slopes (C, rows, P), (C, rows, S) of it.
 
     there: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
-    column: of each piece (C,), which column of the problem it is.
+    column: of each piece (C,), which column of the problem it is. moves: of each piece (C, rows), see `moving_rows`.
     """
 
     problem: Problem
@@ -43,13 +42,14 @@ class Rows:
     there: list[BoolArray]
     steps: list[list[IntArray]]
     column: list[list[int]]
+    moves: list[BoolArray]
 
     @classmethod
     def of(cls, problem: Problem, point: Point, parts: Sequence[Parts]) -> Rows:
         """The rows that an engine shows at a point, by the numbers that the solver sees."""
         count, every = len(problem.parameters), problem.columns
         scale = [p.slope(float(v)) for p, v in zip(problem.parameters, point.values, strict=True)]
-        rows = cls(problem, point, [], [], [], [], [], [])
+        rows = cls(problem, point, [], [], [], [], [], [], [])
         for piece, (every_residual, slopes, at) in zip(problem.pieces, parts, strict=True):
             residual = anew(piece, every_residual)
             wide = np.zeros((*residual.shape, count))
@@ -62,6 +62,7 @@ class Rows:
             rows.there.append(np.array([np.isin(np.arange(residual.shape[1]), at_rows) for at_rows, _ in known]))
             rows.steps.append([steps for _, steps in known])
             rows.column.append([every.index(column) for column in piece.record.columns])
+            rows.moves.append(moving_rows(piece, every_residual))
         return rows
 
     def is_rounding(self, c: int, variance: float) -> bool:
@@ -115,8 +116,10 @@ class Linear:
 
     def of_column(self, k: int, j: int, values: FloatArray) -> FloatArray:
         """Values (rows, K) of column j of piece k made white, in the rows that count."""
-        rows = self.rows
-        return _new(self.memory[rows.column[k][j]], values, rows.there[k][j], rows.steps[k][j])
+        rows, memory = self.rows, self.memory[self.rows.column[k][j]]
+        there = rows.there[k][j]
+        new = memory.new(np.ascontiguousarray(values[there]), rows.steps[k][j], rows.moves[k][j, there])
+        return new / np.sqrt(max(memory.variance, TINY))
 
     def without_starts(self, shown: Shown) -> list[FloatArray]:
         """What is shown, in rows as they are, without what the starts of pieces explain of it. (C, rows, K) each."""
@@ -224,13 +227,6 @@ class Gram:
         weights[by] = ways
         weights[known] = -solved_by(self.matrix[np.ix_(known, known)], self.matrix[np.ix_(known, by)] @ ways)
         return (ways.T @ rest.matrix[by, 0]) ** 2, (weights / self.size[:, None])[1:]
-
-
-def _new(memory: AutoRegression, values: FloatArray, there: BoolArray, steps: IntArray) -> FloatArray:
-    """What is new in each row that counts, over its standard deviation. values (rows, K) -> (rows that count, K)."""
-    own = np.ascontiguousarray(values[there])
-    new = innovations(own, steps, *memory.filter) if memory.remembers else own
-    return new / np.sqrt(max(memory.variance, TINY))
 
 
 def solved(columns: FloatArray, right: FloatArray) -> FloatArray:

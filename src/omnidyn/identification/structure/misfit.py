@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import fdtrc
 
-from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Found
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.whitened import without_gaps
@@ -156,15 +156,17 @@ def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray
     """The memory of each column. taken: of each piece (C, rows, K), what a fit has taken out, as likely as it is."""
     found = []
     for c in range(len(rows.problem.columns)):
-        series: list[FloatArray] = []
+        series, moves = list[FloatArray](), list[BoolArray]()
         for k, own in enumerate(rows.column):
             for j, column in enumerate(own):
                 if column == c:
                     there = rows.there[k][j]
                     more = [] if taken is None else [taken[k][j][there]]
                     series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
+                    moves += without_gaps(rows.moves[k][j, there], rows.steps[k][j])
         plain, adds_up = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
-        found.append(plain if rows.is_rounding(c, plain.variance) else autoregression(series, may_add_up=adds_up))
+        is_white = rows.is_rounding(c, plain.variance)
+        found.append(plain if is_white else autoregression(series, may_add_up=adds_up, moves=moves))
     return found
 
 

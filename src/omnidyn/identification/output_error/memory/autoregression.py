@@ -19,9 +19,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
-from omnidyn.identification.output_error.memory.mixed import coefficients, mixed
+from omnidyn.identification.output_error.memory.innovations import innovations
+from omnidyn.identification.output_error.memory.mixed import coefficients, mixed, told_by_many
+from omnidyn.identification.output_error.memory.moving import Moving, new_while_moving, while_moving
 
 ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tried
 SHARE = 0.1  # of the rows that may be coefficients
@@ -36,13 +38,17 @@ ANYWHERE = 1e8  # times the variance of what is new: where errors that add up ma
 class AutoRegression:
     """partial (p,): partial correlations, each within -1 to 1, so that the series is stationary. variance: of what is
     new in a row. rows: that it was fitted to. adds_up: whether all this is of the changes from row to row. slopes
-    (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself, see mixed.py."""
+    (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself, see mixed.py. moving: phi and
+    lambda of errors that remember only while the robot moves, see moving.py; all else is theirs while it does.
+    information (q, q): that all rows have of the q numbers, where they do not tell as much as rows without end."""
 
     partial: FloatArray
     variance: float
     rows: int
     adds_up: bool = False
     slopes: FloatArray | None = None
+    moving: tuple[float, float] | None = None
+    information: FloatArray | None = None
 
     @property
     def order(self) -> int:
@@ -67,6 +73,12 @@ class AutoRegression:
         back = np.tri(self.order + 1, self.order, -1)  # from the last row to those before, by the changes between
         start = back @ self.covariance @ back.T + ANYWHERE
         return np.append(self.coefficients, 0.0) + np.append(1.0, -self.coefficients), start
+
+    def new(self, series: FloatArray, steps: IntArray, moves: BoolArray) -> FloatArray:
+        """What is new in each row of series (n, K), see innovations.py. moves (n,): in which rows the robot does."""
+        if self.moving is not None:
+            return new_while_moving(series, steps, moves, *self.moving)
+        return innovations(series, steps, *self.filter) if self.remembers else series
 
     @property
     def covariance(self) -> FloatArray:
@@ -142,6 +154,8 @@ class AutoRegression:
         by, known = by_phi, self.covariance
         if self.slopes is not None:
             by, known = self.slopes.T @ by_phi, self.slopes.T @ known @ self.slopes
+        if self.information is not None:
+            known = self.information / max(self.rows, 1)
         return (by * np.linalg.solve(known, by)).sum(axis=0)
 
 
@@ -154,16 +168,21 @@ def _steps(partial: FloatArray) -> list[FloatArray]:
 
 
 def autoregression(
-    stretches: Sequence[FloatArray], most: int | None = None, may_add_up: bool = False
-) -> AutoRegression:
+    stretches: Sequence[FloatArray], most: int | None = None, may_add_up: bool = False,
+    moves: Sequence[BoolArray] | None = None,
+) -> AutoRegression:  # fmt: skip
     """That of series without gaps, each of shape (n, K): the series is what all K columns add up to in the square.
 
     The first column is the series itself; the others may be what a fit has taken out of it, see whitening.py.
     most: the highest order; by default ORDERS log10(rows). may_add_up: whether the errors may add up: whether they do
     is found by their likelihood, and no row in which nothing changes counts then, for a robot at rest adds nothing.
+    moves (n,) of each stretch: in which rows the robot does, where errors may remember only while it does.
     Without rows it has order 0 and variance 0.
     """
     found, cost = _fitted(stretches, most)
+    own = while_moving(stretches, moves) if moves and most is None else None
+    if own is not None and own.cost < cost:
+        return _of_motion(own, sum(int(each.sum()) for each in moves or ()))
     if not may_add_up or not found.order:
         return found
     changes, own = _fitted([np.diff(each, axis=0) for each in stretches], most)
@@ -172,6 +191,15 @@ def autoregression(
         return found
     moving = [each[(each != 0.0).any(axis=1)] for each in (np.diff(one, axis=0) for one in stretches)]
     return replace(_fitted(moving, most)[0], adds_up=True)
+
+
+def _of_motion(found: Moving, rows: int) -> AutoRegression:
+    """Errors that remember in the rows that move, so many."""
+    partial, slopes = told_by_many(found.mixed)
+    return AutoRegression(
+        partial, found.variance * found.settled, rows, slopes=slopes @ found.slopes, moving=(found.phi, found.share),
+        information=found.information,
+    )  # fmt: skip
 
 
 def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegression, float]:

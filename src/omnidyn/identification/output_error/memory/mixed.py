@@ -11,7 +11,7 @@ P. J. Brockwell, R. A. Davis, Time Series: Theory and Methods (1991), 5.3 and 8.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -23,6 +23,7 @@ LONGEST = 60  # rows that an autoregression takes to tell the same
 TAIL = 0.05  # of theta^rows: what is left out there
 MOST = 0.9999, TAIL ** (1.0 / LONGEST)  # of phi and theta
 ROUNDS, CLOSE = 40, 0.05  # of Gauss-Newton; of the log likelihood: near enough to its best
+Look = tuple[float, FloatArray, FloatArray, float]
 STEP = 1e-4  # of the differences that tell how an autoregression moves with the two
 
 
@@ -32,17 +33,29 @@ def mixed(stretches: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, floa
     rows = sum(map(len, stretches))
     series, ends = np.ascontiguousarray(np.concatenate(stretches)), np.cumsum([0, *map(len, stretches)])
 
-    def looked(at: FloatArray) -> tuple[float, FloatArray, FloatArray, float]:
+    def looked(at: FloatArray) -> Look:
         square, logs, gradient, curved = _likelihood(series, ends, *at)
         size = max(square / rows, 1e-300)
         return rows * math.log(size) + logs, gradient / size, curved / size, size
 
-    at: FloatArray = min(map(np.array, STARTS), key=lambda each: looked(each)[0])
+    at, _, size, cost = scored(looked, STARTS, (-MOST[0], -MOST[1]), MOST)
+    return *told_by_many(at), size, cost + 2.0 * math.log(rows)
+
+
+def scored(
+    looked: Callable[[FloatArray], Look], starts: Sequence[tuple[float, float]], low: tuple[float, float],
+    high: tuple[float, float],
+) -> tuple[FloatArray, FloatArray, float, float]:  # fmt: skip
+    """(the two numbers (2,), the matrix there, variance, cost) of the least cost, from the best of some starts.
+
+    looked: (cost, gradient (2,), Gauss-Newton's or Fisher's matrix (2, 2), variance) of two numbers, in one scale.
+    """
+    at: FloatArray = min(map(np.array, starts), key=lambda each: looked(each)[0])
     cost, gradient, curved, size = looked(at)
     damping = 1e-3
     for _ in range(ROUNDS):
         step = np.linalg.lstsq(curved + damping * np.diag(curved.diagonal()), gradient)[0]
-        trial: FloatArray = np.clip(at - step, -np.array(MOST), MOST).astype(float)
+        trial: FloatArray = np.clip(at - step, low, high).astype(float)
         new = looked(trial)
         if new[0] >= cost:
             damping *= 10.0
@@ -53,11 +66,17 @@ def mixed(stretches: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, floa
         cost, gradient, curved, size = new
         if won < CLOSE:
             break
+    return at, curved, size, cost
+
+
+def told_by_many(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(partial correlations (p,) of the autoregression that tells the same, slopes (p, 2) of its coefficients by the
+    two numbers). at: phi and theta."""
     theta = max(abs(float(at[1])), 1e-9)
     count = int(np.clip(math.ceil(math.log(TAIL) / math.log(theta)), 2, LONGEST))
-    ways = STEP * (1.0 - at**2) * np.eye(2)
-    slopes = [coefficients(partials(at + way, count)) - coefficients(partials(at - way, count)) for way in ways]
-    return partials(at, count), np.transpose(slopes) / (2.0 * STEP), size, cost + 2.0 * math.log(rows)
+    steps = STEP * (1.0 - at**2)
+    slopes = [coefficients(partials(at + w, count)) - coefficients(partials(at - w, count)) for w in np.diag(steps)]
+    return partials(at, count), np.transpose(slopes) / (2.0 * steps)
 
 
 def partials(at: FloatArray, count: int) -> FloatArray:

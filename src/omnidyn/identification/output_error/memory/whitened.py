@@ -7,20 +7,22 @@ errors, and the solver, the priors and the covariance are as they are for white 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.memory.innovations import innovations
+from omnidyn.identification.output_error.problem.outputs import SPEEDS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine
 from omnidyn.statistics import stretches
 
 FORGOTTEN = 1000  # rows missing in a row after which a stretch begins anew
+T = TypeVar("T", bound=np.generic)
 Rows = tuple[NDArray[np.intp], IntArray]  # which rows of a piece are known, rows since the one before (0: at a start)
 
 
@@ -43,17 +45,18 @@ class OfRows:
 
 
 class WhitenedEngine(OfRows):
-    """engine: which simulates. models: the memory of each column; one that is not named has none.
+    """engine: which simulates. models: the memory of each column; one that is not named has none. moves: of each piece
+    (C, rows), see `moving_rows`; by default as at the first point that is asked for, and from there on the same.
 
     Memory is counted in rows of the column's own, and a column keeps its rate: a channel that only every fifth row
     has is not missing four. What is missing beside that costs what it would have told, no more.
     """
 
-    def __init__(self, engine: RowEngine[Problem], models: Mapping[Column, AutoRegression]):
-        self.engine, self.models, self.problem = engine, dict(models), engine.problem
-        self._filters = {
-            column: (model.coefficients, model.covariance) for column, model in self.models.items() if model.order
-        }
+    def __init__(
+        self, engine: RowEngine[Problem], models: Mapping[Column, AutoRegression],
+        moves: Sequence[BoolArray] | None = None,
+    ):  # fmt: skip
+        self.engine, self.models, self.problem, self._moves = engine, dict(models), engine.problem, moves
 
     def on(self, problem: Problem) -> WhitenedEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
@@ -61,30 +64,36 @@ class WhitenedEngine(OfRows):
 
     def residuals(self, point: Point) -> list[Parts]:
         """Filtered residuals and slopes of every piece, see engines/sums.py."""
-        parts = zip(self.problem.pieces, self.engine.residuals(point), strict=True)
-        return [self._filtered(piece, own) for piece, own in parts]
+        pieces, parts = self.problem.pieces, self.engine.residuals(point)
+        if self._moves is None:
+            self._moves = [moving_rows(piece, own[0]) for piece, own in zip(pieces, parts, strict=True)]
+        return [self._filtered(*each) for each in zip(pieces, parts, self._moves, strict=True)]
 
-    def _filtered(self, piece: Piece, parts: Parts) -> Parts:
+    def _filtered(self, piece: Piece, parts: Parts, moves: BoolArray) -> Parts:
         residual, slopes, at = parts
         residual, slopes = residual.copy(), slopes.copy()
         for c, column in enumerate(piece.record.columns):
-            if column not in self._filters:
+            if column not in self.models or not self.models[column].order:
                 continue
             rows, steps = known_rows(piece, residual[c], slopes[c])
             if rows.size < residual.shape[1]:
                 left = np.setdiff1d(np.arange(residual.shape[1]), rows)
                 residual[c, left], slopes[c, left] = np.nan, 0.0
             series = np.column_stack([residual[c, rows], slopes[c, rows]])
-            new = innovations(series, steps, *self._filters[column])
+            new = self.models[column].new(series, steps, moves[c, rows])
             residual[c, rows], slopes[c, rows] = new[:, 0], new[:, 1:]
         return residual, slopes, at
 
 
 class TangentEngine(OfRows):
-    """Shows what another engine would show near a point if its rows were straight there: nothing is simulated."""
+    """Shows what another engine would show near a point if its rows were straight there: nothing is simulated.
+
+    moves: of each piece, the rows that move at that point.
+    """
 
     def __init__(self, engine: RowEngine[Problem], point: Point):
         self.problem, self.point, self._parts = engine.problem, point, engine.residuals(point)
+        self.moves = [moving_rows(piece, own[0]) for piece, own in zip(self.problem.pieces, self._parts, strict=True)]
 
     def on(self, problem: Problem) -> TangentEngine:
         """Raises NotImplementedError: it knows its own pieces only."""
@@ -96,6 +105,16 @@ class TangentEngine(OfRows):
         for (residual, slopes, at), now, before in zip(self._parts, point.states, self.point.states, strict=True):
             found.append((residual - slopes @ np.concatenate([moved, now - before])[at], slopes, at))
         return found
+
+
+def moving_rows(piece: Piece, residual: FloatArray) -> BoolArray:
+    """In which rows what a column shows moves by the model, of which dry friction leaves exactly 0 at rest. (C, rows).
+
+    residual (C, rows): as it is. Of what is no speed, all rows count as moving.
+    """
+    there = [column[0] in SPEEDS for column in piece.record.columns]
+    shown = piece.record.outputs[piece.first : piece.last + 1].T - residual
+    return np.asarray((shown != 0.0) | ~np.array(there)[:, None])
 
 
 def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:
@@ -110,8 +129,8 @@ def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:
     return rows, steps
 
 
-def without_gaps(series: FloatArray, steps: IntArray) -> list[FloatArray]:
-    """The stretches of a series (n, K) in which no row is missing."""
+def without_gaps(series: NDArray[T], steps: IntArray) -> list[NDArray[T]]:
+    """The stretches of a series (n, ..) in which no row is missing."""
     joined = stretches(np.append(steps[1:] == 1, False)) if len(steps) > 1 else np.zeros((0, 2), int)
     return [series[first : last + 1] for first, last in joined.tolist()]
 

@@ -24,13 +24,13 @@ in M. G. Kenward, J. H. Roger, Biometrics 53, 983 (1997)).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.beside import side_by_side
 from omnidyn.identification.output_error.memory.across import widening
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
@@ -39,6 +39,7 @@ from omnidyn.identification.output_error.memory.whitened import (
     TangentEngine,
     WhitenedEngine,
     known_rows,
+    moving_rows,
     spacing,
     without_gaps,
 )
@@ -132,8 +133,8 @@ def _straight(
     """The memory that rows straight near a point settle at, memory and numbers in turn: nothing is simulated for it."""
     tangent, now = TangentEngine(below(solver), start), start
     for _ in range(TURNS):
-        found = _filtered(solver, tangent, models, solver.close).minimise(now, FEW_STEPS)
-        models = _memory(found, _inverse(Normal(found.solver, found.state).information))
+        found = _filtered(solver, tangent, models, solver.close, tangent.moves).minimise(now, FEW_STEPS)
+        models = _memory(found, _inverse(Normal(found.solver, found.state).information), tangent.moves)
         moved, now = _moved(found, now), found.state.point
         if moved <= SETTLED:
             break
@@ -141,10 +142,11 @@ def _straight(
 
 
 def _filtered(
-    solver: Solver[Problem], engine: RowEngine[Problem], models: Mapping[Column, AutoRegression], close: float
-) -> Solver[Problem]:
+    solver: Solver[Problem], engine: RowEngine[Problem], models: Mapping[Column, AutoRegression], close: float,
+    moves: Sequence[BoolArray] | None = None,
+) -> Solver[Problem]:  # fmt: skip
     """The solver for errors of these memories, which ends `close` to the best point."""
-    return Solver(solver.problem, WhitenedEngine(engine, models), 0.0, close, solver.counted)
+    return Solver(solver.problem, WhitenedEngine(engine, models, moves), 0.0, close, solver.counted)
 
 
 def _moved(found: Solution, before: Point) -> float:
@@ -170,28 +172,35 @@ def below(solver: Solver[Problem]) -> RowEngine[Problem]:
     return cast(RowEngine[Problem], engine)
 
 
-def _memory(solution: Solution, covariance: FloatArray | None) -> dict[Column, AutoRegression]:
+def _memory(
+    solution: Solution, covariance: FloatArray | None, moves: Sequence[BoolArray] | None = None
+) -> dict[Column, AutoRegression]:
     """The memory of the residuals of each column, and of what the fit has taken out of them.
 
-    covariance (P, P): of the parameters; None for a fit whose residuals are taken as they are.
+    covariance (P, P): of the parameters; None for a fit whose residuals are taken as they are. moves: of each piece
+    (C, rows), where the rows do not tell themselves.
     """
     solver = solution.solver
     series: dict[Column, list[FloatArray]] = {column: [] for column in solver.problem.columns}
+    moving: dict[Column, list[BoolArray]] = {column: [] for column in solver.problem.columns}
     taken = None if covariance is None else [_root(own) for own in _of_pieces(solution, covariance)]
     for k, parts in enumerate(below(solver).residuals(solution.state.point)):
-        for column, residual, slopes, steps in _columns(solver.problem.pieces[k], parts):
+        piece = solver.problem.pieces[k]
+        mine = moving_rows(piece, parts[0]) if moves is None else moves[k]
+        for column, rows, residual, slopes, steps in _columns(piece, parts):
             more = [] if taken is None else [slopes @ taken[k][parts[2]]]
             series[column] += without_gaps(np.column_stack([residual, *more]), steps)
-    return {column: autoregression(own) for column, own in series.items() if own}
+            moving[column] += without_gaps(mine[piece.record.columns.index(column), rows], steps)
+    return {column: autoregression(own, moves=moving[column]) for column, own in series.items() if own}
 
 
-def _columns(piece: Piece, parts: Parts) -> Iterator[tuple[Column, FloatArray, FloatArray, IntArray]]:
-    """(column, residuals (n,), slopes (n, U), steps (n,)) of the known rows of every column of a piece."""
+def _columns(piece: Piece, parts: Parts) -> Iterator[tuple[Column, IntArray, FloatArray, FloatArray, IntArray]]:
+    """(column, rows (n,), residuals (n,), slopes (n, U), steps (n,)) of the known rows of every column of a piece."""
     residual, slopes, _ = parts
     for c, column in enumerate(piece.record.columns):
         rows, steps = known_rows(piece, residual[c], slopes[c])
         if rows.size:
-            yield column, residual[c, rows], slopes[c, rows], steps
+            yield column, rows, residual[c, rows], slopes[c, rows], steps
 
 
 def _of_pieces(solution: Solution, covariance: FloatArray) -> list[FloatArray]:
@@ -278,7 +287,7 @@ def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegressi
     pieces = zip(solver.problem.pieces, below(solver).residuals(found.state.point), of_pieces, strict=True)
     for piece, parts, covariance in pieces:
         ways = covariance[:, : len(told)][:, told] / scale
-        for column, _, slopes, _ in _columns(piece, parts):
+        for column, _, _, slopes, _ in _columns(piece, parts):
             if column not in reach:
                 continue
             reach[column] += models[column].products(slopes @ ways[parts[2]])
@@ -295,8 +304,9 @@ def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trus
     orders = sorted({model.order for model in models.values() if model.slopes is None})
     order = " to ".join(str(each) for each in dict.fromkeys((*orders[:1], *orders[-1:])))
     ways = [f"an autoregression of order {order}"] if orders else []
-    if any(model.slopes is not None for model in models.values()):
-        ways.append("white noise beside errors that remember")
+    beside = {model.moving is not None for model in models.values() if model.slopes is not None}
+    if beside:
+        ways.append("white noise beside errors that remember" + " while the robot moves" * (beside == {True}))
     longest = max(models, key=lambda column: models[column].memory)
     model, lasts = models[longest], models[longest].memory * spacing(pieces, longest)[0]
     yield (

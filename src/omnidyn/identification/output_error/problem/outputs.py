@@ -17,6 +17,7 @@ from omnidyn.statistics import find_tick
 
 OUTPUTS = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")
 POSE, PARTS = "pose", ("heading", "position")
+SPEEDS = ("twist", "wheel_speed")
 TRAVEL = ("heading", "position", "wheel_angle")
 
 
@@ -85,7 +86,7 @@ def _without_doubles(
     run: Run, robot: Robot, found: dict[str, FloatArray], asked: bool
 ) -> tuple[dict[str, FloatArray], list[str]]:
     """Without outputs that are computed from another one; where they were asked for, with a warning instead."""
-    if not found.keys() & set(TRAVEL) and not {"twist", "wheel_speed"} <= found.keys():
+    if not found.keys() & set(TRAVEL) and not set(SPEEDS) <= found.keys():
         return found, []
     notes = []
     for name, source in redundant(run, robot).items():
