@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -69,7 +70,9 @@ def needed_late() -> None:
     _run(load_robot("mecanum"))
     row_terms(np.zeros((1, 2)), np.ones(1), 0.0, None, np.ones(1), False)
     row_squares(np.zeros((1, 2, 1)), np.zeros((1, 2)))
-    autoregression([np.convolve(np.random.default_rng(2).standard_normal(ROWS), MEMORY)[:ROWS, None]])
+    series = np.convolve(np.random.default_rng(2).standard_normal(ROWS), MEMORY)[:ROWS, None]
+    model = autoregression([series], moves=[np.arange(ROWS) % HOLD > 0])
+    replace(model, moving=(0.5, 0.5)).new(series, np.arange(ROWS), np.ones(ROWS, bool))
 
 
 def _run(robot: Robot) -> Run:
