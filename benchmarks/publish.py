@@ -14,8 +14,8 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 FIGURES = "identify-figures.md"  # takes every `identify_...`, also one that it does not show yet
 PAGES = {  # and so do these take theirs
     **dict.fromkeys(("groups", "real_fit"), FIGURES),
-    **dict.fromkeys(("first_minutes", "ten_robots", "outputs", "coloured", "wrong_worlds", "ladder", "blind",
-                     "laws_identified", "laws_ladder"), "trust-figures.md"),
+    **dict.fromkeys(("first_minutes", "ten_robots", "outputs", "coloured", "forces", "wrong_worlds", "ladder",
+                     "blind", "laws_identified", "laws_ladder"), "trust-figures.md"),
 }  # fmt: skip
 VERSIONS = ("numpy", "scipy", "numba", "mujoco", "lmfit")
 

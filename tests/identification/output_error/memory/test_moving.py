@@ -5,8 +5,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from benchmarks.forces import FIRST_SEED, pushed
+from benchmarks.wrong_worlds.log import right_case, robot_of, voltages
+from benchmarks.wrong_worlds.remedies import FRICTION
+from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.identification.output_error.memory.moving import Moving, _likelihood, new_while_moving, while_moving
+from omnidyn.identification.output_error.memory.whitened import moving_rows
+from omnidyn.identification.output_error.memory.whitening import below, whitened
+from omnidyn.identification.output_error.trust.uncertainty import WHITE, trust
+from omnidyn.identification.question import Question
+from omnidyn.run import Run
 
 PHI, SHARE = 0.9, 0.3
 SETTLED = Moving(PHI, SHARE, 1.0, np.eye(2), 0.0).settled
@@ -127,3 +136,32 @@ def test_a_robot_that_never_rests_is_asked_for_nothing():
     values = errors(np.ones(500, bool), 0.9, 0.3, 1)
     assert while_moving([values], [np.ones(500, bool)]) is None
     assert while_moving([values], [np.zeros(500, bool)]) is None
+
+
+def test_a_fit_of_a_pushed_robot_knows_when_its_errors_remember():
+    """Under random forces, by another simulator: what is new in rows that move has no slow power left."""
+    slow, words = [], 0
+    for number in (0, 3, 5):
+        seed = FIRST_SEED + number
+        case = right_case(seed).both_but(frame=False)
+        t, volts = voltages(case, seed)
+        twist = pushed(case.told, volts, case.setup.rate, 0.1, seed)
+        noise = [0.012, 0.012, 0.1] * np.random.default_rng(seed).normal(size=twist.shape)
+        fit = Fit.of([Run(t, voltage=volts, twist=twist + noise)], robot_of(case.told), Question(free=FRICTION))
+        found = whitened(solution := fit.solve(), trust(solution.solver, solution, WHITE))
+        assert found is not None
+        words += "while the robot moves" in " ".join(found.warnings)
+        solver = found.solution.solver
+        (piece,), (plain,) = solver.problem.pieces, below(solver).residuals(found.solution.state.point)
+        (new,) = solver.engine.residuals(found.solution.state.point)
+        for own, moves, variance in zip(
+            new[0], moving_rows(piece, plain[0]), found.solution.state.variance, strict=True
+        ):
+            cut = len(own) // 25 * 25
+            blocks, all_move = (
+                np.nan_to_num(own)[:cut].reshape(-1, 25).sum(axis=1),
+                moves[:cut].reshape(-1, 25).all(axis=1),
+            )
+            slow += [np.mean(blocks[all_move] ** 2) / 25 / variance] if all_move.sum() > 5 else []
+    assert words == 3
+    assert np.median(slow) == pytest.approx(1.0, abs=0.25)
