@@ -18,7 +18,7 @@ import numpy as np
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.friction.kinds import COULOMB, KINDS
-from omnidyn.model.mass import masses_couple, without_spin
+from omnidyn.model.mass import of_body_alone, spin_couples
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import levels_of
@@ -58,7 +58,7 @@ def _unequal(robot: Robot) -> bool:
 
 
 def _couples(robot: Robot) -> bool:
-    return masses_couple(robot) or (not _unequal(robot) and not is_decoupled(state_space(without_spin(robot))))
+    return spin_couples(robot) or (not _unequal(robot) and not is_decoupled(state_space(of_body_alone(robot))))
 
 
 def _holds_more(robot: Robot) -> bool:

@@ -122,7 +122,7 @@ def residual(plant, stage, x):
     stiff, d0, d1, d2 = body.mass / task.tau, x[0] - task.goal[0], x[1] - task.goal[1], x[2] - task.goal[2]
     r0, r1, r2 = stiff * d0 - task.push[0], stiff * d1 - task.push[1], stiff * d2 - task.push[2]
     j00, j11, j22, j01, j02, j12 = stiff, stiff, stiff, 0.0, 0.0, 0.0
-    if body.spin[2, 2] != 0.0:  # turning on the spot, every wheel spins
+    if body.spin[2, 2] != 0.0:  # turning on the spot, every wheel spins, and a centre that stands off moves
         often = 1.0 / task.tau
         s00, s11, s22 = often * body.spin[0, 0], often * body.spin[1, 1], often * body.spin[2, 2]
         s01, s02, s12 = often * body.spin[0, 1], often * body.spin[0, 2], often * body.spin[1, 2]
@@ -157,9 +157,12 @@ def residual(plant, stage, x):
         r0, r1 = r0 + px, r1 + py
         j00, j11, j01 = j00 + (cx - px * px) / size, j11 + (cy - py * py) / size, j01 - px * py / size
     t0, t1, t2 = body.turning * x[0], body.turning * x[1], body.turning * x[2]
-    work.residual[0], work.residual[1], work.residual[2] = r0 - t2 * x[1], r1 + t2 * x[0], r2
-    work.jacobian[0, 0], work.jacobian[0, 1], work.jacobian[0, 2] = j00, j01 - t2, j02 - t1
-    work.jacobian[1, 0], work.jacobian[1, 1], work.jacobian[1, 2] = j01 + t2, j11, j12 + t0
-    work.jacobian[2, 0], work.jacobian[2, 1], work.jacobian[2, 2] = j02, j12, j22
+    c0, c1 = body.centre[0], body.centre[1]  # omega x p, v x p
+    work.residual[0], work.residual[1] = r0 - t2 * (x[1] + c0 * x[2]), r1 + t2 * (x[0] - c1 * x[2])
+    work.residual[2] = r2 + t2 * (c0 * x[0] + c1 * x[1])
+    work.jacobian[0, 0], work.jacobian[0, 1], work.jacobian[0, 2] = j00, j01 - t2, j02 - t1 - 2.0 * c0 * t2
+    work.jacobian[1, 0], work.jacobian[1, 1], work.jacobian[1, 2] = j01 + t2, j11, j12 + t0 - 2.0 * c1 * t2
+    work.jacobian[2, 0], work.jacobian[2, 1] = j02 + c0 * t2, j12 + c1 * t2
+    work.jacobian[2, 2] = j22 + c0 * t0 + c1 * t1
     if body.laws != 0.0:
         add_laws(plant, stage, x)

@@ -120,7 +120,7 @@ def _release_shift(plant, stage, along, start, end, before, after, d):
     for c in range(3):
         jump = max(jump, abs(before[c] - after[c]))
     force = forces_at_work(plant, stage)
-    if jump * plant.body.mass > 1e-6 * force and _weakest(plant, stage, along, start, force):
+    if jump * plant.body.least > 1e-6 * force and _weakest(plant, stage, along, start, force):
         later = _later(plant, stage, along, start, before)
         there = 0.0 < abs(later) < np.inf
         for k in range(len(d) if there else 0):
