@@ -72,6 +72,12 @@ def frame_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
     return robot.body.mass * np.stack([omega * across, -omega * along, -omega * (c * x + d * y)], axis=-1)
 
 
+def frame_terms(robot: Robot) -> FloatArray:
+    """The same wrench as a matrix: per omega v_y, -omega v_x and omega^2 [kg, kg, kg m], columns. Shape (3, 3)."""
+    turned = frame_wrench(robot, np.array([[0.0, 1.0, 1.0], [-1.0, 0.0, 1.0], [0.0, 0.0, 1.0]]))
+    return np.stack([turned[0] - turned[2], turned[1] - turned[2], turned[2]], axis=1) + 0.0
+
+
 def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
     """Acceleration of the twist [m/s^2, m/s^2, rad/s^2], eqs (4)-(6), currents settled.
 
