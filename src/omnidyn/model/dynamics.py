@@ -67,9 +67,12 @@ def frame_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
     if not robot.body.rotating_frame:
         return np.zeros_like(twist)
     x, y, omega = np.moveaxis(twist, -1, 0)
-    c, d = robot.body.centre
-    across, along = y + omega * c, x - omega * d  # of the centre of mass
-    return robot.body.mass * np.stack([omega * across, -omega * along, -omega * (c * x + d * y)], axis=-1)
+    about = np.zeros_like(omega)
+    if any(robot.body.centre):
+        c, d = robot.body.centre
+        about = -omega * (c * x + d * y)
+        x, y = x - omega * d, y + omega * c  # of the centre of mass
+    return robot.body.mass * np.stack([omega * y, -omega * x, about], axis=-1)
 
 
 def frame_terms(robot: Robot) -> FloatArray:
