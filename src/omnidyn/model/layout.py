@@ -56,6 +56,7 @@ BODY = _record(
     laws=(),  # 0 where no level depends on the speed and nothing has a memory: then what follows is not read
     steep=(),  # [1/s] bound of the rate at which friction that falls with the speed lets a body run away
     bristles=(),  # the sum of the levels of all bristles [N]; 0 where there are none
+    off=(),  # 1 where the centre of mass stands off
     gathers=(),  # 1 where an axis gathers momentum in Karnopp's band
 )
 ELEMENT = _record(

@@ -171,7 +171,8 @@ def test_what_is_known_of_the_offset_is_known_of_the_centre():
 
 
 def test_a_load_that_tips_the_robot_over_is_refused():
-    with pytest.raises(InputError, match=r"centre_m lies 0.18.* m from the centre .* beyond all of them \(0.1 m\)"):
+    words = r"payload: \[body\] centre_m lies 0.18.* m from the centre .* beyond all of them \(0.1 m\)"
+    with pytest.raises(InputError, match=words):
         omnidyn.vary(ROBOT, payload=Payload(mass=10.0, offset=(0.21, 0.0)))
 
 

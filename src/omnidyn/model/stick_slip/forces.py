@@ -113,6 +113,21 @@ def forces_at_work(plant, stage):
 
 
 @part
+def _add_centre(body, work, x):
+    """What a turning frame does more where the centre of mass stands off: omega x p and v x p, p = omega x c there."""
+    c0, c1 = body.centre[0], body.centre[1]
+    t0, t1, t2 = body.turning * x[0], body.turning * x[1], body.turning * x[2]
+    work.residual[0] -= t2 * c0 * x[2]
+    work.residual[1] -= t2 * c1 * x[2]
+    work.residual[2] += t2 * (c0 * x[0] + c1 * x[1])
+    work.jacobian[0, 2] -= 2.0 * c0 * t2
+    work.jacobian[1, 2] -= 2.0 * c1 * t2
+    work.jacobian[2, 0] += c0 * t2
+    work.jacobian[2, 1] += c1 * t2
+    work.jacobian[2, 2] += c0 * t0 + c1 * t1
+
+
+@part
 def residual(plant, stage, x):
     """(M/tau)(x - x*) minus all forces but those of stuck elements, its Jacobian, and the currents at x.
 
@@ -157,12 +172,11 @@ def residual(plant, stage, x):
         r0, r1 = r0 + px, r1 + py
         j00, j11, j01 = j00 + (cx - px * px) / size, j11 + (cy - py * py) / size, j01 - px * py / size
     t0, t1, t2 = body.turning * x[0], body.turning * x[1], body.turning * x[2]
-    c0, c1 = body.centre[0], body.centre[1]  # omega x p, v x p
-    work.residual[0], work.residual[1] = r0 - t2 * (x[1] + c0 * x[2]), r1 + t2 * (x[0] - c1 * x[2])
-    work.residual[2] = r2 + t2 * (c0 * x[0] + c1 * x[1])
-    work.jacobian[0, 0], work.jacobian[0, 1], work.jacobian[0, 2] = j00, j01 - t2, j02 - t1 - 2.0 * c0 * t2
-    work.jacobian[1, 0], work.jacobian[1, 1], work.jacobian[1, 2] = j01 + t2, j11, j12 + t0 - 2.0 * c1 * t2
-    work.jacobian[2, 0], work.jacobian[2, 1] = j02 + c0 * t2, j12 + c1 * t2
-    work.jacobian[2, 2] = j22 + c0 * t0 + c1 * t1
+    work.residual[0], work.residual[1], work.residual[2] = r0 - t2 * x[1], r1 + t2 * x[0], r2
+    work.jacobian[0, 0], work.jacobian[0, 1], work.jacobian[0, 2] = j00, j01 - t2, j02 - t1
+    work.jacobian[1, 0], work.jacobian[1, 1], work.jacobian[1, 2] = j01 + t2, j11, j12 + t0
+    work.jacobian[2, 0], work.jacobian[2, 1], work.jacobian[2, 2] = j02, j12, j22
+    if body.off != 0.0:
+        _add_centre(body, work, x)
     if body.laws != 0.0:
         add_laws(plant, stage, x)

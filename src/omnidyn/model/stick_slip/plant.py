@@ -22,7 +22,7 @@ def plant(robot: Robot) -> Plant:
     own = blank_plant(robot.wheels.count)
     body, element = own
     body.mass, body.length = robot.body.mass, length
-    body.centre[:] = np.array(robot.body.centre) / length
+    body.centre[:], body.off = np.array(robot.body.centre) / length, float(any(robot.body.centre))
     body.spin[:] = (off_centre(robot) + added_mass(robot)) / np.outer([1.0, 1.0, length], [1.0, 1.0, length])
     body.least = _least(robot.body.mass, float(np.hypot(*body.centre)))
     body.turning = robot.body.mass / length if robot.body.rotating_frame else 0.0

@@ -113,7 +113,10 @@ def _loaded(robot: Robot, payload: Payload, told: Mapping[str, Prior]) -> Robot:
         before, more = priors.get(f"body.{name}"), told.get(name)
         if before is not None and more is not None and before.std is not None and more.std is not None:
             priors[f"body.{name}"] = before.replace(std=float(np.hypot(before.std, more.std)))
-    return robot.replace(body=body.replace(mass=total, inertia=inertia, centre=centre.tolist()), priors=priors)
+    try:
+        return robot.replace(body=body.replace(mass=total, inertia=inertia, centre=centre.tolist()), priors=priors)
+    except InputError as error:
+        raise error.at("payload") from None
 
 
 def _of_centre(robot: Robot, share: float, told: Mapping[str, Prior]) -> dict[str, Prior]:
