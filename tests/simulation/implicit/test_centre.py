@@ -8,14 +8,25 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from omnidyn.errors import UnsupportedError
+from omnidyn.model.deadzone import breakaway_voltage
 from omnidyn.model.dynamics import acceleration, drive_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.surroundings.floor import Floor
 from omnidyn.simulation.simulate import simulate
+from tests.reference import bristles
 from tests.reference.modes import plant_of, reference
 from tests.reference.modes_stepper import stepped
 from tests.support.friction_shapes import AXEBOT, implicit
-from tests.support.mixed_robots import random_robot, random_voltages, with_centre, with_spin
+from tests.support.mixed_robots import (
+    eager,
+    random_robot,
+    random_voltages,
+    with_bristles,
+    with_centre,
+    with_spin,
+    with_stribeck,
+)  # fmt: skip
 
 ROWS = 15
 SCALAR = [seed for seed in range(40) if seed % 7 in (0, 2, 3)]  # axes, wheels, both: no ellipse
@@ -81,6 +92,41 @@ def test_random_robots_against_the_modes_of_the_centre_of_mass(seed, spin):
     assert np.abs(run.twist[:, 2] - truth.twist[:, 2]).max() <= 1e-5
     assert np.abs(run.pose - truth.pose).max() <= 1e-6
     np.testing.assert_array_equal(run.twist == 0.0, truth.stuck[:, :3])
+
+
+@pytest.mark.parametrize("seed", [seed for seed in SCALAR if eager(seed)][:6])
+def test_friction_that_falls_with_the_speed_against_the_modes(seed):
+    robot = with_centre(with_stribeck(random_robot(seed), seed), seed)
+    voltage, dt = (each[:8] for each in random_voltages(robot, seed))
+    truth, run = reference(robot, voltage, dt), simulate(robot, voltage, dt, tol=1e-7)
+    assert (np.abs(run.twist - truth.twist) / [1.0, 1.0, 10.0]).max() <= 1e-6
+    np.testing.assert_array_equal(run.twist == 0.0, truth.stuck[:, :3])
+
+
+@pytest.mark.parametrize("seed", SCALAR[:6])
+def test_friction_that_bends_against_its_differential_equation(seed):
+    robot = with_centre(with_bristles(random_robot(seed), seed), seed)
+    voltage, dt = (each[:6] for each in random_voltages(robot, seed))
+    twist, pose = bristles.reference(robot, voltage, dt)
+    run = simulate(robot, voltage, dt, tol=1e-6)
+    assert (np.abs(run.twist - twist) / [1.0, 1.0, 10.0]).max() <= 1e-6
+    assert np.abs(run.pose - pose).max() <= 1e-6
+    assert not run.warnings
+
+
+def test_karnopp_s_law_refuses_it_by_name():
+    axes = AXEBOT.friction.axes.replace(law="karnopp", karnopp_speed=(1e-3, 1e-3, 1e-2))
+    with pytest.raises(UnsupportedError, match=r"knows axes that rest each for itself; got .*a centre_m"):
+        simulate(beside(AXEBOT).replace(friction=Friction(axes=axes)), np.ones((3, 3)), 0.01)
+
+
+def test_what_holds_a_robot_is_not_its_mass():
+    """Dead zones are those of the robot whose centre stands in the middle, wheel friction and lossy gears included."""
+    for seed in (0, 2, 3):
+        robot = random_robot(seed)
+        for pattern in np.eye(robot.wheels.count):
+            one, other = breakaway_voltage(robot, pattern), breakaway_voltage(with_centre(robot, seed), pattern)
+            assert other == pytest.approx(one, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", [0, 2, 3, 10])
