@@ -40,6 +40,8 @@ def test_a_robot_that_knows_it_is_fitted_by_the_implicit_engine(log):
     """Friction comes out as it is; without the centre it would not, by many of its errors."""
     fit = omnidyn.identify([log], BESIDE.replace(body=BESIDE.body.replace(rotating_frame=True)))
     check(fit, ["friction.axes.coulomb[0]", "friction.axes.coulomb[1]", "friction.axes.viscous[0]"], BESIDE)
+    assert not fit.lack_of_fit.found
+    assert set(CENTRE) <= set(fit.rests_on["friction.axes.coulomb[1]"])
 
 
 def test_a_paper_robot_whose_centre_is_free_leaves_the_exact_engine(log):
