@@ -164,7 +164,7 @@ def _with_levels_as_they_are(way: Switch) -> Switch:
 
 def _balanced(robot: Robot, by: Sequence[float]) -> Robot:
     """The robot with its centre of mass moved by so much [m], well within its wheels."""
-    most = 0.5 * WITHIN * float(np.min(robot.wheels.robot_radius))
+    most = 0.7 * WITHIN * float(np.min(robot.wheels.robot_radius))
     return robot.replace(body=robot.body.replace(centre=np.clip(np.add(robot.body.centre, by), -most, most)))
 
 

@@ -20,7 +20,7 @@ SPAN = 1e4  # a number that must be positive stays within so many times its star
 SPAN_OF_SPEED = 30.0  # the same of a speed at which friction changes: far beyond, it changes nothing, or in no time
 LIGHT = 1e-3  # of its start, that what spins stays above: it has no place where it would be off, but slopes need a size
 
-WITHIN = 0.7  # of the distance of the wheels: there a centre of mass lies between them, whatever its other place is
+WITHIN = 0.95  # of the distance of the wheels: as far as a centre of mass may be ahead, or aside
 LARGEST = 700.0  # e^709 is the last float
 
 
