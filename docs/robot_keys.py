@@ -22,7 +22,8 @@ PRETTY = {"kg m^2": "kg m²", "deg": "degree", "ohm": "Ω"}
 # The descriptions in the model are notes for the margin of a robot file; these are sentences.
 MEANING = {
     "body.mass_kg": "mass M",
-    "body.inertia_kg_m2": "inertia I_n about the vertical axis",
+    "body.inertia_kg_m2": "inertia I_n about the vertical axis through the centre of mass",
+    "body.centre_m": "c, of mass, from the centre of the wheels: forward, to the left",
     "body.rotating_frame": "keep the terms M ω v of axes that turn with the robot",
     "body.centre_height_m": "of the centre of mass above the floor: it shifts the loads of wheels that may slip",
     "wheels.azimuth_deg": "where each wheel stands, seen from the centre, counter-clockwise from forward",

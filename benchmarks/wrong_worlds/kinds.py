@@ -178,7 +178,7 @@ KINDS: tuple[Kind, ...] = (
     # What no candidate describes.
     Kind("sag", "a battery with an inner resistance [ohm]", _world("battery", 0.0), most=2.0),
     Kind("heating", "windings that warm up", _heats, most=2.0),
-    Kind("off centre", "centre of mass ahead of the wheels' [m]", _world("centre", 0.0), most=0.08),
+    Kind("off centre", "centre of mass ahead of the wheels' [m]", _world("centre", 0.0), "body.centre_m", most=0.08),
     Kind("backward", "friction that is less backward", _world("aside", 0.0), most=0.9),
     Kind("Stribeck", "friction that falls with the speed", _world("stribeck", 0.0), f"{AXES}.stribeck_speed",
          (f"{AXES}.breakaway",), most=3.0),

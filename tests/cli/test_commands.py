@@ -9,6 +9,7 @@ import pytest
 
 from omnidyn.logs.run_file import read_run
 from omnidyn.model.robot_file import load_robot, preset_names, robot_to_toml
+from omnidyn.simulation.simulate import simulate
 from tests.support.outputs import strict
 
 VOLTAGES = "t_s,u1_V,u2_V,u3_V\n0,0,3,-3\n1,0,0,0\n2,1,1,1\n"
@@ -186,6 +187,18 @@ def test_a_bad_robot_is_refused_in_one_line(call, robot):
 
 
 # ---- simulate -------------------------------------------------------------------------------------------
+
+
+def test_simulate_carries_a_load_beside_the_middle(call, here):
+    load = "\n[variations.payload.2kg]\nmass_kg = 2\ninertia_kg_m2 = 0.01\noffset_m = [0.05, 0.0]\n"
+    (here / "own.toml").write_text(robot_to_toml(load_robot("axebot")) + load, "utf-8")
+    code, out, _ = call("simulate", "own.toml", "u.csv", "--with", "payload=2kg", "-o", "run.csv")
+    assert code == 0
+    assert "axebot with payload 2kg, implicit engine" in out
+    body = load_robot("axebot").body
+    body = body.replace(mass=3.5, centre=(0.1 / 3.5, 0.0), inertia=0.035 + 1.5 * 2.0 / 3.5 * 0.05**2)
+    expected = simulate(load_robot("axebot").replace(body=body), [[0, 3, -3], [0, 0, 0], [1, 1, 1]], 1.0)
+    np.testing.assert_allclose(read_run("run.csv").twist, expected.twist, rtol=0, atol=1e-6)
 
 
 def test_simulate_refuses_a_tolerance_that_is_none(call, here):

@@ -163,8 +163,12 @@ def test_columns_can_be_named(call, tmp_path):
     assert (code, "applied: the logged voltage" in out) == (0, True)
 
 
-def test_with_the_load_of_the_log(call, tmp_path):
-    file = robot_to_toml(AXEBOT) + "\n[variations.payload.crate]\nmass_kg = 1.0\ninertia_kg_m2 = 0.01\n"
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (0.05, -0.03)])
+def test_with_the_load_of_the_log(call, tmp_path, offset):
+    """In the middle; and beside it, in a turning frame, where its mass and inertia alone would not do."""
+    turns = AXEBOT.replace(body=AXEBOT.body.replace(rotating_frame=any(offset)))
+    load = f"mass_kg = 1\ninertia_kg_m2 = 0.01\noffset_m = {list(offset)}\n"
+    file = robot_to_toml(turns) + f"\n[variations.payload.crate]\n{load}"
     (tmp_path / "own.toml").write_text(file, "utf-8")
     loaded = omnidyn.vary(load_robot("own.toml"), payload="crate")
     omnidyn.write_run(noisy(clean_log(loaded, 1), 1), "loaded.csv")

@@ -110,7 +110,10 @@ def test_what_it_refuses(call, arguments, code, words):
 
 
 def test_the_robot_in_truth_can_be_varied(call, tmp_path):
-    text = robot_to_toml(omnidyn.load_robot("axebot")) + "\n[variations.payload.2kg]\nmass_kg = 2.0\n"
+    text = (
+        robot_to_toml(omnidyn.load_robot("axebot"))
+        + "\n[variations.payload.2kg]\nmass_kg = 2\noffset_m = [0.05, 0.0]\n"
+    )
     (tmp_path / "own.toml").write_text(text, "utf-8")
     code, out, _ = call("own.toml", *SHORT, "--with", "payload=2kg")
     assert code == 0

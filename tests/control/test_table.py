@@ -12,13 +12,15 @@ from omnidyn.control.table import feedforward_table
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.robot_file import load_robot
 from tests.support.friction_shapes import SHAPES, shaped
-from tests.support.mixed_robots import random_robot, with_spin
+from tests.support.mixed_robots import random_robot, with_centre, with_spin
 
 
 def robots():
     drop = {"voltage_drop": 0.3, "rotor_inertia": 1e-6}
     every = {name: shaped(name, **drop) for name in SHAPES} | {"axebot": load_robot("axebot")}
     many = with_spin(random_robot(5), 5)
+    beside = with_centre(shaped("ellipse and wheels", **drop), 1)
+    every |= {"beside": beside, "beside, axes": with_centre(shaped("axes", **drop), 2)}
     every["mixed"] = many.replace(motor=many.motor.replace(gear_efficiency=1.0))
     return every
 
@@ -45,7 +47,7 @@ def test_the_paper_s_robot_by_hand():
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler here")
-@pytest.mark.parametrize("name", ["axebot", "all", "mixed"])
+@pytest.mark.parametrize("name", ["axebot", "all", "mixed", "beside", "beside, axes"])
 def test_its_code_compiles_and_says_the_same(name, tmp_path):
     robot = robots()[name]
     table = feedforward_table(robot)
@@ -56,7 +58,8 @@ def test_its_code_compiles_and_says_the_same(name, tmp_path):
     (tmp_path / "table.c").write_text(
         "#include <math.h>\nfloat sgn(float x) { return (x > 0) - (x < 0); }\n"
         "void volts(float vx, float vy, float w, float ax, float ay, float aw, float *u) {\n"
-        f"float d = 0, fx = 0, fy = 0, {', '.join(f'u{k}' for k in wheels)};\n(void)d; (void)fx; (void)fy;\n"
+        f"float d = 0, fx = 0, fy = 0, ft = 0, {', '.join(f'u{k}' for k in wheels)};\n"
+        "(void)d; (void)fx; (void)fy; (void)ft;\n"
         f"{signs}{body}\n{out}\n}}\n"
     )
     subprocess.run(["cc", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-O1", "-o", "t.so", "table.c", "-lm"],

@@ -19,11 +19,12 @@ from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.features import FEATURES, LEAVES_OUT, PARTLY, REFUSES, cell
 from omnidyn.export.kinds import KINDS, maker
 from tests.support.exported import STRICT, exact_robot, sloping
-from tests.support.mixed_robots import random_robot, with_spin
+from tests.support.mixed_robots import random_robot, with_centre, with_spin
 
 ROBOTS = [
     *(random_robot(seed) for seed in range(14)), *(with_spin(random_robot(seed), seed) for seed in range(14, 20)),
     *(exact_robot(seed) for seed in range(10)), sloping(exact_robot(0)), sloping(random_robot(0)),
+    with_centre(exact_robot(1), 1), with_centre(random_robot(3), 3),
 ]  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from omnidyn.interop.urdf import robot_of_urdf
 from tests.support.exported import exact_robot
 
 ROBOT = omnidyn.load_robot("axebot")
+BESIDE = ROBOT.replace(name="beside", body=ROBOT.body.replace(centre=(0.03, -0.02)))
 
 
 def pairs():
@@ -19,7 +20,9 @@ def pairs():
 
 
 @pytest.mark.parametrize("kind", [0, 1], ids=["urdf", "mjcf"])
-@pytest.mark.parametrize("robot", [ROBOT, *(exact_robot(seed) for seed in range(8))], ids=lambda robot: robot.name)
+@pytest.mark.parametrize(
+    "robot", [ROBOT, BESIDE, *(exact_robot(seed) for seed in range(8))], ids=lambda robot: robot.name
+)
 def test_what_was_written_comes_back(kind, robot):
     if kind:
         pytest.importorskip("mujoco")
@@ -27,6 +30,8 @@ def test_what_was_written_comes_back(kind, robot):
     again = read(write(robot).text, "file", robot)
     assert again.body.mass == pytest.approx(robot.body.mass, rel=1e-9)
     assert again.body.inertia == pytest.approx(robot.body.inertia, rel=1e-9)
+    np.testing.assert_allclose(again.body.centre, robot.body.centre, atol=1e-10)
+    assert (again.body.centre == (0.0, 0.0)) == (robot.body.centre == (0.0, 0.0))
     np.testing.assert_allclose(again.wheels.wrench_matrix, robot.wheels.wrench_matrix, atol=1e-9)
     np.testing.assert_allclose(again.wheels.radii, robot.wheels.radii, rtol=1e-9)
     assert again.motor == robot.motor
@@ -76,6 +81,21 @@ def test_a_urdf_of_somebody_else(name):
     assert robot.wheels.robot_radius == pytest.approx(0.15)
     assert robot.wheels.wheel_radius == 0.04
     assert robot.wheels.wheel_inertia == pytest.approx(2e-4)
+
+
+def test_an_arm_that_reaches_out_moves_the_centre_of_mass():
+    """An arm of 1 kg, 60 mm in front and 20 mm to the left, on a robot of 5.6 kg; angles to three digits do not."""
+    text = kiwi().replace('link="arm"/>', 'link="arm"/><origin xyz="0.06 0.02 0.1"/>')
+    robot = robot_of_urdf(text)
+    np.testing.assert_allclose(robot.body.centre, [0.06 / 5.6, 0.02 / 5.6], rtol=1e-9)
+    apart = 1.0 * 4.6 / 5.6 * (0.06**2 + 0.02**2)
+    assert robot.body.inertia == pytest.approx(0.06 + 0.01 + 3 * (1e-4 + 0.2 * 0.15**2) + apart, rel=1e-6)
+    np.testing.assert_allclose(robot.wheels.azimuth_deg, [90.0, -150.0, -30.0], atol=1e-6)
+    assert robot.wheels.robot_radius == pytest.approx(0.15)
+    assert robot.priors["body.centre_m"].origin == "imported"
+    rounded = kiwi().replace("3.66519142918809", "3.665")
+    assert rounded != kiwi()
+    assert robot_of_urdf(rounded).body.centre == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from omnidyn.model.motor import settled_current, voltage_of_current
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.sliding import sliding_wrench
 from tests.support.friction_shapes import SHAPES, shaped
-from tests.support.mixed_robots import eager, random_robot, with_spin
+from tests.support.mixed_robots import eager, random_robot, with_centre, with_spin
 
 DRAWS = 30
 
@@ -43,6 +43,14 @@ def test_every_friction_backward_is_itself_forward(name):
 def test_so_it_is_with_drops_gears_rotors_and_any_wheels(seed):
     robot = with_spin(random_robot(seed), seed)
     robot = robot.replace(drive=robot.drive.replace(dead_band=0.1))
+    twist, wanted, got = round_trip(robot, seed)
+    moving = twist.all(axis=1) if eager(seed) else slice(None)
+    np.testing.assert_allclose(got[moving], wanted[moving], rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_so_it_is_with_a_centre_of_mass_beside_the_wheels(seed):
+    robot = with_centre(with_spin(random_robot(seed), seed), seed)
     twist, wanted, got = round_trip(robot, seed)
     moving = twist.all(axis=1) if eager(seed) else slice(None)
     np.testing.assert_allclose(got[moving], wanted[moving], rtol=1e-11, atol=1e-11)

@@ -92,7 +92,7 @@ BAD = {
     "unknown key, nothing near": (
         MASS,
         f"{MASS}\nzzz = 1",
-        "zzz: unknown key; got zzz; known keys: centre_height_m, inertia_kg_m2, mass_kg",
+        "zzz: unknown key; got zzz; known keys: centre_height_m, centre_m, inertia_kg_m2, mass_kg",
     ),
     "missing key": (MASS, "", "mass_kg: a key is missing; expected mass_kg"),
     "missing table": (AXEBOT[AXEBOT.index("[motor]") : AXEBOT.index("[friction")], "", "motor: a key is missing"),

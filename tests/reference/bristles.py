@@ -15,7 +15,7 @@ import math
 import numpy as np
 from scipy.integrate import DOP853
 
-from tests.reference.modes_plant import left_at, plant_of
+from tests.reference.modes_plant import left_at, plant_of, to_centre
 
 
 class Bristles:
@@ -26,10 +26,10 @@ class Bristles:
         self.p, n = plant_of(rigid), robot.wheels.count
         self.kind, self.rows = [], []
         axes, way, rim = robot.friction.axes, robot.friction.direction, robot.friction.wheels
-        m = self.p.mass
+        m, along = self.p.mass, np.linalg.inv(to_centre(robot))  # axes of the wheels, seen from the centre of mass
         if axes.law in ("dahl", "lugre"):
             for k in range(3):
-                self._add(axes, np.eye(3)[k], k, m[k], axes.viscous[k], lambda v, k=k: None if v is None else v[k])
+                self._add(axes, along[k], k, m[k], axes.viscous[k], lambda v, k=k: None if v is None else v[k])
         if way.law in ("dahl", "lugre") and way.yaw_coulomb > 0.0:
             turning = way.model_copy(
                 update={
@@ -40,13 +40,13 @@ class Bristles:
             self._add(turning, np.eye(3)[2], 2, m[2], way.yaw_viscous, lambda v: v)
         if rim.law in ("dahl", "lugre"):
             for k in range(n):
-                g = self.p.G[:, k]
+                g = robot.wheels.wrench_matrix[:, k]
                 mass = m[0] / (g[0] ** 2 + g[1] ** 2 + g[2] ** 2 * m[0] / m[2])
 
                 def pick(v, k=k):
                     return v[k] if isinstance(v, tuple) else v
 
-                self._add(rim, g, k, mass, pick(rim.viscous), pick)
+                self._add(rim, self.p.G[:, k], k, mass, pick(rim.viscous), pick)
         self.way = way if way.law in ("dahl", "lugre") and any(way.coulomb) else None
         self.first = 6 + (n if self.p.dynamic else 0)
         self.inverse = np.linalg.inv(self.p.M)
@@ -115,8 +115,9 @@ class Bristles:
 
 def reference(robot, voltage, dt, rtol=1e-11, atol=1e-13):
     """(twist, pose), shape (rows + 1, 3), from rest with bristles unbent."""
-    model = Bristles(robot)
+    model, (x, y) = Bristles(robot), robot.body.centre
     z = np.zeros(model.first + len(model.rows) + (2 if model.way is not None else 0))
+    z[3:5] = x, y
     out = [z.copy()]
     for u, h in zip(np.asarray(voltage, dtype=float), np.broadcast_to(dt, len(voltage)), strict=True):
         solver = DOP853(lambda t, y, u=u: model.rates(y, u), 0.0, z, h, rtol=rtol, atol=atol)
@@ -126,4 +127,6 @@ def reference(robot, voltage, dt, rtol=1e-11, atol=1e-13):
         z = solver.y.copy()
         out.append(z.copy())
     found = np.array(out)
-    return found[:, :3], found[:, 3:6]
+    cos, sin = np.cos(found[:, 5]), np.sin(found[:, 5])
+    place = found[:, 3:6] - np.stack([cos * x - sin * y, sin * x + cos * y, 0.0 * cos], axis=1)
+    return found[:, :3] @ np.linalg.inv(to_centre(robot)).T, place

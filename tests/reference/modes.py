@@ -46,7 +46,7 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq, minimize_scalar
 
 from tests.reference.modes_friction import Decision, Gauge, Tie, closure, decide, directions, null, span
-from tests.reference.modes_plant import Plant, left_at, plant_of
+from tests.reference.modes_plant import Plant, left_at, plant_of, to_centre
 
 RTOL, ATOL = 1e-12, 1e-13
 NOISE = 1e-12  # an event function nearer to 0 than this has not said anything yet
@@ -543,6 +543,12 @@ class Integrator:
         return instant + correction, mode.what[e]
 
 
+def _turned(place, heading):
+    """A place of the body, along the axes of the room."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    return cos * place[0] - sin * place[1], sin * place[0] + cos * place[1]
+
+
 def reference(
     robot,
     voltage,
@@ -567,7 +573,10 @@ def reference(
     coast = np.zeros(voltage.shape, dtype=bool) if open_circuit is None else np.asarray(open_circuit, dtype=bool)
     run = Integrator(p, energy, rtol, atol)
     start = np.zeros(p.wheels) if current is None else np.asarray(current, dtype=float)
-    run.start(np.asarray(twist, dtype=float), np.asarray(pose, dtype=float), start, voltage[0], coast[0])
+    there, off = to_centre(robot), np.asarray(robot.body.centre)
+    back = np.linalg.inv(there)
+    place = np.add(pose, [*_turned(off, pose[2]), 0.0])
+    run.start(there @ np.asarray(twist, dtype=float), place, start, voltage[0], coast[0])
     t = np.concatenate([[0.0], np.cumsum(dt)])
     out = {name: [] for name in ("twist", "pose", "current", "stuck", "energy")}
 
@@ -575,10 +584,10 @@ def reference(
         mode = run.mode(u)
         z = run.z
         rest = mode.N
-        held = [*np.eye(3), *p.G.T]
+        held = [*back, *p.G.T]
         flags = [bool(np.abs(d @ rest).max(initial=0.0) < 1e-9) for d in held]
-        out["twist"].append(np.where(flags[:3], 0.0, z[:3]))
-        out["pose"].append(z[3:6].copy())
+        out["twist"].append(np.where(flags[:3], 0.0, back @ z[:3]))
+        out["pose"].append(z[3:6] - [*_turned(off, z[5]), 0.0])
         out["current"].append(mode.currents(z).copy())
         out["stuck"].append([*flags[:3], flags[0] and flags[1], *flags[3:]])
         stored = 0.5 * z[:3] @ p.M @ z[:3]

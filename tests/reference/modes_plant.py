@@ -1,9 +1,13 @@
-"""The numbers of a robot that the reference of modes.py needs, and nothing else of omnidyn."""
+"""The numbers of a robot that the reference of modes.py needs, and nothing else of omnidyn.
+
+A centre of mass beside that of the wheels needs no other equations: the twist is that of the centre of mass, where a
+body is diag(m, m, I) again, and the wheels and the axes of friction stand beside it.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,8 +81,24 @@ def left_at(u, exponent, lorentzian):
     return 1.0 / (1.0 + u**exponent) if lorentzian else np.exp(-(u**exponent))
 
 
+def to_centre(robot) -> np.ndarray:
+    """The twist of the centre of mass per twist of that of the wheels. Shape (3, 3)."""
+    x, y = robot.body.centre
+    return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+
+
 def plant_of(robot) -> Plant:
-    """The numbers of an omnidyn Robot."""
+    """The numbers of an omnidyn Robot, of its centre of mass."""
+    plant = _plant_of(robot)
+    if not any(robot.body.centre):
+        return plant
+    assert plant.hold_ellipse is None, "an ellipse is one of the centre of the wheels"
+    back = np.linalg.inv(to_centre(robot))
+    return replace(plant, G=back.T @ plant.G, viscous=back.T @ plant.viscous @ back, direction=plant.direction @ back)
+
+
+def _plant_of(robot) -> Plant:
+    """The numbers as they are where the centre of mass is that of the wheels."""
     n = robot.wheels.count
 
     def each(value, absent=0.0):

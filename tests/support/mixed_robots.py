@@ -84,6 +84,14 @@ def with_spin(robot: Robot, seed: int, heavy: float = 1.0) -> Robot:
     )
 
 
+def with_centre(robot: Robot, seed: int) -> Robot:
+    """The robot with a centre of mass beside that of the wheels, by up to half of the way to the wheels."""
+    random = Random(f"centre {seed}")
+    far, way = random.uniform(0.1, 0.5) * float(np.min(robot.wheels.robot_radius)), random.uniform(0.0, 6.28)
+    centre = float(f"{far * np.cos(way):.6g}"), float(f"{far * np.sin(way):.6g}")
+    return robot.replace(body=robot.body.replace(centre=centre))
+
+
 def with_stribeck(robot: Robot, seed: int) -> Robot:
     """The robot with levels that fall with the speed, each its own, wherever its breakaway is above coulomb."""
     random, changed = Random(f"stribeck {seed}"), {}

@@ -1,6 +1,9 @@
 """Wheels that slip, event by event: modes of grip and stick, DOP853 between events. Shares no code with the engine.
 
 M v' = G f + h,  m s' = K (u - E s)/R - f;   grip: s' = g . v', |f| <= mu N;   an axis at rest: v' = 0, |h| <= C
+
+The first line is that of the centre of mass: M = diag(m, m, I) moves with the twist T v, and wrenches of the centre of
+the wheels act there as T^-T w.
 """
 
 import numpy as np
@@ -27,18 +30,22 @@ class Slip:
         self.limit = robot.wheels.traction_mu * load
         self.shift = robot.wheels.traction_mu * (np.zeros((n, 2)) if shift is None else shift)
         self.turning = robot.body.mass * robot.body.rotating_frame
+        x, y = robot.body.centre
+        self.T = np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+        self.there = np.linalg.inv(self.T).T
         self.least = np.inf  # how near to an edge any decision was
 
     def forces(self, y, u, axis, contact):
         """(v', s', friction of the axes, traction) in a mode: axis (3,), contact (n,), 0 where held."""
         v, s, n = y[:3], y[3 : 3 + self.n], self.n
         driven = self.kt / self.R * (u - self.ke * s)
-        free = -self.B * v + self.turning * v[2] * np.array([v[1], -v[0], 0.0])
+        c = self.T @ v
+        free = self.there @ (-self.B * v) + self.turning * c[2] * np.array([c[1], -c[0], 0.0])
         # unknowns: v' (3), s' (n), h (3), f (n)
         a, b = np.zeros((6 + 2 * n, 6 + 2 * n)), np.zeros(6 + 2 * n)
+        a[:3, :3], a[:3, 3 + n : 6 + n] = self.M[:, None] * self.T, -self.there
+        a[:3, 6 + n :], b[:3] = -self.there @ self.G, free
         for k in range(3):
-            a[k, k], a[k, 3 + n + k] = self.M[k], -1.0
-            a[k, 6 + n :], b[k] = -self.G[k], free[k]
             row = 3 + n + k
             if axis[k] == 0:
                 a[row, k] = 1.0

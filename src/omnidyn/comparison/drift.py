@@ -20,7 +20,7 @@ from scipy.special import chdtrc, ndtri
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Points, Table, all_of, chance_cell, interval_cell, plain, sentence
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.model.keys import Key, expand, in_words, unit
+from omnidyn.model.keys import CENTRE, Key, expand, in_words, unit
 from omnidyn.model.known.told import Told, told
 from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.model.robot_file import load_robot
@@ -34,7 +34,7 @@ LEVEL = 0.05  # chance of any change in fits of one and the same robot
 NAMED = 4  # numbers that a sentence names
 UPPER = float(ndtri(0.975))
 SAME = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
-TAKEN = ("body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m",
+TAKEN = ("body.mass_kg", "body.inertia_kg_m2", CENTRE, "wheels.wheel_radius_m", "wheels.robot_radius_m",
          "motor.resistance_ohm", "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad",
          "motor.gear_ratio")  # fmt: skip
 

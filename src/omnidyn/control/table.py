@@ -1,11 +1,12 @@
 """The inverse model as a few numbers: what a microcontroller needs to know of a robot, kS, kV and kA of every wheel.
 
     u = V (v_x, v_y, omega) + A (v_x', v_y', omega') + sum_e S_e sgn(d_e . twist)            volts at the motors
-        + P (Cx^2 v_x, Cy^2 v_y, 0)/sqrt(Cx^2 v_x^2 + Cy^2 v_y^2) + P M omega (-v_y, v_x, 0)
+        + P (Cx^2 v_x, Cy^2 v_y, 0)/sqrt(Cx^2 v_x^2 + Cy^2 v_y^2) + P M omega (-v_y - omega c_x, v_x - omega c_y, c . v)
     asked = u + drop sgn i + dead_band sgn u
 
-P: volts per wrench; e: the body axes and wheels that rub; the terms of the second line where the robot has them. It is
-`voltage_for` of a robot in motion, to the last bits; at rest the sign is that of the way it is to start.
+P: volts per wrench; e: the body axes and wheels that rub; c: the centre of mass, from that of the wheels; the terms of
+the second line where the robot has them. It is `voltage_for` of a robot in motion, to the last bits; at rest the sign
+is that of the way it is to start.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ class FeedforwardTable(Shown):
 
     speed: V, kV, shape (wheels, 3). change: A, kA, shape (wheels, 3). directions: d_e of what rubs, shape (k, 3).
     sign: S_e, kS, forward and backward, shape (2, wheels, k). push: P [V/N, V/N, V/(N m)], shape (wheels, 3).
-    ellipse: (Cx, Cy) [N]. turning: M where the body frame turns, else 0 [kg]. drop [V], shape (wheels,); dead_band [V].
-    back_emf: of a twist [V], shape (wheels, 3).
+    ellipse: (Cx, Cy) [N]. turning: M where the body frame turns, else 0 [kg]. centre: c [m], shape (2,). drop [V],
+    shape (wheels,); dead_band [V]. back_emf: of a twist [V], shape (wheels, 3).
     """
 
     robot: str
@@ -47,6 +48,7 @@ class FeedforwardTable(Shown):
     push: FloatArray
     ellipse: FloatArray
     turning: float
+    centre: FloatArray
     drop: FloatArray
     dead_band: float
     back_emf: FloatArray
@@ -57,7 +59,8 @@ class FeedforwardTable(Shown):
         along = self.directions @ nu
         u = self.speed @ nu + self.change @ change
         u = u + self.sign[0] @ np.maximum(np.sign(along), 0.0) - self.sign[1] @ np.maximum(np.sign(-along), 0.0)
-        wrench = np.array([-nu[2] * nu[1], nu[2] * nu[0], 0.0]) * self.turning
+        (x, y, w), (c, d) = nu, self.centre
+        wrench = self.turning * w * np.array([-y - w * c, x - w * d, c * x + d * y])
         rubs = float(np.hypot(*(self.ellipse * nu[:2])))
         if rubs > 0.0:
             wrench[:2] += self.ellipse**2 * nu[:2] / rubs
@@ -89,6 +92,7 @@ class FeedforwardTable(Shown):
 
     def code(self) -> list[str]:
         """The formula in C, a line for each wheel; vx, vy, w are the twist, ax, ay, aw its derivative, sgn(0) = 0."""
+        off = bool(self.turning) and bool(self.centre.any())
         lines = ["/* volts of each wheel: twist (vx, vy, w) and its derivative (ax, ay, aw) */"]
         if self.ellipse.any():
             x, y = (self.ellipse**2).tolist()
@@ -100,13 +104,16 @@ class FeedforwardTable(Shown):
             lines += ["fx = 0; fy = 0;"]
         if self.turning:
             lines += [f"fx -= {_c(self.turning)}*w*vy; fy += {_c(self.turning)}*w*vx;"]
+        if off:
+            c, d = (self.turning * self.centre).tolist()
+            lines += [f"fx -= {_c(c)}*w*w; fy -= {_c(d)}*w*w; ft = w*({_sum(np.array([c, d]), ('vx', 'vy'))});"]
         for e, way in enumerate(self.directions):
             lines.append(f"s{e} = sgn({_sum(way, ('vx', 'vy', 'w'))});")
         for k in range(len(self.speed)):
             terms = [_sum(self.speed[k], ("vx", "vy", "w")), _sum(self.change[k], ("ax", "ay", "aw"))]
             terms += [self._sign_term(k, e) for e in range(len(self.directions))]
             if self.ellipse.any() or self.turning:
-                terms.append(_sum(self.push[k, :2], ("fx", "fy")))
+                terms.append(_sum(self.push[k] if off else self.push[k, :2], ("fx", "fy", "ft")[: 3 if off else 2]))
             told = " + ".join(term for term in terms if term != "0").replace("+ -", "- ")
             lines.append(f"u{k + 1} = {told or '0'};")
             if self.drop[k]:
@@ -149,8 +156,8 @@ def feedforward_table(robot: Robot) -> FeedforwardTable:
     return FeedforwardTable(
         robot.name, _clean(emf + push @ viscous), _clean(push @ model.mass), _clean(own.directions[rubs]), _clean(sign),
         _clean(push), own.ellipse_slide,
-        robot.body.mass if robot.body.rotating_frame else 0.0, per_wheel(robot.motor.voltage_drop, count),
-        robot.drive.dead_band, _clean(emf),
+        robot.body.mass if robot.body.rotating_frame else 0.0, np.array(robot.body.centre),
+        per_wheel(robot.motor.voltage_drop, count), robot.drive.dead_band, _clean(emf),
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.friction.kinds import COULOMB, KINDS
-from omnidyn.model.mass import masses_couple, without_spin
+from omnidyn.model.mass import of_body_alone, spin_couples
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import levels_of
@@ -58,7 +58,7 @@ def _unequal(robot: Robot) -> bool:
 
 
 def _couples(robot: Robot) -> bool:
-    return masses_couple(robot) or (not _unequal(robot) and not is_decoupled(state_space(without_spin(robot))))
+    return spin_couples(robot) or (not _unequal(robot) and not is_decoupled(state_space(of_body_alone(robot))))
 
 
 def _holds_more(robot: Robot) -> bool:
@@ -108,6 +108,9 @@ FEATURES = {
             or robot.friction.axes.hold_backward != (robot.friction.axes.breakaway or robot.friction.axes.coulomb)
         ),
     ),
+    "centre": Feature(
+        "a centre of mass beside that of the wheels ([body] centre_m)", lambda robot: any(robot.body.centre)
+    ),
     "frame": Feature("the turning frame ([body] rotating_frame = true)", lambda robot: robot.body.rotating_frame),
     "no-frame": Feature(
         "no turning frame ([body] rotating_frame = false)", lambda robot: not robot.body.rotating_frame
@@ -147,7 +150,7 @@ _DRIVE = {"latency": _DELAY, "loop": _LOOP, "duty": _DUTY}
 _NOT_EXACT = dict.fromkeys(
     (
         "direction", "wheels", "falls", "bends", "sides", "frame", "current", "drop", "gear", "unequal", "couples",
-        "slope", "slip",
+        "slope", "slip", "centre",
     ),
     Cell(REFUSES, "it holds the exact step, and this robot has none"),
 )  # fmt: skip
@@ -177,6 +180,7 @@ _GAINS = {
     "current": Cell(LEAVES_OUT, "volts beyond what the current limit allows do not act"),
     "gear": Cell(LEAVES_OUT, "no gear takes anything"),
     "couples": Cell(LEAVES_OUT, "each axis for itself: here one axis also drives another one"),
+    "centre": Cell(PARTLY, "kA of turning is about the centre of the wheels; that a push turns the robot is left out"),
     "latency": _DELAY,
     "loop": Cell(LEAVES_OUT, "volts at the motors: the speed loop of the firmware is not in it"),
 }
@@ -226,7 +230,7 @@ _ROS = {
     "slope": _LEVEL,
     "slip": _ROLL,
     **_LAWS,
-    **dict.fromkeys(("axes", "direction", "wheels", "drop", "band"), Cell(PARTLY, _KINEMATICS)),
+    **dict.fromkeys(("axes", "direction", "wheels", "drop", "band", "centre"), Cell(PARTLY, _KINEMATICS)),
     **dict.fromkeys(("breakaway", "frame", "inductance", "current", "gear"), Cell(LEAVES_OUT, "kinematics only")),
     **dict.fromkeys(
         ("rollers", "uneven"),

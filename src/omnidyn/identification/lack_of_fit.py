@@ -20,7 +20,6 @@ UNOFFERED = {
     "turns of the wheels": "something that comes back with the turns of the wheels",
     "sag": "a supply that sags under load",
     "heat": "motors that weaken as they warm up",
-    "centre of mass": "a centre of mass off the middle of the wheels",
     "filter": "speeds that went through a filter",
 }
 WORTH = 0.01  # share of the variance of a residual that is worth a line

@@ -1,8 +1,9 @@
 """A robot from its parts, as files of links and joints tell them: masses, inertias, wheels on axles.
 
-The body is all there is: mass of all parts, inertia about the vertical through their centre. A wheel stands at the
-azimuth of its place; its axle must point to the centre, as that of an omni wheel does: the angle of rollers is in no
-such file. Motors and friction of the floor are not in them either: they come from another robot, or are guessed.
+The body is all there is: mass of all parts, inertia about the vertical through their centre of mass. The centre of the
+wheels is where their axles meet, as those of omni wheels do: the angle of rollers is in no such file. A wheel stands at
+the azimuth of its place, seen from there; the centre of mass may stand beside it. Motors and friction of the floor are
+not in them either: they come from another robot, or are guessed.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from omnidyn.model.value import to_list
 from omnidyn.model.wheels import MAX_WHEELS, MIN_WHEELS, Wheels
 
 RADIAL = math.radians(1.0)  # by which an axle may miss the centre
+NEGLIGIBLE = 1e-3  # of the distance of the wheels: files give angles as 1.57 and the like
 NEAR = 1e-9  # relative: numbers that differ by less are one number
 LONGEST_NAMES = 150
 
@@ -66,12 +68,16 @@ def robot_of_parts(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], wher
 
 def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, other: Robot | None) -> Robot:
     mass, turning, centre = whole(lumps)
-    wheels = _wheels(axles, centre)
+    middle = _middle(axles, centre)
+    wheels, off = _wheels(axles, middle), centre[:2] - middle[:2]
     made = first_guess(name, wheels, mass) if other is None else like(other, name, wheels, mass)
     if turning > 0.0:
         made = made.replace(body=made.body.replace(inertia=turning))
+    if off.any():
+        made = made.replace(body=made.body.replace(centre=off))
     told = {
         "body.mass_kg", "wheels.azimuth_deg", "wheels.robot_radius_m", "wheels.wheel_radius_m",
+        *(["body.centre_m"] if off.any() else []),
         *(["body.inertia_kg_m2"] if turning > 0.0 else []), *(["wheels.inertia_kg_m2"] if wheels.wheel_inertia else []),
     }  # fmt: skip
     kept = {key: prior for key, prior in made.priors.items() if key.partition("[")[0] not in told}
@@ -82,8 +88,21 @@ def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, 
     )
 
 
+def _middle(axles: Sequence[Axle], centre: FloatArray) -> FloatArray:
+    """Where the axles meet, by least squares; the centre of mass where that is as near as makes no matter."""
+    if not axles:
+        return centre
+    across = np.array([[-axle.axis[1], axle.axis[0]] for axle in axles])
+    places = np.array([axle.centre[:2] for axle in axles]) - centre[:2]
+    if np.linalg.matrix_rank(across, tol=RADIAL) < 2:
+        return centre
+    off = np.linalg.lstsq(across, np.sum(across * places, axis=1), rcond=None)[0]
+    far = float(np.max(np.hypot(*places.T)))
+    return centre if math.hypot(*off) <= NEGLIGIBLE * far else np.add(centre, [*off, 0.0])
+
+
 def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
-    """Where the wheels stand, seen from the centre of mass."""
+    """Where the wheels stand, seen from their centre."""
     if not MIN_WHEELS <= len(axles) <= MAX_WHEELS:
         raise InputError(
             "cannot tell the wheels", got=f"{len(axles)} found: {', '.join(axle.name for axle in axles) or 'none'}",

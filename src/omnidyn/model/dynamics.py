@@ -4,7 +4,9 @@
     M v'_y = F_y - B_y v_y - C_y sgn v_y   (- M omega v_x)
     I omega' = T - B_w omega - C_w sgn omega
 
-without what spins with motors and wheels; with it, the mass matrix of mass.py stands on the left.
+without what spins with motors and wheels; with it, or with a centre of mass beside that of the wheels, the mass matrix
+of mass.py stands on the left, and with p, the momentum there, the terms in brackets are (omega p_y, -omega p_x,
+v_y p_x - v_x p_y).
 
 The terms in brackets belong to a turning body frame; eqs (4) (5) leave them out, `rotating_frame` keeps them.
 """
@@ -59,12 +61,24 @@ def linear_part(robot: Robot) -> Robot:
 
 
 def frame_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
-    """Apparent wrench M omega (v_y, -v_x, 0) of the turning body frame; zero where the robot leaves it out."""
+    """Apparent wrench [N, N, N m] of the turning body frame, M omega (v_y, -v_x, 0) where the centre of mass is that of
+    the wheels; zero where the robot leaves it out."""
     twist = np.asanyarray(twist, dtype=float)
     if not robot.body.rotating_frame:
         return np.zeros_like(twist)
     x, y, omega = np.moveaxis(twist, -1, 0)
-    return robot.body.mass * np.stack([omega * y, -omega * x, np.zeros_like(omega)], axis=-1)
+    about = np.zeros_like(omega)
+    if any(robot.body.centre):
+        c, d = robot.body.centre
+        about = -omega * (c * x + d * y)
+        x, y = x - omega * d, y + omega * c  # of the centre of mass
+    return robot.body.mass * np.stack([omega * y, -omega * x, about], axis=-1)
+
+
+def frame_terms(robot: Robot) -> FloatArray:
+    """The same wrench as a matrix: per omega v_y, -omega v_x and omega^2 [kg, kg, kg m], columns. Shape (3, 3)."""
+    turned = frame_wrench(robot, np.array([[0.0, 1.0, 1.0], [-1.0, 0.0, 1.0], [0.0, 0.0, 1.0]]))
+    return np.stack([turned[0] - turned[2], turned[1] - turned[2], turned[2]], axis=1) + 0.0
 
 
 def acceleration(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:

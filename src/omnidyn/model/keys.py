@@ -30,6 +30,7 @@ BOX = tuple(f"{BODY_AXES}.{level}[{axis}]" for level in (VISCOUS, COULOMB) for a
 """The six numbers of friction on the body axes, the paper's."""
 TORQUE, EMF = "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad"
 ROTOR, WHEEL = "motor.rotor_inertia_kg_m2", "wheels.inertia_kg_m2"
+CENTRE = "body.centre_m"
 GAINS = ("drive.kp_V_s_rad", "drive.ki_V_rad")
 DEAD_BAND, LATENCY = "drive.dead_band_V", "drive.latency_s"
 
@@ -126,6 +127,8 @@ class Key:
         if self.part == FRICTION:
             return f"{name.removeprefix('yaw ').replace('stribeck', 'Stribeck').replace('dahl', 'Dahl')}{self._acts()}"
         name = f"{name} of the speed loop" if self.name in GAINS else name
+        if self.name == CENTRE:
+            return "centre of mass" if self.index is None else f"centre of mass{(' forward', ' sideways')[self.index]}"
         if self.wheel is None:
             return name
         return f"{name} of {'motor' if self.part == 'motor' else 'wheel'} {self.wheel + 1}"

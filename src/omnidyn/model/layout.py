@@ -5,7 +5,8 @@
     stage.work.jacobian[a, b]                            room to work in
 
 Yaw is measured as length, rho = sqrt(I/M) of the body, so that the body has the mass M in all directions and all
-forces are in newtons. What spins adds its own mass, which couples the directions where wheels differ.
+forces are in newtons. What spins adds its own mass, which couples the directions where wheels differ, and so does a
+centre of mass that stands off.
 An element is where dry friction acts on one scalar speed: rows 0..2 are the body axes, 3.. the wheels. The ellipse of
 the direction of travel acts on (v_x, v_y) as a whole: what it needs stands in `body` and `task`. Pairs of levels are
 against forward and against backward motion; of the ellipse, along x and along y.
@@ -34,10 +35,12 @@ def _record(**fields: Any) -> np.dtype[Any]:
 
 BODY = _record(
     mass=(),  # M of the body [kg]
-    spin=(3, 3),  # [kg] what rotors and wheels add to it
+    least=(),  # [kg] the least that any direction has: M, but where the centre of mass stands off
+    spin=(3, 3),  # [kg] what rotors and wheels, and a centre that stands off, add to M in all directions
+    centre=(2,),  # of mass, from that of the wheels, in rho
     length=(),  # rho [m]
     turning=(),  # M/rho where the body frame turns, else 0
-    room=(2,),  # [N] constant force along x and y of the room
+    room=(2,),  # [N] constant force on the centre of mass along x and y of the room
     active=(),  # 1 where there is an ellipse
     coulomb=(2,),  # of the ellipse [N]
     breakaway=(2,),  # [N]
@@ -53,6 +56,7 @@ BODY = _record(
     laws=(),  # 0 where no level depends on the speed and nothing has a memory: then what follows is not read
     steep=(),  # [1/s] bound of the rate at which friction that falls with the speed lets a body run away
     bristles=(),  # the sum of the levels of all bristles [N]; 0 where there are none
+    off=(),  # 1 where the centre of mass stands off
     gathers=(),  # 1 where an axis gathers momentum in Karnopp's band
 )
 ELEMENT = _record(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from omnidyn.document import Document
@@ -15,8 +17,8 @@ from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor, mass_at_rim
 from omnidyn.model.robot_table import robot_table
 from omnidyn.model.surroundings.floor import Floor
-from omnidyn.model.surroundings.variations import Variations
-from omnidyn.model.value import Flag, Text, Value, number
+from omnidyn.model.surroundings.variations import FARTHEST, Variations
+from omnidyn.model.value import Flag, Text, Value, number, place
 from omnidyn.model.wheels import Wheels, check_count
 from omnidyn.shown import FIGURE, Shown, make
 
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SCHEMA = 1
+MOST_OFF = 1000.0  # times the radius of gyration: beyond, a push has no turning that digits could tell
 MOST_SPINNING = 1000.0  # times the body, at the rim: more is a unit that was mistaken
 
 
@@ -31,7 +34,8 @@ class Body(Value):
     """The rigid body: mass M [kg], inertia I_n about the vertical axis [kg m^2].
 
     Of all there is, wheels and motors included, as if no wheel turned about its axle: what their spin adds is the
-    motor's rotor_inertia and the wheels' wheel_inertia.
+    motor's rotor_inertia and the wheels' wheel_inertia. The axis is that through the centre of mass, as in URDF.
+    centre: of mass, from that of the wheels, along x and y [m]; twist and pose are of the centre of the wheels.
     rotating_frame: keep the terms M omega v of a turning body frame, which eqs (4) (5) leave out.
     centre_height: of the centre of mass above the floor [m]; it shifts the loads of wheels that may slip.
     """
@@ -40,6 +44,10 @@ class Body(Value):
     inertia: Annotated[
         float, number(1e-9, 1e6), Field(alias="inertia_kg_m2", description="I_n, about the vertical axis")
     ]
+    centre: Annotated[
+        Annotated[tuple[float, float], place(FARTHEST)],
+        Field(alias="centre_m", description="of mass, from that of the wheels"),
+    ] = (0.0, 0.0)
     rotating_frame: Annotated[Flag, Field(description="terms M omega v of a turning body")] = False
     centre_height: Annotated[
         Annotated[float, number(0.0, 100.0)],
@@ -115,6 +123,22 @@ class Robot(Shown, Value):
                 f"[motor] rotor_inertia_kg_m2 and [wheels] inertia_kg_m2 weigh {spinning:.3g} kg at the rim of a "
                 f"wheel; expected at most {MOST_SPINNING:g} times the mass of the robot. Data sheets give a rotor in "
                 "g cm2: 1 g cm2 = 1e-7 kg m2"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _stands_on_its_wheels(self) -> Robot:
+        off, widest = math.hypot(*self.body.centre), max(np.atleast_1d(self.wheels.robot_radius).tolist())
+        if off > widest:
+            raise ValueError(
+                f"[body] centre_m lies {off:.3g} m from the centre of the wheels, beyond all of them ({widest:.3g} m): "
+                "the robot would tip over. centre_m is in metres"
+            )
+        if off**2 * self.body.mass > MOST_OFF**2 * self.body.inertia:
+            raise ValueError(
+                f"[body] centre_m lies {off:.3g} m off, inertia_kg_m2 stands for masses "
+                f"{math.sqrt(self.body.inertia / self.body.mass):.3g} m about that; expected at most {MOST_OFF:g} "
+                "times as far. inertia_kg_m2 is about the centre of mass, in kg m2"
             )
         return self
 

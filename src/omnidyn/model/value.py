@@ -94,6 +94,12 @@ def per_axis_number(low: float, high: float) -> Checked:
     return Checked(Annotated[tuple[one, one, one], BeforeValidator(to_list)])
 
 
+def place(most: float) -> Checked:
+    """Two numbers within -most to most: along x, along y."""
+    one = number(-most, most).type
+    return Checked(Annotated[tuple[one, one], BeforeValidator(to_list)])
+
+
 def word_of(*words: str) -> Checked:
     """One of some words."""
     choices: Any = Literal

@@ -11,7 +11,7 @@ from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Points, Table
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
-from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.dynamics import drive_wrench, frame_wrench
 from omnidyn.model.frames import AXES
 from omnidyn.model.friction import lugre
 from omnidyn.model.friction.bristle import LAWS
@@ -189,7 +189,9 @@ def _ramps(
         assert run.twist is not None
         middle = 0.5 * (run.twist[1:] + run.twist[:-1])
         gained = np.diff(run.twist, axis=0) / dt[:, None] @ mass_matrix(robot)
-        dry = (drive_wrench(robot, middle, voltage) - gained)[:, k] - viscous * middle[:, k]
+        dry = (drive_wrench(robot, middle, voltage) + frame_wrench(robot, middle) - gained)[:, k] - viscous * middle[
+            :, k
+        ]
         found.append(float(dry.max()))
     rest = float(drive_wrench(robot, np.zeros(3), volts * pattern)[k])
     return full / np.array(RAMPS), np.array(found) if bends else np.full(len(RAMPS), rest)

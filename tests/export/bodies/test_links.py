@@ -8,7 +8,7 @@ import pytest
 import omnidyn
 from omnidyn.export.bodies.sdf import sdf
 from omnidyn.export.bodies.urdf import urdf
-from tests.support.mixed_robots import random_robot, with_spin
+from tests.support.mixed_robots import random_robot, with_centre, with_spin
 
 ROBOT = omnidyn.load_robot("axebot")
 
@@ -58,17 +58,28 @@ def from_sdf(text):
 KINDS = [(urdf, from_urdf), (sdf, from_sdf)]
 
 
+def base_centre(text):
+    """Where the base balances, by either format."""
+    base = next(ET.fromstring(text).iter("link")).find("inertial")
+    origin = base.find("origin")
+    return numbers(base.findtext("pose") if origin is None else origin.get("xyz"))[:2] if len(base) > 2 else np.zeros(2)
+
+
 @pytest.mark.parametrize("write, read", KINDS, ids=["urdf", "sdf"])
 @pytest.mark.parametrize("seed", range(30))
 def test_thirty_robots_weigh_what_they_weigh(write, read, seed):
+    """Mass, centre of mass, and inertia about that, of all parts together."""
     robot = random_robot(seed) if seed % 2 else with_spin(random_robot(seed), seed)
-    links, joints = read(write(robot).text)
+    robot = with_centre(robot, seed) if seed % 3 else robot
+    text = write(robot).text
+    links, joints = read(text)
     assert len(joints) == robot.wheels.count == len(links) - 1
-    turning = links[0][1][2]
-    for (mass, about), (place, *_) in zip(links[1:], joints, strict=True):
-        turning += about[2] + mass * (place[0] ** 2 + place[1] ** 2)
-    assert sum(mass for mass, _ in links) == pytest.approx(robot.body.mass, rel=1e-12)
-    assert turning == pytest.approx(robot.body.inertia, rel=1e-12)
+    places = np.array([base_centre(text), *(place[:2] for place, *_ in joints)])
+    masses = np.array([mass for mass, _ in links])
+    assert masses.sum() == pytest.approx(robot.body.mass, rel=1e-12)
+    np.testing.assert_allclose(masses @ places / masses.sum(), robot.body.centre, atol=1e-12)
+    turning = sum(about[2] for _, about in links) + masses @ np.sum((places - robot.body.centre) ** 2, axis=1)
+    assert turning == pytest.approx(robot.body.inertia, rel=1e-11)
     for mass, about in links:
         assert mass > 0.0
         assert 2.0 * max(about) < sum(about)  # the triangle inequality
@@ -148,7 +159,7 @@ def _unknown(element):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_a_parser_of_sdf_reads_thirty_robots_and_knows_every_element(seed):
-    text = sdf(with_spin(random_robot(seed), seed) if seed % 2 else random_robot(seed)).text
+    text = sdf(with_spin(random_robot(seed), seed) if seed % 2 else with_centre(random_robot(seed), seed)).text
     links, joints, unknown = from_python_sdformat(text)
     assert unknown == []
     bad = text.replace("<damping>", "<dampness>").replace("</damping>", "</dampness>")

@@ -100,6 +100,34 @@ def test_a_turning_robot_is_ours_with_the_turning_frame():
     assert any("Newtonian" in words for words in mjcf(ROBOT).missing)
 
 
+@pytest.mark.parametrize("centre", [(0.05, -0.03), (0.0, 0.08)])
+def test_a_centre_of_mass_beside_the_wheels_moves_mujoco_as_us(centre):
+    """Its bodies know nothing of our equations: accelerations to the last digits, and a run at small steps."""
+    body = ROBOT.body.replace(rotating_frame=True, centre=centre)
+    robot = ROBOT.replace(body=body, friction=type(ROBOT.friction)())
+    model, data = loaded(robot)
+    twist, volts = np.array([0.4, -0.3, 5.0]), np.array([1.5, 5.5, -2.5])
+    data.qvel[:], data.ctrl[:] = twist, volts
+    mujoco.mj_forward(model, data)
+    # qvel is along the axes of the room, which at heading 0 are those of the body: v' there, and omega x v here
+    turned = twist[2] * np.array([-twist[1], twist[0], 0.0])
+    np.testing.assert_allclose(data.qacc - turned, omnidyn.acceleration(robot, twist, volts), rtol=1e-9, atol=1e-9)
+    rows = np.tile(volts, (10_000, 1))
+    model.opt.timestep = 1e-4
+    mujoco.mj_resetData(model, data)
+    places = []
+    for row in rows:
+        data.ctrl[:] = row
+        mujoco.mj_step(model, data)
+        places.append(data.qpos.copy())
+    run = omnidyn.simulate(robot, rows[:100], 1e-2)
+    assert run.pose is not None
+    np.testing.assert_allclose(np.array(places)[99::100], run.pose[1:], atol=2e-3)
+    middle = omnidyn.simulate(robot.replace(body=body.replace(centre=(0.0, 0.0))), rows[:100], 1e-2)
+    assert middle.pose is not None
+    assert np.abs(middle.pose - run.pose).max() > 0.02
+
+
 def test_friction_of_other_shapes_is_its_level_along_each_axis():
     robot = omnidyn.load_robot("robotino")
     model, _ = loaded(robot)

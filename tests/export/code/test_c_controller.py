@@ -15,7 +15,7 @@ from omnidyn.export.features import CONTROLLERS, REFUSES, Cell
 from omnidyn.model.drive import Drive
 from tests.support.controlled import CController
 from tests.support.exported import STRICT, exact_robot
-from tests.support.mixed_robots import random_robot, with_spin
+from tests.support.mixed_robots import random_robot, with_centre, with_spin
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
 ROBOT = omnidyn.load_robot("axebot")
@@ -37,7 +37,7 @@ def driven(kind):
 ROBOTS = [
     ROBOT, *(without_losses(random_robot(seed)) for seed in range(4)),
     *(without_losses(with_spin(random_robot(seed), seed)) for seed in (6,)), exact_robot(2), driven("duty"),
-    driven("speed"),
+    driven("speed"), without_losses(with_centre(random_robot(7), 7)),
 ]  # fmt: skip
 
 

@@ -19,6 +19,7 @@ ROUND = np.radians(np.arange(0.0, 360.0, 45.0))
 WEAK = (0.0053, 0.0059, 0.0059)
 WORLDS = {
     "body.rotating_frame": AXEBOT.replace(body=AXEBOT.body.replace(rotating_frame=True)),
+    "body.centre_m": AXEBOT.replace(body=AXEBOT.body.replace(centre=(0.01, -0.02))),
     "motor.current_limit_A": AXEBOT.replace(motor=AXEBOT.motor.replace(current_limit=1.5)),
     "motor.voltage_drop_V": AXEBOT.replace(motor=AXEBOT.motor.replace(voltage_drop=0.3)),
     "motor.gear_efficiency": AXEBOT.replace(motor=AXEBOT.motor.replace(gear_efficiency=0.85)),

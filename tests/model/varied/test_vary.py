@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.model.surroundings.floor import Floor
@@ -132,9 +132,48 @@ def test_a_robot_that_knows_none_says_which_table_is_missing():
         omnidyn.vary(load_robot("axebot"), floor="carpet")
 
 
-def test_a_load_beside_the_middle_is_refused_by_name():
-    with pytest.raises(UnsupportedError, match=r"no law yet for a load .* beside .*; got offset_m = \[0.1, 0.0\]"):
-        omnidyn.vary(ROBOT, payload="basket")
+def test_a_load_beside_the_middle_is_a_body_of_two_points():
+    """Against the sums over three point masses: two of the body, one of the load."""
+    robot = ROBOT.replace(body=ROBOT.body.replace(mass=2.0, inertia=2.0 * 0.09**2, centre=(0.01, 0.02)))
+    loaded = omnidyn.vary(robot, payload=Payload(mass=0.5, offset=(-0.03, 0.06), inertia=0.001))
+    places = np.array([[0.01, 0.02 + 0.09], [0.01, 0.02 - 0.09], [-0.03, 0.06]])
+    masses = np.array([1.0, 1.0, 0.5])
+    centre = masses @ places / masses.sum()
+    inertia = masses @ ((places - centre) ** 2).sum(axis=1) + 0.001
+    assert loaded.body.mass == 2.5
+    np.testing.assert_allclose(loaded.body.centre, centre, rtol=1e-14)
+    assert loaded.body.inertia == pytest.approx(inertia, rel=1e-14)
+    half = Payload(mass=0.25, offset=(-0.03, 0.06), inertia=0.0005)
+    twice = omnidyn.vary(omnidyn.vary(robot, payload=half), payload=half)
+    np.testing.assert_allclose(twice.body.centre, centre, rtol=1e-14)
+    assert twice.body.inertia == pytest.approx(inertia, rel=1e-14)
+
+
+def test_loads_that_balance_each_other_are_one_in_the_middle():
+    one = omnidyn.vary(omnidyn.vary(ROBOT, payload=Payload(mass=1.0, offset=(0.05, 0.0))),
+                       payload=Payload(mass=1.0, offset=(-0.05, 0.0)))  # fmt: skip
+    both = omnidyn.vary(ROBOT, payload=Payload(mass=2.0, inertia=2.0 * 0.05**2))
+    np.testing.assert_allclose(one.body.centre, (0.0, 0.0), atol=1e-17)
+    assert one.body.inertia == pytest.approx(both.body.inertia, rel=1e-14)
+
+
+def test_what_is_known_of_the_offset_is_known_of_the_centre():
+    text = robot_to_toml(load_robot("axebot")) + (
+        "[variations.payload.box]\nmass_kg = 1.5\noffset_m = [{ value = 0.04, std = 0.01 }, 0.02]\n"
+    )
+    loaded = omnidyn.vary(parse_robot(text), payload="box")
+    assert loaded.body.centre == pytest.approx((0.02, 0.01))
+    assert loaded.priors["body.centre_m[0]"].std == pytest.approx(0.005)
+    assert "body.centre_m[1]" not in loaded.priors
+    again = parse_robot(robot_to_toml(loaded))
+    assert again.body == loaded.body
+    assert again.priors["body.centre_m[0]"] == loaded.priors["body.centre_m[0]"]
+
+
+def test_a_load_that_tips_the_robot_over_is_refused():
+    words = r"payload: \[body\] centre_m lies 0.18.* m from the centre .* beyond all of them \(0.1 m\)"
+    with pytest.raises(InputError, match=words):
+        omnidyn.vary(ROBOT, payload=Payload(mass=10.0, offset=(0.21, 0.0)))
 
 
 def test_something_else_is_refused():

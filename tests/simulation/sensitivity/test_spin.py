@@ -66,6 +66,45 @@ def test_against_the_modes(unequal):
     check(lambda r: reference(r, TURNING, 0.01), unequal, keys, 1e-4)
 
 
+def test_a_centre_of_mass_beside_the_wheels(unequal):
+    """By where it is, and by what else moves then: the reference knows the equations of the centre of mass alone."""
+    wheels = Friction(wheels=WheelFriction(coulomb=(0.3, 0.2, 0.25), viscous=0.1))
+    robot = unequal.replace(
+        name="beside", friction=wheels, body=unequal.body.replace(centre=(0.03, -0.05)),
+    )  # fmt: skip
+    keys = ["body.centre_m[0]", "body.centre_m[1]", "body.mass_kg", "body.inertia_kg_m2", f"{ROTOR}[1]"]
+    check(lambda r: reference(r, TURNING, 0.01), robot, keys, 1e-4)
+
+
+@pytest.mark.parametrize("volts, omega", [((0.6, 0.7, -1.4), 1.0), ((0.5, 2.0, -2.8), 2.3)])
+def test_a_stop_that_lets_another_axis_go(axebot, volts, omega):
+    """While it slows down, yaw holds y against what drives it, and lets it go as it stops: one instant for both."""
+    robot = axebot.replace(body=axebot.body.replace(centre=(0.06, 0.0)))
+    rows, start = np.tile(volts, (60, 1)), (0.3, 0.0, omega)
+    run = simulate(robot, rows, 0.005, twist=start)
+    stops = int(np.flatnonzero((run.twist[:-1, 2] != 0.0) & (run.twist[1:, 2] == 0.0))[0])
+    assert (run.twist[:stops, 1] == 0.0).all()
+    assert (run.twist[stops + 1 :, 1] != 0.0).all()
+    keys = ["friction.axes.coulomb[1]", "friction.axes.coulomb[2]", "body.centre_m[0]", "body.inertia_kg_m2"]
+    found = derivatives(robot, rows, 0.005, keys, twist=start, tol=1e-8)
+    for j, key in enumerate(keys):
+        twist, pose, _ = differences(lambda r: reference(r, rows, 0.005, twist=start), robot, key, 1e-5)
+        assert max(worst(found.twist[..., j], twist), worst(found.pose[..., j], pose)) <= 1e-4, key
+
+
+def test_a_first_step_of_the_centre_from_the_middle(unequal):
+    """From 0, where the number has no size of its own: central differences of whole runs."""
+    found = derivatives(unequal, TURNING[:20], 0.01, ["body.centre_m[0]", "body.centre_m[1]"], tol=1e-9)
+    for k in range(2):
+        up, down = (
+            simulate(
+                unequal.replace(body=unequal.body.replace(centre=tuple(np.eye(2)[k] * each))),
+                TURNING[:20], 0.01, tol=1e-9,
+            ).twist for each in (1e-4, -1e-4)
+        )  # fmt: skip
+        assert worst(found.twist[..., k], (up - down) / 2e-4) <= 1e-4
+
+
 def test_dynamic_electrics(unequal):
     motor = unequal.motor.replace(electrical="dynamic", inductance=0.004)
     keys = [f"{ROTOR}[0]", "motor.gear_ratio", "body.mass_kg", "motor.inductance_H"]

@@ -158,6 +158,40 @@ def test_slip_takes_energy_and_gives_none():
     assert lost[-1] > 1.0
 
 
+@pytest.mark.parametrize("seed", [*range(4), *LONG])
+def test_a_centre_of_mass_beside_the_wheels_against_the_events(seed):
+    """The same with its centre of mass off by up to 0.4 of where the wheels stand: unequal loads, coupled masses.
+
+    Not so far that a wheel lifts off: the reference knows none that does.
+    """
+    rng = np.random.default_rng(200 + seed)
+    far, way = rng.uniform(0.01, 0.04), rng.uniform(0.0, 6.28)
+    robot = slippery(
+        (AXEBOT, FOUR)[seed % 2], rng.uniform(0.2, 0.8), rng.uniform(1e-5, 5e-5), rotating_frame=bool(seed // 2 % 2),
+        centre=(far * np.cos(way), far * np.sin(way)), centre_height=rng.choice([0.0, 0.015]),
+    )  # fmt: skip
+    u, reference = levels(robot, 200 + seed), Slip(robot, wheel_loads(robot).newtons, load_shift(robot))
+    twist, rims, contact = reference.run(u, 0.25)
+    if reference.least < EDGE:
+        pytest.skip("what holds and what drives differ by no more than rounding")
+    run = omnidyn.simulate(robot, u, 0.25, tol=1e-6)
+    middle = omnidyn.simulate(robot.replace(body=robot.body.replace(centre=(0.0, 0.0))), u, 0.25, tol=1e-6)
+    assert np.abs(run.twist - middle.twist).max() > 1e-3
+    assert (np.abs(run.twist - twist) / [1.0, 1.0, 10.0]).max() < 1e-6
+    assert np.abs(run.wheel_speed * robot.wheels.radii - rims).max() < 1e-5
+    assert contact.any()
+    assert not any("cap" in words for words in run.warnings)
+
+
+def test_wheels_that_grip_carry_a_centre_beside_them_as_wheels_that_roll():
+    """On a slope too, with an ellipse: the engine of wheels that roll knows its torque."""
+    robot = slippery(shaped("ellipse"), 50.0, centre=(0.04, -0.03), rotating_frame=True)
+    robot = robot.replace(floor=Floor(tilt=3.0, downhill=50.0))
+    rolls, u = robot.replace(wheels=robot.wheels.replace(traction_mu=None)), levels(robot, 5)
+    one, other = omnidyn.simulate(robot, u, 0.1, tol=1e-7), omnidyn.simulate(rolls, u, 0.1, tol=1e-7)
+    assert (np.abs(one.twist - other.twist) / [1.0, 1.0, 10.0]).max() < 1e-6
+
+
 # --- loads ------------------------------------------------------------------------------------------------------------
 
 
@@ -181,6 +215,25 @@ def test_four_wheels_on_equal_springs():
     places = np.stack([np.ones(4), np.cos(angle), np.sin(angle)])
     np.testing.assert_allclose(places @ loads, [robot.body.mass * GRAVITY, 0.0, 0.0], atol=1e-12)
     assert np.linalg.matrix_rank(np.vstack([places, loads]), tol=1e-9) == 3
+
+
+def test_a_load_in_front_is_carried_in_front():
+    """Three wheels: by the moments about the centre of mass. All of it over one wheel is carried by that one."""
+    robot = AXEBOT.replace(body=AXEBOT.body.replace(centre=(0.03, -0.01)))
+    loads, angle = wheel_loads(robot).newtons, np.radians(AXEBOT.wheels.azimuth_deg)
+    places = 0.1 * np.stack([np.cos(angle), np.sin(angle)], axis=1) - robot.body.centre
+    np.testing.assert_allclose(loads @ places, [0.0, 0.0], atol=1e-12)
+    assert loads.sum() == pytest.approx(robot.body.mass * GRAVITY)
+    over = AXEBOT.replace(body=AXEBOT.body.replace(centre=(-0.1, 0.0)))
+    np.testing.assert_allclose(wheel_loads(over).newtons, [1.5 * GRAVITY, 0.0, 0.0], atol=1e-9)
+
+
+def test_mecanum_wheels_that_slip_under_a_centre_beside_them_are_refused():
+    robot = slippery(load_robot("mecanum"), 0.5, centre=(0.02, 0.0))
+    with pytest.raises(
+        UnsupportedError, match=r"\[body\] centre_m: what mecanum wheels carry .* got centre_m = \[0.02"
+    ):
+        omnidyn.simulate(robot, np.ones((5, 4)), 0.01)
 
 
 def test_a_wheel_in_the_air_carries_nothing_and_is_named():

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from omnidyn.arrays import FloatArray
+from omnidyn.model.dynamics import frame_terms
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
@@ -51,7 +52,7 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     decay, phi, psi = _held(robot, rates, dt)
     linear = np.zeros((1, LINEAR_SIZE))
     by_mass = per_mass(robot, np.eye(N_AXES)).T
-    turning = by_mass * robot.body.mass if robot.body.rotating_frame else np.zeros((3, 3))
+    turning = by_mass @ frame_terms(robot)
     for column, value in {DECAY: decay, PHI: phi, PSI: psi, FEED: np.linalg.inv(phi), TURNING: turning,
                           BY_MASS: by_mass}.items():  # fmt: skip
         linear[0, column : column + 9] = value.ravel()

@@ -123,7 +123,7 @@ def frame_at(linear, twist):
     """(terms of a turning frame [m/s^2, m/s^2, rad/s^2], their slope by the twist)."""
     t = matrix(linear, 0, TURNING)
     x, y, w = twist
-    return mv(t, (w * y, -w * x, 0.0)), mm(t, (0.0, w, y, -w, 0.0, -x, 0.0, 0.0, 0.0))
+    return mv(t, (w * y, -w * x, w * w)), mm(t, (0.0, w, y, -w, 0.0, -x, 0.0, 0.0, 2.0 * w))
 
 
 @part

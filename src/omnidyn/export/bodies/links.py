@@ -1,6 +1,7 @@
 """A robot as a base and wheels on joints, which urdf and sdf write down: masses, inertias, limits, friction of axles.
 
-The whole robot weighs M and turns about the vertical axis with I_n: what the wheels take is taken off the base. A wheel
+The whole robot weighs M, balances at its centre of mass, and turns about the vertical axis there with I_n: what the
+wheels take is taken off the base. A wheel
 is a disc whose inertia about its axle is J_w where the robot has one. The positive sense of a joint is that of the
 model: all wheels forward turn the robot counter-clockwise.
 """
@@ -19,6 +20,7 @@ from omnidyn.model.wheels import per_wheel
 
 LIGHT = 1e-3  # of the robot: the mass of a wheel of which no inertia is known
 MOST = 0.25  # of the robot: what all wheels together may weigh, and may add about the vertical axis
+ROUNDING = 1e-12  # of the distance of the wheels
 ACROSS = 0.55  # of the inertia about the axle: that about the other axes, a little more than of a flat disc
 
 
@@ -44,10 +46,14 @@ class Wheel(NamedTuple):
 
 
 class Links(NamedTuple):
-    """The parts of a robot. mass, inertia (I_xx, I_yy, I_zz): of the base alone. tall: its height [m]."""
+    """The parts of a robot. mass, centre (x, y) of mass and inertia (I_xx, I_yy, I_zz) about it: of the base alone.
+
+    tall: its height [m].
+    """
 
     name: str
     mass: float
+    centre: tuple[float, float]
     inertia: tuple[float, float, float]
     tall: float
     wheels: tuple[Wheel, ...]
@@ -66,15 +72,19 @@ def links(robot: Robot, tall: float) -> Links:
     flat = 0.5 * mass * radius**2
     spins = np.where(axle > 0.0, spins, np.minimum(flat, 0.5 * most / ACROSS))
     across = ACROSS * spins
-    base = robot.body.mass - mass.sum()
-    turning = robot.body.inertia - float(np.sum(mass * far**2 + across))
+    base = float(robot.body.mass - mass.sum())
+    stands, whole = np.array([[each.x, each.y] for each in where]), np.array(robot.body.centre)
+    centre = (robot.body.mass * whole - mass @ stands) / base
+    centre = np.where(np.abs(centre) <= ROUNDING * far.max(), 0.0, centre)
+    apart = base * np.sum((centre - whole) ** 2) + mass @ np.sum((stands - whole) ** 2, axis=1)
+    turning = robot.body.inertia - float(apart + across.sum())
     notes = ("a wheel is lighter in the file than its inertia says: it would weigh more than the robot",)
     wheels = tuple(
         Wheel(f"wheel{k + 1}", where[k], float(mass[k]), (float(spins[k]), float(across[k])), *_joint(robot, k))
         for k in range(n)
     )
     return Links(
-        identifier(robot.name), float(base), inertias(float(base), turning, tall), tall, wheels,
+        identifier(robot.name), base, (float(centre[0]), float(centre[1])), inertias(base, turning, tall), tall, wheels,
         notes if np.any(spins < axle) else (),
     )  # fmt: skip
 

@@ -56,7 +56,7 @@ def _body(robot: Robot, tall: float) -> list[str]:
     viscous = viscous + np.array([along.viscous, along.viscous, along.yaw_viscous])
     lines = [
         f'    <body name="base" pos="0 0 {number(float(robot.wheels.radii.max()))}">',
-        f'      <inertial pos="0 0 0" mass="{number(mass)}" diaginertia="'
+        f'      <inertial pos="{several(*robot.body.centre, 0.0)}" mass="{number(mass)}" diaginertia="'
         f'{several(*inertias(mass, robot.body.inertia, tall))}"/>',
     ]
     for axis, (name, kind, line) in enumerate(

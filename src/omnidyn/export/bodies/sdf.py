@@ -33,16 +33,17 @@ def sdf(robot: Robot, height: float | None = None) -> Export:
     return Export("sdf", robot.name, {"robot.sdf": text}, missing, NOTES)
 
 
-def _inertial(mass: float, about: tuple[float, float, float]) -> list[str]:
+def _inertial(mass: float, about: tuple[float, float, float], centre: tuple[float, float] = (0.0, 0.0)) -> list[str]:
     entries = "".join(f"<{n}>{number(v)}</{n}>" for n, v in zip(("ixx", "iyy", "izz"), about, strict=True))
-    return [f"      <inertial><mass>{number(mass)}</mass>",
+    place = f"<pose>{several(*centre, 0.0, 0.0, 0.0, 0.0)}</pose>" if any(centre) else ""
+    return [f"      <inertial>{place}<mass>{number(mass)}</mass>",
             f"        <inertia>{entries}<ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial>"]  # fmt: skip
 
 
 def _base(parts: Links) -> list[str]:
     radius = max(math.hypot(each.place.x, each.place.y) for each in parts.wheels)
     shape = f"<cylinder><radius>{number(radius)}</radius><length>{number(parts.tall)}</length></cylinder>"
-    return ['    <link name="base_link">', *_inertial(parts.mass, parts.inertia),
+    return ['    <link name="base_link">', *_inertial(parts.mass, parts.inertia, parts.centre),
             f'      <visual name="looks"><geometry>{shape}</geometry></visual>', "    </link>"]  # fmt: skip
 
 

@@ -40,19 +40,20 @@ def description(name: str, parts: Links, missing: tuple[str, ...], outward: bool
     ])  # fmt: skip
 
 
-def inertial(mass: float, about: tuple[float, float, float]) -> list[str]:
-    """Mass and inertia of a link."""
+def inertial(mass: float, about: tuple[float, float, float], centre: tuple[float, float] = (0.0, 0.0)) -> list[str]:
+    """Mass of a link, its centre, and its inertia about that."""
     names = ("ixx", "iyy", "izz")
     entries = " ".join(f'{name}="{number(value)}"' for name, value in zip(names, about, strict=True))
-    return [f'    <inertial><mass value="{number(mass)}"/>',
+    place = f'<origin xyz="{several(*centre, 0.0)}"/>' if any(centre) else ""
+    return [f'    <inertial>{place}<mass value="{number(mass)}"/>',
             f'      <inertia {entries} ixy="0" ixz="0" iyz="0"/></inertial>']  # fmt: skip
 
 
 def _base(parts: Links) -> list[str]:
     radius = max(math.hypot(each.place.x, each.place.y) for each in parts.wheels)
     shape = f'<geometry><cylinder radius="{number(radius)}" length="{number(parts.tall)}"/></geometry>'
-    return ['  <link name="base_link">', *inertial(parts.mass, parts.inertia), f"    <visual>{shape}</visual>",
-            "  </link>"]  # fmt: skip
+    return ['  <link name="base_link">', *inertial(parts.mass, parts.inertia, parts.centre),
+            f"    <visual>{shape}</visual>", "  </link>"]  # fmt: skip
 
 
 def _wheel(wheel: Wheel, axis: str) -> list[str]:

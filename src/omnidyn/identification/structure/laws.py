@@ -11,15 +11,18 @@ from omnidyn.arrays import FloatArray
 from omnidyn.identification.structure.candidates import CHANGE, STEP, Candidate, Trial, as_it_is, numbers, of_the_log
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
+from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import COULOMB, LUGRE
 from omnidyn.model.friction.stribeck import USUAL as EXPONENT
 from omnidyn.model.friction.stribeck import fallen
-from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS, find_key, in_words, unit
+from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
+from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Robot
 
+NEARBY = 1e-4  # [m] of a centre of mass
 LOSS, SHARE = 0.05, 0.03  # of a gear; of the robot's mass that rotors may be, each a small one to try
 LIMITS = (0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of the largest current, at which a limit is tried
 ABOVE = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb friction
@@ -45,6 +48,25 @@ def _of_the_body(bench: Workbench) -> Iterator[Candidate]:
     other = bench.robot.model_copy(update={"body": body.model_copy(update={"rotating_frame": not body.rotating_frame})})
     words = "no forces of a turning frame" if body.rotating_frame else "the forces of a turning frame"
     yield Candidate("body.rotating_frame", lambda b: [Trial(b.change(other))], as_it_is(words))
+    words = "another centre of mass" if any(body.centre) else "a centre of mass off the middle of the wheels"
+    yield Candidate(CENTRE, lambda b: [Trial(b.by_force(_off_centre))], as_it_is(words))
+
+
+def _off_centre(motion: Motion) -> FloatArray:
+    """What a centre of mass a metre ahead, and one a metre aside, does to the body as it moves. Shape (n, 2, 3)."""
+    body, found = motion.robot.body, []
+    pace = np.zeros_like(motion.twist)
+    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
+    for way in np.eye(2) * NEARBY:
+        up, down = (
+            motion.robot.model_copy(
+                update={"body": body.model_copy(update={"centre": tuple(body.centre + side * way)})}
+            )
+            for side in (1.0, -1.0)
+        )
+        turned = frame_wrench(up, motion.twist) - frame_wrench(down, motion.twist)
+        found.append((turned - pace @ (mass_matrix(up) - mass_matrix(down))) / (2.0 * NEARBY))
+    return np.stack(found, axis=1)
 
 
 def _of_motors(bench: Workbench) -> Iterator[Candidate]:

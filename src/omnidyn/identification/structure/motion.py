@@ -87,10 +87,10 @@ class Motion:
 
 
 def in_the_room(motion: Motion) -> FloatArray:
-    """Forces along x and along y of the room, as the body feels them. Shape (n, 2, 3)."""
+    """Forces on the centre of mass along x and along y of the room, as the body feels them. Shape (n, 2, 3)."""
     c, s = np.cos(motion.pose[:, YAW]), np.sin(motion.pose[:, YAW])
-    zero = np.zeros_like(c)
-    return np.stack([np.stack([c, -s, zero], axis=1), np.stack([s, c, zero], axis=1)], axis=1)
+    x, y = motion.robot.body.centre
+    return np.stack([np.stack([c, -s, -x * s - y * c], axis=1), np.stack([s, c, x * c - y * s], axis=1)], axis=1)
 
 
 def motions(problem: Problem, point: Point) -> list[Motion]:

@@ -9,13 +9,14 @@ from omnidyn.identification.output_error.problem.bending import bending_keys
 from omnidyn.identification.output_error.problem.falling import falls
 from omnidyn.identification.structure.linear import Linear, solved
 from omnidyn.identification.structure.workbench import Workbench, scaled
-from omnidyn.model.keys import BODY_AXES, BREAKAWAY, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 
 PERCENT = 0.01
 TRIED = 0.01  # relative change of a fixed number, either way is alike
 FIXED = (
     "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.resistance_ohm",
     TORQUE, EMF, "motor.gear_ratio", "motor.rotor_inertia_kg_m2", "motor.voltage_drop_V", "motor.current_limit_A",
+    f"{CENTRE}[0]", f"{CENTRE}[1]",
 )  # fmt: skip
 
 LEVELS = (f"{BODY_AXES}.breakaway", f"{DIRECTION}.breakaway", f"{DIRECTION}.yaw_breakaway", f"{WHEELS}.breakaway")
@@ -32,7 +33,7 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
     values = bench.point.values
     found: dict[str, dict[str, float]] = {p.name: {} for p in problem.robot_parameters}
     taken = {Key.parse(p.name).name for p in problem.robot_parameters}
-    fixed = [(name, TRIED) for name in FIXED if name not in taken]
+    fixed = [(name, TRIED) for name in FIXED if Key.parse(name).name not in taken]
     for name, tried in [*fixed, *((name, TRIED_FALL) for name in _of_laws(bench))]:
         robot = scaled(bench.robot, name, 1.0 + tried)
         if robot is None:

@@ -20,7 +20,7 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
-from omnidyn.identification.output_error.problem.parameters import EFFICIENCY
+from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, WITHIN
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
@@ -36,7 +36,7 @@ from omnidyn.identification.structure.laws import (
 )
 from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import KINDS, LUGRE
-from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
+from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Prior, Robot
@@ -100,6 +100,8 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
     elif key == FRAME:
         body = robot.body.replace(rotating_frame=not robot.body.rotating_frame)
         yield Switch(robot.replace(body=body), asked, words)
+    elif key == CENTRE:
+        yield Switch(_balanced(robot, remedy.size), _free(asked, key), words)
     elif key == BREAKAWAY:
         yield _breaking_away(remedy, robot, asked)
     elif key == DIRECTION:
@@ -158,6 +160,12 @@ def _with_levels_as_they_are(way: Switch) -> Switch:
     if kept == keys or (is_exact(way.robot) and stays_exact(way.robot, kept)):
         return way
     return replace(way, question=replace(way.question, free=kept))
+
+
+def _balanced(robot: Robot, by: Sequence[float]) -> Robot:
+    """The robot with its centre of mass moved by so much [m], well within its wheels."""
+    most = 0.7 * WITHIN * float(np.min(robot.wheels.robot_radius))
+    return robot.replace(body=robot.body.replace(centre=np.clip(np.add(robot.body.centre, by), -most, most)))
 
 
 def _of_another_shape(asked: Question) -> Question:

@@ -28,7 +28,6 @@ def unoffered(bench: Workbench) -> Iterator[Candidate]:
         ("turns of the wheels", _waves, WAVES),
         ("sag", _sag, (0.0,)),
         ("heat", _heat, (0.0,)),
-        ("centre of mass", _off_centre, (0.0,)),
     ):
         yield Candidate(key, _tried(force, sizes), as_it_is(UNOFFERED[key]), offered=False)
     yield Candidate("filter", _filtered, as_it_is(UNOFFERED["filter"]), offered=False)
@@ -73,16 +72,6 @@ def _heat(motion: Motion, _: float) -> FloatArray:
     step = np.append(np.diff(motion.t), 0.0)[:, None]
     heat = np.cumsum(motion.current**2 * step, axis=0)
     return -((motion.current * heat) @ motion.robot.wheels.wrench_matrix.T)[:, None, :]
-
-
-def _off_centre(motion: Motion, _: float) -> FloatArray:
-    """M (c x dw/dt + w^2 c) and its torque, for c along x and along y."""
-    x, y, w = motion.twist.T
-    pace = np.zeros_like(motion.twist)
-    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
-    ahead = np.stack([w * w, -pace[:, 2], -(pace[:, 1] + w * x)], axis=1)
-    aside = np.stack([pace[:, 2], w * w, pace[:, 0] - w * y], axis=1)
-    return np.stack([ahead, aside], axis=1)
 
 
 def _filtered(bench: Workbench) -> list[Trial]:

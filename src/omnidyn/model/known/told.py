@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.fitted.correlation import KeyCorrelation, key_correlation
-from omnidyn.model.keys import BREAKAWAY, COULOMB, DEAD_BAND, LATENCY, VISCOUS, Key, expand, find_key
+from omnidyn.model.keys import BREAKAWAY, CENTRE, COULOMB, DEAD_BAND, LATENCY, VISCOUS, Key, expand, find_key
 from omnidyn.model.robot import Prior, Robot
 
 NEAR = 0.5  # std over value, from which on a friction may be 0
-ANGLES = ("wheels.azimuth_deg", "wheels.roller_angle_deg")
+SIGNED = ("wheels.azimuth_deg", "wheels.roller_angle_deg", CENTRE)  # numbers that may as well be below 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def is_log(name: str, value: float, std: float) -> bool:
     """Whether a number has a logarithmic scale: what must be positive, and what may be 0 but is far from it."""
     key = Key.parse(name)
     may_be_0 = bool(key.level) or key.name in (DEAD_BAND, LATENCY)
-    return key.name not in ANGLES and value > 0.0 and (not may_be_0 or std < NEAR * value)
+    return key.name not in SIGNED and value > 0.0 and (not may_be_0 or std < NEAR * value)
 
 
 def correlation_of(robot: Robot) -> KeyCorrelation | None:

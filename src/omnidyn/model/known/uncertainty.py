@@ -30,7 +30,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.beside import one_by_one
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import BREAKAWAY, Key
-from omnidyn.model.known.told import ANGLES, Told, is_log, numbers_told, told
+from omnidyn.model.known.told import SIGNED, Told, is_log, numbers_told, told
 from omnidyn.model.robot import Robot
 
 DRAWS = 100
@@ -189,7 +189,7 @@ def _drawn(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> R
 def _off(key: Key, value: float, error: float, log: bool) -> float:
     if log:
         return value * math.exp(min(max(error, -FURTHEST), FURTHEST))
-    return value + error if key.name in ANGLES else max(LEAST * max(value, abs(error)), value + error)
+    return value + error if key.name in SIGNED else max(LEAST * max(value, abs(error)), value + error)
 
 
 def _out_of_range(robot: Robot, origin: Robot) -> set[str]:

@@ -113,6 +113,21 @@ def forces_at_work(plant, stage):
 
 
 @part
+def _add_centre(body, work, x):
+    """What a turning frame does more where the centre of mass stands off: omega x p and v x p, p = omega x c there."""
+    c0, c1 = body.centre[0], body.centre[1]
+    t0, t1, t2 = body.turning * x[0], body.turning * x[1], body.turning * x[2]
+    work.residual[0] -= t2 * c0 * x[2]
+    work.residual[1] -= t2 * c1 * x[2]
+    work.residual[2] += t2 * (c0 * x[0] + c1 * x[1])
+    work.jacobian[0, 2] -= 2.0 * c0 * t2
+    work.jacobian[1, 2] -= 2.0 * c1 * t2
+    work.jacobian[2, 0] += c0 * t2
+    work.jacobian[2, 1] += c1 * t2
+    work.jacobian[2, 2] += c0 * t0 + c1 * t1
+
+
+@part
 def residual(plant, stage, x):
     """(M/tau)(x - x*) minus all forces but those of stuck elements, its Jacobian, and the currents at x.
 
@@ -122,7 +137,7 @@ def residual(plant, stage, x):
     stiff, d0, d1, d2 = body.mass / task.tau, x[0] - task.goal[0], x[1] - task.goal[1], x[2] - task.goal[2]
     r0, r1, r2 = stiff * d0 - task.push[0], stiff * d1 - task.push[1], stiff * d2 - task.push[2]
     j00, j11, j22, j01, j02, j12 = stiff, stiff, stiff, 0.0, 0.0, 0.0
-    if body.spin[2, 2] != 0.0:  # turning on the spot, every wheel spins
+    if body.spin[2, 2] != 0.0:  # turning on the spot, every wheel spins, and a centre that stands off moves
         often = 1.0 / task.tau
         s00, s11, s22 = often * body.spin[0, 0], often * body.spin[1, 1], often * body.spin[2, 2]
         s01, s02, s12 = often * body.spin[0, 1], often * body.spin[0, 2], often * body.spin[1, 2]
@@ -161,5 +176,7 @@ def residual(plant, stage, x):
     work.jacobian[0, 0], work.jacobian[0, 1], work.jacobian[0, 2] = j00, j01 - t2, j02 - t1
     work.jacobian[1, 0], work.jacobian[1, 1], work.jacobian[1, 2] = j01 + t2, j11, j12 + t0
     work.jacobian[2, 0], work.jacobian[2, 1], work.jacobian[2, 2] = j02, j12, j22
+    if body.off != 0.0:
+        _add_centre(body, work, x)
     if body.laws != 0.0:
         add_laws(plant, stage, x)

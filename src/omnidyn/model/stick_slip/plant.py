@@ -10,7 +10,7 @@ from omnidyn.errors import UnsupportedError
 from omnidyn.model.friction.bristle import fade_of
 from omnidyn.model.friction.stribeck import BENDS, steepest, steepest_of
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
-from omnidyn.model.mass import added_mass
+from omnidyn.model.mass import added_mass, off_centre
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
@@ -22,7 +22,9 @@ def plant(robot: Robot) -> Plant:
     own = blank_plant(robot.wheels.count)
     body, element = own
     body.mass, body.length = robot.body.mass, length
-    body.spin[:] = added_mass(robot) / np.outer([1.0, 1.0, length], [1.0, 1.0, length])
+    body.centre[:], body.off = np.array(robot.body.centre) / length, float(any(robot.body.centre))
+    body.spin[:] = (off_centre(robot) + added_mass(robot)) / np.outer([1.0, 1.0, length], [1.0, 1.0, length])
+    body.least = _least(robot.body.mass, float(np.hypot(*body.centre)))
     body.turning = robot.body.mass / length if robot.body.rotating_frame else 0.0
     body.room[:] = robot.floor.pull(robot.body.mass)
     element["g"][:N_AXES] = np.eye(N_AXES)
@@ -41,13 +43,18 @@ def plant(robot: Robot) -> Plant:
     return own
 
 
+def _least(mass: float, off: float) -> float:
+    """The least eigenvalue of mass x [[1, off], [off, 1 + off^2]]; what spins only adds to it."""
+    return mass / (1.0 + 0.5 * off**2 + off * float(np.sqrt(1.0 + 0.25 * off**2)))
+
+
 def _check_band(robot: Robot, plant: Plant) -> None:
     """Raises UnsupportedError where body axes do not gather momentum in Karnopp's band each for itself."""
     couples = np.any(plant.body.spin[np.triu_indices(N_AXES, 1)] != 0.0)
     if couples or np.any(np.asarray(robot.motor.gear_efficiency) != 1.0):
         raise UnsupportedError(
             'law = "karnopp" knows axes that rest each for itself',
-            got="unequal inertias of rotors or wheels, or gears that lose", expected="neither",
+            got="unequal inertias of rotors or wheels, a centre_m, or gears that lose", expected="neither",
             remedy='take law = "coulomb": it sticks exactly, which the band stands in for', where="friction.axes.law",
         )  # fmt: skip
 
@@ -63,7 +70,7 @@ def _bound_laws(plant: Plant) -> None:
         round_ = body.coulomb[0] == body.coulomb[1] and body.breakaway[0] == body.breakaway[1]
         rate = more * (1.0 if round_ else 2.0) + 2.0 * BENDS * bends  # an ellipse falls faster than its levels do
         steep += rate * body.fall * steepest(0.0, body.form, body.exponent)
-    body.steep = (steep + fade_of(body)) / body.mass
+    body.steep = (steep + fade_of(body)) / body.least
     body.bristles = plant.element["bristle_breakaway"].max(axis=1).sum() + body.bristle_breakaway.sum()
     body.laws = float(body.steep > 0.0 or body.stiffness > 0.0 or bool(np.any(plant.element["stiffness"] > 0.0)))
 

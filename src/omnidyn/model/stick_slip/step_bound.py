@@ -17,7 +17,7 @@ YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
 def longest_step(plant, stage, x, h):
     """h, or less, so that friction which falls with the speed leaves each stage of a step from x one solution."""
     while h * plant.body.steep > MONOTONE:
-        reach = 2.0 * h * forces_at_work(plant, stage) / plant.body.mass
+        reach = 2.0 * h * forces_at_work(plant, stage) / plant.body.least
         if h * _steep_near(plant, x, reach) <= MONOTONE:
             return h
         h *= 0.5
@@ -79,7 +79,7 @@ def growth(plant, stage, start, end, h):
 @part
 def _grown(plant, u, shape, exponent, more, gain):
     """The growth of one element: more [N] can be lost, `gain` [m/s^2] is its acceleration."""
-    left = more * fall(u, shape, exponent)[0] / plant.body.mass
+    left = more * fall(u, shape, exponent)[0] / plant.body.least
     return min(1.0 + left / max(gain, 1e-300), GROWS) if left > 1e-6 * gain else 1.0
 
 
@@ -89,11 +89,12 @@ def bristle_error(plant, one, two, first):
     body = plant.body
     worst, m, turned = 0.0, len(plant.element), max(1.0, YAW_SHARE / body.length)
     for e in range(m):
-        if plant.element[e].stiffness > 0.0:
-            worst = max(worst, math.sqrt(plant.element[e].stiffness / body.mass) * abs(two[first + e] - one[first + e]))
+        stiffness = plant.element[e].stiffness
+        if stiffness > 0.0:
+            worst = max(worst, math.sqrt(stiffness / body.least) * abs(two[first + e] - one[first + e]))
     if body.stiffness > 0.0:
         for a in range(m, m + 2):
-            worst = max(worst, math.sqrt(body.stiffness / body.mass) * abs(two[first + a] - one[first + a]))
+            worst = max(worst, math.sqrt(body.stiffness / body.least) * abs(two[first + a] - one[first + a]))
     return worst * turned
 
 
@@ -113,8 +114,8 @@ def bristle_turns(plant, a, b, first, h):
             if before * after < 0.0:
                 side = 0 if before > 0.0 else 1
                 bent = min(abs(a[first + e]) * own.stiffness / own.bristle_coulomb[side], 1.0)
-                worst = max(worst, math.sqrt(own.stiffness / body.mass) * bent * h * abs(after - before))
+                worst = max(worst, math.sqrt(own.stiffness / body.least) * bent * h * abs(after - before))
     if body.stiffness > 0.0 and a[0] * b[0] + a[1] * b[1] < 0.0:
         change = math.hypot(a[0] - b[0], a[1] - b[1])
-        worst = max(worst, math.sqrt(body.stiffness / body.mass) * h * change)
+        worst = max(worst, math.sqrt(body.stiffness / body.least) * h * change)
     return 0.25 * worst * max(1.0, YAW_SHARE / body.length)

@@ -17,10 +17,10 @@ from pydantic import Field, model_validator
 
 from omnidyn.model.friction import Friction
 from omnidyn.model.surroundings.floor import Floor
-from omnidyn.model.value import Checked, PerWheel, Value, number, per_wheel_number
+from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, place
 
 _NAME = re.compile(r"[\w-]{1,60}", re.ASCII)
-BETWEEN = 100.0  # [m]
+FARTHEST = 100.0  # [m]
 
 
 class Payload(Value):
@@ -32,7 +32,7 @@ class Payload(Value):
         Annotated[float, number(0.0, 1e6)], Field(alias="inertia_kg_m2", description="about its own vertical axis")
     ] = 0.0
     offset: Annotated[
-        Annotated[tuple[float, float], Checked(tuple[number(-BETWEEN, BETWEEN).type, number(-BETWEEN, BETWEEN).type])],
+        Annotated[tuple[float, float], place(FARTHEST)],
         Field(alias="offset_m", description="of its centre, x and y"),
     ] = (0.0, 0.0)
 

@@ -6,19 +6,19 @@ A robot like any other, with a name that says what was changed.
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError
 from omnidyn.model.fitted.correlation import KeyCorrelation, key_correlation
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.surroundings.floor import Floor
 from omnidyn.model.surroundings.variations import KINDS, Battery, Payload, Surface
 
-CENTRED = 1e-9  # [m] an offset that is none
 ON_FLOOR = ("axes", "direction")  # the parts of friction that a floor has; that at the wheels is of bearings and gears
 
 
@@ -28,11 +28,12 @@ def vary(
 ) -> Robot:  # fmt: skip
     """The robot with a load, on another floor, on a slope, with another battery: by the names of its file, or by value.
 
-    payload: adds mass and inertia. floor: friction between robot and floor. tilt: a slope, whose pull stays where it is
-    in the room. battery: what duties are shares of, and the most that a motor gets.
+    payload: adds mass and inertia, and moves the centre of mass towards its own. floor: friction between robot and
+    floor. tilt: a slope, whose pull stays where it is in the room. battery: what duties are shares of, and the most
+    that a motor gets.
     What is known of a number that is replaced goes; what is known of one that grows stays. The robot no longer knows
-    the kinds that were chosen. Raises InputError for a name that the file does not have, UnsupportedError for a load
-    whose centre does not stand over that of the wheels.
+    the kinds that were chosen. Raises InputError for a name that the file does not have, or a load under which the
+    robot would tip over.
     """
     check_order("vary(robot)", (robot, Robot))
     chosen = {"payload": payload, "floor": floor, "tilt": tilt, "battery": battery}
@@ -101,20 +102,36 @@ def _priors_of(robot: Robot, kind: str, choice: object) -> dict[str, Prior]:
 
 
 def _loaded(robot: Robot, payload: Payload, told: Mapping[str, Prior]) -> Robot:
-    if max(map(abs, payload.offset)) > CENTRED:
-        raise UnsupportedError(
-            "no law yet for a load whose centre stands beside that of the wheels",
-            got=f"offset_m = {list(payload.offset)}", expected="[0, 0]: one that stands in the middle",
-            remedy="loads that balance each other are one payload: their mass, and inertia with mass x distance^2",
-            where="payload",
-        )  # fmt: skip
-    body = robot.body.replace(mass=robot.body.mass + payload.mass, inertia=robot.body.inertia + payload.inertia)
-    priors = dict(robot.priors)
+    """Body and load as one: their common centre of mass, and their inertias about it by Steiner's theorem."""
+    body, total = robot.body, robot.body.mass + payload.mass
+    centre = (body.mass * np.array(body.centre) + payload.mass * np.array(payload.offset)) / total
+    moved, beside = (float(np.sum((each - centre) ** 2)) for each in (np.array(body.centre), np.array(payload.offset)))
+    inertia = (body.inertia + body.mass * moved) + (payload.inertia + payload.mass * beside)
+    centred = _of_centre(robot, payload.mass / total, told)
+    priors = {key: prior for key, prior in robot.priors.items() if key != "body.centre_m" or not centred} | centred
     for name in ("mass_kg", "inertia_kg_m2"):
         before, more = priors.get(f"body.{name}"), told.get(name)
         if before is not None and more is not None and before.std is not None and more.std is not None:
             priors[f"body.{name}"] = before.replace(std=float(np.hypot(before.std, more.std)))
-    return robot.replace(body=body, priors=priors)
+    try:
+        return robot.replace(body=body.replace(mass=total, inertia=inertia, centre=centre.tolist()), priors=priors)
+    except InputError as error:
+        raise error.at("payload") from None
+
+
+def _of_centre(robot: Robot, share: float, told: Mapping[str, Prior]) -> dict[str, Prior]:
+    """What is known of the common centre of mass, of which the load is a share: by key."""
+    found = {}
+    for k in range(2):
+        before, more = (
+            of.get(f"{name}[{k}]", of.get(name)) for of, name in ((robot.priors, "body.centre_m"), (told, "offset_m"))
+        )
+        known = more or before
+        if known is not None:
+            parts = [(before, 1.0 - share), (more, share)]
+            std = math.hypot(*(part * each.std for each, part in parts if each is not None and each.std is not None))
+            found[f"body.centre_m[{k}]"] = known.replace(std=std or None)
+    return found
 
 
 def _on_surface(robot: Robot, surface: Surface, told: Mapping[str, Prior]) -> Robot:

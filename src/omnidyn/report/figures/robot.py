@@ -132,4 +132,7 @@ def _dimensions(axes: Axes, robot: Robot, reach: float) -> None:
     axes.plot([left, left + radius], [bottom + 0.14 * reach] * 2, color=INK, linewidth=3, solid_capstyle="butt")
     axes.text(left, bottom + 0.17 * reach, f"r = {radius:g} m", ha="left", va="bottom")
     words = f"{robot.name}\n{robot.body.mass:g} kg, {robot.body.inertia:g} kg m²"
+    if any(robot.body.centre):
+        axes.plot(*_seen(np.array(robot.body.centre)), marker="P", markersize=11, color=INK, zorder=5)
+        words += "\n+ centre of mass"
     note(axes, -0.95 * reach, 0.95 * reach, words, ha="left", va="top", fontsize=11)

@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, maker, part
 from omnidyn.errors import InputError
-from omnidyn.model.mass import axis_masses, masses_couple, without_spin
+from omnidyn.model.mass import axis_masses, of_body_alone, spin_couples
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import StateSpace, discretise, is_decoupled, state_space
@@ -38,6 +38,8 @@ def why_not_exact(robot: Robot) -> list[str]:
         reasons.append("rotating frame ([body] rotating_frame = true)")
     if robot.wheels.traction_mu is not None:
         reasons.append("wheels that may slip ([wheels] traction_mu)")
+    if any(robot.body.centre):
+        reasons.append("a centre of mass beside that of the wheels ([body] centre_m)")
     if robot.floor.tilt:
         reasons.append("a floor that is not level ([floor] tilt_deg)")
     if any(law != type(law)() for law in robot.friction.laws[1:]):
@@ -55,9 +57,9 @@ def why_not_exact(robot: Robot) -> list[str]:
         per_wheel.append(motor.inductance or 0.0)
     if any(isinstance(value, tuple) and len(set(value)) > 1 for value in (*per_wheel, robot.wheels.wheel_radius)):
         reasons.append("unequal motors or wheel radii (a list in [motor] or [wheels])")
-    elif not is_decoupled(state_space(without_spin(robot))):
+    elif not is_decoupled(state_space(of_body_alone(robot))):
         reasons.append("a wheel layout whose axes couple (G G^T is not diagonal)")
-    elif masses_couple(robot):
+    elif spin_couples(robot):
         reasons.append("unequal inertias that couple the axes ([motor] rotor_inertia_kg_m2, [wheels] inertia_kg_m2)")
     return reasons
 

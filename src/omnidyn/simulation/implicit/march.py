@@ -118,6 +118,7 @@ def pull(plant, stage, ahead):
         cos, sin = math.cos(task.facing + ahead), math.sin(task.facing + ahead)
         task.push[0] = cos * body.room[0] + sin * body.room[1]
         task.push[1] = cos * body.room[1] - sin * body.room[0]
+        task.push[2] = body.centre[0] * task.push[1] - body.centre[1] * task.push[0]
 
 
 @part
@@ -162,7 +163,7 @@ def _unresolved(plant, stage, state, h):
     stage.task.tau = h
     for e in range(N_AXES, len(plant.element)):
         stage.each[e].aimed_current = state[current_entry(e, len(plant.element))]
-    return 2.0 * h * forces_at_work(plant, stage) / plant.body.mass * max(1.0, YAW_SHARE / plant.body.length)
+    return 2.0 * h * forces_at_work(plant, stage) / plant.body.least * max(1.0, YAW_SHARE / plant.body.length)
 
 
 @part
@@ -178,7 +179,7 @@ def _reverses(plant, a, b, h):
         own = element[e]
         i, j = a[first + e - N_AXES], b[first + e - N_AXES]
         if own.drop > 0.0 and own.inductance > 0.0 and i * j <= 0.0 and i != j:
-            push = own.thrust / own.efficiency / own.resistance / plant.body.mass
+            push = own.thrust / own.efficiency / own.resistance / plant.body.least
             off = push * max(1.0, YAW_SHARE / plant.body.length) + CURRENT_SHARE / own.inductance
             worst = max(worst, 2.0 * h * own.drop * off)
     return worst

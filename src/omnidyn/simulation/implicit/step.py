@@ -69,7 +69,7 @@ def _stage(plant, stage, start, end):
     falls = body.fall > 0.0
     level = task.hold if falls else body.coulomb
     x, y = _hold_as(stage, level[0], level[1])
-    reach = task.tau / body.mass * forces_at_work(plant, stage)
+    reach = task.tau / body.least * forces_at_work(plant, stage)
     if math.hypot(task.goal[0], task.goal[1]) <= reach:
         _stop_ellipse(stage, end)  # it could stop in this stage: a first guess, which solve takes back if wrong
     count = solve(plant, stage, end)

@@ -12,7 +12,7 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.friction.kinds import KARNOPP
-from omnidyn.model.keys import ROTOR, WHEEL, Key
+from omnidyn.model.keys import CENTRE, ROTOR, WHEEL, Key
 from omnidyn.model.layout import Plant, Stage, many, new_stage
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
@@ -139,7 +139,10 @@ def _scale(robot: Robot, key: str) -> float:
 
 
 def _size_of_none(key: Key, robot: Robot) -> float:
-    """The size beside which a number that is 0 is small: 1, but of an inertia that spins what weighs as the body."""
+    """The size beside which a number that is 0 is small: 1, but of an inertia that spins what weighs as the body; of a
+    centre of mass, where the wheels stand."""
+    if key.name == CENTRE:
+        return float(np.mean(robot.wheels.robot_radius))
     if key.name not in (ROTOR, WHEEL):
         return 1.0
     radius, gear = float(np.mean(robot.wheels.radii)), float(np.mean(robot.motor.gear_ratio))

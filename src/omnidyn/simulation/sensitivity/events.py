@@ -63,14 +63,18 @@ def _leap(plant, stage, along, start, end, h, gained, d):
     `start` and `end`: states whose signs are those of the next moment; gained: acceleration at the end. The instant
     moves by dt, so that d+ = d- + (f- - f+) dt, f the accelerations before and after. A reversal is at g . x = 0:
     dt = -(g . dx + dg . x)/(g . f-); a release is where the gap phi of what is stuck reaches 0; a stop is left to the
-    stage at the end.
+    stage at the end, but for one that lets something else go at that instant.
     """
     m, before, after = len(plant.element), along.point[2], along.point[3]
     put(stage, start)
     _acceleration(plant, stage, start, start, before)
-    _release_shift(plant, stage, along, start, end, before, after, d)
+    lets_go = _lets_go(plant, start, end)
+    if lets_go >= 0:
+        _reverse(plant.element[lets_go].g[:], along.arm[lets_go], start, before, gained, d)
+    else:
+        _release_shift(plant, stage, along, start, end, before, after, d)
     for e in range(m):
-        if start[SIGNS + e] * end[SIGNS + e] == -1.0:
+        if start[SIGNS + e] * end[SIGNS + e] == -1.0 and lets_go < 0:
             stage.each[e].sign = end[SIGNS + e]
             _acceleration(plant, stage, start, end, after)
             _reverse(plant.element[e].g[:], along.arm[e], start, before, after, d)
@@ -83,6 +87,23 @@ def _leap(plant, stage, along, start, end, h, gained, d):
         _at_instant(plant, stage, start, start, h)
         copy_table(along.aim, d)
         stage_derivatives(plant, stage, along, end, along.aim, d)
+
+
+@part
+def _lets_go(plant, start, end):
+    """The element that stops or reverses between two states while another one is released; -1 for none.
+
+    Where masses couple, what slows down holds against what rests, and lets it go as it stops.
+    """
+    spin, released, turns = plant.body.spin, False, -1
+    if spin[0, 1] == 0.0 and spin[0, 2] == 0.0 and spin[1, 2] == 0.0:
+        return -1
+    for e in range(len(plant.element)):
+        before, after = start[SIGNS + e], end[SIGNS + e]
+        released |= before == 0.0 and after != 0.0
+        if (before == 1.0 or before == -1.0) and after != before:
+            turns = e
+    return turns if released else -1
 
 
 @part
@@ -120,7 +141,7 @@ def _release_shift(plant, stage, along, start, end, before, after, d):
     for c in range(3):
         jump = max(jump, abs(before[c] - after[c]))
     force = forces_at_work(plant, stage)
-    if jump * plant.body.mass > 1e-6 * force and _weakest(plant, stage, along, start, force):
+    if jump * plant.body.least > 1e-6 * force and _weakest(plant, stage, along, start, force):
         later = _later(plant, stage, along, start, before)
         there = 0.0 < abs(later) < np.inf
         for k in range(len(d) if there else 0):

@@ -1,6 +1,6 @@
-"""What each wheel carries: the weight, by where the wheels stand under a centre of mass in the middle of them.
+"""What each wheel carries: the weight, by where the wheels stand under the centre of mass c.
 
-    sum N = M g cos(tilt),   sum N x = 0,   sum N y = 0
+    W = sum N = M g cos(tilt),   sum N x = W c_x,   sum N y = W c_y
 
 Three wheels: statics. Four or more, on equally stiff suspensions: of all loads that balance, those of the least sum of
 squares, N = a + b x + c y. A load that would have to be negative is that of a wheel in the air: it carries nothing, and
@@ -8,7 +8,7 @@ the others share the weight.
 
 A centre of mass at a height h shifts loads as the robot speeds up, by the forces F of the floor on it:
 
-    sum N x = -h F_x,   sum N y = -h F_y
+    sum N x = W c_x - h F_x,   sum N y = W c_y - h F_y
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.errors import UnsupportedError
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings.floor import GRAVITY
 from omnidyn.model.wheels import per_wheel, sin_cos_deg
@@ -39,8 +40,17 @@ class WheelLoads:
 
 
 def wheel_loads(robot: Robot) -> WheelLoads:
-    """The static loads of the wheels of a robot [N]."""
-    count = robot.wheels.count
+    """The static loads of the wheels of a robot [N].
+
+    Raises UnsupportedError for mecanum wheels under a centre of mass beside their own: no key has their places.
+    """
+    count, centre = robot.wheels.count, robot.body.centre
+    if any(centre) and np.any(np.asarray(robot.wheels.roller_angle_deg) != 0.0):
+        raise UnsupportedError(
+            "what mecanum wheels carry depends on where they stand, and no key says so", got=f"centre_m = {[*centre]}",
+            expected="[0, 0] for mecanum wheels that slip", remedy="leave [wheels] traction_mu out",
+            where="[body] centre_m",
+        )  # fmt: skip
     sin, cos = sin_cos_deg(robot.wheels.azimuth_deg)
     arm = per_wheel(robot.wheels.robot_radius, count)
     weight = robot.body.mass * GRAVITY * float(np.cos(np.radians(robot.floor.tilt)))
@@ -48,7 +58,7 @@ def wheel_loads(robot: Robot) -> WheelLoads:
     down = np.ones(count, dtype=bool)
     while True:
         loads = np.zeros(count)
-        loads[down] = np.linalg.pinv(places[:, down]) @ [weight, 0.0, 0.0]
+        loads[down] = np.linalg.pinv(places[:, down]) @ [weight, weight * centre[0], weight * centre[1]]
         lowest = int(np.argmin(loads))
         if loads[lowest] >= -ROUNDING * weight or down.sum() <= 1:
             return WheelLoads(np.maximum(loads, 0.0), tuple(np.flatnonzero(~down).tolist()))

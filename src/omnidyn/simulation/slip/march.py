@@ -75,6 +75,7 @@ def _pulled(plant, heading, pull):
     cos, sin = math.cos(heading), math.sin(heading)
     pull[0] = cos * plant.room[0] + sin * plant.room[1]
     pull[1] = cos * plant.room[1] - sin * plant.room[0]
+    pull[2] = plant.centre[0] * pull[1] - plant.centre[1] * pull[0]
 
 
 @part
@@ -111,7 +112,7 @@ def _unresolved(plant, volts, bound, hold, h):
         forces += contact
         worst = max(worst, SHARE * (motor + contact) / plant.spin[w])
     lightest = min(plant.mass[0], SHARE**-1 * plant.mass[2] / math.sqrt(plant.mass[2] / plant.mass[0]))
-    return 2.0 * h * max(worst, forces / lightest)
+    return 2.0 * h * max(worst, forces / (plant.alone * lightest))
 
 
 @part
@@ -197,7 +198,7 @@ def _march(
     n = len(plant.spin)
     state, pose, modes, hold = states[0].copy(), poses[0].copy(), np.zeros(4 + 2 * n), np.zeros(5 + n)
     spare, marks, holds = np.zeros((3, 3 + n)), np.zeros((3, 4 + 2 * n)), np.zeros((3, 5 + n))
-    pull, goal, space, counts = np.zeros(2), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64)
+    pull, goal, space, counts = np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64)
     volts, h, capped = np.zeros(n), dt[0], 0
     _marks_of(plant, state, modes)
     for k in range(len(dt)):

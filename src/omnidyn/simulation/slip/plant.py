@@ -8,6 +8,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
+from omnidyn.model.mass import off_centre
 from omnidyn.model.motor import DYNAMIC, mass_at_rim
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, sin_cos_deg
@@ -24,8 +25,10 @@ KNOWN = {
 
 
 class SlipPlant(NamedTuple):
-    """Body: mass (3,) [kg, kg, kg m^2]; turning [kg], the mass in the terms of a turning frame, or 0; viscous (3,) and
-    dry (3,) along the axes [N s/m, N]; ellipse (2,) of the direction of travel [N]; room (2,): a pull there [N].
+    """Body: mass (3,) [kg, kg, kg m^2], about the centre of the wheels; centre (2,) of mass [m]; alone: the share of it
+    that is left to a force where the centre stands off; turning [kg], the mass in the terms of a turning frame, or 0;
+    viscous (3,) and dry (3,) along the axes [N s/m, N]; ellipse (2,) of the direction of travel [N]; room (2,): a pull
+    on the centre of mass there [N].
 
     Wheels (n,): g (n, 3) their columns of the wrench matrix; spin [kg] at the rim; grip [N], what the floor takes, and
     shift (n, 2), what a force of the floor on the body adds to it [N/N], zeros (0, 2) where it adds nothing;
@@ -34,6 +37,8 @@ class SlipPlant(NamedTuple):
     """
 
     mass: FloatArray
+    centre: FloatArray
+    alone: float
     turning: float
     viscous: FloatArray
     dry: FloatArray
@@ -60,11 +65,12 @@ def slip_plant(robot: Robot) -> SlipPlant:
     n, motor, friction = robot.wheels.count, robot.motor, robot.friction
     axes, along, rim = friction.axes, friction.direction, friction.wheels
     at_rim = per_wheel(motor.gear_ratio, n) / robot.wheels.radii
-    mass = np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
+    mass = np.diag(np.diag([robot.body.mass, robot.body.mass, robot.body.inertia]) + off_centre(robot)).copy()
+    alone = 1.0 - float(np.hypot(*robot.body.centre)) * float(np.sqrt(mass[0] / mass[2]))
     viscous = np.add(axes.viscous, [along.viscous, along.viscous, along.yaw_viscous])
     slowest = float(np.max(mass / np.maximum(viscous, 1e-9 * mass)))
     return SlipPlant(
-        mass, robot.body.mass if robot.body.rotating_frame else 0.0, viscous,
+        mass, np.array(robot.body.centre), alone, robot.body.mass if robot.body.rotating_frame else 0.0, viscous,
         np.add(axes.coulomb, [0.0, 0.0, along.yaw_coulomb]), np.array(along.coulomb, dtype=float),
         robot.floor.pull(robot.body.mass), np.ascontiguousarray(robot.wheels.wrench_matrix.T),
         mass_at_rim(motor, robot.wheels), grips(robot), _shift(robot), at_rim * per_wheel(motor.torque_constant, n),

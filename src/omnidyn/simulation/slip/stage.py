@@ -4,7 +4,9 @@
 
 Each wheel, each axis and the ellipse is a block with one exact answer, given the force of all others (wheel.py). With
 loads that do not depend on the motion all of it is the minimum of a convex function, to which the blocks lead from
-anywhere. Steps are SDIRK2, as in implicit/step.py; friction holds exactly: what rests has a speed of literal 0.
+anywhere. What a centre of mass beside that of the wheels couples counts as a force, like that of the turning frame:
+from sweep to sweep it is off by c/sqrt(I/M + c^2) of what it was. Steps are SDIRK2, as in implicit/step.py; friction
+holds exactly: what rests has a speed of literal 0.
 """
 
 from __future__ import annotations
@@ -65,8 +67,24 @@ def _body_blocks(plant, heavy, total, hold, mode):
 
 
 @part
+def _frame(plant, tau, goal, v, total, frame):
+    """What a turning frame does, and a centre of mass beside that of the wheels, at the twist v: in place of before."""
+    c0, c1 = plant.centre[0], plant.centre[1]
+    off = c0 != 0.0 or c1 != 0.0
+    if plant.turning > 0.0 or off:
+        turn = plant.turning * v[2]
+        f0, f1, f2 = turn * (v[1] + v[2] * c0), -turn * (v[0] - v[2] * c1), -turn * (c0 * v[0] + c1 * v[1])
+        if off:
+            often = plant.mass[0] / tau
+            d0, d1, d2 = v[0] - goal[0], v[1] - goal[1], v[2] - goal[2]
+            f0, f1, f2 = f0 + often * c1 * d2, f1 - often * c0 * d2, f2 + often * (c1 * d0 - c0 * d1)
+        total[0], total[1], total[2] = total[0] + f0 - frame[0], total[1] + f1 - frame[1], total[2] + f2 - frame[2]
+        frame[0], frame[1], frame[2] = f0, f1, f2
+
+
+@part
 def solve_stage(plant, volts, bound, tau, goal, pull, x, hold, mode, space):
-    """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. goal: x*. pull (2,) [N] on the body.
+    """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. goal: x*. pull (3,): wrench on the body.
 
     hold (3 + 2 + n,) [N]: forces of the axes, the ellipse and the wheels, a first guess too. mode (3 + 1 + 2 n,): signs
     of the axes and of the ellipse, then of each wheel and of its contact. space (12,). Returns the number of sweeps.
@@ -74,7 +92,7 @@ def solve_stage(plant, volts, bound, tau, goal, pull, x, hold, mode, space):
     n, heavy, total, frame, offset = len(plant.spin), space[:3], space[3:6], space[6:9], space[9:12]
     for a in range(3):
         heavy[a] = plant.mass[a] / tau + plant.viscous[a]
-        offset[a] = plant.mass[a] / tau * goal[a] + (pull[a] if a < 2 else 0.0)
+        offset[a] = plant.mass[a] / tau * goal[a] + pull[a]
         total[a] = offset[a] + hold[a]
         frame[a] = 0.0
     total[0], total[1] = total[0] + hold[3], total[1] + hold[4]
@@ -84,10 +102,7 @@ def solve_stage(plant, volts, bound, tau, goal, pull, x, hold, mode, space):
     for sweep in range(SWEEPS):
         worst, size, loads = 0.0, 0.0, 0.0  # loads: forces of which what is left is the rounding
         v0, v1, v2 = total[0] / heavy[0], total[1] / heavy[1], total[2] / heavy[2]
-        if plant.turning > 0.0:
-            f0, f1 = plant.turning * v2 * v1, -plant.turning * v2 * v0
-            total[0], total[1] = total[0] + f0 - frame[0], total[1] + f1 - frame[1]
-            frame[0], frame[1] = f0, f1
+        _frame(plant, tau, goal, (v0, v1, v2), total, frame)
         for w in range(n):
             free = give = 0.0
             for a in range(3):

@@ -24,6 +24,7 @@ from tests.support.mpc_programs import Solver, random_program
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
 ROBOT = omnidyn.load_robot("axebot")
 TURNING = ROBOT.body.replace(rotating_frame=True)
+BESIDE = TURNING.replace(centre=(0.05, -0.04))
 ELLIPSE = Friction(direction=DirectionFriction(coulomb=(2.6, 1.9), viscous=0.9, yaw_coulomb=0.11, yaw_viscous=0.01))
 FOUR = ROBOT.wheels.replace(azimuth_deg=(45.0, 135.0, 225.0, 315.0))
 DUTY = Drive.model_validate({"kind": "duty", "supply_V": 7.0, "latency_s": 0.04})
@@ -31,6 +32,7 @@ LOOP = Drive.model_validate({"kind": "speed", "rate_Hz": 200.0, "kp_V_s_rad": 0.
 VARIANTS = {
     "duty, two steps late": (ROBOT.replace(drive=DUTY), {}),
     "ellipse in a turning frame": (ROBOT.replace(friction=ELLIPSE, body=TURNING), {}),
+    "a centre of mass beside the wheels": (ROBOT.replace(body=BESIDE), {}),
     "four wheels, current, slew": (
         ROBOT.replace(wheels=FOUR, friction=Friction(wheels=WheelFriction(coulomb=0.7, viscous=0.3)),
                       motor=ROBOT.motor.replace(current_limit=2.2, voltage_limit=(6.0, 5.5, 6.0, 5.0))),

@@ -92,6 +92,7 @@ def _constants(controller: Mpc) -> str:
     turning, ellipse = bool(linear[TURNING] != 0.0), bool(linear[ELLIPSE] > 0.0)
     whether = {
         "LEVELS": len(controller._numbers.levels), "ELLIPSE": ellipse, "TURNING": turning,
+        "OFF_CENTRE": any(robot.body.centre),
         "LEARN": controller.observer, "BOUNDED": _bounded(controller), "CURRENT": _current(controller),
         "SLEW": settings.slew is not None,
         "WHEEL_SPEED": controller.output == WHEEL_SPEED, "LATE_STEPS": controller.steps_late,

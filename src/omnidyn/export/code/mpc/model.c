@@ -90,7 +90,7 @@ static void friction_at(const float *twist, int how, float f[4][3])
 /* Terms of a turning frame. */
 static void frame_at(const float *twist, float n[3])
 {
-    const float across[3] = {twist[2] * twist[1], -twist[2] * twist[0], 0.0f};
+    const float across[3] = {twist[2] * twist[1], -twist[2] * twist[0], OFF_CENTRE ? twist[2] * twist[2] : 0.0f};
     int i;
     ROLLED for (i = 0; i < 3; i++) {
         n[i] = dot3(FRAME[i], across);
@@ -127,7 +127,7 @@ static void linear_stage(const omnidyn_control *c, const float *x, const float *
 #if TURNING
     {
         const float w[3] = {0.5f * (twist[0] + end[0]), 0.5f * (twist[1] + end[1]), 0.5f * (twist[2] + end[2])};
-        const float by[3][3] = {{0.0f, w[2], w[1]}, {-w[2], 0.0f, -w[0]}, {0.0f, 0.0f, 0.0f}};
+        const float by[3][3] = {{0.0f, w[2], w[1]}, {-w[2], 0.0f, -w[0]}, {0.0f, 0.0f, 2.0f * w[2]}};
         float n[3], bend[3];
         frame_at(w, n);
         ROLLED for (i = 0; i < 3; i++) { /* n - J w = -n, as n is of second order */
@@ -138,7 +138,8 @@ static void linear_stage(const omnidyn_control *c, const float *x, const float *
             both[i][6] += dot3(gain, n);
             ROLLED for (j = 0; j < 3; j++) {
                 ROLLED for (p = 0; p < 3; p++) {
-                    bend[p] = 0.5f * (FRAME[p][0] * by[0][j] + FRAME[p][1] * by[1][j]);
+                    bend[p] = 0.5f * (FRAME[p][0] * by[0][j] + FRAME[p][1] * by[1][j]
+                                      + (OFF_CENTRE ? FRAME[p][2] * by[2][j] : 0.0f));
                 }
                 both[i][j] -= dot3(gain, bend);
                 both[i][3 + j] += dot3(gain, bend);

@@ -6,9 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.keys import BREAKAWAY, EMF, FRICTION, ROTOR, TORQUE, WHEEL, Key, expand
+from omnidyn.model.keys import BREAKAWAY, CENTRE, EMF, FRICTION, ROTOR, TORQUE, WHEEL, Key, expand
 from omnidyn.model.robot import Robot
 
 FRICTION_LIMIT = 1e6  # what a robot file takes
@@ -18,6 +20,7 @@ SPAN = 1e4  # a number that must be positive stays within so many times its star
 SPAN_OF_SPEED = 30.0  # the same of a speed at which friction changes: far beyond, it changes nothing, or in no time
 LIGHT = 1e-3  # of its start, that what spins stays above: it has no place where it would be off, but slopes need a size
 
+WITHIN = 0.95  # of the distance of the wheels: as far as a centre of mass may be ahead, or aside
 LARGEST = 700.0  # e^709 is the last float
 
 
@@ -82,14 +85,17 @@ def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, o
     """A number of the robot file as a free parameter; `others` are free beside it.
 
     Friction may be 0: it has a linear scale and a bound at 0. So may what rotors and wheels weigh beside the body: on
-    a logarithmic scale 0 is infinitely far off, and a robot without rotors keeps some of the guess as mass. What must
-    be positive has a logarithmic scale.
+    a logarithmic scale 0 is infinitely far off, and a robot without rotors keeps some of the guess as mass. A centre of
+    mass may be on either side, between the wheels. What must be positive has a logarithmic scale.
     Raises InputError for an unknown key, and for a number that is not positive and has no bound at 0.
     """
     place = Key.parse(key)
     value = float(place.get(robot))
     if place.level:
         return Parameter(key, value, 0.0, FRICTION_LIMIT, prior=prior)
+    if place.name == CENTRE:
+        widest = WITHIN * max(np.atleast_1d(robot.wheels.robot_radius).tolist())
+        return Parameter(key, value, -widest, widest, prior=prior)
     if value <= 0.0:
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")
     if place.name in (ROTOR, WHEEL):

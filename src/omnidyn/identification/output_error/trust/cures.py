@@ -21,7 +21,7 @@ from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.trust.blind import Way
 from omnidyn.model.actuation import at_motors
 from omnidyn.model.dynamics import settled_currents
-from omnidyn.model.keys import EMF, ROTOR, TORQUE, WHEEL, Key, find_key, in_words
+from omnidyn.model.keys import CENTRE, EMF, ROTOR, TORQUE, WHEEL, Key, find_key, in_words
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
@@ -38,6 +38,7 @@ MEASURED = {
     "motor.resistance_ohm": "measure the resistance of a motor", TORQUE: "take the torque constant from the data sheet",
     EMF: "take the emf constant from the data sheet (in SI it is the torque constant)",
     ROTOR: "take the rotor inertia from the data sheet", WHEEL: "weigh a wheel",
+    CENTRE: "balance the robot on an edge",
     "body.inertia_kg_m2": "measure the inertia (swing the robot)", "gain": "measure the voltage at the motors",
 }  # fmt: skip
 CHANNELS = {

@@ -1,0 +1,57 @@
+"""Fits of a robot whose centre of mass stands beside that of its wheels: taken as known, and found."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.model.keys import Key
+
+AXEBOT = omnidyn.load_robot("axebot")
+TURNING = AXEBOT.replace(body=AXEBOT.body.replace(rotating_frame=True))
+BESIDE = TURNING.replace(body=TURNING.body.replace(centre=(0.03, -0.02)))
+CENTRE = ("body.centre_m[0]", "body.centre_m[1]")
+
+
+@pytest.fixture(scope="module")
+def log():
+    """Four seconds of random levels: wheel speeds with white noise."""
+    random = np.random.default_rng(3)
+    run = omnidyn.simulate(BESIDE, np.repeat(random.uniform(-6.0, 6.0, (27, 3)), 15, axis=0), 0.01)
+    assert run.wheel_speed is not None
+    noisy = run.wheel_speed + random.normal(0.0, 0.1, run.wheel_speed.shape)
+    return run.replace(wheel_speed=noisy, twist=None, pose=None, current=None)
+
+
+def check(fit, keys, robot):
+    for key in keys:
+        truth = Key.parse(key).get(robot)
+        assert abs(fit.value[key] - truth) <= 4.0 * fit.std[key], key
+
+
+def test_it_is_found_from_the_middle(log):
+    """Its own place and friction, from a robot file without it; the truth is that of the simulation."""
+    fit = omnidyn.identify([log], TURNING, free=["friction", "body.centre_m"])
+    check(fit, [*CENTRE, "friction.axes.coulomb[0]", "friction.axes.viscous[2]"], BESIDE)
+    assert max(fit.std[key] for key in CENTRE) < 2e-4
+    assert fit.robot.priors[CENTRE[0]].origin == "identified"
+
+
+def test_a_robot_that_knows_it_is_fitted_by_the_implicit_engine(log):
+    """Friction comes out as it is; without the centre it would not, by many of its errors."""
+    fit = omnidyn.identify([log], BESIDE.replace(body=BESIDE.body.replace(rotating_frame=True)))
+    check(fit, ["friction.axes.coulomb[0]", "friction.axes.coulomb[1]", "friction.axes.viscous[0]"], BESIDE)
+    assert not fit.lack_of_fit.found
+    assert set(CENTRE) <= set(fit.rests_on["friction.axes.coulomb[1]"])
+
+
+def test_a_paper_robot_whose_centre_is_free_leaves_the_exact_engine(log):
+    """Without a turning frame the exact engine serves it, as long as nothing may move its centre."""
+    run = omnidyn.simulate(AXEBOT.replace(body=BESIDE.body.replace(rotating_frame=False)), log.voltage[:-1], 0.01)
+    assert "implicit" in run.source
+    random = np.random.default_rng(0)
+    noisy = run.replace(
+        wheel_speed=run.wheel_speed + random.normal(0.0, 0.1, run.wheel_speed.shape),
+        twist=None, pose=None, current=None,
+    )  # fmt: skip
+    fit = omnidyn.identify([noisy], AXEBOT, free=["friction", "body.centre_m"])
+    check(fit, CENTRE, BESIDE)
