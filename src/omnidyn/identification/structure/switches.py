@@ -76,6 +76,12 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
         return []
 
 
+def as_it_ended(robot: Robot, question: Question, found: Solution) -> Switch:
+    """A fit as it ended, nothing switched on."""
+    way = Switch(_where_it_ended(robot, found), _as_it_settled(robot, question, found), "")
+    return _with_levels_as_they_are(way)
+
+
 def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
     """Without bristles behind a fall that explains more: they have that fall too, and their turn after it; a fit of
     bristles to a log without any takes long."""
