@@ -79,7 +79,7 @@ def steady_failure(study: SteadyStudy) -> str:
     if share <= MISSES:
         return ""
     return (
-        f"no shape of friction explains the forces: the best, {score.name}, misses {score.loo:.2g} N of "
+        f"no shape of friction explains the forces: the best, {score.name}, misses {study.choice.error:.2g} N of "
         f"{size:.2g} N in a direction that was left out"
     )
 
@@ -88,7 +88,8 @@ def _best_shape(study: SteadyStudy) -> tuple[ShapeScore, float, float]:
     """(score of the best shape, size of the forces [N], share of it that this shape misses)."""
     score, forces = study.choice.score, study.points.wrench[:, :2]
     size = float(np.sqrt(np.mean((forces**2).sum(axis=1))))
-    return score, size, score.loo / size if size > 0.0 and math.isfinite(score.loo) else math.inf
+    error = study.choice.error
+    return score, size, error / size if size > 0.0 and math.isfinite(error) else math.inf
 
 
 def steady_verdict(study: SteadyStudy) -> str:
@@ -106,9 +107,16 @@ def steady_verdict(study: SteadyStudy) -> str:
         alike = f"; but no offered shape fits: {f'it takes {best} beside it' if best else 'the errors repeat'}"
     known = _of_groups({group: each.numbers_known() for group, each in study.estimates.items()})
     return (
-        f"Friction along travel is {levels}; its shape, {score.name} ({score.words.partition(';')[0]}), predicts "
+        f"Friction along travel is {levels}; its shape, {_shapes(study)}, predicts "
         f"the force in a direction that was left out within {max(1.0, round(100.0 * share)):.0f} %{alike}; {known}."
     )
+
+
+def _shapes(study: SteadyStudy) -> str:
+    """The shape of all groups, or of each."""
+    if not study.choice.own:
+        return f"{study.choice.chosen} ({study.choice.score.words.partition(';')[0]})"
+    return all_of([f"{study.choice.of(group)} ({group})" for group in study.estimates])
 
 
 def lines_verdict(estimates: Mapping[str, Estimate]) -> str:

@@ -13,7 +13,8 @@ from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.held_out import errors, margins_of
-from omnidyn.identification.structure.ladder.models import Model, can, is_own, moves
+from omnidyn.identification.structure.ladder.models import Model, can, is_own, moves, moves_apart
+from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 
 SEED = 7001  # of no log of a benchmark, nor of their pilots
@@ -106,15 +107,17 @@ def given():
 
 
 def test_what_is_tried(given):
-    def told(worth):
-        return [(move.key, move.groups) for move in moves(worth, given)]
+    def told(made, worth):
+        return [(move.key, move.groups) for move in made(worth, given)]
 
     ellipse, mass = Remedy("friction.direction", "", 0.1, 0.0), Remedy("body.mass_kg", "", 0.1, 0.0)
-    assert told({"green": [ellipse]}) == [("friction.direction", ()), ("friction.direction", ("green",))]
-    assert told({"gray": [ellipse], "green": [mass, ellipse]}) == [
-        ("friction.direction", ()), ("friction.direction", ("gray",)), ("friction.direction", ("green",)),
-        ("body.mass_kg", ()),
-    ]  # fmt: skip
+    one, both = {"green": [ellipse]}, {"gray": [ellipse, mass], "green": [mass, ellipse]}
+    assert told(moves, one) == [("friction.direction", ()), ("friction.direction", ("green",))]
+    assert told(moves, both) == [("friction.direction", ()), ("body.mass_kg", ())]
+    assert told(moves_apart, one) == []
+    assert told(moves_apart, both) == [("friction.direction", ("gray",)), ("friction.direction", ("green",))]
+    twice = [replace(mass, at=1.0), replace(mass, at=2.0)]
+    assert [move.remedies["gray"].at for move in moves({"gray": twice}, given)] == [1.0, 2.0]
 
 
 def test_what_each_group_has_for_itself():
@@ -145,3 +148,17 @@ def test_blocks_of_groups_are_those_of_one_fit_where_all_is_each_groups_own(give
     assert together.left == pytest.approx(sum(each.left for each in parts), rel=1e-9)
     assert together.held_out == pytest.approx(sum(each.held_out for each in parts), rel=1e-9)
     assert (together.rows, together.numbers) == (sum(each.rows for each in parts), 12)
+
+
+def test_an_ellipse_gets_a_level_for_each_wheel():
+    """Three unequal wheels beside an ellipse, under the file of an ellipse."""
+    case = right_case(7101).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0)
+    world = replace(case.world, shape=ELLIPSE, each_wheel=(1.7, 1.0, 0.3))
+    run, robot = logged(replace(case, world=world), 7101), robot_of(replace(case.told, shape=ELLIPSE))
+    estimate = fit_output_error(run, robot, free=FREE, ladder=True)
+    assert estimate.ladder is not None
+    assert [rung.key for rung in estimate.ladder.taken] == ["friction.wheels.coulomb"]
+    true = truths(world, ELLIPSE) | {f"friction.wheels.coulomb[{k}]": own for k, own in enumerate(world.each_wheel)}
+    held = [low <= true[name] <= high for name, (low, high) in estimate.ci95.items()]
+    assert np.mean(held) >= 0.75
+    assert estimate.robot.friction.wheels.coulomb == pytest.approx(world.each_wheel, abs=0.15)

@@ -27,11 +27,10 @@ from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.candidates import CHANGE
 from omnidyn.identification.structure.diagnosis import Examined, examine
 from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
-from omnidyn.identification.structure.ladder.models import Model, Untried, moves, tried
+from omnidyn.identification.structure.ladder.models import Model, Untried, can, moves, moves_apart, tried
 from omnidyn.identification.structure.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
 from omnidyn.identification.structure.motion import motions
-from omnidyn.identification.structure.switches import LIMIT, simpler_first, told
-from omnidyn.model.friction import WheelFriction
+from omnidyn.identification.structure.switches import EACH_WHEEL, LIMIT, simpler_first, told
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
 from omnidyn.run import Run
@@ -62,13 +61,14 @@ def climb(
         if not lacks:
             return _ended(stands, rungs, "the residuals hold nothing but noise")
         every, found, best, after = list[Model | Untried](), list[Rung](), None, None
-        for worth in (
-            {group: offered(lack) for group, lack in lacks.items()},
-            {group: unseen(lack, stands, group) for group, lack in lacks.items()},
-        ):
-            every += [each for move in moves(worth, stands) for each in tried(move, stands, runs, names, progress)]
-            if every:
-                found, best = judged(step, stands, every, seen)
+        first = {group: offered(lack) for group, lack in lacks.items()}
+        far = {group: unseen(lack, stands, group) for group, lack in lacks.items()}
+        for asked in (moves(first, stands), moves_apart(first, stands), moves(far, stands)):
+            more = [each for move in asked for each in tried(move, stands, runs, names, progress)]
+            if not more:
+                continue
+            every += more
+            found, best = judged(step, stands, every, seen)
             after = _examined(best) if best is not None else None
             if after is not None and not _lacks(after):
                 break
@@ -110,15 +110,15 @@ def unseen(lack: LackOfFit, stands: Model, group: str) -> list[Remedy]:
     boxed, limit = any(robot.friction.axes.coulomb), robot.motor.current_limit
     shape = (DIRECTION, "an ellipse") if boxed else (BODY_AXES, "a box")
     found = [Remedy(shape[0], f"Coulomb friction of another shape, {shape[1]}", 0.0, 0.0)]
-    if robot.friction.wheels == WheelFriction():
-        found.append(Remedy(WHEELS, "friction at the wheels", 0.0, 0.0))
+    found.append(Remedy(WHEELS, "friction at the wheels", 0.0, 0.0))
+    found.append(Remedy(EACH_WHEEL, "Coulomb friction of its own at each wheel", 0.0, 0.0))
     usual = Remedy("", FALL_WORDS, 0.0, 0.0, size=(USUAL_FALL - 1.0,) * N_AXES, at=USUAL_SPEED)
     found += [replace(usual, key=f"{table}.{FALL}") for table in may_fall(robot.friction)]
     if limit is None:
         most = np.concatenate([np.abs(motion.current).max(axis=1) for motion in motions(problem, point)])
         levels = np.quantile(most[most > 0.0], LIMITS).tolist() if most.any() else []
         found += [Remedy(LIMIT, f"a current limit, from {at:.2g} A", 0.0, 0.0, at=at) for at in levels]
-    return [remedy for remedy in found if remedy.key not in first]
+    return [remedy for remedy in found if remedy.key not in first and can(remedy.key, robot)]
 
 
 def judged(

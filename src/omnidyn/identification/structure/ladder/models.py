@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import zip_longest
 
+import numpy as np
+
 from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Remedy
@@ -23,7 +25,7 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.laws import FALL, may_fall
-from omnidyn.identification.structure.switches import FALLS, Switch, as_it_ended, switches
+from omnidyn.identification.structure.switches import EACH_WHEEL, FALLS, Switch, as_it_ended, switches
 from omnidyn.model.friction import WheelFriction
 from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, find_key
 from omnidyn.model.robot import Robot
@@ -113,19 +115,33 @@ class Untried:
 
 
 def moves(worth: Mapping[str, Sequence[Remedy]], stands: Model) -> list[Move]:
-    """What is to be tried of the remedies of each group, best first."""
+    """What is to be tried of the remedies of each group, best first: in all groups, and where it is their own, in those
+    that ask for it."""
+    found = []
+    for key, own in _of_groups(worth):
+        every = [group for group in stands.begins if can(key, stands.robot(group))] or [*own]
+        some = next(iter(own.values()))
+        parts = [{group: own.get(group, some) for group in every}]
+        if is_own(key, stands.fit.question) and own.keys() != parts[0].keys():
+            parts.append(own)
+        found += [Move(part, len(part) == len(stands.begins)) for part in parts]
+    return found
+
+
+def moves_apart(worth: Mapping[str, Sequence[Remedy]], stands: Model) -> list[Move]:
+    """The same in each group alone, where several ask for it."""
+    return [
+        Move({group: remedy}, all=False)
+        for key, own in _of_groups(worth) if len(own) > 1 and is_own(key, stands.fit.question)
+        for group, remedy in own.items()
+    ]  # fmt: skip
+
+
+def _of_groups(worth: Mapping[str, Sequence[Remedy]]) -> list[tuple[str, dict[str, Remedy]]]:
+    """(key, group -> the remedy) of all remedies, in the order of the groups' own."""
     named = {group: _numbered(own) for group, own in worth.items()}
-    found: dict[tuple[object, ...], Move] = {}
-    for name in dict.fromkeys(name for row in zip_longest(*named.values()) for name in row if name):
-        own = {group: each[name] for group, each in named.items() if name in each}
-        some, key = next(iter(own.values())), name[0]
-        every = {group: own.get(group, some) for group in stands.begins if can(key, stands.robot(group))} or own
-        parts = [every]
-        if len(stands.begins) > 1 and is_own(key, stands.fit.question):
-            parts += [own, *({group: each} for group, each in own.items())]
-        for part in parts:
-            found.setdefault((name, *part), Move(part, len(part) == len(stands.begins)))
-    return list(found.values())
+    names = dict.fromkeys(name for row in zip_longest(*named.values()) for name in row if name)
+    return [(name[0], {group: each[name] for group, each in named.items() if name in each}) for name in names]
 
 
 def _numbered(remedies: Sequence[Remedy]) -> dict[tuple[str, int], Remedy]:
@@ -151,6 +167,9 @@ def can(key: str, robot: Robot) -> bool:
         return any(friction.direction.coulomb)
     if key == WHEELS:
         return friction.wheels == WheelFriction()
+    if key == EACH_WHEEL:  # beside a box that acts where wheels do, too, only once they have a level for all
+        one = bool(friction.wheels.coulomb) and not np.ndim(friction.wheels.coulomb)
+        return one or (friction.wheels == WheelFriction() and any(friction.direction.coulomb))
     return key not in FALLS or key in {f"{table}.{FALL}" for table in may_fall(friction)}
 
 
