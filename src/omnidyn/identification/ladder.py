@@ -114,4 +114,6 @@ def _spread(rungs: Sequence[Rung]) -> str:
         return ""
     values = {name: [rung.value[name] for rung in rungs] for name in kept}
     name = max(kept, key=lambda each: (max(values[each]) - min(values[each])) / (abs(values[each][0]) or 1.0))
-    return f"{in_words(name)} from {min(values[name]):.3g} to {max(values[name]):.3g} {unit(name)}"
+    key, _, group = name.partition("@")  # of one group, where it is its own
+    where = f" in {group}" if group else ""
+    return f"{in_words(key)}{where} from {min(values[name]):.3g} to {max(values[name]):.3g} {unit(key)}"

@@ -44,16 +44,17 @@ def fits_verdict(
         logs = sum(each.fatal for each in verdicts)
         of = "the log has" if len(verdicts) == 1 else f"{logs} of {len(verdicts)} logs have"
         words.append(sentence(f"{of} a fatal fault, to be mended first: {faults[0].message}"))
+    words += [sentence(fit.ladder.words()) for fit in [*fits.values()][:1] if fit.ladder]  # all have the same
     told = {group: _led_by_misfit(fit, fit_verdict(fit, validations.get(group))) for group, fit in fits.items()}
     return " ".join([*words, *(each if len(told) == 1 else f"{group}: {each}" for group, each in told.items())])
 
 
 def _led_by_misfit(fit: OutputErrorEstimate, words: str) -> str:
-    """The verdict of a fit, led by the steps of its ladder and by what it leaves out."""
+    """The verdict of a fit, led by what it leaves out."""
     lack = fit.lack_of_fit
     if lack is not None and lack.found and not fit.not_followed:
-        words = f"{sentence(lack.words())} {words}"
-    return f"{sentence(fit.ladder.words())} {words}" if fit.ladder is not None else words
+        return f"{sentence(lack.words())} {words}"
+    return words
 
 
 def fit_failure(fit: OutputErrorEstimate, validation: Validation | None = None) -> str:

@@ -1,5 +1,6 @@
 """The ladder on logs of several groups, of the simulator of wrong_worlds, which shares no code with what fits them."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +15,10 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.held_out import errors, margins_of
 from omnidyn.identification.structure.ladder.models import Model, can, is_own, moves, moves_apart
+from omnidyn.identification.structure.switches import told
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
+from omnidyn.report.fit_page import render_fit
 
 SEED = 7001  # of no log of a benchmark, nor of their pilots
 FREE, PER = ("friction",), ("gray=gray/*", "green=green/*")
@@ -73,6 +76,25 @@ def test_the_robot_of_each_group_has_its_shape_and_what_is_shared_stays_so(mixed
     assert found.differences == ()  # no number is in both
 
 
+def test_the_answer_has_the_ladder_once(mixed):
+    found, _ = mixed
+    text, page = found.document().to_text(), render_fit(found, {"omnidyn": "0", "command": "", "inputs": []})
+    assert found.verdict.startswith(
+        "The ladder took Coulomb friction along the direction of travel, an ellipse in green"
+    )
+    assert (found.verdict.count("The ladder"), text.count("held-out error  ")) == (1, 1)
+    assert page.count("What was switched on, step by step") in (1, 2)  # its heading, and the table of contents
+    rungs = json.loads(json.dumps(found.document().data, allow_nan=False))["groups"]["gray"]["ladder"]["rungs"]
+    assert ["green"] in [rung["groups"] for rung in rungs if rung["taken"]]
+
+
+def test_a_number_of_one_group_is_told_with_its_group():
+    assert (
+        told("w", {}, {"body.mass_kg@gray": 2.0, "body.mass_kg@green": 3.0})
+        == "mass 2 kg in gray and mass 3 kg in green"
+    )
+
+
 def test_a_shape_that_all_have_is_one():
     runs, robot, _ = floors(ELLIPSE, ELLIPSE)
     found = Identification.of(runs, robot, free=FREE, ladder=True, per=PER)
@@ -107,15 +129,15 @@ def given():
 
 
 def test_what_is_tried(given):
-    def told(made, worth):
+    def asked(made, worth):
         return [(move.key, move.groups) for move in made(worth, given)]
 
     ellipse, mass = Remedy("friction.direction", "", 0.1, 0.0), Remedy("body.mass_kg", "", 0.1, 0.0)
     one, both = {"green": [ellipse]}, {"gray": [ellipse, mass], "green": [mass, ellipse]}
-    assert told(moves, one) == [("friction.direction", ()), ("friction.direction", ("green",))]
-    assert told(moves, both) == [("friction.direction", ()), ("body.mass_kg", ())]
-    assert told(moves_apart, one) == []
-    assert told(moves_apart, both) == [("friction.direction", ("gray",)), ("friction.direction", ("green",))]
+    assert asked(moves, one) == [("friction.direction", ()), ("friction.direction", ("green",))]
+    assert asked(moves, both) == [("friction.direction", ()), ("body.mass_kg", ())]
+    assert asked(moves_apart, one) == []
+    assert asked(moves_apart, both) == [("friction.direction", ("gray",)), ("friction.direction", ("green",))]
     twice = [replace(mass, at=1.0), replace(mass, at=2.0)]
     assert [move.remedies["gray"].at for move in moves({"gray": twice}, given)] == [1.0, 2.0]
 

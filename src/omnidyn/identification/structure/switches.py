@@ -20,7 +20,7 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
-from omnidyn.identification.output_error.problem.parameters import EFFICIENCY
+from omnidyn.identification.output_error.problem.parameters import AT, EFFICIENCY
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
@@ -96,7 +96,11 @@ def told(words: str, before: Mapping[str, float], after: Mapping[str, float]) ->
     new = [name for name in after if name not in before and not name.startswith(FRICTION)]
     if not new or len(new) > N_AXES or any(name.partition(".")[0] in (TILT, PUSH) for name in new):
         return words
-    return all_of([f"{in_words(name)} {after[name]:.3g} {unit(name)}".rstrip() for name in new])
+    keys = {name: name.partition(AT) for name in new}  # of one group, where it is its own
+    return all_of([
+        f"{in_words(key)} {after[name]:.3g} {unit(key)}".rstrip() + (f" in {group}" if group else "")
+        for name, (key, _, group) in keys.items()
+    ])  # fmt: skip
 
 
 def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
