@@ -38,6 +38,7 @@ NAMES = {
     "first_minutes": "CSV to report of a robot of `init`, whole commands: nothing compiled, and compiled (3 minutes)",
     "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
     "mpc": "the predictive controller: a step beside others' in the same run, cold starts, tracking, C (8 minutes)",
+    "group_shapes": "a shape of friction per group, a level of each wheel: taken where it is so only (half an hour)",
     "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",

@@ -15,7 +15,7 @@ FIGURES = "identify-figures.md"  # takes every `identify_...`, also one that it 
 PAGES = {  # and so do these take theirs
     **dict.fromkeys(("groups", "real_fit"), FIGURES),
     **dict.fromkeys(("first_minutes", "ten_robots", "outputs", "coloured", "forces", "wrong_worlds", "ladder",
-                     "blind", "laws_identified", "laws_ladder"), "trust-figures.md"),
+                     "blind", "group_shapes", "laws_identified", "laws_ladder"), "trust-figures.md"),
 }  # fmt: skip
 VERSIONS = ("numpy", "scipy", "numba", "mujoco", "lmfit")
 

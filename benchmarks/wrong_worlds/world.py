@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.wrong_worlds.kernel import HEAT, Physics, march
+from benchmarks.wrong_worlds.sums import STEP as SHORT
+from benchmarks.wrong_worlds.sums import Sum, march_sum
 
 BOX, ELLIPSE, WHEELS = "axes", "direction", "wheels"  # tables of a robot file
 STEP = 2e-3  # [s]; of what turns with the wheels a quarter
@@ -19,7 +21,8 @@ class World:
 
     Below `rim` everything is neutral. after_*: factors from `change` [s] on. load [A]: at which windings have grown by
     `heating`. pull: constant force in the world [N]. cogging [N] at the rim, `teeth` a turn. gap: play of a gear,
-    either way [m at the rim]. traction: most force of a wheel [N].
+    either way [m at the rim]. traction: most force of a wheel [N]. each_wheel: Coulomb friction at the rims [N] beside
+    what the shape says; with it, of all that may be wrong only what stands above `rotor_inertia`.
     """
 
     azimuth: tuple[float, ...] = (60.0, 180.0, 300.0)
@@ -65,6 +68,7 @@ class World:
     after_mass: float = 1.0
     after_friction: float = 1.0
     after_gain: float = 1.0
+    each_wheel: tuple[float, ...] = ()
 
     @property
     def G(self) -> np.ndarray:
@@ -94,6 +98,17 @@ class World:
             self.voltage_limit, self.drop, self.dead, self.limit, self.efficiency, self.heating, self.load,
             np.full(n, self.eccentric), self.bumps, np.array(self.wheel_radius), self.cogging, self.ripple, self.teeth,
             self.traction, self.gap, self.change, duration,
+        )  # fmt: skip
+
+    def sum(self) -> Sum:
+        """The numbers that march_sum reads."""
+        d, level, viscous = self._elements()
+        round_ = self.shape == ELLIPSE
+        damping = (d.T * viscous) @ d + np.diag([1.0, 1.0, 0.0]) * (self.viscous[0] if round_ else 0.0)
+        return Sum(
+            self.G, self._inertia(self.mass), self.mass * self.frame, self.ke, np.array(self.resistance),
+            np.ascontiguousarray(np.vstack([d, self.G.T])), np.concatenate([level, self.each_wheel]), damping,
+            np.array(self.coulomb[:2]) if round_ else np.zeros(2),
         )  # fmt: skip
 
     def _elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -126,5 +141,9 @@ def drive(world: World, since: np.ndarray, voltage: np.ndarray, wanted: np.ndarr
     n = voltage.shape[1]
     states, seen = np.zeros((len(wanted), HEAT + n)), np.zeros((len(wanted), n))
     asked = np.ascontiguousarray(np.clip(voltage, -world.voltage_limit, world.voltage_limit))
+    if world.each_wheel:
+        states = np.zeros((len(wanted), 6))
+        march_sum(world.sum(), since, asked, wanted, min(step, SHORT), states)
+        return Motion(states[:, :3], states[:, 3:], states[:, :3] @ world.G / np.array(world.wheel_radius))
     march(world.physics(float(wanted[-1])), since, asked, wanted, step, states, seen)
     return Motion(states[:, :3], states[:, 3:6], seen / np.array(world.wheel_radius))

@@ -116,8 +116,9 @@ def study(loo, ties=(), std=0.02) -> Any:
     """A disc of 10 N, which misses `loo` N in a direction that was left out."""
     one = SimpleNamespace(name="disc", words="equal in all directions", loo=loo, told_apart=not ties)
     scores = [one, *(SimpleNamespace(name=name, told_apart=False) for name in ties)]
+    choice = SimpleNamespace(score=one, scores=scores, chosen="disc", own={}, error=loo)
     return SimpleNamespace(
-        choice=SimpleNamespace(score=one, scores=scores), travel={"all": SimpleNamespace(mean=10.0)},
+        choice=choice, travel={"all": SimpleNamespace(mean=10.0)},
         points=SimpleNamespace(wrench=np.array([[10.0, 0.0, 0.0], [0.0, -10.0, 0.0]])),
         estimates={"all": estimate([std] * 6, Estimate)}, lack_of_fit={},
     )  # fmt: skip

@@ -26,13 +26,13 @@ def fit_document(
 ) -> Document:  # fmt: skip
     """The fit of each group beside its logs, the differences between groups, and what to do next."""
     blocks: list[Sequence[Part]] = []
-    groups = {}
+    groups, last = {}, [*fits][-1:]  # all have the same ladder
     for group, fit in fits.items():
         beside = [validations[group].document()] if group in validations else []
         told = [fit.document(), *beside]
         found = fit.diagnosis
         blocks += [[f"group {group}"] if len(fits) > 1 else [], *(each.parts for each in told)]
-        blocks += [fit.ladder.parts()] if fit.ladder else []
+        blocks += [fit.ladder.parts()] if fit.ladder and group in last else []
         blocks += _found(found) if found and not fit.not_followed else []
         groups[group] = {
             **fit.to_dict(), "validation": beside[0].data if beside else None,

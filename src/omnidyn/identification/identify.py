@@ -324,7 +324,7 @@ def _answered(
     progress = Progress(better, lambda words: heard.now(f"fitting: {words}"))
     fit = Fit.of(runs, robot, asked, groups, progress)
     try:
-        return solved(fit, runs, progress), ""
+        return solved(fit, runs, progress, groups), ""
     except KeyboardInterrupt:
         if not heard.keep_best or progress.best is None:
             raise

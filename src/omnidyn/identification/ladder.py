@@ -24,7 +24,7 @@ class Rung:
     its standard error. bic: less that of the step before, for the number of causes that were tried. taken: whether
     the ladder went on from here; why: or why not, in words. same_as: keys that as good a model has in its place.
     instead: whether it is without what the step before had switched on. value: number of the robot, or of the log ->
-    fitted.
+    fitted. groups: in which it was switched on, where there are several and not in all.
     """
 
     step: int
@@ -40,6 +40,7 @@ class Rung:
     same_as: tuple[str, ...] = ()
     instead: bool = False
     value: Mapping[str, float] = field(default_factory=dict)
+    groups: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -113,4 +114,6 @@ def _spread(rungs: Sequence[Rung]) -> str:
         return ""
     values = {name: [rung.value[name] for rung in rungs] for name in kept}
     name = max(kept, key=lambda each: (max(values[each]) - min(values[each])) / (abs(values[each][0]) or 1.0))
-    return f"{in_words(name)} from {min(values[name]):.3g} to {max(values[name]):.3g} {unit(name)}"
+    key, _, group = name.partition("@")  # of one group, where it is its own
+    where = f" in {group}" if group else ""
+    return f"{in_words(key)}{where} from {min(values[name]):.3g} to {max(values[name]):.3g} {unit(key)}"

@@ -44,16 +44,17 @@ def fits_verdict(
         logs = sum(each.fatal for each in verdicts)
         of = "the log has" if len(verdicts) == 1 else f"{logs} of {len(verdicts)} logs have"
         words.append(sentence(f"{of} a fatal fault, to be mended first: {faults[0].message}"))
+    words += [sentence(fit.ladder.words()) for fit in [*fits.values()][:1] if fit.ladder]  # all have the same
     told = {group: _led_by_misfit(fit, fit_verdict(fit, validations.get(group))) for group, fit in fits.items()}
     return " ".join([*words, *(each if len(told) == 1 else f"{group}: {each}" for group, each in told.items())])
 
 
 def _led_by_misfit(fit: OutputErrorEstimate, words: str) -> str:
-    """The verdict of a fit, led by the steps of its ladder and by what it leaves out."""
+    """The verdict of a fit, led by what it leaves out."""
     lack = fit.lack_of_fit
     if lack is not None and lack.found and not fit.not_followed:
-        words = f"{sentence(lack.words())} {words}"
-    return f"{sentence(fit.ladder.words())} {words}" if fit.ladder is not None else words
+        return f"{sentence(lack.words())} {words}"
+    return words
 
 
 def fit_failure(fit: OutputErrorEstimate, validation: Validation | None = None) -> str:
@@ -79,7 +80,7 @@ def steady_failure(study: SteadyStudy) -> str:
     if share <= MISSES:
         return ""
     return (
-        f"no shape of friction explains the forces: the best, {score.name}, misses {score.loo:.2g} N of "
+        f"no shape of friction explains the forces: the best, {score.name}, misses {study.choice.error:.2g} N of "
         f"{size:.2g} N in a direction that was left out"
     )
 
@@ -88,7 +89,8 @@ def _best_shape(study: SteadyStudy) -> tuple[ShapeScore, float, float]:
     """(score of the best shape, size of the forces [N], share of it that this shape misses)."""
     score, forces = study.choice.score, study.points.wrench[:, :2]
     size = float(np.sqrt(np.mean((forces**2).sum(axis=1))))
-    return score, size, score.loo / size if size > 0.0 and math.isfinite(score.loo) else math.inf
+    error = study.choice.error
+    return score, size, error / size if size > 0.0 and math.isfinite(error) else math.inf
 
 
 def steady_verdict(study: SteadyStudy) -> str:
@@ -106,9 +108,16 @@ def steady_verdict(study: SteadyStudy) -> str:
         alike = f"; but no offered shape fits: {f'it takes {best} beside it' if best else 'the errors repeat'}"
     known = _of_groups({group: each.numbers_known() for group, each in study.estimates.items()})
     return (
-        f"Friction along travel is {levels}; its shape, {score.name} ({score.words.partition(';')[0]}), predicts "
+        f"Friction along travel is {levels}; its shape, {_shapes(study)}, predicts "
         f"the force in a direction that was left out within {max(1.0, round(100.0 * share)):.0f} %{alike}; {known}."
     )
+
+
+def _shapes(study: SteadyStudy) -> str:
+    """The shape of all groups, or of each."""
+    if not study.choice.own:
+        return f"{study.choice.chosen} ({study.choice.score.words.partition(';')[0]})"
+    return all_of([f"{study.choice.of(group)} ({group})" for group in study.estimates])
 
 
 def lines_verdict(estimates: Mapping[str, Estimate]) -> str:

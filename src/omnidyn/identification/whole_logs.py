@@ -8,7 +8,7 @@ from functools import cache
 from typing import Unpack
 
 from omnidyn.arguments import check_order
-from omnidyn.errors import InsufficientDataError, UnsupportedError
+from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
@@ -56,24 +56,18 @@ def identify_groups(
     runs = as_list(runs)
     progress = Progress.of(watch)
     fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
-    return solved(fit, runs, progress)
+    return solved(fit, runs, progress, groups)
 
 
-def solved(fit: Fit, runs: Sequence[Run], progress: Progress) -> Answer:
-    """The answer of a fit of some runs, with the ladder where that is asked for."""
+def solved(fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[str] | None = None) -> Answer:
+    """The answer of a fit of some runs, with the ladder where that is asked for. groups: name of each run's group."""
     if not fit.question.ladder:
         return answered(fit, fit.solve(progress), progress)
-    if len(fit.groups) > 1:
-        raise UnsupportedError(
-            "the ladder has one group only", got=f"{len(fit.groups)} groups", expected="logs of one robot as it is",
-            remedy="climb it with the logs of one group, and fit the groups with the robot that it writes",
-            where="ladder",
-        )  # fmt: skip
     for group in fit.groups:
         refuse_slip(group.robot.wheels, "the ladder knows")
     from omnidyn.identification.structure.ladder.climb import climb  # here, for it takes time to load
 
-    best, solution, ladder = climb(fit, fit.solve(progress), runs, progress)
+    best, solution, ladder = climb(fit, fit.solve(progress), runs, progress, groups)
     answer = answered(best, solution, progress)
     estimates = {
         name: replace(own, ladder=ladder, warnings=(*own.warnings, *ladder.warnings()))

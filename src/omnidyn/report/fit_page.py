@@ -60,7 +60,7 @@ def _page(
     checked = content(verdict_table(found.verdicts)) if found.verdicts else unchecked
     warnings, advice = list(dict.fromkeys(_warnings(fits, validations))), list(dict.fromkeys(found.advice))
     residuals = "".join(_residuals(g, fits[g], v) for g, v in validations.items())
-    climbed = _each({group: fit for group, fit in fits.items() if fit.ladder}, _ladder)
+    climbed = _ladder(next(iter(fits.values())))  # all groups have the same
     numbers = _each(fits, lambda group, fit: content(*filter(None, (number_table(fit), fit.alone_table()))))
     sections = [
         section("warnings", "Warnings", Points(warnings), none="None."),
@@ -131,7 +131,7 @@ def _misfit(group: str, fit: OutputErrorEstimate) -> str:
     return content(Points(lack.statements()), *drawn, *([lack.table()] if lack.found and lack.remedies else []))
 
 
-def _ladder(_group: str, fit: OutputErrorEstimate) -> str:
+def _ladder(fit: OutputErrorEstimate) -> str:
     """Every model that the ladder fitted, and what it came to."""
     if fit.ladder is None:
         return ""

@@ -8,7 +8,6 @@ import pytest
 
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
-from omnidyn.errors import UnsupportedError
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import Ladder, Rung
@@ -185,13 +184,6 @@ def test_remedies_that_are_worth_a_fit():
     assert [each.key for each in offered(Lack)] == [
         "gain", "body.mass_kg", "body.inertia_kg_m2", "motor.resistance_ohm"
     ]  # fmt: skip
-
-
-def test_groups_have_no_ladder():
-    run, robot, _ = world("mass", 0.0)
-    runs = [run.replace(source="a/1.csv"), run.replace(t=run.t + 1.0, source="b/1.csv")]
-    with pytest.raises(UnsupportedError, match="one group only"):
-        Identification.of(runs, robot, free=FREE, ladder=True, per=("a=a/*", "b=b/*"))
 
 
 def test_the_page_and_the_values_for_machines_have_every_model_that_was_fitted():

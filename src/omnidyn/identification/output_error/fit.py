@@ -8,12 +8,12 @@ correlation that the shared numbers bring about.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.findings.needs import is_exact, why_no_inputs
+from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.answer import Answer
+from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
 from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
 from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
@@ -23,25 +23,18 @@ from omnidyn.identification.output_error.prepare import (
     IMPLICIT,
     LOOP,
     Group,
-    expand_keys,
-    free_by_default,
-    guesses,
     make_engine,
-    make_group,
-    read_records,
-    stays_exact,
 )
-from omnidyn.identification.output_error.problem.band import band_words, with_band, without_band
-from omnidyn.identification.output_error.problem.bending import with_damping
+from omnidyn.identification.output_error.problem.band import band_words, with_band
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, implausible
-from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated, refuse_unknown
+from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
 from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, Progress
 from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver
-from omnidyn.identification.output_error.trust.breakaway import KEY, Breakaway, asked_axes, find_breakaway
+from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
@@ -55,7 +48,6 @@ from omnidyn.run import Run, as_list
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
-WHOLE = "all"  # the name of the group where there are none
 INTERRUPTED = "the fit was interrupted: the numbers are the best so far, their intervals are those of that point"
 
 
@@ -76,44 +68,36 @@ class Fit:
     @classmethod
     def of(
         cls, runs: Run | Sequence[Run], robot: Robot, question: Question, groups: Sequence[str] | None = None,
-        progress: Progress | None = None,
+        progress: Progress | None = None, begins: Mapping[str, tuple[Robot, Question]] | None = None,
     ) -> Fit:  # fmt: skip
-        """Make runs of any length and rate, split at gaps, a problem. groups: name of each run's group.
+        """Make runs of any length and rate, split at gaps, a problem. groups: name of each run's group. begins: group
+        -> the robot that it begins from and what is asked of it, where that is not the same in all; then every key of
+        `question` is written out, and one of per_free that no group has is left out.
 
         Raises InputError for options and logs that cannot be used, InsufficientDataError where nothing can be learnt,
         UnsupportedError for what an engine does not know. Of the nuisances, robots that need the implicit engine have
         latencies by default, and the others where they are asked for.
         """
-        every = as_list(runs)
-        names = _group_names(every, question, groups)
+        every, joint = as_list(runs), groups is not None
+        names = group_names(every, question, groups)
         kept, twice = count_once(every, names)
         every, names = [every[k] for k in kept], [names[k] for k in kept]
-        rigid = without_band(robot, ())
-        exact = is_exact(rigid)
-        usual = free_by_default(rigid, exact)
         refuse_repeated(question.free or ())
-        question = _written_out(question, robot, usual)
-        began, robot = robot, with_damping(without_band(robot, question.free or ()), question.free or ())
-        if groups is not None:
-            _refuse_joint(every, robot, question)
-        found = {
-            name: read_records([run for run, own in zip(every, names, strict=True) if own == name], robot, question)
-            for name in (dict.fromkeys(names) or [WHOLE])
-        }
         if question.bootstrap:
-            refuse_bootstrap(question.bootstrap, Counter(names if groups is not None else [""] * len(names)))
-        refuse_unknown(question.fixed, robot)
-        asked_axes(robot, question.free or (), question.fixed)
+            refuse_bootstrap(question.bootstrap, Counter(names if joint else [""] * len(names)))
+        starts = {name: (begins or {}).get(name, (robot, question)) for name in (dict.fromkeys(names) or [WHOLE])}
         (progress or Progress()).doing("looking for what moved")
-        keys = question.free if question.free is not None else guesses(robot)
-        exact = exact and stays_exact(robot, [key for key in keys if key not in question.fixed])
         made = [
-            make_group(name, records, robot, question, exact, usual, alone=groups is None)
-            for name, records in found.items()
+            begun(name, [run for run, own in zip(every, names, strict=True) if own == name], *start, joint)
+            for name, start in starts.items()
         ]
-        if groups is not None:
-            own_names(question.per_free, [group.problem() for group in made])
-        return cls(question, tuple(made), began, twice)
+        problems = [group.problem() for group, _ in made] if joint else []
+        there = {name for problem in problems for name in problem.names}
+        own = tuple(name for name in question.per_free if name in there)
+        question = replace(question, per_free=own) if begins else made[0][1]
+        if joint:
+            own_names(question.per_free, problems)
+        return cls(question, tuple(group for group, _ in made), robot, twice)
 
     @property
     def nu(self) -> float:
@@ -346,42 +330,6 @@ def degrees(loss: str) -> float:
 def loss_words(loss: str) -> str:
     """A loss as an answer names it."""
     return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
-
-
-def _group_names(runs: Sequence[Run], question: Question, groups: Sequence[str] | None) -> list[str]:
-    """The group of each run."""
-    if groups is None:
-        if question.per_free:
-            raise InputError("there are no groups", got=question.per_free[0], expected="with `per`", where="per_free")
-        return [WHOLE] * len(runs)
-    if len(groups) != len(runs) or len(set(groups)) < 2:
-        got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
-        raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
-    return list(groups)
-
-
-def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Question:
-    """The question with every key written out."""
-
-    def every(keys: Iterable[str]) -> tuple[str, ...]:
-        return expand_keys(tuple(keys), robot, usual)
-
-    free = question.free
-    return replace(
-        question, free=None if free is None else every(free), fixed=every(question.fixed),
-        per_free=every(question.per_free), profile=every(question.profile),
-    )  # fmt: skip
-
-
-def _refuse_joint(runs: Sequence[Run], robot: Robot, question: Question) -> None:
-    if asked_axes(robot, question.free or ()):
-        raise UnsupportedError(
-            "breakaway is not profiled in groups", got=KEY, expected="other keys", remedy="fit each group alone",
-            where="free",
-        )  # fmt: skip
-    why = why_no_inputs(runs, robot)
-    if why:
-        raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
 
 
 def _in_each_group(names: Iterable[str], problem: Problem) -> list[str]:

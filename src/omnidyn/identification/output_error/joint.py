@@ -87,13 +87,17 @@ class JointEngine:
         """Where the columns of a group stand among all."""
         return np.array([self._columns[column] for column in member.problem.columns])
 
+    def alone(self, member: Member, solution: Solution) -> Solution:
+        """What a solution of all groups is for one of them."""
+        at, now = member.at, solution.state
+        variance = now.variance[self.columns_of(member)]
+        state = State(member.point(now.point), [now.sums[k] for k in member.places], now.objective, variance)
+        solver = Solver(member.problem, member.engine, solution.solver.nu, counted=solution.solver.counted)
+        return Solution(state, solution.held[at], solution.iterations, solution.converged, solver)
+
     def seen_alone(self, member: Member, solution: Solution, known: Trust) -> tuple[Solution, Trust]:
         """What a solution of all groups and the trust in it are for one of them."""
-        at, columns, now = member.at, self.columns_of(member), solution.state
-        state = State(
-            member.point(now.point), [now.sums[k] for k in member.places], now.objective, now.variance[columns]
-        )
-        solver = Solver(member.problem, member.engine, solution.solver.nu, counted=solution.solver.counted)
+        at, columns = member.at, self.columns_of(member)
         own = replace(
             known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
             unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],
@@ -101,7 +105,7 @@ class JointEngine:
             directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
             ways=tuple(replace(way, step=way.step[at], size=way.size[at]) for way in known.ways if way.step[at].any()),
         )  # fmt: skip
-        return Solution(state, solution.held[at], solution.iterations, solution.converged, solver), own
+        return self.alone(member, solution), own
 
     def named_alone(self, member: Member, found: Mapping[str, T]) -> dict[str, T]:
         """What was found by the names of all groups, by the names of one of them."""

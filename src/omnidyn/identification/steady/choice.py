@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -68,15 +68,32 @@ class ShapeScore:
 
 @dataclass(frozen=True, eq=False)
 class ShapeChoice:
-    """The scores, best first by what decides; the name of the chosen shape.
+    """The scores, best first by what decides, of all groups together; the name of the shape that they share.
 
-    fits: shape -> group -> fit; missing: shape -> why not.
+    fits: shape -> group -> fit; missing: shape -> why not. own: group -> the shape that it has for itself, where its
+    points tell that from the shared one; scored: group -> the scores in these.
     """
 
     scores: tuple[ShapeScore, ...]
     chosen: str
     fits: Mapping[str, Mapping[str, ShapeFit]]
     missing: Mapping[str, str]
+    own: Mapping[str, str] = field(default_factory=dict)
+    scored: Mapping[str, tuple[ShapeScore, ...]] = field(default_factory=dict)
+
+    def of(self, group: str) -> str:
+        """The shape of a group."""
+        return self.own.get(group, self.chosen)
+
+    def fit(self, group: str) -> ShapeFit:
+        """The fit of a group, of its shape."""
+        return self.fits[self.of(group)][group]
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the left-out error of the full force vector, each group with its shape [N]."""
+        groups = next(iter(self.fits.values()))
+        return float(np.sqrt(np.mean(_joined([(self.fit(group).error ** 2).sum(axis=1) for group in groups]))))
 
     @property
     def score(self) -> ShapeScore:
@@ -85,7 +102,8 @@ class ShapeChoice:
 
 
 def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust: bool = True) -> ShapeChoice:
-    """Fit every shape to every group, each with its own levels, and choose.
+    """Fit every shape to every group, each with its own levels, and choose: one shape for all, but for groups whose
+    points tell it from another that does better there.
 
     shape: "auto", or the name of the one that is wanted; the others are still compared.
     Raises InputError for an unknown shape, InsufficientDataError when the wanted shape, or all, cannot be fitted.
@@ -116,7 +134,39 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
         )  # fmt: skip
     judge = _Judge(fits, robust)
     scores = _scores(fits, judge)
-    return ShapeChoice(scores, shape if shape != AUTO else _choice(scores, judge), fits, missing)
+    if shape != AUTO:
+        return ShapeChoice(scores, shape, fits, missing)
+    chosen, own, scored = _of_groups(fits, _choice(scores, judge), robust)
+    return ShapeChoice(scores, chosen, fits, missing, own, scored)
+
+
+def _of_groups(
+    fits: Mapping[str, Mapping[str, ShapeFit]], chosen: str, robust: bool
+) -> tuple[str, dict[str, str], dict[str, tuple[ShapeScore, ...]]]:
+    """(the shape that groups share, group -> that of one which tells another from it, group -> the scores in it).
+
+    What is left of the groups without these may share a simpler one, or a better: it is chosen anew.
+    """
+    rest, own = [*next(iter(fits.values()))], dict[str, str]()
+    scored: dict[str, tuple[ShapeScore, ...]] = {}
+    alone = {group: {name: {group: each[group]} for name, each in fits.items()} for group in rest}
+    while len(rest) + len(own) > 1 and rest:
+        found = {}
+        for group in rest:
+            judge = _Judge(alone[group], robust)
+            scored[group] = _scores(alone[group], judge)
+            able = [score.name for score in scored[group] if score.in_model and not score.at_bound]
+            if able and judge.apart(chosen, able[0]) > APART:
+                found[group] = _choice(scored[group], judge)
+        if not found:
+            break
+        own |= found
+        rest = [group for group in rest if group not in own]
+        if rest:
+            left = {name: {group: each[group] for group in rest} for name, each in fits.items()}
+            judge = _Judge(left, robust)
+            chosen = _choice(_scores(left, judge), judge)
+    return chosen, own, {group: scored[group] for group in own}
 
 
 def _refuse_lost_signs(points: ForcePoints) -> None:

@@ -200,6 +200,7 @@ _PLAIN = {
     "disc+wheel": ("a disc, and the same at all wheels", ("disc", *_TURN, "wheel"), _BODY),
     "disc+wheels": ("a disc, and each wheel its own", ("disc", *_TURN, "wheels"), _BODY),
     "ellipse+wheel": ("an ellipse, and the same at all wheels", ("ellipse", *_TURN, "wheel"), _BODY),
+    "ellipse+wheels": ("an ellipse, and each wheel its own", ("ellipse", *_TURN, "wheels"), _BODY),
 }
 
 

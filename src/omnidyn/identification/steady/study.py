@@ -50,8 +50,9 @@ def identify_steady(
 ) -> SteadyStudy:  # fmt: skip
     """Identify friction from the steady windows of runs.
 
-    groups: name of each run's group (a floor, a load); every group has its own levels of one shape. question, options:
-    those of `Question` that belong to steady state, such as shape=, speed=, window=.
+    groups: name of each run's group (a floor, a load); every group has its own levels of one shape, and where its
+    points tell another shape from that one, a shape of its own. question, options: those of `Question` that belong to
+    steady state, such as shape=, speed=, window=.
     The friction of `robot` is replaced; its motor and wheels are taken as they are.
     Raises InsufficientDataError when nothing is steady, nothing moves, or no shape is determined; InputError for a run
     without the channels needed, or for a wrong option.
@@ -76,7 +77,7 @@ def identify_steady(
     differences = _differences(choice)
     internal = {group: _internal(robot, own) for group, own in parts.items()} if robot.wheels.count > 3 else {}
     changed = moments(runs, robot, points.speed_from, points.force_from, asked.window)
-    lack = {group: lack_of_fit(robot, own, choice.fits[choice.chosen][group]) for group, own in parts.items()}
+    lack = {group: lack_of_fit(robot, own, choice.fit(group)) for group, own in parts.items()}
     turning = any(is_turning(robot, own) for own in parts.values())
     return SteadyStudy(
         robot=robot, points=points, choice=choice, estimates=estimates, travel=travel, viscous=viscous,
@@ -111,7 +112,7 @@ def _viscous(
     robot: Robot, choice: ShapeChoice, group: str, points: ForcePoints, travel: Travel, robust: bool
 ) -> tuple[Viscous, ...]:
     """The viscous levels of the chosen shape, fitted beside its other levels."""
-    name, found = base_name(choice.chosen) + VISCOUS, []
+    name, found = base_name(choice.of(group)) + VISCOUS, []
     fit = choice.fits[name][group] if name in choice.fits else None
     if fit is None and speeds_differ(points):  # the other groups may have one speed only
         fit = fit_shape(SHAPES[name], robot, points, turning=is_turning(robot, points), robust=robust)
@@ -175,7 +176,7 @@ def _back_emf(robot: Robot, points: ForcePoints) -> _BackEmf:
 
 
 def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool) -> Estimate:
-    fit, emf = choice.fits[choice.chosen][group], _back_emf(robot, points)
+    fit, emf = choice.fit(group), _back_emf(robot, points)
     extra = np.array([emf.relative_std * emf.of(Key.parse(key)) if Key.parse(key).level == VISCOUS_LEVEL else 0.0
                       for key in fit.keys])  # fmt: skip
     fit = replace(fit, covariance=fit.covariance + np.diag(extra**2))
@@ -241,11 +242,11 @@ def _priors(robot: Robot, std: dict[str, float], kept: dict[str, float], data: s
 
 def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
     """Every level between every two groups: independent data, so their variances add up."""
-    fits, found = choice.fits[choice.chosen], []
+    fits, found = {group: choice.fit(group) for group in choice.fits[choice.chosen]}, []
     for first, second in combinations(fits, 2):
         one, other = fits[first], fits[second]
         for k, key in enumerate(one.keys):
-            if key not in other.keys:  # only one of the groups turns
+            if key not in other.keys:  # only one of the groups turns, or their shapes differ
                 continue
             j = other.keys.index(key)
             values = float(one.free[k]), float(other.free[j])

@@ -101,6 +101,7 @@ def _shape_table(study: SteadyStudy) -> Table:
     rows = []
     for score in study.choice.scores:
         marks = ["chosen"] if score.name == study.choice.chosen else []
+        marks += [f"chosen in {group}" for group, name in study.choice.own.items() if name == score.name]
         marks += [] if score.told_apart or score.behind == 0.0 else ["not told apart"]
         marks += [] if score.in_model else ["not in a robot file"]
         marks += ["a level below 0"] if score.at_bound else []
@@ -139,6 +140,7 @@ def _data(study: SteadyStudy) -> dict[str, Any]:
         "groups": {
             group: {
                 **study.estimates[group].to_dict(),
+                "shape": study.choice.of(group),
                 "along_travel": asdict(study.travel[group]),
                 "viscous": [asdict(each) for each in study.viscous[group]],
                 "lack_of_fit": asdict(study.lack_of_fit[group]),

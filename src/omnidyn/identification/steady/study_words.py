@@ -48,10 +48,10 @@ def statements(
     internal: Mapping[str, float], lack: Mapping[str, LackOfFit], matters: float,
 ) -> tuple[str, ...]:  # fmt: skip
     """What the data say, one sentence each."""
-    found = [_about_choice(choice), *_about_ties(choice), *_about_comparison(choice)]
+    found = [_about_choice(choice), *_about_own(choice), *_about_ties(choice), *_about_comparison(choice)]
     found += [words for group, each in lack.items() for words in _about_fit_or_not(group, each)]
     for group, levels in viscous.items():
-        found += [_about_viscous(group, level, choice.chosen, matters) for level in levels]
+        found += [_about_viscous(group, level, choice.of(group), matters) for level in levels]
     found += [_about_difference(each) for each in differences]
     found += [
         f"{_of(group)}the wheels work against each other with {force:.3g} N (rms): that pushes nowhere"
@@ -72,6 +72,19 @@ def _about_choice(choice: ShapeChoice) -> str:
         f"friction has the shape {score.name}, {score.words}: it predicts the force in a direction left out within "
         f"{score.loo:.2f} +- {score.loo_std:.2f} N{beside}"
     )
+
+
+def _about_own(choice: ShapeChoice) -> list[str]:
+    """Groups whose shape is not that of the others."""
+    found = []
+    for group, name in choice.own.items():
+        scores = {score.name: score for score in choice.scored[group]}
+        own, other = scores[name], scores[choice.chosen]
+        beside = "" if name == choice.chosen else f", {other.loo:.2f} +- {other.loo_std:.2f} N for {other.name}"
+        found.append(
+            f"{group} has a shape of its own, {name}, {own.words}: within {own.loo:.2f} +- {own.loo_std:.2f} N{beside}"
+        )
+    return found
 
 
 def _about_ties(choice: ShapeChoice) -> list[str]:
@@ -117,7 +130,7 @@ def about_lack_of_fit(lack: Mapping[str, LackOfFit], choice: ShapeChoice) -> tup
             best = each.remedies[0]
             as_well = f"; as well do: {', '.join(best.same_as)}" if best.same_as else ""
             told = (
-                f"with {best.words} beside {choice.chosen} the force in a direction left out is told within "
+                f"with {best.words} beside {choice.of(group)} the force in a direction left out is told within "
                 f"{best.error:.2g} N, without within {best.error_before:.2g} N{as_well}"
             )
         else:

@@ -20,7 +20,7 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
-from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, WITHIN
+from omnidyn.identification.output_error.problem.parameters import AT, EFFICIENCY, WITHIN
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
@@ -35,13 +35,14 @@ from omnidyn.identification.structure.laws import (
     table_of,
 )
 from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
-from omnidyn.model.friction.kinds import KINDS, LUGRE
+from omnidyn.model.friction.kinds import COULOMB, KINDS, LUGRE
 from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
-from omnidyn.model.layout import N_AXES
+from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Prior, Robot
 
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
+EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one of all
 FALLS, BRISTLES = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS)), f"{BODY_AXES}.{BRISTLE}"
 LOSS = 0.01  # of a gear, from which its fit begins at least
 UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
@@ -76,6 +77,12 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
         return []
 
 
+def as_it_ended(robot: Robot, question: Question, found: Solution) -> Switch:
+    """A fit as it ended, nothing switched on."""
+    way = Switch(_where_it_ended(robot, found), _as_it_settled(robot, question, found), "")
+    return _with_levels_as_they_are(way)
+
+
 def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
     """Without bristles behind a fall that explains more: they have that fall too, and their turn after it; a fit of
     bristles to a log without any takes long."""
@@ -89,7 +96,11 @@ def told(words: str, before: Mapping[str, float], after: Mapping[str, float]) ->
     new = [name for name in after if name not in before and not name.startswith(FRICTION)]
     if not new or len(new) > N_AXES or any(name.partition(".")[0] in (TILT, PUSH) for name in new):
         return words
-    return all_of([f"{in_words(name)} {after[name]:.3g} {unit(name)}".rstrip() for name in new])
+    keys = {name: name.partition(AT) for name in new}  # of one group, where it is its own
+    return all_of([
+        f"{in_words(key)} {after[name]:.3g} {unit(key)}".rstrip() + (f" in {group}" if group else "")
+        for name, (key, _, group) in keys.items()
+    ])  # fmt: skip
 
 
 def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
@@ -109,7 +120,9 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
     elif key == BODY_AXES:
         yield Switch(robot.replace(friction=along_axes(friction)), _of_another_shape(asked), words)
     elif key == WHEELS:
-        yield from _at_wheels(robot, asked, words)
+        yield from _at_wheels(robot, asked)
+    elif key == EACH_WHEEL:
+        yield _at_each_wheel(robot, asked)
     elif key in FALLS:
         yield _falling(remedy, robot, asked)
     elif key == BRISTLES:
@@ -223,22 +236,51 @@ def _rough(robot: Robot, asked: Question, names: Sequence[str], words: str) -> S
     return Switch(robot.replace(priors={**robot.priors, **rough}), _free(asked, *keys), words)
 
 
-def _at_wheels(robot: Robot, asked: Question, words: str) -> Iterator[Switch]:
+def _at_wheels(robot: Robot, asked: Question) -> Iterator[Switch]:
     """In the place of what acts on the body, at the levels that come nearest to it; and Coulomb friction beside it."""
     g = robot.wheels.wrench_matrix
     viscous, coulomb = _on_axes(robot.friction)
-    level = float(np.mean(coulomb / np.abs(g).sum(axis=1)))
+    level = _at_rims(robot)
     rim = float(np.mean(viscous / (g**2).sum(axis=1)))
     yield Switch(
         robot.replace(friction=Friction(wheels=WheelFriction(coulomb=level, viscous=rim))), _of_another_shape(asked),
-        f"{words} in the place of the other",
+        "friction at the wheels in the place of the other",
     )  # fmt: skip
-    half = AxesFriction(viscous=_levels(viscous), coulomb=_levels(0.5 * coulomb))
+    if coulomb.any():
+        yield _beside(robot, asked, "Coulomb friction at the wheels", 0.5 * level)
+
+
+def _at_each_wheel(robot: Robot, asked: Question) -> Switch:
+    """A level of each wheel: of the friction that is there already, else beside that on the body."""
+    wheels, count, words = robot.friction.wheels, robot.wheels.count, "Coulomb friction of its own at each wheel"
+    if not np.any(wheels.coulomb):
+        return _beside(robot, asked, words, (0.5 * _at_rims(robot),) * count)
+    wheels = wheels.replace(coulomb=tuple(per_wheel(wheels.coulomb, count).tolist()))
+    return Switch(robot.replace(friction=robot.friction.replace(wheels=wheels)), _of_another_shape(asked), words)
+
+
+def _beside(robot: Robot, asked: Question, words: str, level: float | tuple[float, ...]) -> Switch:
+    """Coulomb friction at the wheels beside that on the body, of which half is left."""
+    direction = robot.friction.direction
+    viscous, coulomb = _on_axes(robot.friction)
     if any(robot.friction.axes.coulomb):
-        beside = Friction(axes=half, wheels=WheelFriction(coulomb=0.5 * level))
-        yield Switch(
-            robot.replace(friction=beside), _of_another_shape(asked), f"Coulomb {words} beside that on the axes"
+        body, where = (
+            Friction(axes=AxesFriction(viscous=_levels(viscous), coulomb=_levels(0.5 * coulomb))),
+            "on the axes",
         )
+    else:
+        half = direction.replace(
+            coulomb=tuple((0.5 * coulomb[:YAW]).tolist()), yaw_coulomb=0.5 * direction.yaw_coulomb, law=COULOMB,
+            **dict.fromkeys(("breakaway", "yaw_breakaway", FALL, f"yaw_{FALL}")),
+        )  # fmt: skip
+        body, where = Friction(direction=half), "along the direction of travel"
+    both = body.replace(wheels=WheelFriction(coulomb=level))
+    return Switch(robot.replace(friction=both), _of_another_shape(asked), f"{words} beside that {where}")
+
+
+def _at_rims(robot: Robot) -> float:
+    """The level of Coulomb friction at the wheels that comes nearest to that on the body [N]."""
+    return float(np.mean(_on_axes(robot.friction)[1] / np.abs(robot.wheels.wrench_matrix).sum(axis=1)))
 
 
 def _on_axes(friction: Friction) -> tuple[FloatArray, FloatArray]:

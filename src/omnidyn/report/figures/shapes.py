@@ -91,9 +91,9 @@ def draw_polar(study: SteadyStudy) -> Picture:
             name = "measured" if group == "all" else group
             axes.plot(np.arctan2(own.twist[:, 1], own.twist[:, 0]), own.along, mark, color=colour, markersize=3.5,
                       alpha=0.55, markeredgewidth=0, label=name)  # fmt: skip
-            way, curve = _curve(study, group, study.choice.chosen, own)
+            way, curve = _curve(study, group, study.choice.of(group), own)
             axes.plot(np.radians(way), _along(way, curve), color=colour, linestyle=line, linewidth=2.2,  # type: ignore[arg-type]
-                      label=f"{study.choice.chosen}" + ("" if group == "all" else f", {group}"))  # fmt: skip
+                      label=study.choice.of(group) + ("" if group == "all" else f", {group}"))  # fmt: skip
             top = max(top, float(np.nanmax(own.along, initial=0.0)))
         _compared(study, axes, groups[0])
         around_robot(axes, top)
@@ -105,7 +105,7 @@ def draw_polar(study: SteadyStudy) -> Picture:
 def _compared(study: SteadyStudy, axes: PolarAxes, group: str) -> None:
     """The box of the paper and the wheels, of the first group, to compare."""
     for name, (colour, line) in COMPARED.items():
-        if name in study.choice.fits and name != study.choice.chosen:
+        if name in study.choice.fits and name != study.choice.of(group):
             way, curve = _curve(study, group, name, _of(study.points, group))
             axes.plot(np.radians(way), _along(way, curve), color=colour, linestyle=line, linewidth=1.5, label=name)
 
@@ -148,10 +148,10 @@ def _component(study: SteadyStudy, panel: Axes, component: int, group: str, numb
     name = "measured" if group == "all" else group
     panel.plot(way, own.wrench[:, component], GROUP_MARKS[number], color=colour, markersize=3.5, alpha=0.55,
                markeredgewidth=0, label=name)  # fmt: skip
-    angles, curve = _curve(study, group, study.choice.chosen, own)
-    label = study.choice.chosen + ("" if group == "all" else f", {group}")
+    angles, curve = _curve(study, group, study.choice.of(group), own)
+    label = study.choice.of(group) + ("" if group == "all" else f", {group}")
     panel.plot(angles, curve[:, component], color=colour, linestyle=LINES[number], label=label)  # type: ignore[arg-type]
-    if number == 0 and "box" in study.choice.fits and study.choice.chosen != "box":
+    if number == 0 and "box" in study.choice.fits and study.choice.of(group) != "box":
         angles, curve = _curve(study, group, "box", own)
         panel.plot(angles, curve[:, component], ":", color=ORANGE, linewidth=1.6, label="box (the paper)")
 

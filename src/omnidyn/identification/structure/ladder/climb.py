@@ -11,31 +11,28 @@ less than such a cause would.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from omnidyn.document import all_of
-from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import UNOFFERED, LackOfFit, Remedy
 from omnidyn.identification.ladder import STANDS, Ladder, Rung
+from omnidyn.identification.output_error.begin import WHOLE
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.candidates import CHANGE
 from omnidyn.identification.structure.diagnosis import Examined, examine
 from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
+from omnidyn.identification.structure.ladder.models import Model, Untried, can, moves, moves_apart, tried
 from omnidyn.identification.structure.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
 from omnidyn.identification.structure.motion import motions
-from omnidyn.identification.structure.switches import LIMIT, Switch, simpler_first, switches, told
-from omnidyn.model.friction import WheelFriction
+from omnidyn.identification.structure.switches import EACH_WHEEL, LIMIT, simpler_first, told
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
-from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
 STEPS = 4  # at most
@@ -46,65 +43,55 @@ CLEAR = 1.0  # standard errors of its gain by which a step must pay
 BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A fit, what it came to, and the robot and question it began from. numbers: see `Switch`. before: what stood when
-    it was tried; instead: of which step it is in the place, in words."""
-
-    fit: Fit
-    solution: Solution
-    robot: Robot
-    question: Question
-    remedy: Remedy | None = None
-    words: str = STANDS
-    numbers: int = 0
-    before: Model | None = None
-    instead: str = ""
-
-    @property
-    def key(self) -> str:
-        """Of what was switched on last."""
-        return self.remedy.key if self.remedy else ""
-
-    @property
-    def value(self) -> dict[str, float]:
-        """What was fitted."""
-        problem, values = self.solution.solver.problem, self.solution.state.point.values
-        return dict(zip(problem.names, values.tolist(), strict=True))
-
-
-def climb(fit: Fit, solution: Solution, runs: Sequence[Run], progress: Progress) -> tuple[Fit, Solution, Ladder]:
-    """The best fit of some runs, its solution, and the way to it. fit, solution: of the robot as it was given."""
-    stands, rungs = Model(fit, solution, fit.groups[0].robot, fit.question), list[Rung]()
-    seen: Examined | None = None
+def climb(
+    fit: Fit, solution: Solution, runs: Sequence[Run], progress: Progress, names: Sequence[str] | None = None
+) -> tuple[Fit, Solution, Ladder]:
+    """The best fit of some runs, its solution, and the way to it. fit, solution: of the robot as it was given. names:
+    of the group of each run, where there are groups."""
+    stands, rungs = Model.first(fit, solution), list[Rung]()
+    seen: dict[str, Examined] | None = None
     for step in range(1, STEPS + 1):
         if unexplained(stands.solution.solver, stands.solution):
             return _ended(
                 stands, rungs, "the model does not follow the logs: first mend signs, units, the order of wheels"
             )
         progress.doing(f"step {step} of the ladder: looking for what the model leaves out")
-        seen = seen or examine(stands.solution)
-        lack = seen.diagnosis.lack_of_fit
-        if not lack.found:
+        seen = seen or _examined(stands)
+        lacks = _lacks(seen)
+        if not lacks:
             return _ended(stands, rungs, "the residuals hold nothing but noise")
-        count, beyond = seen.tried, _beyond(lack, seen.rows)
-        tried, found, best, after = [], list[Rung](), None, None
-        for worth in (offered(lack), unseen(lack, stands)):
-            tried += [each for remedy in worth for each in _tried(remedy, stands, runs, progress)]
-            if tried:
-                found, best = judged(step, stands, tried, seen.memory, count, beyond, lack)
-            after = examine(best.solution) if best is not None else None
-            if after is not None and not after.diagnosis.lack_of_fit.found:
+        every, found, best, after = list[Model | Untried](), list[Rung](), None, None
+        first = {group: offered(lack) for group, lack in lacks.items()}
+        far = {group: unseen(lack, stands, group) for group, lack in lacks.items()}
+        for asked in (moves(first, stands), moves_apart(first, stands), moves(far, stands)):
+            more = [each for move in asked for each in tried(move, stands, runs, names, progress)]
+            if not more:
+                continue
+            every += more
+            found, best = judged(step, stands, every, seen)
+            after = _examined(best) if best is not None else None
+            if after is not None and not _lacks(after):
                 break
-        if best is not None and best.remedy is not None and stands.before is not None:  # may the step before go?
-            tried += _tried(best.remedy, stands.before, runs, progress, stands.words)
-            found, best = judged(step, stands, tried, seen.memory, count, beyond, lack)
-            after = examine(best.solution) if best is not None and best.instead else after
+        if best is not None and best.move is not None and stands.before is not None:  # may the step before go?
+            every += tried(best.move, stands.before, runs, names, progress, stands.words)
+            found, best = judged(step, stands, every, seen)
+            after = _examined(best) if best is not None and best.instead else after
         rungs += found
         if best is None:
-            return _ended(stands, rungs, f"nothing that was tried pays{_said(lack)}")
+            return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}")
         stands, seen = best, after
     return _ended(stands, rungs, f"{STEPS} steps are the most that it takes")
+
+
+def _examined(model: Model) -> dict[str, Examined]:
+    """What a model leaves out, of each group."""
+    return {group: examine(alone) for group, alone in model.alone.items()}
+
+
+def _lacks(seen: Mapping[str, Examined]) -> dict[str, LackOfFit]:
+    """The groups in which something is left out, and what."""
+    every = {group: each.diagnosis.lack_of_fit for group, each in seen.items()}
+    return {group: lack for group, lack in every.items() if lack.found}
 
 
 def offered(lack: LackOfFit) -> list[Remedy]:
@@ -115,75 +102,60 @@ def offered(lack: LackOfFit) -> list[Remedy]:
     return [*able[:TRIED], *same[: TRIED - 1]]
 
 
-def unseen(lack: LackOfFit, stands: Model) -> list[Remedy]:
-    """What is far from the fit however little of it there is, and was not among the first remedies."""
+def unseen(lack: LackOfFit, stands: Model, group: str) -> list[Remedy]:
+    """What is far from the fit however little of it there is, and was not among the first remedies of a group."""
     first = {remedy.key for remedy in offered(lack)}
-    problem, point = stands.solution.solver.problem, stands.solution.state.point
-    robot = problem.robot_at(point.values)
+    problem, point = stands.alone[group].solver.problem, stands.alone[group].state.point
+    robot = stands.robot(group)
     boxed, limit = any(robot.friction.axes.coulomb), robot.motor.current_limit
     shape = (DIRECTION, "an ellipse") if boxed else (BODY_AXES, "a box")
     found = [Remedy(shape[0], f"Coulomb friction of another shape, {shape[1]}", 0.0, 0.0)]
-    if robot.friction.wheels == WheelFriction():
-        found.append(Remedy(WHEELS, "friction at the wheels", 0.0, 0.0))
+    found.append(Remedy(WHEELS, "friction at the wheels", 0.0, 0.0))
+    found.append(Remedy(EACH_WHEEL, "Coulomb friction of its own at each wheel", 0.0, 0.0))
     usual = Remedy("", FALL_WORDS, 0.0, 0.0, size=(USUAL_FALL - 1.0,) * N_AXES, at=USUAL_SPEED)
     found += [replace(usual, key=f"{table}.{FALL}") for table in may_fall(robot.friction)]
     if limit is None:
         most = np.concatenate([np.abs(motion.current).max(axis=1) for motion in motions(problem, point)])
         levels = np.quantile(most[most > 0.0], LIMITS).tolist() if most.any() else []
         found += [Remedy(LIMIT, f"a current limit, from {at:.2g} A", 0.0, 0.0, at=at) for at in levels]
-    return [remedy for remedy in found if remedy.key not in first]
-
-
-def _tried(
-    remedy: Remedy, stands: Model, runs: Sequence[Run], progress: Progress, instead: str = ""
-) -> list[Model | tuple[Remedy, Switch, str]]:
-    """A remedy, fitted in every way in which it can be switched on; (remedy, way, why not) where it cannot."""
-    found: list[Model | tuple[Remedy, Switch, str]] = []
-    for way in switches(remedy, stands.robot, stands.question, stands.solution):
-        aside = progress.aside(f"the ladder tries {way.words}")
-        try:
-            fit = Fit.of(runs, way.robot, way.question, progress=aside)
-            solution, _ = fit.with_levels(fit.solve(aside))
-        except OmnidynError as error:
-            found.append((remedy, way, str(error)))
-            continue
-        numbers = stands.numbers + way.numbers
-        found.append(Model(fit, solution, way.robot, way.question, remedy, way.words, numbers, stands, instead))
-    return found
+    return [remedy for remedy in found if remedy.key not in first and can(remedy.key, robot)]
 
 
 def judged(
-    step: int, stands: Model, tried: Sequence[Model | tuple[Remedy, Switch, str]], memory: Sequence[AutoRegression],
-    count: int, beyond: tuple[float, str], lack: LackOfFit,
-) -> tuple[list[Rung], Model | None]:  # fmt: skip
+    step: int, stands: Model, every: Sequence[Model | Untried], seen: Mapping[str, Examined]
+) -> tuple[list[Rung], Model | None]:
     """(the rungs of a step, that of the model before first; the model to go on from, None where nothing pays).
 
-    memory: of each column, of what is left beside all that residuals follow. count: of causes that were looked at.
-    beyond: (what the best cause explains that no robot file holds, less what its numbers cost; its words).
+    seen: of each group what the model before leaves out; its memory is of what is left beside all that residuals
+    follow.
     """
-    models = [each for each in tried if isinstance(each, Model)]
+    models = [each for each in every if isinstance(each, Model)]
+    count, memory = sum(each.tried for each in seen.values()), {group: each.memory for group, each in seen.items()}
     margins = margins_of([each.solution for each in (stands, *models)])
     before = errors(stands.solution, memory, margins, stands.numbers)
-    seen = [errors(each.solution, memory, margins, each.numbers) for each in models]
-    why = [_why_not(each, own, before, count, beyond) for each, own in zip(models, seen, strict=True)]
+    by = [errors(each.solution, memory, margins, each.numbers) for each in models]
+    why = [_why_not(each, own, before, count, _beyond(each, seen)) for each, own in zip(models, by, strict=True)]
     paying = [k for k, words in enumerate(why) if not words]
-    best = max(paying, key=lambda k: seen[k].gain(before)[0], default=None)
+    best = max(paying, key=lambda k: by[k].gain(before)[0], default=None)
     alike = [
         k for k in paying
-        if best is not None and (_is_alike(seen[best], seen[k]) or _is_same(seen[best], seen[k]))
+        if best is not None and (_is_alike(by[best], by[k]) or _is_same(by[best], by[k]))
     ]  # fmt: skip
-    taken = min(alike, key=lambda k: (seen[k].numbers, not models[k].instead, seen[k].bic(count)), default=None)
+    taken = min(
+        alike, key=lambda k: (by[k].numbers, models[k].shapes, not models[k].instead, by[k].bic(count)), default=None
+    )
     rungs = []
-    for k, (each, own) in enumerate(zip(models, seen, strict=True)):
-        same = [o for o in paying if taken in (k, o) and o != k and k in paying and _is_same(seen[k], seen[o])]
+    for k, (each, own) in enumerate(zip(models, by, strict=True)):
+        same = [o for o in paying if taken in (k, o) and o != k and k in paying and _is_same(by[k], by[o])]
         words = why[k] or _why_other(k, taken, alike, same)
-        others = [models[o].key for o in same] + _not_fitted(models, each, own, before, lack)
+        others = [models[o].key for o in same] + _not_fitted(models, each, own, before, seen)
         rungs.append(_rung(step, each, own, before, count, k == taken, words, others, stands))
     rungs.sort(key=lambda rung: (not rung.taken, -rung.gain))
     rungs = [*{(rung.key, rung.words): rung for rung in reversed(rungs)}.values()][::-1]  # a limit found twice is one
     rungs += [
-        Rung(step, remedy.key, way.words, 0, np.nan, np.nan, np.nan, np.nan, why=f"cannot be fitted: {words}")
-        for each in tried if isinstance(each, tuple) for remedy, way, words in [each]
+        Rung(step, each.move.key, each.words, 0, np.nan, np.nan, np.nan, np.nan, why=f"cannot be fitted: {each.why}",
+             groups=each.move.groups)
+        for each in every if isinstance(each, Untried)
     ]  # fmt: skip
     first = [Rung(0, "", STANDS, before.numbers, before.size, taken=True, value=stands.value)] if step == 1 else []
     return [*first, *rungs], None if taken is None else models[taken]
@@ -224,14 +196,16 @@ def _is_same(one: Errors, other: Errors) -> bool:
     return abs(one.bic() - other.bic()) < TOLD_APART
 
 
-def _not_fitted(models: Sequence[Model], model: Model, own: Errors, before: Errors, lack: LackOfFit) -> list[str]:
+def _not_fitted(
+    models: Sequence[Model], model: Model, own: Errors, before: Errors, seen: Mapping[str, Examined]
+) -> list[str]:
     """What the diagnosis could not tell from a model, was not fitted, and might explain as much as the model does."""
-    assert model.remedy is not None
+    assert model.move is not None
     fitted, noise = {each.key for each in models}, own.left / max(own.rows, 1)
     enough = (1.0 - ROUGHLY) * (before.left - own.left) / noise - TOLD_APART
     return [
-        r.key for r in lack.remedies
-        if r.key in model.remedy.same_as and r.key not in fitted and r.chi2 >= enough
+        r.key for group, remedy in model.move.remedies.items() for r in seen[group].diagnosis.lack_of_fit.remedies
+        if r.key in remedy.same_as and r.key not in fitted and r.chi2 >= enough
     ]  # fmt: skip
 
 
@@ -246,34 +220,43 @@ def _rung(
     return Rung(
         step, model.key, words, own.numbers, own.size, gain, std,
         own.bic(count) - before.bic(), taken, why, tuple(others), bool(model.instead),
-        model.value,
+        model.value, model.move.groups if model.move else (),
     )  # fmt: skip
 
 
-def _beyond(lack: LackOfFit, rows: int) -> tuple[float, str]:
-    """(what the best cause explains that is never taken, less what its numbers cost, in chi squared; its words)."""
+def _beyond(model: Model, seen: Mapping[str, Examined]) -> tuple[float, str]:
+    """(what the best cause explains that is never taken, less what its numbers cost, in chi squared; its words): of all
+    groups in which something was switched on."""
+    assert model.move is not None
+    found = [_beyond_one(seen[group]) for group in model.move.remedies]
+    worth = [value for value, _ in found if value > 0.0]
+    most, words = max(found)
+    return (sum(worth), words) if worth else (most, words)
+
+
+def _beyond_one(seen: Examined) -> tuple[float, str]:
+    lack = seen.diagnosis.lack_of_fit
     others = [r for r in lack.remedies if not r.offered or r.key == CHANGE]
-    worth = [(r.chi2 - np.log(max(rows, 2)) * r.numbers, r.words) for r in others]
+    worth = [(r.chi2 - np.log(max(seen.rows, 2)) * r.numbers, r.words) for r in others]
     return max(worth, default=(-np.inf, ""))
 
 
-def _why_none(lack: LackOfFit) -> str:
-    if not lack.remedies:
-        return "no cause that is known here explains what is left"
-    return f"nothing can be switched on for what is left{_said(lack)}"
-
-
-def _said(lack: LackOfFit) -> str:
+def _said(lacks: Mapping[str, LackOfFit]) -> str:
     """What was not taken because no robot file holds it."""
+    told = {group: words for group, lack in lacks.items() if (words := _looks_like(lack))}
+    return "".join(f"; {words}" if group == WHOLE else f"; {group}: {words}" for group, words in told.items())
+
+
+def _looks_like(lack: LackOfFit) -> str:
     first = next(iter(lack.remedies), None)
     if first is None:
         return ""
     if first.key == CHANGE:
-        return f"; it looks like {first.words}: fit the parts as logs of their own"
+        return f"it looks like {first.words}: fit the parts as logs of their own"
     if not first.offered:
-        return f"; it looks like {first.words}, which no law that is known here holds"
+        return f"it looks like {first.words}, which no law that is known here holds"
     if first.rivals:
-        return f"; it may be {all_of([UNOFFERED[key] for key in first.rivals])}, which no law that is known here holds"
+        return f"it may be {all_of([UNOFFERED[key] for key in first.rivals])}, which no law that is known here holds"
     return ""
 
 

@@ -6,18 +6,20 @@ the other blocks would be is one linear step away from the fit to all.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.remedies import Blocks
 
+Memories = Sequence[AutoRegression] | Mapping[str, Sequence[AutoRegression]]
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
 
 
@@ -47,22 +49,67 @@ class Errors:
         return float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
 
 
-def errors(
-    solution: Solution, memory: Sequence[AutoRegression], margins: Sequence[FloatArray], more: int = 0
-) -> Errors:
-    """The errors of a fit. memory: of each column; margins: of each piece, see `margins_of`; more: numbers that are
-    fitted beside its parameters. One that a bound holds was fitted, too: it is no gain of the model without it."""
+def errors(solution: Solution, memory: Memories, margins: Sequence[FloatArray], more: int = 0) -> Errors:
+    """The errors of a fit. memory: of each column, of each group where there are any; margins: of each piece, see
+    `margins_of`; more: numbers that are fitted beside its parameters. One that a bound holds was fitted, too: it is no
+    gain of the model without it.
+
+    Of groups a tenth of each is held out at a time: no number that a group has for itself is without a log.
+    """
+    engine = solution.solver.engine
+    if not isinstance(memory, Mapping) or not isinstance(engine, JointEngine):
+        memory = next(iter(memory.values())) if isinstance(memory, Mapping) else memory
+        blocks, seen = _blocks(solution, memory, margins)
+    else:
+        parts, seen, told = list[tuple[Blocks, IntArray]](), 0, set[int]()
+        for member in engine.members:
+            own = [margins[k] for k in member.places]
+            found, rows = _blocks(
+                engine.alone(member, solution),
+                memory[member.name],
+                own,
+                [k for k, at in enumerate(member.at.tolist()) if at in told],
+            )
+            parts.append((found, member.at))
+            seen, told = seen + rows, told | {*member.at.tolist()}
+        blocks = _Together(parts, len(solution.solver.problem.parameters))
+    known = np.arange(1, 1 + blocks.count)
+    return Errors(blocks.held_out(known), blocks.left(known), seen, blocks.count + more)
+
+
+def _blocks(
+    solution: Solution, memory: Sequence[AutoRegression], margins: Sequence[FloatArray], told: Container[int] = ()
+) -> tuple[Blocks, int]:
+    """(blocks of one group, how many rows they have). told: parameters whose priors another group has already."""
     problem = _from(solution.solver.problem, margins).shortened(MOST_ROWS)
     point = solution.state.point
     engine: RowEngine = solution.solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]
-    rows = Rows.of(problem, point, engine.residuals(point))
+    parts = engine.residuals(point)
+    bare = [replace(p, prior=None) if k in told else p for k, p in enumerate(problem.parameters)]
+    rows = Rows.of(replace(problem, parameters=tuple(bare)), point, parts)
     slopes = [np.where(solution.held, 0.0, own) for own in rows.slopes]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), memory)
     nothing = [np.zeros((*residual.shape, 0)) for residual in rows.residual]
-    blocks = Blocks(linear, nothing)
-    known = np.arange(1, 1 + blocks.count)
-    seen = int(sum(there.sum() for there in rows.there))
-    return Errors(blocks.held_out(known), blocks.left(known), seen, blocks.count + more)
+    return Blocks(linear, nothing), int(sum(there.sum() for there in rows.there))
+
+
+class _Together(Blocks):
+    """The blocks of several groups as those of one fit: their scalar products add up, each where its parameters stand
+    among all. parts: blocks of a group, and where its parameters stand (P of the group,)."""
+
+    def __init__(self, parts: Sequence[tuple[Blocks, IntArray]], count: int):
+        self.count, self.rows = count, sum(part.rows for part, _ in parts)
+        self.matrix = np.zeros((len(parts[0][0].matrix), 1 + count, 1 + count))
+        self.total = np.zeros((1 + count, 1 + count))
+        for part, at in parts:
+            where, size = np.concatenate([[0], 1 + at]), np.outer(part.size, part.size)
+            self.matrix[:, where[:, None], where] += part.matrix * size
+            self.total[where[:, None], where] += part.total * size
+        self.size = np.sqrt(np.diag(self.total))
+        self.size[0] = 1.0
+        self.size[self.size == 0.0] = 1.0
+        self.matrix /= np.outer(self.size, self.size)
+        self.total /= np.outer(self.size, self.size)
 
 
 def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:

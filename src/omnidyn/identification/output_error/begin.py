@@ -1,0 +1,86 @@
+"""What a fit begins with: the group of each run, and the logs, the robot and the question of each group."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.findings.needs import is_exact, why_no_inputs
+from omnidyn.identification.output_error.prepare import (
+    Group,
+    expand_keys,
+    free_by_default,
+    guesses,
+    make_group,
+    read_records,
+    stays_exact,
+)
+from omnidyn.identification.output_error.problem.band import without_band
+from omnidyn.identification.output_error.problem.bending import with_damping
+from omnidyn.identification.output_error.problem.parameters import refuse_unknown
+from omnidyn.identification.output_error.trust.breakaway import KEY, asked_axes
+from omnidyn.identification.question import Question
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+
+WHOLE = "all"  # the name of the group where there are none
+
+
+def group_names(runs: Sequence[Run], question: Question, groups: Sequence[str] | None) -> list[str]:
+    """The group of each run. Raises InputError for names that are not one for each, or where there is one group."""
+    if groups is None:
+        if question.per_free:
+            raise InputError("there are no groups", got=question.per_free[0], expected="with `per`", where="per_free")
+        return [WHOLE] * len(runs)
+    if len(groups) != len(runs) or len(set(groups)) < 2:
+        got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
+        raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
+    return list(groups)
+
+
+def begun(name: str, runs: Sequence[Run], robot: Robot, question: Question, joint: bool) -> tuple[Group, Question]:
+    """(the group of these runs, its question with every key written out). robot: as it is given; joint: whether there
+    are other groups.
+
+    Raises InputError for options and logs that cannot be used, InsufficientDataError where nothing moved,
+    UnsupportedError for what an engine, or a fit of several groups, does not know.
+    """
+    rigid = without_band(robot, ())
+    exact = is_exact(rigid)
+    usual = free_by_default(rigid, exact)
+    asked = _written_out(question, robot, usual)
+    free = asked.free or ()
+    robot = with_damping(without_band(robot, free), free)
+    if joint:
+        _refuse_joint(runs, robot, asked)
+    records = read_records(runs, robot, asked)
+    refuse_unknown(asked.fixed, robot)
+    asked_axes(robot, free, asked.fixed)
+    keys = asked.free if asked.free is not None else guesses(robot)
+    exact = exact and stays_exact(robot, [key for key in keys if key not in asked.fixed])
+    return make_group(name, records, robot, asked, exact, usual, alone=not joint), asked
+
+
+def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Question:
+    """The question with every key written out, as this robot has them."""
+
+    def every(keys: Iterable[str]) -> tuple[str, ...]:
+        return expand_keys(tuple(keys), robot, usual)
+
+    free = question.free
+    return replace(
+        question, free=None if free is None else every(free), fixed=every(question.fixed),
+        per_free=every(question.per_free), profile=every(question.profile),
+    )  # fmt: skip
+
+
+def _refuse_joint(runs: Sequence[Run], robot: Robot, question: Question) -> None:
+    if asked_axes(robot, question.free or ()):
+        raise UnsupportedError(
+            "breakaway is not profiled in groups", got=KEY, expected="other keys", remedy="fit each group alone",
+            where="free",
+        )  # fmt: skip
+    why = why_no_inputs(runs, robot)
+    if why:
+        raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")

@@ -1,0 +1,231 @@
+"""What the ladder fits: a Move switches a remedy on in some groups of the logs, a Model is the fit with it.
+
+Groups share what they share: what is not each group's own is switched on in all of them. Friction is each group's own,
+as it is in a fit of groups, and so is its shape: it is switched on in all that can have it, and in each alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import zip_longest
+
+import numpy as np
+
+from omnidyn.document import all_of
+from omnidyn.errors import OmnidynError
+from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.ladder import STANDS
+from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.joint import JointEngine
+from omnidyn.identification.output_error.prepare import expand_keys
+from omnidyn.identification.output_error.problem.parameters import AT
+from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.question import Question
+from omnidyn.identification.structure.laws import FALL, may_fall
+from omnidyn.identification.structure.switches import EACH_WHEEL, FALLS, Switch, as_it_ended, switches
+from omnidyn.model.friction import WheelFriction
+from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, find_key
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+
+
+@dataclass(frozen=True)
+class Move:
+    """group -> the remedy that is switched on there, the same in all. all: whether these are all groups."""
+
+    remedies: Mapping[str, Remedy]
+    all: bool = True
+
+    @property
+    def key(self) -> str:
+        """Of what is switched on."""
+        return next(iter(self.remedies.values())).key
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """In which groups it is switched on, where not in all."""
+        return () if self.all else tuple(self.remedies)
+
+    @property
+    def where(self) -> str:
+        """The same in words, with a blank before them."""
+        return f" in {all_of(self.groups)}" if self.groups else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A fit, and what it came to. begins: group -> the robot and the question it began from. numbers: see `Switch`.
+    before: what stood when it was tried; instead: of which step it is in the place, in words."""
+
+    fit: Fit
+    solution: Solution
+    begins: Mapping[str, tuple[Robot, Question]]
+    move: Move | None = None
+    words: str = STANDS
+    numbers: int = 0
+    before: Model | None = None
+    instead: str = ""
+
+    @classmethod
+    def first(cls, fit: Fit, solution: Solution) -> Model:
+        """The model as it was given."""
+        return cls(fit, solution, {group.name: (group.robot, group.question) for group in fit.groups})
+
+    @property
+    def key(self) -> str:
+        """Of what was switched on last."""
+        return self.move.key if self.move else ""
+
+    @property
+    def value(self) -> dict[str, float]:
+        """What was fitted."""
+        problem, values = self.solution.solver.problem, self.solution.state.point.values
+        return dict(zip(problem.names, values.tolist(), strict=True))
+
+    @cached_property
+    def alone(self) -> dict[str, Solution]:
+        """What the solution is for each group."""
+        engine = self.solution.solver.engine
+        if not isinstance(engine, JointEngine):
+            return {self.fit.groups[0].name: self.solution}
+        return {member.name: engine.alone(member, self.solution) for member in engine.members}
+
+    def robot(self, group: str) -> Robot:
+        """The fitted robot of a group."""
+        found = self.alone[group]
+        return found.solver.problem.robot_at(found.state.point.values)
+
+    @property
+    def shapes(self) -> int:
+        """In how many ways friction is fitted, group by group: one where all have the same."""
+        names = [alone.solver.problem.names for alone in self.alone.values()]
+        return len({frozenset(name for name in own if name.startswith(FRICTION)) for own in names})
+
+
+@dataclass(frozen=True)
+class Untried:
+    """A move that could not be fitted, and why."""
+
+    move: Move
+    words: str
+    why: str
+
+
+def moves(worth: Mapping[str, Sequence[Remedy]], stands: Model) -> list[Move]:
+    """What is to be tried of the remedies of each group, best first: in all groups, and where it is their own, in those
+    that ask for it."""
+    found = []
+    for key, own in _of_groups(worth):
+        every = [group for group in stands.begins if can(key, stands.robot(group))] or [*own]
+        some = next(iter(own.values()))
+        parts = [{group: own.get(group, some) for group in every}]
+        if is_own(key, stands.fit.question) and own.keys() != parts[0].keys():
+            parts.append(own)
+        found += [Move(part, len(part) == len(stands.begins)) for part in parts]
+    return found
+
+
+def moves_apart(worth: Mapping[str, Sequence[Remedy]], stands: Model) -> list[Move]:
+    """The same in each group alone, where several ask for it."""
+    return [
+        Move({group: remedy}, all=False)
+        for key, own in _of_groups(worth) if len(own) > 1 and is_own(key, stands.fit.question)
+        for group, remedy in own.items()
+    ]  # fmt: skip
+
+
+def _of_groups(worth: Mapping[str, Sequence[Remedy]]) -> list[tuple[str, dict[str, Remedy]]]:
+    """(key, group -> the remedy) of all remedies, in the order of the groups' own."""
+    named = {group: _numbered(own) for group, own in worth.items()}
+    names = dict.fromkeys(name for row in zip_longest(*named.values()) for name in row if name)
+    return [(name[0], {group: each[name] for group, each in named.items() if name in each}) for name in names]
+
+
+def _numbered(remedies: Sequence[Remedy]) -> dict[tuple[str, int], Remedy]:
+    """(key, how many of it came before) -> remedy: a limit may be tried at several levels."""
+    keys = [remedy.key for remedy in remedies]
+    return {(key, keys[:k].count(key)): remedy for k, (key, remedy) in enumerate(zip(keys, remedies, strict=True))}
+
+
+def is_own(key: str, question: Question) -> bool:
+    """Whether each group of a fit has for itself what this is about: friction, unless other numbers are asked for."""
+    own = question.per_free
+    if key.partition(".")[0] == FRICTION:
+        return not own or any(name.partition(".")[0] == FRICTION for name in own)
+    return any(name == key or name.startswith((f"{key}.", f"{key}[")) for name in own)
+
+
+def can(key: str, robot: Robot) -> bool:
+    """Whether there is something to switch on: no robot gets a shape of friction that it has."""
+    friction = robot.friction
+    if key == DIRECTION:
+        return any(friction.axes.coulomb)
+    if key == BODY_AXES:
+        return any(friction.direction.coulomb)
+    if key == WHEELS:
+        return friction.wheels == WheelFriction()
+    if key == EACH_WHEEL:  # beside a box that acts where wheels do, too, only once they have a level for all
+        one = bool(friction.wheels.coulomb) and not np.ndim(friction.wheels.coulomb)
+        return one or (friction.wheels == WheelFriction() and any(friction.direction.coulomb))
+    return key not in FALLS or key in {f"{table}.{FALL}" for table in may_fall(friction)}
+
+
+def tried(
+    move: Move, stands: Model, runs: Sequence[Run], names: Sequence[str] | None, progress: Progress, instead: str = ""
+) -> list[Model | Untried]:
+    """A move, fitted in every way in which it can be switched on. names: of the group of each run."""
+    every = {
+        group: switches(remedy, *stands.begins[group], stands.alone[group]) for group, remedy in move.remedies.items()
+    }
+    found: list[Model | Untried] = []
+    for ways in zip(*every.values(), strict=False):
+        words, aside = f"{ways[0].words}{move.where}", progress.aside(f"the ladder tries {ways[0].words}{move.where}")
+        begins = _begins(stands, dict(zip(every, ways, strict=True)))
+        try:
+            fit = _fit(stands, begins, runs, names, aside)
+            solution, _ = fit.with_levels(fit.solve(aside))
+        except OmnidynError as error:
+            found.append(Untried(move, words, str(error)))
+            continue
+        numbers = stands.numbers + sum(way.numbers for way in ways)
+        found.append(Model(fit, solution, begins, move, words, numbers, stands, instead))
+    return found
+
+
+def _begins(stands: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot, Question]]:
+    """Each group as it is switched on, or as it ended."""
+    found = {}
+    for group, start in stands.begins.items():
+        way = ways.get(group) or as_it_ended(*start, stands.alone[group])
+        found[group] = way.robot, way.question
+    return found
+
+
+def _fit(
+    stands: Model, begins: Mapping[str, tuple[Robot, Question]], runs: Sequence[Run], names: Sequence[str] | None,
+    progress: Progress,
+) -> Fit:  # fmt: skip
+    if names is None:
+        return Fit.of(runs, *begins[stands.fit.groups[0].name], progress=progress)
+    asked, first = stands.fit.question, next(iter(begins.values()))[1]
+    profiles = [set(question.profile) for _, question in begins.values()]
+    question = replace(
+        asked, per_free=_own(stands, begins), nuisances=first.nuisances,
+        profile=tuple(name for name in asked.profile if all(name in own for own in profiles)),
+    )  # fmt: skip
+    return Fit.of(runs, stands.fit.began, question, names, progress, begins)
+
+
+def _own(stands: Model, begins: Mapping[str, tuple[Robot, Question]]) -> tuple[str, ...]:
+    """The numbers that each group has for itself: where friction is its own, all of it that was not shared before."""
+    asked = stands.fit.question.per_free
+    if not is_own(FRICTION, stands.fit.question):
+        return asked
+    shared = {name for name in stands.solution.solver.problem.names if AT not in name}
+    keys = [key for robot, question in begins.values() for key in expand_keys(question.free or (), robot)]
+    of_friction: Callable[[str], bool] = lambda key: (place := find_key(key)) is not None and place.part == FRICTION  # noqa: E731
+    own = [key for key in keys if of_friction(key) and key not in shared]
+    return tuple(dict.fromkeys([*(key for key in asked if not of_friction(key)), *own]))
