@@ -18,7 +18,9 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.stability import LOGS, TIME, Level, Shift, Split, Stability
 from omnidyn.identification.structure.blocks import BLOCKS, Blocks, apart
-from omnidyn.identification.structure.linear import Linear
+from omnidyn.identification.structure.linear import Linear, Rows
+from omnidyn.identification.structure.misfit import TOLD as KNOWN
+from omnidyn.identification.structure.misfit import memory_beside
 from omnidyn.statistics import homogeneity, t_quantile
 
 FALSE = 0.01  # of right logs in which some moment is found; the same between logs
@@ -41,8 +43,25 @@ class _Compared:
 
 
 def stability(linear: Linear) -> Stability:
-    """What differs within a fit. linear: its rows made white."""
-    return _Look(linear).stability()
+    """What differs within a fit. linear: its rows made white.
+
+    A memory of which little is known may be the change itself: once more then, with that of what the likeliest would
+    leave.
+    """
+    seen = _Look(linear).stability()
+    if seen.splits or not seen.likely or linear.degrees >= KNOWN:
+        return seen
+    return _Look(Linear(linear.rows, memory_beside(linear.rows, _after(linear.rows, seen.likely[0])))).stability()
+
+
+def _after(rows: Rows, share: float) -> list[FloatArray]:
+    """What the numbers show after a share of each log, and not before: slopes (C, rows, P) of each piece."""
+    found = []
+    for piece, slopes in zip(rows.pieces, rows.slopes, strict=True):
+        t = piece.record.t
+        later = t[piece.first : piece.last + 1] - t[0] >= share * (t[-1] - t[0])
+        found.append(slopes * later[:, None])
+    return found
 
 
 class _Look:

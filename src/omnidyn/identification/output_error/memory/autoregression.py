@@ -181,7 +181,7 @@ def autoregression(
     """
     found, cost = _fitted(stretches, most)
     own = while_moving(stretches, moves) if moves and most is None else None
-    if own is not None and (not found.order or own.cost + 2.0 * math.log(found.rows) < cost):
+    if own is not None and own.cost < cost:
         return _of_motion(own, sum(int(each.sum()) for each in moves or ()))
     if not may_add_up or not found.order:
         return found

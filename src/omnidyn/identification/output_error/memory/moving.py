@@ -23,13 +23,12 @@ from omnidyn.identification.output_error.memory.mixed import Look, scored
 
 STARTS = ((0.95, -4.0), (0.8, -3.0), (0.8, 0.0))  # of phi, and of the logarithm of lambda
 LOW, HIGH = (0.0, -16.0), (0.9999, 16.0)
-LIKELIER = 4.0  # of twice the log likelihood, that two numbers must bring: Akaike's
 LEAST = 0.02  # share of the rows that move, and that rest, for the two to be told apart
 
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """share: lambda. variance: s^2. information (2, 2): on phi and the logarithm of lambda. cost: -2 log likelihood."""
+    """share: lambda. variance: s^2. information (2, 2): on phi and the logarithm of lambda. cost: BIC."""
 
     phi: float
     share: float
@@ -79,7 +78,8 @@ def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) ->
         return rows * math.log(size) + logs, gradient, curved, size
 
     at, curved, size, cost = scored(looked, STARTS, LOW, HIGH)
-    return Moving(float(at[0]), math.exp(at[1]), size, 0.5 * curved, cost) if cost < white - LIKELIER else None
+    cost += 2.0 * math.log(rows)
+    return Moving(float(at[0]), math.exp(at[1]), size, 0.5 * curved, cost) if cost < white else None
 
 
 @kernel
