@@ -43,6 +43,7 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("fit of speeds", partial(_fit, paper, "twist")),
         ("fit of speeds alone", partial(_fit, paper, "twist", nuisances=(), start="rest")),
         ("fit of speeds whose errors remember", partial(_fit, paper, "twist", memory=MEMORY)),
+        ("errors that remember while the robot moves", _remember),
         ("fit of speeds, currents and poses", partial(_fit, paper, "twist", "current", "pose")),
         ("fit of counted angles", partial(_fit, paper, "wheel_angle")),
         ("simulation, any friction", partial(_run, other)),
@@ -70,6 +71,11 @@ def needed_late() -> None:
     _run(load_robot("mecanum"))
     row_terms(np.zeros((1, 2)), np.ones(1), 0.0, None, np.ones(1), False)
     row_squares(np.zeros((1, 2, 1)), np.zeros((1, 2)))
+    _remember()
+
+
+def _remember() -> None:
+    """Errors of every kind of memory, filtered."""
     series = np.convolve(np.random.default_rng(2).standard_normal(ROWS), MEMORY)[:ROWS, None]
     model = autoregression([series], moves=[np.arange(ROWS) % HOLD > 0])
     replace(model, moving=(0.5, 0.5)).new(series, np.arange(ROWS), np.ones(ROWS, bool))
