@@ -23,6 +23,7 @@ from omnidyn.identification.output_error.memory.mixed import Look, scored
 
 STARTS = ((0.95, -4.0), (0.8, -3.0), (0.8, 0.0))  # of phi, and of the logarithm of lambda
 LOW, HIGH = (0.0, -16.0), (0.9999, 16.0)
+COLOURED = 3.0  # standard errors of the correlation of neighbours, beyond which what is left is not white
 LEAST = 0.02  # share of the rows that move, and that rest, for the two to be told apart
 
 
@@ -58,7 +59,8 @@ class Moving:
 
 
 def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) -> Moving | None:
-    """Of series (n, K) without gaps; None where they are white, or where the robot hardly ever moves or rests.
+    """Of series (n, K) without gaps; None where they are white, where what is beside their memory is not, or where the
+    robot hardly ever moves or rests.
 
     moves (n,) of each: in which rows it does.
     """
@@ -79,7 +81,12 @@ def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) ->
 
     at, curved, size, cost = scored(looked, STARTS, LOW, HIGH)
     cost += 2.0 * math.log(rows)
-    return Moving(float(at[0]), math.exp(at[1]), size, 0.5 * curved, cost) if cost < white else None
+    found = Moving(float(at[0]), math.exp(at[1]), size, 0.5 * curved, cost)
+    steps = np.ones(rows, np.intp)
+    steps[ends[:-1]] = 0
+    new = new_while_moving(series[:, :1].copy(), steps, there, found.phi, found.share)[:, 0]
+    coloured = abs(float(new[1:] @ new[:-1])) > COLOURED * math.sqrt(rows) * float((new**2).mean())
+    return found if cost < white and not coloured else None
 
 
 @kernel
