@@ -1,8 +1,8 @@
 """Forty kinds of wrong world: what `identify` says where the model is wrong, and where it is right (an hour).
 
-kernel, world: a simulator that shares no code with omnidyn. log: cases and their logs. kinds: what is wrong. sizes:
-how much, drawn beforehand by pilot on other seeds. remedies: the true remedy, applied. score, right: wrong and right
-worlds against the truth. OMNIDYN_BENCH_SHARE=0.04 does that share of the logs.
+kernel, held, world: a simulator that shares no code with omnidyn. log: cases and their logs. kinds: what is wrong.
+sizes: how much, drawn beforehand by pilot on other seeds. remedies: the true remedy, applied. score, right: wrong and
+right worlds against the truth. OMNIDYN_BENCH_SHARE=0.04 does that share of the logs.
 """
 
 from __future__ import annotations

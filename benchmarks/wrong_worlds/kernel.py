@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from benchmarks.wrong_worlds.held import held_until
+
 SHORTEST = 1e-6  # [s] within which an event is found
 CREEP = 3e-5  # [m/s] below it the plane rests where it can be held: an ellipse turns ever faster as it stops
 HEAT = 9  # where the heat of the windings begins in a state: twist, path, pose, heat
@@ -382,10 +384,7 @@ def march(p, since, command, wanted, step, states, seen):
     now, row = 0.0, 0
     for k in range(len(wanted)):
         while True:
-            while row < len(since) and since[row] <= now + 1e-12:
-                u[:] = command[row]
-                row += 1
-            until = wanted[k] if row >= len(since) else min(wanted[k], since[row])
+            row, until = held_until(since, command, row, now, wanted[k], u)
             if now + 1e-12 < p.change < until - 1e-12:
                 until = p.change
             if until - now > 1e-12:

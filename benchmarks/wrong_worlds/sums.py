@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from benchmarks.wrong_worlds.held import held_until
+
 STEP = 1e-4  # [s]
 SWEEPS, SETTLED = 200, 1e-10  # at most; [N] by which nothing changes any more
 
@@ -40,10 +42,7 @@ def march_sum(p, since, command, wanted, step, states):
     now, row, u = 0.0, 0, np.zeros(command.shape[1])
     for k in range(len(wanted)):
         while True:
-            while row < len(since) and since[row] <= now + 1e-12:
-                u[:] = command[row]
-                row += 1
-            until = wanted[k] if row >= len(since) else min(wanted[k], since[row])
+            row, until = held_until(since, command, row, now, wanted[k], u)
             if until - now > 1e-12:
                 steps = int(np.ceil((until - now) / step))
                 for _ in range(steps):

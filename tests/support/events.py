@@ -30,3 +30,14 @@ def meet_events(robot: Robot, seed: int) -> None:
         assert np.abs(run.pose - truth.pose).max() <= tol
         assert ((run.twist == 0.0) == truth.stuck[:, :3]).all()
         assert not run.warnings
+
+
+def meet_modes(robot: Robot, voltage: FloatArray, dt: FloatArray) -> None:
+    """At tol 1e-7: within 1e-6 [m/s], 1e-5 [rad/s], 1e-6 [m, rad], and at rest in the same rows."""
+    truth = reference(robot, voltage, dt)
+    run = simulate(robot, voltage, dt, tol=1e-7)
+    assert not run.warnings
+    assert np.abs(run.twist[:, :2] - truth.twist[:, :2]).max() <= 1e-6
+    assert np.abs(run.twist[:, 2] - truth.twist[:, 2]).max() <= 1e-5
+    assert np.abs(run.pose - truth.pose).max() <= 1e-6
+    np.testing.assert_array_equal(run.twist == 0.0, truth.stuck[:, :3])

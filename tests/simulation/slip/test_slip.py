@@ -53,6 +53,19 @@ def test_against_the_events(seed):
     assert any(words.startswith("wheels slip: wheel ") for words in run.warnings)
 
 
+def meet_slip(robot, body, seed):
+    """(the run of a robot, which meets the events of the reference; that of the same robot with another body)."""
+    u, reference = levels(robot, seed), Slip(robot, wheel_loads(robot).newtons, load_shift(robot))
+    twist, rims, contact = reference.run(u, 0.25)
+    if reference.least < EDGE:
+        pytest.skip("what holds and what drives differ by no more than rounding")
+    run, other = (omnidyn.simulate(each, u, 0.25, tol=1e-6) for each in (robot, robot.replace(body=body)))
+    assert (np.abs(run.twist - twist) / [1.0, 1.0, 10.0]).max() < 1e-6
+    assert np.abs(run.wheel_speed * robot.wheels.radii - rims).max() < 1e-5
+    assert contact.any()
+    return run, other
+
+
 @pytest.mark.parametrize("seed", [*range(3), *LONG])
 def test_loads_that_shift_against_the_events(seed):
     """The same with a centre of mass at a height of up to 0.4 of where the wheels stand."""
@@ -61,16 +74,8 @@ def test_loads_that_shift_against_the_events(seed):
         (AXEBOT, FOUR)[seed % 2], rng.uniform(0.2, 0.8), rng.uniform(1e-5, 5e-5), rotating_frame=bool(seed // 2 % 2),
         centre_height=rng.uniform(0.01, 0.04),
     )  # fmt: skip
-    u, reference = levels(robot, 100 + seed), Slip(robot, wheel_loads(robot).newtons, load_shift(robot))
-    twist, rims, contact = reference.run(u, 0.25)
-    if reference.least < EDGE:
-        pytest.skip("what holds and what drives differ by no more than rounding")
-    run = omnidyn.simulate(robot, u, 0.25, tol=1e-6)
-    low = omnidyn.simulate(robot.replace(body=robot.body.replace(centre_height=0.0)), u, 0.25, tol=1e-6)
-    assert np.abs(run.twist - low.twist).max() > 1e-4
-    assert (np.abs(run.twist - twist) / [1.0, 1.0, 10.0]).max() < 1e-6
-    assert np.abs(run.wheel_speed * robot.wheels.radii - rims).max() < 1e-5
-    assert contact.any()
+    run, other = meet_slip(robot, robot.body.replace(centre_height=0.0), 100 + seed)
+    assert np.abs(run.twist - other.twist).max() > 1e-4
 
 
 # --- wheels that roll -------------------------------------------------------------------------------------------------
@@ -170,16 +175,8 @@ def test_a_centre_of_mass_beside_the_wheels_against_the_events(seed):
         (AXEBOT, FOUR)[seed % 2], rng.uniform(0.2, 0.8), rng.uniform(1e-5, 5e-5), rotating_frame=bool(seed // 2 % 2),
         centre=(far * np.cos(way), far * np.sin(way)), centre_height=rng.choice([0.0, 0.015]),
     )  # fmt: skip
-    u, reference = levels(robot, 200 + seed), Slip(robot, wheel_loads(robot).newtons, load_shift(robot))
-    twist, rims, contact = reference.run(u, 0.25)
-    if reference.least < EDGE:
-        pytest.skip("what holds and what drives differ by no more than rounding")
-    run = omnidyn.simulate(robot, u, 0.25, tol=1e-6)
-    middle = omnidyn.simulate(robot.replace(body=robot.body.replace(centre=(0.0, 0.0))), u, 0.25, tol=1e-6)
-    assert np.abs(run.twist - middle.twist).max() > 1e-3
-    assert (np.abs(run.twist - twist) / [1.0, 1.0, 10.0]).max() < 1e-6
-    assert np.abs(run.wheel_speed * robot.wheels.radii - rims).max() < 1e-5
-    assert contact.any()
+    run, other = meet_slip(robot, robot.body.replace(centre=(0.0, 0.0)), 200 + seed)
+    assert np.abs(run.twist - other.twist).max() > 1e-3
     assert not any("cap" in words for words in run.warnings)
 
 
