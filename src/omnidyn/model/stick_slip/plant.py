@@ -61,18 +61,20 @@ def _check_band(robot: Robot, plant: Plant) -> None:
 
 def _bound_laws(plant: Plant) -> None:
     """What the solvers must know beforehand of what falls with the speed, and of what bends."""
-    body, steep = plant.body, 0.0
-    for row in plant.element[(plant.element["fall"] > 0.0) | (plant.element["stiffness"] > 0.0)]:
-        steep += (steepest_of(row) + fade_of(row)) * float(row.g @ row.g)
+    body = plant.body
+    for row in plant.element:
+        row.steep = (steepest_of(row) + fade_of(row)) * float(row.g @ row.g) / body.least
+    steep = fade_of(body)
     if body.fall > 0.0:
         more = (body.breakaway - body.coulomb).max()
         bends = float((body.bristle_breakaway - body.bristle_coulomb).max())
         round_ = body.coulomb[0] == body.coulomb[1] and body.breakaway[0] == body.breakaway[1]
         rate = more * (1.0 if round_ else 2.0) + 2.0 * BENDS * bends  # an ellipse falls faster than its levels do
         steep += rate * body.fall * steepest(0.0, body.form, body.exponent)
-    body.steep = (steep + fade_of(body)) / body.least
+    body.steep = steep / body.least
+    body.steep_sum = body.steep + plant.element["steep"].sum()
     body.bristles = plant.element["bristle_breakaway"].max(axis=1).sum() + body.bristle_breakaway.sum()
-    body.laws = float(body.steep > 0.0 or body.stiffness > 0.0 or bool(np.any(plant.element["stiffness"] > 0.0)))
+    body.laws = float(body.steep_sum > 0.0 or body.stiffness > 0.0 or bool(np.any(plant.element["stiffness"] > 0.0)))
 
 
 def _memory(mass: float, element: Any, driven: bool) -> float:

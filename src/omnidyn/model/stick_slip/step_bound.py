@@ -7,6 +7,7 @@ import math
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.stribeck import fall, steepness_left
 from omnidyn.model.stick_slip.forces import forces_at_work
+from omnidyn.model.stick_slip.release import SIGNS
 
 MONOTONE = 0.5  # of 1/STEEP: a stage so short has one solution, that of an implicit Euler step included
 GROWS = 1e4  # by which an error is taken to grow at the most
@@ -15,33 +16,50 @@ YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
 
 @part
 def longest_step(plant, stage, x, h):
-    """h, or less, so that friction which falls with the speed leaves each stage of a step from x one solution."""
-    while h * plant.body.steep > MONOTONE:
+    """h, or less, so that friction which falls with the speed leaves each stage of a step from x one solution.
+
+    What is at rest stays there in all of them, as long as it is held: see `has_one_start`.
+    """
+    while h * plant.body.steep_sum > MONOTONE:
         reach = 2.0 * h * forces_at_work(plant, stage) / plant.body.least
-        if h * _steep_near(plant, x, reach) <= MONOTONE:
+        if h * _steep_near(plant, stage, x, reach, False) <= MONOTONE:
             return h
         h *= 0.5
     return h
 
 
 @part
-def _steep_near(plant, x, reach):
-    """STEEP, over the speeds within `reach` of x [m/s]: next to nothing falls at several Stribeck speeds."""
-    body = plant.body
-    share = 1.0 if body.fade > 0.0 else 0.0
+def has_one_start(plant, stage, x, h):
+    """Whether a step is so short that there is one way for what is at rest to give way, too."""
+    reach = 2.0 * h * forces_at_work(plant, stage) / plant.body.least
+    return h * _steep_near(plant, stage, x, reach, True) <= MONOTONE
+
+
+@part
+def _steep_near(plant, stage, x, reach, rests):
+    """The sum of all STEEP over the speeds within `reach` of x [m/s]: next to nothing falls at several Stribeck speeds.
+
+    rests: whether that of what is at rest counts.
+    """
+    body, found = plant.body, 0.0
     for e in range(len(plant.element)):
         own = plant.element[e]
-        if own.fall > 0.0:
+        if own.steep > 0.0 and (rests or stage.each[e].sign != 0.0):
             g0, g1, g2 = own.g[0], own.g[1], own.g[2]
             size = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2)
             least = abs(g0 * x[0] + g1 * x[1] + g2 * x[2]) - size * reach
-            share = max(share, steepness_left(least * own.fall, own.form, own.exponent))
-        if own.fade > 0.0:
-            share = 1.0
-    if body.fall > 0.0:
-        least = math.hypot(x[0], x[1]) - reach
-        share = max(share, steepness_left(least * body.fall, body.form, body.exponent))
-    return share * body.steep
+            found += own.steep * _share_left(own, least)
+    if body.steep > 0.0 and (rests or stage.task.ellipse != 0.0):
+        found += body.steep * _share_left(body, math.hypot(x[0], x[1]) - reach)
+    return found
+
+
+@part
+def _share_left(own, speed):
+    """How much of its STEEP an element has left at a speed [m/s] and beyond; all of it where its damping fades."""
+    if own.fade > 0.0 or own.fall == 0.0:
+        return 1.0
+    return steepness_left(speed * own.fall, own.form, own.exponent)
 
 
 @part
@@ -54,7 +72,8 @@ def growth(plant, stage, start, end, h):
     worst = 1.0
     for e in range(len(plant.element)):
         own = plant.element[e]
-        if own.fall > 0.0:
+        rests = start[SIGNS + e] == 0.0 and end[SIGNS + e] == 0.0
+        if own.fall > 0.0 and not rests:
             g0, g1, g2 = own.g[0], own.g[1], own.g[2]
             speed = abs(g0 * start[0] + g1 * start[1] + g2 * start[2])
             more = max(stage.each[e].hold[0] - own.coulomb[0], stage.each[e].hold[1] - own.coulomb[1])
@@ -64,7 +83,8 @@ def growth(plant, stage, start, end, h):
                 g = g0 if a == 0 else (g1 if a == 1 else g2)
                 gain += g * (end[a] - start[a]) / h
             worst = max(worst, _grown(plant, speed * own.fall, own.form, own.exponent, more * size, abs(gain)))
-    if body.fall > 0.0:
+    first = SIGNS + len(plant.element)
+    if body.fall > 0.0 and not (start[first] == 0.0 and end[first] == 0.0):
         more = max(stage.task.hold[0] - body.coulomb[0], stage.task.hold[1] - body.coulomb[1])
         more = max(
             more,

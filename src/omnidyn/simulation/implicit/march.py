@@ -21,7 +21,7 @@ from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
 from omnidyn.model.stick_slip.release import SIGNS, current_entry, new_state, put, settle, sticks, with_given_currents
-from omnidyn.model.stick_slip.step_bound import MONOTONE, bristle_error, bristle_turns, growth, longest_step
+from omnidyn.model.stick_slip.step_bound import MONOTONE, bristle_error, bristle_turns, growth, has_one_start, longest_step
 from omnidyn.simulation.implicit.step import GAMMA, step
 from omnidyn.simulation.speed_loop import Loop, close_loop, passed
 
@@ -203,7 +203,7 @@ def _share(plant, stage, state, tol):
 def _beyond(plant, stage, state, end, h, tol, ratio):
     """The ratio of the error of a step to what it may be, where friction falls with the speed or bends."""
     m = len(plant.element)
-    if plant.body.steep > 0.0:
+    if plant.body.steep_sum > 0.0:
         ratio *= growth(plant, stage, state, end, h)
     if plant.body.bristles > 0.0:
         ratio = max(ratio, bristle_turns(plant, state, end, current_entry(m, m), h) / tol)
@@ -213,7 +213,7 @@ def _beyond(plant, stage, state, end, h, tol, ratio):
 @part
 def in_one_row(plant, dt):
     """Into how many fixed steps a row is cut: one, but where friction falls so fast that a stage had two solutions."""
-    return max(1, math.ceil(dt * plant.body.steep / MONOTONE))
+    return max(1, math.ceil(dt * plant.body.steep_sum / MONOTONE))
 
 
 @part
@@ -228,7 +228,7 @@ def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
     body = plant.body
     one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(plant.element)
     rate = _share(plant, stage, state, tol)
-    if body.steep > 0.0:
+    if body.steep_sum > 0.0:
         _unresolved(plant, stage, state, h)  # poses the problem whose forces bound the speeds of the step
         h = longest_step(plant, stage, state, h)
     while True:
@@ -247,6 +247,8 @@ def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
         astray = max(_reverses(plant, state, middle, h), _reverses(plant, middle, two, h))
         if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
             astray = max(astray, _unresolved(plant, stage, state, h))
+            if body.steep_sum > 0.0 and not has_one_start(plant, stage, state, h):
+                astray = max(astray, 2.0 * tol)
         if body.gathers > 0.0 and (
             crosses(plant, middle, current_entry(m, m)) or crosses(plant, two, current_entry(m, m))
         ):
