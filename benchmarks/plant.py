@@ -17,10 +17,10 @@ from scipy.integrate import solve_ivp
 from benchmarks.table import Table, Times, machine, one_core
 from benchmarks.tanh import run_tanh
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.layout import new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.model.stick_slip.release import new_state
 from omnidyn.simulation.implicit.march import run_implicit
 from omnidyn.simulation.simulate import simulate
 from omnidyn.simulation.speed_loop import no_loop
@@ -96,7 +96,7 @@ def ours(robot: Robot, voltage: np.ndarray, tol: float | None, repeats: int) -> 
     run = whole.measure(partial(simulate, robot, voltage, DT, tol=tol), repeats)
     outcome = kernel.measure(call, repeats)
     assert run.twist is not None
-    assert np.array_equal(outcome.state[:, :2], run.twist[:, :2])
+    assert np.array_equal(outcome.state.x[:, :2], run.twist[:, :2])
     p50, p99 = np.percentile(outcome.iterations, [50, 99])
     cells = per_step(whole, len(voltage)) | {"kernel us/step": min(kernel.cpu) * 1e3 / len(voltage)}
     return cells | {"p50": int(p50), "p99": int(p99), "max": int(outcome.iterations.max())}, run.twist

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from omnidyn.arguments import check_order
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
-from omnidyn.model.layout import N_AXES
+from omnidyn.model.layout import N_AXES, new_states
 from omnidyn.model.mass import masses_couple, per_mass
 from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
 from omnidyn.model.robot import Robot
@@ -117,11 +117,12 @@ def holds_under(robot: Robot) -> Callable[[FloatArray], BoolArray]:
     numbers = plant(
         robot.rigid.model_copy(update={"motor": robot.motor.model_copy(update={"electrical": QUASI_STATIC})})
     )
-    at_rest, bare = moving_states(numbers, np.zeros((1, N_AXES))), with_given_currents(numbers)
+    bare = with_given_currents(numbers)
 
     def holds(voltage: FloatArray) -> BoolArray:
         volts = np.ascontiguousarray(voltage, dtype=float)
-        return np.all(accelerations(numbers, np.tile(at_rest, (len(volts), 1)), volts, bare) == 0.0, axis=-1)
+        at_rest = new_states(numbers, len(volts))
+        return np.all(accelerations(numbers, at_rest, volts, bare) == 0.0, axis=-1)
 
     return holds
 

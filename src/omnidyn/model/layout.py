@@ -1,6 +1,7 @@
 """The named parts that the compiled solvers work in: the constants of a robot, and a stage of one of its steps.
 
     plant.body.mass, plant.element[e].coulomb[side]      constants: a Plant. No solver writes into one that it is given
+    state.x[a], state.each[e].sign, .current, .bend      the State of a run
     stage.task.tau, stage.each[e].sign                   the problem of one stage, and what its solution leaves
     stage.work.jacobian[a, b]                            room to work in
 
@@ -111,6 +112,11 @@ EACH = _record(
     found=(),  # marks of the solver
     before=(),
 )
+EACH_STATE = _record(
+    sign=(),  # as in EACH
+    current=(),  # of a motor [A]
+    bend=(),  # z of a bristle [m]; in Karnopp's band the speed gathered against it [m/s]
+)
 WORK = _record(
     residual=(3,),  # (M/tau)(x - x*) minus all forces but those of stuck elements [N]
     jacobian=(3, 3),  # its slopes by x
@@ -145,6 +151,21 @@ class Plant(NamedTuple):
         return Plant(self.body.copy(), self.element.copy())
 
 
+class State(NamedTuple):
+    """The state of a run. x: (3,) [m/s]; each: shape (3 + wheels + 2,), of EACH_STATE.
+
+    Behind the elements stands the ellipse, along x and along y; its sign is in the first of the two. Of many instants,
+    or robots: one more axis in front.
+    """
+
+    x: Any
+    each: Any
+
+    def at(self, rows: Any) -> State:
+        """The state, or the states, of some of many."""
+        return State(*(part[rows] for part in self))
+
+
 class Stage(NamedTuple):
     """A stage of a step: task, a record TASK; each, shape (3 + wheels,), of EACH; work, a record WORK."""
 
@@ -173,6 +194,19 @@ def many(plants: Sequence[Plant]) -> Plant:
     """Plants of as many elements each, as one. Python hands arrays of records to a kernel, and be it of one: a record
     takes it twenty times as long."""
     return Plant(np.array([each.body for each in plants], BODY), np.array([each.element for each in plants], ELEMENT))
+
+
+def new_states(plant: Plant, count: int) -> State:
+    """So many states of rest of one plant, without currents: all that can stick is stuck."""
+    body, element = plant
+    states = State(np.zeros((count, 3)), np.zeros((count, len(element) + 2), EACH_STATE))
+    states.each["sign"] = 2.0 - 2.0 * np.concatenate([element["active"], [body.active, 0.0]])
+    return states
+
+
+def new_state(plant: Plant) -> State:
+    """One of them."""
+    return new_states(plant, 1).at(0)
 
 
 def new_stage(plant: Plant) -> Stage:

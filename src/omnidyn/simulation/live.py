@@ -124,10 +124,9 @@ class LiveRobot:
         units = np.array([1.0, 1.0, numbers.body.length])
         limit = robot.motor.current_limit
         most = per_wheel(np.inf if limit is None else limit, n)
-        state = start_state(numbers, self.twist, np.zeros(n))
-        wheels, work = slip_plant(robot) if slips else None, room(numbers)
-        if wheels is not None:
-            units, state = np.ones(N_AXES), rolling(wheels, self.twist)
+        state, work = start_state(numbers, self.twist, np.zeros(n)), room(numbers)
+        wheels = slip_plant(robot) if slips else None
+        rims = np.zeros(0) if wheels is None else rolling(wheels, self.twist)
         loop: Loop = no_loop(n)
         if self._kind == SPEED:
             loop = loop_of(robot, np.zeros((1, n)), np.ones(1, np.bool_))
@@ -135,7 +134,7 @@ class LiveRobot:
 
         def advance(length: float, command: FloatArray) -> None:
             """Go on by a length of time [s] with a command held, from the state that the last call left."""
-            nonlocal state, now, asked
+            nonlocal state, rims, now, asked
             dts, ticks = _ticks(now, length, period) if period else (np.array([length]), np.ones(1, np.bool_))
             volts = np.empty((len(dts), n))
             if period:
@@ -145,14 +144,16 @@ class LiveRobot:
                 volts[:], given = self._at_motors(self._volts(command)), loop
             bound = np.tile(np.where(command == 0.0, 0.0, most) if robot.drive.coasts else most, (len(dts), 1))
             if wheels is not None:
-                out = run_slipping(wheels, volts, bound, dts, state, self.pose, given, tol)
-                self._turning = out.state[-1, N_AXES:] / robot.wheels.radii
+                slid = run_slipping(wheels, volts, bound, dts, rims, self.pose, given, tol)
+                rims, self.pose = slid.state[-1], slid.pose[-1]
+                self.twist, self._turning = rims[:N_AXES].copy(), rims[N_AXES:] / robot.wheels.radii
             else:
                 out = run_implicit(numbers, volts, bound, dts, state, self.pose, given, tol, work)
-            state, now, asked = out.state[-1], now + length, volts[-1]
+                state, self.pose = out.state.at(-1), out.pose[-1]
+                self.twist = state.x / units
+            now, asked = now + length, volts[-1]
             if period and self._fresh:
                 self.voltage, self._fresh = volts[0].copy(), False
-            self.twist, self.pose = state[:N_AXES] / units, out.pose[-1]
 
         return advance
 

@@ -17,7 +17,7 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import DYNAMIC, settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.model.stick_slip.release import SIGNS, current_entry, start_state
+from omnidyn.model.stick_slip.release import start_state
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, as_floats, commands, current_bounds, on_ticks
@@ -139,7 +139,7 @@ def _implicit(
     dt, voltage, loop, keep = _on_grid(robot, acting)
     bound = current_bounds(robot, acting, len(dt))
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
-    kept = Outcome(outcome.pose[keep], outcome.state[keep], outcome.iterations, outcome.steps)
+    kept = Outcome(outcome.pose[keep], outcome.state.at(keep), outcome.iterations, outcome.steps)
     asked = voltage[keep[:-1]]
     motors = asked if acting.set_point is None else reaching(robot, asked)
     return implicit_run(robot, given, motors, kept, tol, acting, view, asked)
@@ -200,7 +200,7 @@ def implicit_run(
     how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
     stopped, rows = capped(outcome), len(outcome.iterations)
     warnings = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
-    twists = outcome.state[:, :N_AXES] / [1.0, 1.0, plant(robot).body.length]
+    twists = outcome.state.x / [1.0, 1.0, plant(robot).body.length]
     done = Done(voltage, twists, outcome.pose, outcome, asked=asked)
     return as_run(robot, given, acting or given, done, how, warnings, view)
 
@@ -231,12 +231,11 @@ def as_run(
     turning, outcome = wheel_speed(robot.wheels, done.twist), done.outcome
     turning = turning if done.wheel_speed is None else done.wheel_speed
     if outcome is not None:  # a wheel that sticks is at rest, to the last bit
-        turning[outcome.state[:, SIGNS + N_AXES : SIGNS + N_AXES + n] == 0.0] = 0.0
+        turning[outcome.state.each["sign"][:, N_AXES : N_AXES + n] == 0.0] = 0.0
     if done.current is not None:
         current = done.current
     elif outcome is not None and robot.motor.electrical == DYNAMIC:
-        first = current_entry(N_AXES, N_AXES + n)
-        current = outcome.state[:, first : first + n]
+        current = outcome.state.each["current"][:, N_AXES : N_AXES + n]
     else:
         push = 0.0 if view.push is None else view.push  # of the floor, not of the motors
         current = settled_currents(robot, done.twist, _with_last(done.voltage - push))

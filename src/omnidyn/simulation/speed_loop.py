@@ -17,7 +17,6 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
-from omnidyn.model.stick_slip.release import SIGNS
 from omnidyn.simulation.commands import loop_gains
 
 
@@ -55,9 +54,9 @@ def passed(voltage, dead):
 
 
 @part
-def seen_speed(g, state, radius, moves):
+def seen_speed(g, x, radius, moves):
     """Speed of a wheel, its local direction g, as the encoder shows it [rad/s]: exactly 0 where it sticks."""
-    rim = g[0] * state[0] + g[1] * state[1] + g[2] * state[2]
+    rim = g[0] * x[0] + g[1] * x[1] + g[2] * x[2]
     return rim / radius if moves else 0.0
 
 
@@ -83,6 +82,6 @@ def close_loop(plant, state, loop, command, voltage):
     """One tick of all wheels under set points (n,): the voltages (n,), and the integrals in place."""
     for w in range(len(loop.kp)):
         kp, ki, limit, e = loop.kp[w], loop.ki[w], loop.limit[w], N_AXES + w
-        error = command[w] - seen_speed(plant.element[e].g, state, loop.radius[w], state[SIGNS + e] != 0.0)
+        error = command[w] - seen_speed(plant.element[e].g, state.x, loop.radius[w], state.each[e].sign != 0.0)
         takes, side = tick_branch(kp, ki, limit, loop.period, error, loop.sum[w])
         voltage[w], loop.sum[w] = tick_answer(kp, ki, limit, loop.period, error, loop.sum[w], takes, side)

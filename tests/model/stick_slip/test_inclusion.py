@@ -35,9 +35,9 @@ def problem(seed, turning=True):
     if random.random() < 0.3:
         twist[:] = 0.0
     state = start_state(own, twist, np.zeros(own.wheels))
-    put(p.stage, state)
+    put(p.stage, state.each)
     task.tau = 10.0 ** random.uniform(-5.0, -2.3)
-    task.goal[:] = state[:3] + scale * 0.2 * random.normal(size=3) * (random.random(3) < 0.7)
+    task.goal[:] = state.x + scale * 0.2 * random.normal(size=3) * (random.random(3) < 0.7)
     task.push[:] = random.normal(size=3) * (random.random() < 0.2)
     if not turning:
         own.body.turning = 0.0
@@ -47,7 +47,7 @@ def problem(seed, turning=True):
     wheels["aimed_current"] = random.normal(size=own.wheels)
     if random.random() < 0.2:
         wheels["bound"][random.integers(own.wheels)] = 0.0  # a motor that coasts
-    return p, state[:3].copy()
+    return p, state.x.copy()
 
 
 def current(e, at, tau, speed):
@@ -216,8 +216,8 @@ def test_the_first_guess_does_not_matter(seed):
     for _ in range(20):
         q, y = base.copy(), random.normal(size=3)
         state = start_state(q.plant, y / [1.0, 1.0, q.plant.body.length], np.zeros(q.plant.wheels))
-        put(q.stage, state)
-        y = state[:3].copy()
+        put(q.stage, state.each)
+        y = state.x.copy()
         solve(*q, y)
         np.testing.assert_allclose(y, x, rtol=1e-10, atol=1e-13)
         np.testing.assert_array_equal(y == 0.0, x == 0.0)
@@ -238,7 +238,7 @@ def test_what_rounds_along_one_axis_blurs_no_friction_along_another(axebot):
         stage.task.tau = tau
         stage.each["voltage"][N_AXES:] = [-1.0, -4.0, 5.0]
         stage.each["bound"][N_AXES:] = np.inf
-        x = start_state(own, np.array([0.6, 0.5, 0.0]), np.zeros(3))[:3]
+        x = start_state(own, np.array([0.6, 0.5, 0.0]), np.zeros(3)).x
         x[2] = sign * 0.5 * tau * own.element[2].coulomb[0] / own.body.mass
         stage.task.goal[:] = x
         stage.each["sign"][:N_AXES] = np.sign(x)

@@ -11,7 +11,7 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, Wh
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.model.stick_slip.release import current_entry, start_state
+from omnidyn.model.stick_slip.release import start_state
 from omnidyn.simulation.implicit.march import run_implicit
 from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.simulate import simulate
@@ -203,9 +203,7 @@ def bend_along_x(robot, voltage, dt, tol=1e-8):
     state = start_state(numbers, np.zeros(3), np.zeros(3))
     bound, lengths = np.full(voltage.shape, np.inf), np.full(len(voltage), dt)
     out = run_implicit(numbers, voltage.copy(), bound, lengths, state, np.zeros(3), no_loop(3), tol)
-    first = current_entry(len(numbers.element), len(numbers.element))
-    assert len(state) == first + len(numbers.element) + 2
-    return out.pose[:, 0], robot.friction.axes.stiffness[0] * out.state[:, first]
+    return out.pose[:, 0], robot.friction.axes.stiffness[0] * out.state.each["bend"][:, 0]
 
 
 def test_dahl_runs_along_its_exact_hysteresis():

@@ -5,8 +5,8 @@ import pytest
 
 from omnidyn import load_robot, simulate
 from omnidyn.errors import InputError
+from omnidyn.model.layout import new_state
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.model.stick_slip.release import new_state
 from omnidyn.simulation.implicit import march as implicit
 from omnidyn.simulation.speed_loop import no_loop
 
@@ -29,7 +29,7 @@ def test_steps_far_below_the_shortest_share_are_not_halved_in_vain():
     )
     assert outcome.steps.sum() < 70_000
     fine = simulate(LIMITED, voltage, 1e-3, tol=1e-9)
-    np.testing.assert_allclose(outcome.state[:, :2], fine.twist[:, :2], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(outcome.state.x[:, :2], fine.twist[:, :2], rtol=0, atol=1e-6)
 
 
 def test_a_robot_too_fast_to_be_followed_is_refused(monkeypatch):
@@ -61,8 +61,8 @@ def test_a_friction_far_below_the_forces_at_work_still_stops_what_it_stops(elect
         numbers, voltage, np.full((150, 3), np.inf), np.full(150, 0.02), new_state(numbers), np.zeros(3), no_loop(3),
         1e-5,
     )  # fmt: skip
-    turns = outcome.state[1:, 2]
+    turns = outcome.state.x[1:, 2]
     assert outcome.steps.max() < 1000
     assert turns[9] > 0.1
     assert (turns[140:] == 0.0).all()
-    assert (np.abs(outcome.state[141:, :2]) > 0.1).all()
+    assert (np.abs(outcome.state.x[141:, :2]) > 0.1).all()

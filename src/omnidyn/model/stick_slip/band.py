@@ -13,7 +13,6 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.stick_slip.forces import forces_at_work
 
-SIGNS = 3  # where the signs begin in a state
 FIRM = 4.0  # times all forces at work: what an axis in its band is held with, whatever drives it
 
 
@@ -33,10 +32,10 @@ def hold_in_band(plant, stage):
 
 
 @part
-def aim_band(stage, start, first, back):
+def aim_band(stage, start, back):
     """Set w* of a stage, as currents have their i*."""
     for a in range(N_AXES):
-        w = start[first + a]
+        w = start.each[a].bend
         stage.each[a].aimed_bend = w + back * (stage.each[a].bend - w) if back != 0.0 else w
 
 
@@ -53,41 +52,40 @@ def gather(plant, stage, tau):
 
 
 @part
-def keep_band(stage, end, first):
+def keep_band(stage, end):
     """Into a state: what has gathered."""
     for a in range(N_AXES):
-        end[first + a] = stage.each[a].bend if stage.each[a].sign == 0.0 else 0.0
+        end.each[a].bend = stage.each[a].bend if stage.each[a].sign == 0.0 else 0.0
 
 
 @part
-def cross_band(plant, state, first):
+def cross_band(plant, state):
     """Let axes enter and leave their bands, in place."""
     for a in range(N_AXES):
-        width, sign = plant.element[a].band, state[SIGNS + a]
-        if width == 0.0 or sign == 2.0:
+        width, now = plant.element[a].band, state.each[a]
+        if width == 0.0 or now.sign == 2.0:
             continue
-        if sign == 0.0 and abs(state[first + a]) >= width:
-            state[a], state[SIGNS + a] = state[first + a], (1.0 if state[first + a] > 0.0 else -1.0)
-            state[first + a] = 0.0
-        elif sign != 0.0 and abs(state[a]) < width:
-            state[first + a], state[a], state[SIGNS + a] = state[a], 0.0, 0.0
+        if now.sign == 0.0 and abs(now.bend) >= width:
+            state.x[a], now.sign, now.bend = now.bend, (1.0 if now.bend > 0.0 else -1.0), 0.0
+        elif now.sign != 0.0 and abs(state.x[a]) < width:
+            state.x[a], now.sign, now.bend = 0.0, 0.0, state.x[a]
 
 
 @part
-def crosses(plant, state, first):
+def crosses(plant, state):
     """Whether any axis of a state is to enter or to leave its band."""
     found = False
     for a in range(N_AXES):
-        width, sign = plant.element[a].band, state[SIGNS + a]
-        if width > 0.0 and sign != 2.0:
-            found |= abs(state[first + a]) >= width if sign == 0.0 else abs(state[a]) < width
+        width, now = plant.element[a].band, state.each[a]
+        if width > 0.0 and now.sign != 2.0:
+            found |= abs(now.bend) >= width if now.sign == 0.0 else abs(state.x[a]) < width
     return found
 
 
 @part
-def band_error(one, two, first):
+def band_error(one, two):
     """Difference of what has gathered in two states [m/s]."""
     worst = 0.0
     for a in range(N_AXES):
-        worst = max(worst, abs(one[first + a] - two[first + a]))
+        worst = max(worst, abs(one.each[a].bend - two.each[a].bend))
     return worst

@@ -1,7 +1,7 @@
 """Friction whose force is more than a level and a sign: what falls with the speed (Stribeck), what bends (bristles).
 
 Read only where plant.body.laws is set; then `residual` adds `add_laws`, a step asks step_bound.py for its length and
-for what its errors become, and states carry what bends behind the currents. Formulas: friction/stribeck.py and
+for what its errors become, and states carry what bends. Formulas: friction/stribeck.py and
 friction/bristle.py. What bends is eliminated from a stage like the currents are.
 """
 
@@ -153,8 +153,8 @@ def push_of_laws(plant, stage, x, push):
 
 
 @part
-def aim_bristles(plant, stage, start, first, back):
-    """Set z* of a stage: z of the state, `first` its entry; for back > 0 beyond z of the stage just solved.
+def aim_bristles(plant, stage, start, back):
+    """Set z* of a stage: z of the state `start`; for back > 0 beyond z of the stage just solved.
 
     Beyond what its level can bend it no bristle is aimed: a long step would make it push what moves.
     """
@@ -162,7 +162,7 @@ def aim_bristles(plant, stage, start, first, back):
     for e in range(len(plant.element)):
         own = plant.element[e]
         if own.stiffness > 0.0:
-            aimed = start[first + e]
+            aimed = start.each[e].bend
             if back != 0.0:
                 aimed += back * (stage.each[e].bend - aimed)
                 forward, backward = (
@@ -172,9 +172,8 @@ def aim_bristles(plant, stage, start, first, back):
                 aimed = min(max(aimed, -backward), forward)
             stage.each[e].aimed_bend = aimed
     if body.stiffness > 0.0:
-        m = len(plant.element)
         for a in range(2):
-            aimed = start[first + m + a]
+            aimed = start.each[len(plant.element) + a].bend
             if back != 0.0:
                 most = body.bristle_breakaway[a] / body.stiffness
                 aimed = min(max(aimed + back * (stage.task.bend[a] - aimed), -most), most)
@@ -182,11 +181,11 @@ def aim_bristles(plant, stage, start, first, back):
 
 
 @part
-def keep_bristles(plant, stage, end, first):
+def keep_bristles(plant, stage, end):
     """Into a state: how far bristles are bent at the solution."""
     for e in range(len(plant.element)):
         if plant.element[e].stiffness > 0.0:
-            end[first + e] = stage.each[e].bend
+            end.each[e].bend = stage.each[e].bend
     if plant.body.stiffness > 0.0:
         m = len(plant.element)
-        end[first + m], end[first + m + 1] = stage.task.bend[0], stage.task.bend[1]
+        end.each[m].bend, end.each[m + 1].bend = stage.task.bend[0], stage.task.bend[1]

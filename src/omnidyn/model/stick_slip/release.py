@@ -1,8 +1,7 @@
 """What gives way at once: the acceleration of a robot, the elements at rest choosing their force.
 
 The acceleration solves the inclusion of inclusion.py with speeds and currents frozen: what slides pulls with its
-Coulomb level, what rests holds as much as it can. A state is one vector: x (3) [m/s], the signs of the elements and of
-the ellipse, the currents of the motors [A].
+Coulomb level, what rests holds as much as it can.
 """
 
 from __future__ import annotations
@@ -11,20 +10,10 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import branching_kernel, part
-from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, many, new_stage
+from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
 from omnidyn.model.stick_slip.forces import residual, winding
 from omnidyn.model.stick_slip.inclusion import solve
 from omnidyn.model.stick_slip.laws import aim_bristles, push_of_laws
-
-SIGNS = 3  # where the signs begin in a state
-
-
-def new_state(plant: Plant) -> FloatArray:
-    """A state of rest without currents: every element that can stick is stuck."""
-    m, bends = len(plant.element), plant.body.bristles + plant.body.gathers > 0.0
-    state = np.zeros(SIGNS + m + 1 + plant.wheels + (m + 2 if bends else 0))
-    state[SIGNS : SIGNS + m], state[SIGNS + m] = 2.0 - 2.0 * plant.element["active"], 2.0 - 2.0 * plant.body.active
-    return state
 
 
 def with_given_currents(plant: Plant) -> Problem:
@@ -49,55 +38,46 @@ def with_given_currents(plant: Plant) -> Problem:
     return Problem(plants, stages)
 
 
-def place_of_current(e, m):
-    """Where the current of element e stands in a state of m elements."""
-    return SIGNS + 1 + m + e - N_AXES
-
-
-current_entry = part(place_of_current)
-
-
 @part
-def put(stage, state):
+def put(stage, each):
     """Take the signs of a state into a stage."""
     for e in range(len(stage.each)):
-        stage.each[e].sign = state[SIGNS + e]
-    stage.task.ellipse = state[SIGNS + len(stage.each)]
+        stage.each[e].sign = each[e].sign
+    stage.task.ellipse = each[len(stage.each)].sign
 
 
 @part
-def take(stage, state):
+def take(stage, each):
     """Bring the signs of a stage back into a state."""
     for e in range(len(stage.each)):
-        state[SIGNS + e] = stage.each[e].sign
-    state[SIGNS + len(stage.each)] = stage.task.ellipse
+        each[e].sign = stage.each[e].sign
+    each[len(stage.each)].sign = stage.task.ellipse
 
 
 @part
-def sticks(state, m):
-    """Whether anything is stuck in a state of m elements."""
+def sticks(state):
+    """Whether anything is stuck in a state."""
     found = False
-    for e in range(SIGNS, SIGNS + m + 1):
-        found |= state[e] == 0.0
+    for e in range(len(state.each)):
+        found |= state.each[e].sign == 0.0
     return found
 
 
-def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> FloatArray:
+def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> State:
     """The state of a robot that moves with `twist` [m/s, m/s, rad/s] under `current` [A]."""
-    state = moving_states(plant, twist[None])[0]
-    first = place_of_current(N_AXES, len(plant.element))
-    state[first : first + plant.wheels] = current
+    state = moving_states(plant, twist[None]).at(0)
+    state.each["current"][N_AXES : N_AXES + plant.wheels] = current
     return state
 
 
-def moving_states(plant: Plant, twists: FloatArray) -> FloatArray:
-    """The states of a robot that moves with each of `twists` (k, 3) [m/s, m/s, rad/s], no currents. Shape (k, size)."""
-    states = np.tile(new_state(plant), (len(twists), 1))
-    states[:, :3] = twists * [1.0, 1.0, plant.body.length]
-    x, y, z = states[:, :3].T
+def moving_states(plant: Plant, twists: FloatArray) -> State:
+    """The states of a robot that moves with each of `twists` (k, 3) [m/s, m/s, rad/s], no currents; k of them."""
+    states = new_states(plant, len(twists))
+    states.x[:] = twists * [1.0, 1.0, plant.body.length]
+    x, y, z = states.x.T
     local = [g[0] * x + g[1] * y + g[2] * z for g in plant.element["g"]]
     for e, speed in enumerate([*local, np.hypot(x, y)]):
-        sign = states[:, SIGNS + e]
+        sign = states.each["sign"][:, e]
         moving = (speed != 0.0) & (sign != 2.0)
         sign[moving] = np.sign(speed[moving])
     return states
@@ -112,8 +92,9 @@ def settle_currents(plant, stage, state):
         own = element[e]
         if own.inductance == 0.0:
             g0, g1, g2 = own.g[0], own.g[1], own.g[2]
-            speed = g0 * state[0] + g1 * state[1] + g2 * state[2] if state[SIGNS + e] != 0.0 else 0.0
-            state[current_entry(e, m)] = winding(
+            now = state.each[e]
+            speed = g0 * state.x[0] + g1 * state.x[1] + g2 * state.x[2] if now.sign != 0.0 else 0.0
+            now.current = winding(
                 speed, stage.each[e].voltage, 0.0, 1.0, own.emf, own.resistance, 0.0, own.drop,
                 stage.each[e].bound,
             )[0]  # fmt: skip
@@ -126,17 +107,17 @@ def _smooth_force(plant, stage, bare_plant, bare_stage, state):
     for e in range(m):
         bare_plant.element[e].viscous = plant.element[e].viscous
         if e >= N_AXES:
-            stuck = state[SIGNS + e] == 0.0
-            bare_stage.each[e].aimed_current = 0.0 if stuck else state[current_entry(e, m)]
+            stuck = state.each[e].sign == 0.0
+            bare_stage.each[e].aimed_current = 0.0 if stuck else state.each[e].current
     bare_plant.body.turning = plant.body.turning
     for a in range(3):
-        bare_stage.task.goal[a], bare_stage.task.push[a] = state[a], stage.task.push[a]
-    put(bare_stage, state)
+        bare_stage.task.goal[a], bare_stage.task.push[a] = state.x[a], stage.task.push[a]
+    put(bare_stage, state.each)
     if plant.body.laws != 0.0:
-        put(stage, state)
-        aim_bristles(plant, stage, state, current_entry(m, m), 0.0)
-        push_of_laws(plant, stage, state, bare_stage.task.push)
-    residual(bare_plant, bare_stage, state)
+        put(stage, state.each)
+        aim_bristles(plant, stage, state, 0.0)
+        push_of_laws(plant, stage, state.x, bare_stage.task.push)
+    residual(bare_plant, bare_stage, state.x)
     for a in range(3):
         bare_stage.task.push[a] = -bare_stage.work.residual[a]
 
@@ -157,37 +138,37 @@ def settle(plant, stage, bare, state, acceleration):
     bare_plant.body.turning = 0.0
     for e in range(m):
         bare_plant.element[e].viscous = 0.0
-        bare_stage.each[e].sign = 0.0 if state[SIGNS + e] == 0.0 else 2.0
+        bare_stage.each[e].sign = 0.0 if state.each[e].sign == 0.0 else 2.0
         if e >= N_AXES:
-            stuck = state[SIGNS + e] == 0.0
-            bare_stage.each[e].aimed_current = state[current_entry(e, m)] if stuck else 0.0
-    bare_stage.task.ellipse = 0.0 if state[SIGNS + m] == 0.0 else 2.0
+            stuck = state.each[e].sign == 0.0
+            bare_stage.each[e].aimed_current = state.each[e].current if stuck else 0.0
+    bare_stage.task.ellipse = 0.0 if state.each[m].sign == 0.0 else 2.0
     for a in range(3):
         acceleration[a] = bare_stage.task.goal[a] = 0.0
     count = solve(bare_plant, bare_stage, acceleration)
     for e in range(m):
-        if state[SIGNS + e] == 0.0:
-            state[SIGNS + e] = bare_stage.each[e].sign
-    if state[SIGNS + m] == 0.0:
-        state[SIGNS + m] = bare_stage.task.ellipse
+        if state.each[e].sign == 0.0:
+            state.each[e].sign = bare_stage.each[e].sign
+    if state.each[m].sign == 0.0:
+        state.each[m].sign = bare_stage.task.ellipse
     return count
 
 
 @branching_kernel
 def _accelerations(own, stages, bare, states, voltage, out):
     plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
-    for k in range(len(states)):
+    for k in range(len(out)):
         for e in range(N_AXES, len(plant.element)):
             stage.each[e].voltage = voltage[k, e - N_AXES]
-        settle(plant, stage, bare, states[k], out[k])
+        settle(plant, stage, bare, State(states.x[k], states.each[k]), out[k])
 
 
-def accelerations(plant: Plant, states: FloatArray, voltage: FloatArray, bare: Problem | None = None) -> FloatArray:
-    """Acceleration of x [m/s^2] in each state under its voltages [V]. Shapes (k, size), (k, wheels) -> (k, 3).
+def accelerations(plant: Plant, states: State, voltage: FloatArray, bare: Problem | None = None) -> FloatArray:
+    """Acceleration of x [m/s^2] in each state under its voltages [V]. Of k states, (k, wheels) -> (k, 3).
 
     The signs in `states` are changed in place to those of what gives way. bare: `with_given_currents`, where many ask.
     """
-    out, given = np.zeros((len(states), 3)), with_given_currents(plant) if bare is None else bare.copy()
+    out, given = np.zeros(states.x.shape), with_given_currents(plant) if bare is None else bare.copy()
     own = many([plant])
     _accelerations(own, new_stage(own), given, states, voltage, out)
     return out

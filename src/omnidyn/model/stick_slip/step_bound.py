@@ -7,7 +7,6 @@ import math
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.stribeck import fall, steepness_left
 from omnidyn.model.stick_slip.forces import forces_at_work
-from omnidyn.model.stick_slip.release import SIGNS
 
 MONOTONE = 0.5  # of 1/STEEP: a stage so short has one solution, that of an implicit Euler step included
 GROWS = 1e4  # by which an error is taken to grow at the most
@@ -72,26 +71,27 @@ def growth(plant, stage, start, end, h):
     worst = 1.0
     for e in range(len(plant.element)):
         own = plant.element[e]
-        rests = start[SIGNS + e] == 0.0 and end[SIGNS + e] == 0.0
+        rests = start.each[e].sign == 0.0 and end.each[e].sign == 0.0
         if own.fall > 0.0 and not rests:
             g0, g1, g2 = own.g[0], own.g[1], own.g[2]
-            speed = abs(g0 * start[0] + g1 * start[1] + g2 * start[2])
+            speed = abs(g0 * start.x[0] + g1 * start.x[1] + g2 * start.x[2])
             more = max(stage.each[e].hold[0] - own.coulomb[0], stage.each[e].hold[1] - own.coulomb[1])
             more = max(more, own.bristle_breakaway[0] - own.bristle_coulomb[0])
             size, gain = g0 * g0 + g1 * g1 + g2 * g2, 0.0
             for a in range(3):
                 g = g0 if a == 0 else (g1 if a == 1 else g2)
-                gain += g * (end[a] - start[a]) / h
+                gain += g * (end.x[a] - start.x[a]) / h
             worst = max(worst, _grown(plant, speed * own.fall, own.form, own.exponent, more * size, abs(gain)))
-    first = SIGNS + len(plant.element)
-    if body.fall > 0.0 and not (start[first] == 0.0 and end[first] == 0.0):
+    m = len(plant.element)
+    if body.fall > 0.0 and not (start.each[m].sign == 0.0 and end.each[m].sign == 0.0):
         more = max(stage.task.hold[0] - body.coulomb[0], stage.task.hold[1] - body.coulomb[1])
         more = max(
             more,
             body.bristle_breakaway[0] - body.bristle_coulomb[0],
             body.bristle_breakaway[1] - body.bristle_coulomb[1],
         )
-        u, gain = math.hypot(start[0], start[1]), math.hypot(end[0] - start[0], end[1] - start[1]) / h
+        u = math.hypot(start.x[0], start.x[1])
+        gain = math.hypot(end.x[0] - start.x[0], end.x[1] - start.x[1]) / h
         worst = max(worst, _grown(plant, u * body.fall, body.form, body.exponent, more, gain))
     return worst
 
@@ -104,38 +104,38 @@ def _grown(plant, u, shape, exponent, more, gain):
 
 
 @part
-def bristle_error(plant, one, two, first):
+def bristle_error(plant, one, two):
     """Difference of what bends between two states, as the speed of a body with the same energy [m/s]."""
     body = plant.body
     worst, m, turned = 0.0, len(plant.element), max(1.0, YAW_SHARE / body.length)
     for e in range(m):
         stiffness = plant.element[e].stiffness
         if stiffness > 0.0:
-            worst = max(worst, math.sqrt(stiffness / body.least) * abs(two[first + e] - one[first + e]))
+            worst = max(worst, math.sqrt(stiffness / body.least) * abs(two.each[e].bend - one.each[e].bend))
     if body.stiffness > 0.0:
         for a in range(m, m + 2):
-            worst = max(worst, math.sqrt(body.stiffness / body.least) * abs(two[first + a] - one[first + a]))
+            worst = max(worst, math.sqrt(body.stiffness / body.least) * abs(two.each[a].bend - one.each[a].bend))
     return worst * turned
 
 
 @part
-def bristle_turns(plant, a, b, first, h):
+def bristle_turns(plant, a, b, h):
     """A bound of how far a reversal of what bends can lead a step from a to b astray [m/s]; 0 without one.
 
     There z' bends by k z, k ~ |s|: of second order in the step, and step doubling does not see where.
     """
     body = plant.body
-    worst, m = 0.0, len(plant.element)
-    for e in range(m):
+    worst, x, y = 0.0, a.x, b.x
+    for e in range(len(plant.element)):
         own = plant.element[e]
         if own.stiffness > 0.0:
             g0, g1, g2 = own.g[0], own.g[1], own.g[2]
-            before, after = g0 * a[0] + g1 * a[1] + g2 * a[2], g0 * b[0] + g1 * b[1] + g2 * b[2]
+            before, after = g0 * x[0] + g1 * x[1] + g2 * x[2], g0 * y[0] + g1 * y[1] + g2 * y[2]
             if before * after < 0.0:
                 side = 0 if before > 0.0 else 1
-                bent = min(abs(a[first + e]) * own.stiffness / own.bristle_coulomb[side], 1.0)
+                bent = min(abs(a.each[e].bend) * own.stiffness / own.bristle_coulomb[side], 1.0)
                 worst = max(worst, math.sqrt(own.stiffness / body.least) * bent * h * abs(after - before))
-    if body.stiffness > 0.0 and a[0] * b[0] + a[1] * b[1] < 0.0:
-        change = math.hypot(a[0] - b[0], a[1] - b[1])
+    if body.stiffness > 0.0 and x[0] * y[0] + x[1] * y[1] < 0.0:
+        change = math.hypot(x[0] - y[0], x[1] - y[1])
         worst = max(worst, math.sqrt(body.stiffness / body.least) * h * change)
     return 0.25 * worst * max(1.0, YAW_SHARE / body.length)

@@ -15,13 +15,20 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
-from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, many, new_stage
+from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
 from omnidyn.model.stick_slip.band import band_error, cross_band, crosses
-from omnidyn.model.stick_slip.copies import copy_row
+from omnidyn.model.stick_slip.copies import copy_row, copy_state, row_of_state, state_of_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
-from omnidyn.model.stick_slip.release import SIGNS, current_entry, new_state, put, settle, sticks, with_given_currents
-from omnidyn.model.stick_slip.step_bound import MONOTONE, bristle_error, bristle_turns, growth, has_one_start, longest_step
+from omnidyn.model.stick_slip.release import put, settle, sticks, with_given_currents
+from omnidyn.model.stick_slip.step_bound import (
+    MONOTONE,
+    bristle_error,
+    bristle_turns,
+    growth,
+    has_one_start,
+    longest_step,
+)
 from omnidyn.simulation.implicit.step import GAMMA, step
 from omnidyn.simulation.speed_loop import Loop, close_loop, passed
 
@@ -41,17 +48,31 @@ class Outcome(NamedTuple):
     """What a run of the kernel gives; row 0 is the start."""
 
     pose: FloatArray  # (rows + 1, 3)
-    state: FloatArray  # (rows + 1, size of a state), see implicit_step
+    state: State  # rows + 1 of them
     iterations: IntArray  # (rows,) most solver iterations of a stage in the row
     steps: IntArray  # (rows,) steps solved
 
 
-def begun(rows: int, state: FloatArray, pose: FloatArray) -> Outcome:
+def begun(rows: int, state: State, pose: FloatArray) -> Outcome:
     """An outcome of which only the start is filled in."""
     counts = np.zeros((2, rows), np.int64)
-    out = Outcome(np.zeros((rows + 1, 3)), np.zeros((rows + 1, len(state))), counts[0], counts[1])
-    out.pose[0], out.state[0] = pose, state
+    states = State(*(np.zeros((rows + 1, *own.shape), own.dtype) for own in state))
+    out = Outcome(np.zeros((rows + 1, 3)), states, counts[0], counts[1])
+    out.pose[0] = pose
+    for kept, own in zip(states, state, strict=True):
+        kept[0] = own
     return out
+
+
+class Spare(NamedTuple):
+    """States on the way: after a whole step, one and two half steps, within a step, as it settles; and that of now."""
+
+    whole: State
+    middle: State
+    two: State
+    inner: State
+    settled: State
+    now: State
 
 
 class Room(NamedTuple):
@@ -59,17 +80,19 @@ class Room(NamedTuple):
 
     own: Problem  # an array of one plant, and of a stage of it
     bare: Problem  # the same, its currents given
-    spare: FloatArray  # (5, ..) states after a whole step, one and two half steps, within a step, and as it settles
+    spare: Spare
 
 
 def room(plant: Plant) -> Room:
     """Room for runs of a plant."""
     own = many([plant])
-    return Room(Problem(own, new_stage(own)), with_given_currents(plant), np.zeros((5, len(new_state(plant)))))
+    states = new_states(plant, len(Spare._fields))
+    spare = Spare(*(states.at(k) for k in range(len(Spare._fields))))
+    return Room(Problem(own, new_stage(own)), with_given_currents(plant), spare)
 
 
 def run_implicit(
-    plant: Plant, voltage: FloatArray, bound: FloatArray, dt: FloatArray, state: FloatArray, pose: FloatArray,
+    plant: Plant, voltage: FloatArray, bound: FloatArray, dt: FloatArray, state: State, pose: FloatArray,
     loop: Loop, tol: float, work: Room | None = None,
 ) -> Outcome:  # fmt: skip
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: one fixed step per row.
@@ -124,17 +147,18 @@ def pull(plant, stage, ahead):
 @part
 def _turned(plant, state, h):
     """How far a body turns [rad] in h [s] at the rate of a state."""
-    return h / plant.body.length * state[2]
+    return h / plant.body.length * state.x[2]
 
 
 @part
-def _event(a, b, m):
+def _event(a, b):
     """Whether two states differ in what sticks or in a direction of sliding; for the ellipse, by more than 0.5 rad."""
-    for e in range(SIGNS, SIGNS + m + 1):
-        if a[e] != b[e]:
+    for e in range(len(a.each)):
+        if a.each[e].sign != b.each[e].sign:
             return True
-    if a[SIGNS + m] == 1.0 and (a[0] != 0.0 or a[1] != 0.0):
-        cross, dot = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
+    x, y = a.x, b.x
+    if a.each[len(a.each) - 2].sign == 1.0 and (x[0] != 0.0 or x[1] != 0.0):
+        cross, dot = x[0] * y[1] - x[1] * y[0], x[0] * y[0] + x[1] * y[1]
         return (dot < 0.0) | (abs(cross) > 0.5 * dot)
     return False
 
@@ -143,26 +167,25 @@ def _event(a, b, m):
 def _error(plant, one, two):
     """Estimated error of `two`, half steps against one whole step, in m/s."""
     body = plant.body
-    worst = max(abs(two[0] - one[0]), abs(two[1] - one[1]))
-    worst = max(worst, YAW_SHARE * abs(two[2] - one[2]) / body.length)
-    first = current_entry(N_AXES, len(plant.element))
+    worst = max(abs(two.x[0] - one.x[0]), abs(two.x[1] - one.x[1]))
+    worst = max(worst, YAW_SHARE * abs(two.x[2] - one.x[2]) / body.length)
     for e in range(N_AXES, len(plant.element)):
         if plant.element[e].inductance > 0.0:
-            worst = max(worst, CURRENT_SHARE * abs(two[first + e - N_AXES] - one[first + e - N_AXES]))
+            worst = max(worst, CURRENT_SHARE * abs(two.each[e].current - one.each[e].current))
     if body.bristles > 0.0:
-        worst = max(worst, bristle_error(plant, one, two, current_entry(len(plant.element), len(plant.element))))
+        worst = max(worst, bristle_error(plant, one, two))
     if body.gathers > 0.0:
-        worst = max(worst, band_error(one, two, current_entry(len(plant.element), len(plant.element))))
+        worst = max(worst, band_error(one, two))
     return worst / 3.0
 
 
 @part
 def _unresolved(plant, stage, state, h):
     """A bound of how far a start, a stop or a reversal inside a step of length h can lead astray [m/s]."""
-    put(stage, state)
+    put(stage, state.each)
     stage.task.tau = h
     for e in range(N_AXES, len(plant.element)):
-        stage.each[e].aimed_current = state[current_entry(e, len(plant.element))]
+        stage.each[e].aimed_current = state.each[e].current
     return 2.0 * h * forces_at_work(plant, stage) / plant.body.least * max(1.0, YAW_SHARE / plant.body.length)
 
 
@@ -173,11 +196,10 @@ def _reverses(plant, a, b, h):
     A voltage drop bends such a current by 2 V_d/L. In the first gamma/2 of a step doubling is blind to the bend: every
     first stage ends behind it. The current, wrong by 2 h V_d/L, goes on pushing for L/R.
     """
-    element = plant.element
-    worst, first = 0.0, current_entry(N_AXES, len(element))
+    element, worst = plant.element, 0.0
     for e in range(N_AXES, len(element)):
         own = element[e]
-        i, j = a[first + e - N_AXES], b[first + e - N_AXES]
+        i, j = a.each[e].current, b.each[e].current
         if own.drop > 0.0 and own.inductance > 0.0 and i * j <= 0.0 and i != j:
             push = own.thrust / own.efficiency / own.resistance / plant.body.least
             off = push * max(1.0, YAW_SHARE / plant.body.length) + CURRENT_SHARE / own.inductance
@@ -191,9 +213,9 @@ def _share(plant, stage, state, tol):
 
     A motor at its limit, or without current under its voltage drop, makes nothing fade.
     """
-    memory, first = plant.body.memory[0], current_entry(N_AXES, len(plant.element))
+    memory = plant.body.memory[0]
     for e in range(N_AXES, len(plant.element)):
-        i = abs(state[first + e - N_AXES])
+        i = abs(state.each[e].current)
         if i >= stage.each[e].bound or (i == 0.0 and plant.element[e].drop > 0.0):
             memory = plant.body.memory[1]
     return tol / min(max(memory, FORGETS[0]), FORGETS[1])
@@ -202,11 +224,10 @@ def _share(plant, stage, state, tol):
 @part
 def _beyond(plant, stage, state, end, h, tol, ratio):
     """The ratio of the error of a step to what it may be, where friction falls with the speed or bends."""
-    m = len(plant.element)
     if plant.body.steep_sum > 0.0:
         ratio *= growth(plant, stage, state, end, h)
     if plant.body.bristles > 0.0:
-        ratio = max(ratio, bristle_turns(plant, state, end, current_entry(m, m), h) / tol)
+        ratio = max(ratio, bristle_turns(plant, state, end, h) / tol)
     return ratio
 
 
@@ -220,17 +241,17 @@ def in_one_row(plant, dt):
 def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
     """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
 
-    spare[1] and spare[2] receive the states in the middle and at the end. Returns its length and the one to try next.
+    spare.middle and .two receive the states in the middle and at the end. Returns its length and the one to try next.
     counts: most iterations, steps solved, and steps tried since the last one that was good and without an event. Where
     what holds and what drives differ by no more than rounding, something gives way and sticks again in every step, for
     as long as that lasts: after MANY, such steps grow all the same. What moves there is slower than rounding, too.
     """
     body = plant.body
-    one, middle, two, inner, m = spare[0], spare[1], spare[2], spare[3], len(plant.element)
+    one, middle, two, inner = spare.whole, spare.middle, spare.two, spare.inner.x
     rate = _share(plant, stage, state, tol)
     if body.steep_sum > 0.0:
         _unresolved(plant, stage, state, h)  # poses the problem whose forces bound the speeds of the step
-        h = longest_step(plant, stage, state, h)
+        h = longest_step(plant, stage, state.x, h)
     while True:
         if left - h < 1e-9 * dt:
             h = left
@@ -245,13 +266,11 @@ def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
         if body.laws != 0.0:
             ratio = _beyond(plant, stage, state, two, h, tol, ratio)
         astray = max(_reverses(plant, state, middle, h), _reverses(plant, middle, two, h))
-        if _event(state, middle, m) or _event(state, two, m) or _event(state, one, m):
+        if _event(state, middle) or _event(state, two) or _event(state, one):
             astray = max(astray, _unresolved(plant, stage, state, h))
-            if body.steep_sum > 0.0 and not has_one_start(plant, stage, state, h):
+            if body.steep_sum > 0.0 and not has_one_start(plant, stage, state.x, h):
                 astray = max(astray, 2.0 * tol)
-        if body.gathers > 0.0 and (
-            crosses(plant, middle, current_entry(m, m)) or crosses(plant, two, current_entry(m, m))
-        ):
+        if body.gathers > 0.0 and (crosses(plant, middle) or crosses(plant, two)):
             astray = max(astray, _unresolved(plant, stage, state, h))
         counts[2] += 1
         if astray > 0.0:
@@ -273,20 +292,20 @@ def _row(plant, stage, bare, spare, state, dt, tol, most, h, pose, counts):
     Returns the step length to begin the next row with.
     """
     body = plant.body
-    middle, two, inner, m, left = spare[1], spare[2], spare[3], len(plant.element), dt
+    middle, two, inner, left = spare.middle, spare.two, spare.inner.x, dt
     stage.task.facing = pose[2]
     pull(plant, stage, 0.0)
     if body.gathers > 0.0:
-        cross_band(plant, state, current_entry(m, m))
+        cross_band(plant, state)
     counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
     while left > 0.0 and counts[1] <= most:
         taken, h = find_step(plant, stage, spare, state, h, left, dt, tol, counts)
-        advance_pose(pose, state, middle, two, body.length, taken, SIMPSON)
-        copy_row(state, two)
+        advance_pose(pose, state.x, middle.x, two.x, body.length, taken, SIMPSON)
+        copy_state(state, two)
         stage.task.facing = pose[2]
         if body.gathers > 0.0:
-            cross_band(plant, state, current_entry(m, m))
-        if sticks(state, m):  # a step so short sees no release within its rounding
+            cross_band(plant, state)
+        if sticks(state):  # a step so short sees no release within its rounding
             pull(plant, stage, 0.0)
             counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
         left = left - taken if taken < left else 0.0
@@ -298,8 +317,9 @@ def _march(room, voltage, bound, dt, loop, tol, most, out):
     """All rows; see run_implicit. Returns how many of them were done before `most` steps were."""
     own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
     plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
-    state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
-    h = dt[0]
+    state, two, inner = spare.now, spare.two, spare.inner.x
+    state_of_row(state, out.state, 0)
+    pose, counts, h = out.pose[0].copy(), np.zeros(3, np.int64), dt[0]
     for k in range(len(dt)):
         counts[0] = counts[1] = 0
         if len(loop.command) > 0:
@@ -319,14 +339,14 @@ def _march(room, voltage, bound, dt, loop, tol, most, out):
             for _ in range(pieces):
                 stage.task.facing = pose[2]
                 pull(plant, stage, _turned(plant, state, 0.5 * dt[k] / pieces))
-                count = step(plant, stage, state, spare[2], spare[3], dt[k] / pieces)
+                count = step(plant, stage, state, two, inner, dt[k] / pieces)
                 counts[0], counts[1] = max(counts[0], count), pieces
-                advance_pose(pose, state, spare[3], spare[2], plant.body.length, dt[k] / pieces, STAGES)
-                copy_row(state, spare[2])
+                advance_pose(pose, state.x, inner, two.x, plant.body.length, dt[k] / pieces, STAGES)
+                copy_state(state, two)
                 if plant.body.gathers > 0.0:
-                    cross_band(plant, state, current_entry(len(plant.element), len(plant.element)))
+                    cross_band(plant, state)
         out.iterations[k], out.steps[k] = counts[0], counts[1]
-        copy_row(out.state[k + 1], state)
+        row_of_state(out.state, k + 1, state)
         copy_row(out.pose[k + 1], pose)
     return len(dt)
 

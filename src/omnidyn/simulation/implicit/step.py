@@ -5,7 +5,6 @@
     2:      x* = x0 + (1 - gamma)/gamma (x1 - x0)      the end of the step
 
 Second order in smooth motion, L-stable. Currents follow the same two stages and are eliminated (inclusion.winding).
-States are vectors, laid out as in stick_slip/release.py.
 """
 
 from __future__ import annotations
@@ -15,10 +14,11 @@ import math
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.stick_slip.band import aim_band, gather, hold_in_band, keep_band
+from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import solve
 from omnidyn.model.stick_slip.laws import aim_bristles, keep_bristles
-from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, take
+from omnidyn.model.stick_slip.release import put, take
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 BACK = (1.0 - GAMMA) / GAMMA
@@ -26,18 +26,18 @@ STIFF = GAMMA / (1.0 - 2.0 * GAMMA)  # tau R/L from which SDIRK2 passes the end 
 
 
 @part
-def _aim(plant, stage, start, end, back):
-    """Set x* and i* of a stage: start + back (end - start), `end` holding x and the plant the currents of stage 1."""
+def _aim(plant, stage, start, x, back):
+    """Set x* and i* of a stage: start + back (x - start), x and the currents in the plant those of stage 1."""
     m = len(plant.element)
     for a in range(3):
-        stage.task.goal[a] = start[a] + back * (end[a] - start[a])
+        stage.task.goal[a] = start.x[a] + back * (x[a] - start.x[a])
     for e in range(N_AXES, m):
-        i = start[current_entry(e, m)]
+        i = start.each[e].current
         stage.each[e].aimed_current = i + back * (stage.each[e].current - i) if back != 0.0 else i
     if plant.body.bristles > 0.0:
-        aim_bristles(plant, stage, start, current_entry(m, m), back)
+        aim_bristles(plant, stage, start, back)
     if plant.body.gathers > 0.0:
-        aim_band(stage, start, current_entry(m, m), back)
+        aim_band(stage, start, back)
 
 
 @part
@@ -50,14 +50,14 @@ def _hold_as(stage, x, y):
 
 
 @part
-def _stop_ellipse(stage, state):
-    state[0] = state[1] = 0.0
+def _stop_ellipse(stage, x):
+    x[0] = x[1] = 0.0
     stage.task.ellipse = 0.0
 
 
 @part
 def _stage(plant, stage, start, end):
-    """Solve one stage in place, from the guess `end`; `start` is the state before the step. Returns the iterations."""
+    """Solve one stage in place, x from the guess `end`; `start`: x before the step. Returns the iterations."""
     body, task = plant.body, stage.task
     if task.ellipse != 1.0:
         count = solve(plant, stage, end)
@@ -81,54 +81,52 @@ def _stage(plant, stage, start, end):
 
 
 @part
-def _slips_back(plant, stage, start):
-    """Whether an element that holds more than it slides with has stopped or reversed since `start`."""
+def _slips_back(plant, stage, each):
+    """Whether an element that holds more than it slides with has stopped or reversed since it was as in `each`."""
     body, task = plant.body, stage.task
     for e in range(len(plant.element)):
         own, at = plant.element[e], stage.each[e]
         gap = at.hold[0] > own.coulomb[0] or at.hold[1] > own.coulomb[1]
         if gap and own.fall == 0.0:
-            before = start[SIGNS + e]
+            before = each[e].sign
             if before != 0.0 and before != at.sign:
                 return True
-    before = start[SIGNS + len(plant.element)]
+    before = each[len(plant.element)].sign
     if body.fall > 0.0:
         return False
     return (task.hold[0] > body.coulomb[0] or task.hold[1] > body.coulomb[1]) and before == 1.0 and task.ellipse == 0.0
 
 
 @part
-def _torn_loose(plant, stage, start):
+def _torn_loose(plant, stage, each):
     """Whether something at rest gave way in a step so long, h R/L > 1 + sqrt 2, that its currents overshoot."""
     element = plant.element
-    m, stiff, released = len(element), False, start[SIGNS + len(element)] == 0.0 and stage.task.ellipse == 1.0
+    m, stiff, released = len(element), False, each[len(element)].sign == 0.0 and stage.task.ellipse == 1.0
     for e in range(m):
         own = element[e]
-        released |= start[SIGNS + e] == 0.0 and stage.each[e].sign != 0.0
+        released |= each[e].sign == 0.0 and stage.each[e].sign != 0.0
         if e >= N_AXES and own.inductance > 0.0:
             stiff |= stage.task.tau * own.resistance > STIFF * own.inductance
     return stiff and released
 
 
 @part
-def _begin(plant, stage, start, end, tau):
-    """Make ready for a first stage of length tau from `start`."""
-    for j in range(len(start)):
-        end[j] = start[j]
-    put(stage, start)
+def _begin(plant, stage, start, x, tau):
+    """Make ready for a first stage of length tau from `start`, which is the first guess of x, too."""
+    copy_row(x, start.x)
+    put(stage, start.each)
     stage.task.tau = tau
-    _aim(plant, stage, start, end, 0.0)
+    _aim(plant, stage, start, x, 0.0)
     if plant.body.gathers > 0.0:
         hold_in_band(plant, stage)
 
 
 @part
 def first_stage(plant, stage, start, end, middle, h):
-    """Stage 1 of a step of length h from `start`, into `end`; `middle` receives x there. Returns the iterations."""
+    """Stage 1 of a step of length h from `start`: x, into `end` and `middle` (3,). Returns the iterations."""
     _begin(plant, stage, start, end, GAMMA * h)
-    count = _stage(plant, stage, start, end)
-    for a in range(3):
-        middle[a] = end[a]
+    count = _stage(plant, stage, start.x, end)
+    copy_row(middle, end)
     return count
 
 
@@ -141,27 +139,27 @@ def last_stage(plant, stage, start, end, h):
     in a step too long for the currents.
     Returns (iterations, b): x* = start + b (x of stage 1 - start), b = 0 for the Euler stage.
     """
-    m, count, back = len(plant.element), 0, BACK
-    euler = _slips_back(plant, stage, start)
+    count, back = 0, BACK
+    euler = _slips_back(plant, stage, start.each)
     if not euler:
-        _aim(plant, stage, start, end, BACK)
-        count = _stage(plant, stage, start, end)
-        euler = _slips_back(plant, stage, start) or _torn_loose(plant, stage, start)
+        _aim(plant, stage, start, end.x, BACK)
+        count = _stage(plant, stage, start.x, end.x)
+        euler = _slips_back(plant, stage, start.each) or _torn_loose(plant, stage, start.each)
     if euler:
-        _begin(plant, stage, start, end, h)
-        count, back = max(count, _stage(plant, stage, start, end)), 0.0
-    take(stage, end)
-    for e in range(N_AXES, m):
-        end[current_entry(e, m)] = stage.each[e].current
+        _begin(plant, stage, start, end.x, h)
+        count, back = max(count, _stage(plant, stage, start.x, end.x)), 0.0
+    take(stage, end.each)
+    for e in range(N_AXES, len(plant.element)):
+        end.each[e].current = stage.each[e].current
     if plant.body.bristles > 0.0:
-        keep_bristles(plant, stage, end, current_entry(m, m))
+        keep_bristles(plant, stage, end)
     if plant.body.gathers > 0.0:
-        keep_band(stage, end, current_entry(m, m))
+        keep_band(stage, end)
     return count, back
 
 
 @part
 def step(plant, stage, start, end, middle, h):
     """One SDIRK2 step of length h from `start` to `end`; `middle` receives x at t + gamma h. Returns the iterations."""
-    first = first_stage(plant, stage, start, end, middle, h)
+    first = first_stage(plant, stage, start, end.x, middle, h)
     return max(first, last_stage(plant, stage, start, end, h)[0])

@@ -13,10 +13,9 @@ from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.friction.kinds import KARNOPP
 from omnidyn.model.keys import CENTRE, ROTOR, WHEEL, Key
-from omnidyn.model.layout import Plant, Stage, many, new_stage
+from omnidyn.model.layout import N_AXES, Plant, Stage, State, many, new_stage, new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.model.stick_slip.release import new_state
 from omnidyn.model.surroundings.floor import refuse_slope
 from omnidyn.model.wheels import refuse_slip
 
@@ -36,7 +35,8 @@ class Directions(NamedTuple):
     aim: FloatArray  # (K, D) derivative of x*, i* and z*; D = 3 + n, and all elements and the plane where any bends
     middle: FloatArray  # (K, D) derivative at stage 1
     half: FloatArray  # (K, D) derivative after the first half step
-    state: FloatArray  # (2, size of a state)
+    first: State  # ends of a piece of a half step
+    last: State
     gained: FloatArray  # (3,) acceleration
     carry: FloatArray  # (3, n) di/di*, the force per ampere of i*, and the branch of the current
     kept: FloatArray  # (K, D) derivative before a piece of a half step
@@ -80,14 +80,16 @@ def directions_of(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Dir
     return Directions(
         plants=own, stages=new_stage(own), arm=arm, voltage=rates,
         lift=np.zeros((3, 6)), held=np.zeros((2, 3), np.int64), point=np.zeros((5, 3)), aim=work[0], middle=work[1],
-        half=work[2], state=np.zeros((2, len(new_state(numbers)))), gained=np.zeros(3), carry=np.zeros((3, n)),
+        half=work[2], first=new_state(numbers),
+        last=new_state(numbers), gained=np.zeros(3), carry=np.zeros((3, n)),
         kept=work[3],
     )  # fmt: skip
 
 
 def width(numbers: Plant) -> int:
     """D: how many numbers of a state have derivatives. x, currents, and where anything bends how far all of it does."""
-    return len(new_state(numbers)) - len(numbers.element) - 1  # less the signs
+    bends = numbers.body.bristles + numbers.body.gathers > 0.0
+    return N_AXES + numbers.wheels + (len(numbers.element) + 2 if bends else 0)
 
 
 def difference(values: FloatArray) -> FloatArray:

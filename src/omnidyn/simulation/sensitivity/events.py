@@ -8,10 +8,10 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES, OPEN, Plant, Stage
 from omnidyn.model.stick_slip.active_set import find_active_set, newton_direction
 from omnidyn.model.stick_slip.can_hold import worst_direction
-from omnidyn.model.stick_slip.copies import copy_row, copy_table
+from omnidyn.model.stick_slip.copies import copy_state, copy_table
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses, winding
 from omnidyn.model.stick_slip.laws import aim_bristles
-from omnidyn.model.stick_slip.release import SIGNS, current_entry, put, settle, sticks
+from omnidyn.model.stick_slip.release import put, settle, sticks
 from omnidyn.simulation.implicit.march import SHORTEST
 from omnidyn.simulation.implicit.step import step
 from omnidyn.simulation.sensitivity.directions import EPS
@@ -27,14 +27,13 @@ SOON = 1e-6  # of L/R: a time in which a current hardly changes
 @part
 def _at_instant(plant, stage, state, x, delay):
     """Pose the problem of the instant: x and the currents of `state` as they are, nothing moves during `delay` [s]."""
-    m = len(plant.element)
     stage.task.tau = delay
     for a in range(3):
         stage.task.goal[a] = x[a]
-    for e in range(N_AXES, m):
-        stage.each[e].aimed_current = state[current_entry(e, m)]
+    for e in range(N_AXES, len(plant.element)):
+        stage.each[e].aimed_current = state.each[e].current
     if plant.body.bristles > 0.0:
-        aim_bristles(plant, stage, state, current_entry(m, m), 0.0)
+        aim_bristles(plant, stage, state, 0.0)
 
 
 @part
@@ -48,12 +47,12 @@ def _acceleration(plant, stage, state, x, out):
 
 
 @part
-def differ(a, b, m):
+def differ(a, b):
     """Whether two states differ in what sticks or in a direction of sliding."""
-    for e in range(SIGNS, SIGNS + m + 1):
-        if a[e] != b[e]:
+    for e in range(len(a.each)):
+        if a.each[e].sign != b.each[e].sign:
             return True
-    return (a[SIGNS + m] == 1.0) & (a[0] * b[0] + a[1] * b[1] < 0.0)
+    return (a.each[len(a.each) - 2].sign == 1.0) & (a.x[0] * b.x[0] + a.x[1] * b.x[1] < 0.0)
 
 
 @part
@@ -66,27 +65,27 @@ def _leap(plant, stage, along, start, end, h, gained, d):
     stage at the end, but for one that lets something else go at that instant.
     """
     m, before, after = len(plant.element), along.point[2], along.point[3]
-    put(stage, start)
-    _acceleration(plant, stage, start, start, before)
+    put(stage, start.each)
+    _acceleration(plant, stage, start, start.x, before)
     lets_go = _lets_go(plant, start, end)
     if lets_go >= 0:
-        _reverse(plant.element[lets_go].g[:], along.arm[lets_go], start, before, gained, d)
+        _reverse(plant.element[lets_go].g[:], along.arm[lets_go], start.x, before, gained, d)
     else:
         _release_shift(plant, stage, along, start, end, before, after, d)
     for e in range(m):
-        if start[SIGNS + e] * end[SIGNS + e] == -1.0 and lets_go < 0:
-            stage.each[e].sign = end[SIGNS + e]
-            _acceleration(plant, stage, start, end, after)
-            _reverse(plant.element[e].g[:], along.arm[e], start, before, after, d)
-    crosses = start[SIGNS + m] == 1.0 and end[SIGNS + m] == 1.0 and (start[0] != 0.0 or start[1] != 0.0)
-    if crosses and start[0] * end[0] + start[1] * end[1] <= 0.0:
-        after[0], after[1] = start[0], start[1]  # along its line
-        _reverse(after, along.arm[0], start, before, gained, d)
-    put(stage, end)
-    if stage.task.ellipse != 1.0 or end[0] != 0.0 or end[1] != 0.0:
-        _at_instant(plant, stage, start, start, h)
+        if start.each[e].sign * end.each[e].sign == -1.0 and lets_go < 0:
+            stage.each[e].sign = end.each[e].sign
+            _acceleration(plant, stage, start, end.x, after)
+            _reverse(plant.element[e].g[:], along.arm[e], start.x, before, after, d)
+    crosses = start.each[m].sign == 1.0 and end.each[m].sign == 1.0 and (start.x[0] != 0.0 or start.x[1] != 0.0)
+    if crosses and start.x[0] * end.x[0] + start.x[1] * end.x[1] <= 0.0:
+        after[0], after[1] = start.x[0], start.x[1]  # along its line
+        _reverse(after, along.arm[0], start.x, before, gained, d)
+    put(stage, end.each)
+    if stage.task.ellipse != 1.0 or end.x[0] != 0.0 or end.x[1] != 0.0:
+        _at_instant(plant, stage, start, start.x, h)
         copy_table(along.aim, d)
-        stage_derivatives(plant, stage, along, end, along.aim, d)
+        stage_derivatives(plant, stage, along, end.x, along.aim, d)
 
 
 @part
@@ -99,7 +98,7 @@ def _lets_go(plant, start, end):
     if spin[0, 1] == 0.0 and spin[0, 2] == 0.0 and spin[1, 2] == 0.0:
         return -1
     for e in range(len(plant.element)):
-        before, after = start[SIGNS + e], end[SIGNS + e]
+        before, after = start.each[e].sign, end.each[e].sign
         released |= before == 0.0 and after != 0.0
         if (before == 1.0 or before == -1.0) and after != before:
             turns = e
@@ -129,15 +128,15 @@ def _release_shift(plant, stage, along, start, end, before, after, d):
     """What a release between two states does to d; `before` becomes the acceleration after it."""
     m, some, jump = len(plant.element), False, 0.0
     for e in range(m + 1):
-        if start[SIGNS + e] == 0.0 and end[SIGNS + e] != 0.0:
+        if start.each[e].sign == 0.0 and end.each[e].sign != 0.0:
             some = True
             if e < m:
-                stage.each[e].sign = end[SIGNS + e]
+                stage.each[e].sign = end.each[e].sign
             else:
                 stage.task.ellipse = 1.0
     if not some:
         return
-    _acceleration(plant, stage, start, end, after)
+    _acceleration(plant, stage, start, end.x, after)
     for c in range(3):
         jump = max(jump, abs(before[c] - after[c]))
     force = forces_at_work(plant, stage)
@@ -177,13 +176,13 @@ def _weakest(plant, stage, along, start, force):
     """
     own, push = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.point[4]
     _copy_problem(along, stage)
-    put(own, start)
+    put(own, start.each)
     own.task.hold[0], own.task.hold[1] = own.task.hold[0] * (1.0 - MARGIN), own.task.hold[1] * (1.0 - MARGIN)
     for e in range(len(own.each)):
         hold = own.each[e].hold
         hold[0], hold[1] = hold[0] * (1.0 - MARGIN), hold[1] * (1.0 - MARGIN)
-    _at_instant(plant, own, start, start, SHORTEST)
-    found = _least_gap(plant, own, start)
+    _at_instant(plant, own, start, start.x, SHORTEST)
+    found = _least_gap(plant, own, start.x)
     for a in range(3):
         push[a] = MARGIN * force * own.work.worst[a]
     return found < 0.0
@@ -193,9 +192,9 @@ def _weakest(plant, stage, along, start, force):
 def _gap(plant, stage, along, start, d, eps):
     """phi of what is stuck in `start`, at the state changed by eps d, under the additional push along.point[4] [N]."""
     m, point = len(plant.element), along.point[0]
-    put(stage, start)
+    put(stage, start.each)
     for a in range(3):
-        point[a] = start[a] + eps * d[a]
+        point[a] = start.x[a] + eps * d[a]
     _at_instant(plant, stage, start, point, SHORTEST)
     for a in range(3):
         stage.task.push[a] = along.point[4, a]
@@ -221,13 +220,13 @@ def _later(plant, stage, along, start, acceleration):
     own, rate = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.aim[0]
     m, each = len(plant.element), own.each
     _copy_problem(along, stage)
-    put(own, start)
+    put(own, start.each)
     for w in range(3 + m - N_AXES):
         rate[w] = acceleration[w] if w < 3 else 0.0
     for side in range(2):  # a stage back in time, too: the currents' slope to second order
         delay = DELAY * (1 - 2 * side)
-        _at_instant(plant, own, start, start, delay)
-        residual(plant, own, start)
+        _at_instant(plant, own, start, start.x, delay)
+        residual(plant, own, start.x)
         for w in range(m - N_AXES):
             e = N_AXES + w
             if plant.element[e].inductance > 0.0:
@@ -242,9 +241,8 @@ def bends(plant, stage, a, b):
 
     The derivative bends there.
     """
-    first = current_entry(N_AXES, len(plant.element))
-    for w in range(len(plant.element) - N_AXES):
-        i, j, own, bound = a[first + w], b[first + w], plant.element[N_AXES + w], stage.each[N_AXES + w].bound
+    for e in range(N_AXES, len(plant.element)):
+        i, j, own, bound = a.each[e].current, b.each[e].current, plant.element[e], stage.each[e].bound
         if (abs(i) >= bound) != (abs(j) >= bound):
             return True
         if (np.sign(i) != np.sign(j)) & ((own.drop > 0.0) | (own.efficiency != 1.0)):
@@ -281,13 +279,13 @@ def _pass_zero(plant, stage, along, start, end, first, last, at_end, d):
     m = len(plant.element)
     for w in range(m - N_AXES):
         e, own, volts = N_AXES + w, plant.element[N_AXES + w], stage.each[N_AXES + w].voltage
-        j = current_entry(e, m)
-        side = np.sign(start[j])
-        if own.inductance == 0.0 or own.drop == 0.0 or side == 0.0 or np.sign(end[j]) == side:
+        side = np.sign(start.each[e].current)
+        if own.inductance == 0.0 or own.drop == 0.0 or side == 0.0 or np.sign(end.each[e].current) == side:
             continue
-        if np.sign(first[j]) != side or (np.sign(last[j]) == side and not at_end):
+        if np.sign(first.each[e].current) != side or (np.sign(last.each[e].current) == side and not at_end):
             continue
-        speed = own.g[0] * last[0] + own.g[1] * last[1] + own.g[2] * last[2] if last[SIGNS + e] != 0.0 else 0.0
+        x = last.x
+        speed = own.g[0] * x[0] + own.g[1] * x[1] + own.g[2] * x[2] if last.each[e].sign != 0.0 else 0.0
         tau = SOON * own.inductance / own.resistance
         little = 4.0 * side * SOON * (abs(volts - own.emf * speed) + own.drop) / own.resistance
         after = _soon(plant, stage, e, speed, 0.0, tau)
@@ -312,23 +310,23 @@ def half_derivatives(plant, stage, bare, along, start, end, middle, h, d0, d1):
 
     A reversal often comes to rest for one step and is released by the next: `settle` says what holds and what does not.
     """
-    first, last, m = along.state[0], along.state[1], len(plant.element)
-    copy_row(first, start)
-    copy_row(last, end)
+    first, last = along.first, along.last
+    copy_state(first, start)
+    copy_state(last, end)
     copy_table(d1, d0)
-    if sticks(start, m):
+    if sticks(start):
         settle(plant, stage, bare, first, along.gained)
-    if sticks(end, m):
+    if sticks(end):
         settle(plant, stage, bare, last, along.gained)
-    if differ(start, end, m) or differ(start, first, m) or differ(end, last, m):
-        if not sticks(end, m):
+    if differ(start, end) or differ(start, first) or differ(end, last):
+        if not sticks(end):
             settle(plant, stage, bare, last, along.gained)
         _leap(plant, stage, along, first, last, h, along.gained, d1)
         return
     if not bends(plant, stage, start, end):
         step_with_derivatives(plant, stage, along, start, last, middle, h, d1, d1)
         return
-    copy_row(first, start)
+    copy_state(first, start)
     left = h
     for piece in range(PIECES):
         length = _reach(plant, stage, first, last, middle, left, NEAR * h) if piece < PIECES - 1 else left
@@ -338,4 +336,4 @@ def half_derivatives(plant, stage, bare, along, start, end, middle, h, d0, d1):
         _pass_zero(plant, stage, along, start, end, first, last, left == 0.0, d1)
         if left == 0.0:
             return
-        copy_row(first, last)
+        copy_state(first, last)

@@ -14,10 +14,10 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
-from omnidyn.model.layout import N_AXES, Plant, Stage
+from omnidyn.model.layout import N_AXES, Plant, Stage, State, new_state
 from omnidyn.model.robot import Robot
-from omnidyn.model.stick_slip.copies import copy_row, copy_table
-from omnidyn.model.stick_slip.release import SIGNS, start_state
+from omnidyn.model.stick_slip.copies import copy_row, copy_state, copy_table, row_of_state, state_of_row
+from omnidyn.model.stick_slip.release import start_state
 from omnidyn.simulation.commands import Commands, current_bounds, loop_gains, on_ticks
 from omnidyn.simulation.implicit.march import SIMPSON, Outcome, advance_pose, begun, room
 from omnidyn.simulation.sensitivity.directions import EPS, Directions
@@ -33,7 +33,7 @@ class LoopDirections(NamedTuple):
     command: FloatArray  # (K, rows, n) derivative of the set points, rows as commanded
     sum: FloatArray  # (K, n) derivative of the integral
     voltage: FloatArray  # (K, n) derivative of the voltage now
-    state: FloatArray  # (size of a state,) at the last tick
+    state: State  # at the last tick
     dstate: FloatArray  # (K, 3 + n) derivative there
     total: FloatArray  # (2, n) integral before this tick, and at the last one
 
@@ -73,8 +73,8 @@ def run_loop_with_derivatives(
     loop = loop_of(robot, np.ascontiguousarray(given.set_point), tick)
     gain = np.array([loop_gains(r) for r in robots]).reshape(-1, 4, n)
     extra = LoopDirections(
-        gain, along.voltage, np.zeros((count, n)), np.zeros((count, n)), np.zeros(len(state)), np.zeros_like(first),
-        np.zeros((2, n)),
+        gain, along.voltage, np.zeros((count, n)), np.zeros((count, n)), new_state(numbers),
+        np.zeros_like(first), np.zeros((2, n)),
     )  # fmt: skip
     found = LoopRun(
         begun(len(given.dt), state, start[1]), np.zeros((kept, *first.shape)), np.zeros((kept, count, 3)),
@@ -92,8 +92,8 @@ def run_loop_with_derivatives(
 @part
 def _tick_derivatives(plant, along, loop, extra, state, d, row, w):
     """Derivatives of the voltage and the integral of wheel w; extra.total[0] is the integral before the tick."""
-    e, moves = N_AXES + w, state[SIGNS + N_AXES + w] != 0.0
-    error = loop.command[row, w] - seen_speed(plant.element[e].g, state, loop.radius[w], moves)
+    e, moves = N_AXES + w, state.each[N_AXES + w].sign != 0.0
+    error = loop.command[row, w] - seen_speed(plant.element[e].g, state.x, loop.radius[w], moves)
     total, period = extra.total[0, w], loop.period
     takes, side = tick_branch(loop.kp[w], loop.ki[w], loop.limit[w], period, error, total)
     point = along.point[0]
@@ -102,7 +102,7 @@ def _tick_derivatives(plant, along, loop, extra, state, d, row, w):
         for up in range(2):
             sign, g = 1.0 - 2.0 * up, extra.gain[2 * k + up]
             for a in range(3):
-                point[a] = state[a] + sign * EPS * d[k, a]
+                point[a] = state.x[a] + sign * EPS * d[k, a]
             seen = seen_speed(along.plants.element[2 * k + up, e].g, point, g[3, w], moves)
             own = loop.command[row, w] + sign * EPS * extra.command[k, row, w] - seen
             before = total + sign * EPS * extra.sum[k, w]
@@ -132,10 +132,13 @@ def _pass_on(loop, voltage, dvoltage, motors, dmotors):
 @part
 def _as_before(loop, extra, state, d, settled):
     """Whether nothing has changed since the last tick; and remembers this one."""
-    change = 0.0
-    for j in range(len(state)):
-        change = max(change, abs(state[j] - extra.state[j]))
-        extra.state[j] = state[j]
+    change, before = 0.0, extra.state
+    for a in range(N_AXES):
+        change = max(change, abs(state.x[a] - before.x[a]))
+    for e in range(len(state.each)):
+        now, was = state.each[e], before.each[e]
+        change = max(change, abs(now.sign - was.sign), abs(now.current - was.current), abs(now.bend - was.bend))
+    copy_state(before, state)
     for k in range(d.shape[0]):
         for j in range(d.shape[1]):
             change = max(change, abs(d[k, j] - extra.dstate[k, j]))
@@ -149,10 +152,11 @@ def _as_before(loop, extra, state, d, settled):
 @branching_kernel
 def march_loop(room, along, loop, extra, bound, dt, first, tol, settled, found):
     """All rows, cut at the ticks. See run_loop_with_derivatives."""
-    out, seen, keep, edges, m = found.outcome, found.seen, found.keep, found.edges, room.own.plant.element.shape[1]
+    out, seen, keep, edges = found.outcome, found.seen, found.keep, found.edges
     own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
     plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
-    state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
+    state, pose, counts = spare.now, out.pose[0].copy(), np.zeros(3, np.int64)
+    state_of_row(state, out.state, 0)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
     motors, dmotors = np.zeros(len(bound)), np.zeros((len(first), len(bound)))
     voltage, row, still, kept = np.zeros(len(bound)), 0, False, len(found.dstate) > 0
@@ -179,12 +183,12 @@ def march_loop(room, along, loop, extra, bound, dt, first, tol, settled, found):
             out.iterations[row] = max(out.iterations[row], counts[0])
             out.steps[row] += counts[1]
         elif kept:
-            pose_derivatives(along, pose, dpose, state, state, state, d, d, d, dt[j], SIMPSON)
-            advance_pose(pose, state, state, state, plant.body.length, dt[j], SIMPSON)
+            pose_derivatives(along, pose, dpose, state.x, state.x, state.x, d, d, d, dt[j], SIMPSON)
+            advance_pose(pose, state.x, state.x, state.x, plant.body.length, dt[j], SIMPSON)
         else:
-            take_samples(seen, along, edges[j], dt[j], m, state, state, state, 0.5, d, d, d, 0.5)
+            take_samples(seen, along, edges[j], dt[j], state, state, state, 0.5, d, d, d, 0.5)
         if j + 1 == keep[row + 1]:
-            copy_row(out.state[row + 1], state)
+            row_of_state(out.state, row + 1, state)
             copy_row(out.pose[row + 1], pose)
             if kept:
                 copy_table(found.dstate[row + 1], d)

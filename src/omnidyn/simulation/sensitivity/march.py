@@ -8,8 +8,8 @@ import numpy as np
 
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.model.layout import N_AXES, Plant, Stage
-from omnidyn.model.stick_slip.copies import copy_row, copy_table
-from omnidyn.model.stick_slip.release import current_entry, settle, sticks
+from omnidyn.model.stick_slip.copies import copy_row, copy_state, copy_table, row_of_state, state_of_row
+from omnidyn.model.stick_slip.release import settle, sticks
 from omnidyn.simulation.implicit.march import SIMPSON, STAGES, advance_pose, find_step, in_one_row
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
@@ -46,16 +46,17 @@ def pose_derivatives(along, pose, dpose, x0, xm, x1, d0, dm, d1, h, rule):
 
 
 @part
-def _middle_currents(start, middle, end, m):
+def _middle_currents(start, middle, end):
     """Into `middle`, which holds x of stage 1 alone, currents on the line from the start to the end."""
-    for j in range(current_entry(N_AXES, m), len(start)):
-        middle[j] = start[j] + GAMMA * (end[j] - start[j])
+    for e in range(N_AXES, len(start.each)):
+        i = start.each[e].current
+        middle.each[e].current = i + GAMMA * (end.each[e].current - i)
 
 
 @part
-def _is_smooth(plant, stage, start, one, middle, two, settled, m):
+def _is_smooth(plant, stage, start, one, middle, two, settled):
     """Whether nothing happens in a step: no stop, reversal or release, and no current meets or leaves its limit."""
-    if differ(start, one, m) or differ(start, middle, m) or differ(middle, two, m) or differ(two, settled, m):
+    if differ(start, one) or differ(start, middle) or differ(middle, two) or differ(two, settled):
         return False
     return not bends(plant, stage, start, middle) and not bends(plant, stage, middle, two)
 
@@ -91,26 +92,27 @@ def _adaptive(
     seen, end,
 ):  # fmt: skip
     """`implicit._row` with derivatives: the half steps that count are done again with theirs. end: of the row [s]."""
-    one, middle, two, inner, settled, m, left = spare[0], spare[1], spare[2], spare[3], spare[4], len(plant.element), dt
+    one, middle, two, inner, settled = spare.whole, spare.middle, spare.two, spare.inner.x, spare.settled
+    left = dt
     counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
     while left > 0.0:
         taken, h = find_step(plant, stage, spare, state, h, left, dt, tol, counts)
-        copy_row(settled, two)
-        if sticks(settled, m):
+        copy_state(settled, two)
+        if sticks(settled):
             counts[0] = max(counts[0], settle(plant, stage, bare, settled, along.gained))
         node, half, dhalf = 0.5, 0.5 * taken, along.half
-        if not kept and _is_smooth(plant, stage, state, one, middle, two, settled, m):
+        if not kept and _is_smooth(plant, stage, state, one, middle, two, settled):
             step_with_derivatives(plant, stage, along, state, one, inner, taken, d, dnext)
             node, dhalf = GAMMA, along.middle
         else:
             half_derivatives(plant, stage, bare, along, state, middle, inner, half, d, dhalf)
             half_derivatives(plant, stage, bare, along, middle, two, inner, half, dhalf, dnext)
         if kept:
-            pose_derivatives(along, pose, dpose, state, middle, two, d, along.half, dnext, taken, SIMPSON)
-            advance_pose(pose, state, middle, two, plant.body.length, taken, SIMPSON)
+            pose_derivatives(along, pose, dpose, state.x, middle.x, two.x, d, along.half, dnext, taken, SIMPSON)
+            advance_pose(pose, state.x, middle.x, two.x, plant.body.length, taken, SIMPSON)
         else:
-            take_samples(seen, along, end - left, taken, m, state, middle, two, 0.5, d, dhalf, dnext, node)
-        copy_row(state, settled)
+            take_samples(seen, along, end - left, taken, state, middle, two, 0.5, d, dhalf, dnext, node)
+        copy_state(state, settled)
         copy_table(d, dnext)  # half_derivatives has moved d past a release that settle finds here
         left = left - taken if taken < left else 0.0
     return h
@@ -119,15 +121,15 @@ def _adaptive(
 @part
 def _fixed(plant, stage, spare, along, state, dt, pose, d, dnext, dpose, kept, seen, begin):
     """One fixed step with derivatives. Returns the iterations."""
-    middle, end, m = spare[3], spare[2], len(plant.element)
-    count = step_with_derivatives(plant, stage, along, state, end, middle, dt, d, dnext)
-    _middle_currents(state, middle, end, m)
+    middle, end = spare.inner, spare.two
+    count = step_with_derivatives(plant, stage, along, state, end, middle.x, dt, d, dnext)
+    _middle_currents(state, middle, end)
     if kept:
-        pose_derivatives(along, pose, dpose, state, middle, end, d, along.middle, dnext, dt, STAGES)
-        advance_pose(pose, state, middle, end, plant.body.length, dt, STAGES)
+        pose_derivatives(along, pose, dpose, state.x, middle.x, end.x, d, along.middle, dnext, dt, STAGES)
+        advance_pose(pose, state.x, middle.x, end.x, plant.body.length, dt, STAGES)
     else:
-        take_samples(seen, along, begin, dt, m, state, middle, end, GAMMA, d, along.middle, dnext, GAMMA)
-    copy_row(state, end)
+        take_samples(seen, along, begin, dt, state, middle, end, GAMMA, d, along.middle, dnext, GAMMA)
+    copy_state(state, end)
     copy_table(d, dnext)
     return count
 
@@ -152,7 +154,8 @@ def march_with_derivatives(
     """All rows; see run_with_derivatives. ds and dposes may be empty: the derivatives then are in `seen`."""
     own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
     plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
-    state, pose, counts = out.state[0].copy(), out.pose[0].copy(), np.zeros(3, np.int64)
+    state, pose, counts = spare.now, out.pose[0].copy(), np.zeros(3, np.int64)
+    state_of_row(state, out.state, 0)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
     kept, begin = len(ds) > 0, 0.0
     for r in range(len(dt)):
@@ -163,7 +166,7 @@ def march_with_derivatives(
         )  # fmt: skip
         begin += dt[r]
         out.iterations[r], out.steps[r] = counts[0], counts[1]
-        copy_row(out.state[r + 1], state)
+        row_of_state(out.state, r + 1, state)
         copy_row(out.pose[r + 1], pose)
         if kept:
             copy_table(ds[r + 1], d)

@@ -24,8 +24,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import part
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.stick_slip.copies import copy_row, copy_table
-from omnidyn.model.stick_slip.release import current_entry
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
 
@@ -153,12 +153,12 @@ def _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
 
 
 @part
-def take_samples(seen, along, begin, h, m, x0, xm, x1, node, d0, dm, d1, dnode):
-    """Sample all rows whose t - late lies in a step of length h from `begin`, then go on to its end; m elements.
+def take_samples(seen, along, begin, h, start, middle, end, node, d0, dm, d1, dnode):
+    """Sample all rows whose t - late lies in a step of length h from `begin`, then go on to its end.
 
-    node, dnode: where in the step xm and dm are, GAMMA or 1/2.
+    node, dnode: where in the step the middle and dm are, GAMMA or 1/2.
     """
-    size = seen.state.shape[2]
+    size, x0, xm, x1 = seen.state.shape[2], start.x, middle.x, end.x
     for c in range(len(seen.late)):
         while seen.next[c] < len(seen.t):
             r = seen.next[c]
@@ -171,9 +171,12 @@ def take_samples(seen, along, begin, h, m, x0, xm, x1, node, d0, dm, d1, dnode):
             share = min(max(after / h, 0.0), 1.0)
             weight, rate, dweight = _weights(share, node), _rates(share, node), _weights(share, dnode)
             for a in range(size):
-                j = a if a < 3 else current_entry(a, m)
-                seen.state[c, r, a] = _mixed(weight, x0[j], xm[j], x1[j])
-                seen.pace[c, r, a] = _mixed(rate, x0[j], xm[j], x1[j]) / h
+                if a < N_AXES:
+                    v0, vm, v1 = x0[a], xm[a], x1[a]
+                else:
+                    v0, vm, v1 = start.each[a].current, middle.each[a].current, end.each[a].current
+                seen.state[c, r, a] = _mixed(weight, v0, vm, v1)
+                seen.pace[c, r, a] = _mixed(rate, v0, vm, v1) / h
                 for k in range(len(d0)):
                     seen.dstate[c, r, k, a] = _mixed(dweight, d0[k, a], dm[k, a], d1[k, a])
             copy_row(seen.way[c, r], seen.gone)

@@ -207,13 +207,13 @@ def step_with_derivatives(plant, stage, along, start, end, middle, h, d0, d1):
 
     d1 may be d0.
     """
-    first = first_stage(plant, stage, start, end, middle, h)
-    stage_derivatives(plant, stage, along, end, d0, along.middle)
+    first = first_stage(plant, stage, start, end.x, middle, h)
+    stage_derivatives(plant, stage, along, end.x, d0, along.middle)
     last, back = last_stage(plant, stage, start, end, h)
     for k in range(len(d0)):
         for j in range(d0.shape[1]):
             along.aim[k, j] = d0[k, j] + back * (along.middle[k, j] - d0[k, j])
         if plant.body.bristles > 0.0 and back != 0.0:
             _aim_within(plant, stage, along, k, along.aim[k])
-    stage_derivatives(plant, stage, along, end, along.aim, d1)
+    stage_derivatives(plant, stage, along, end.x, along.aim, d1)
     return max(first, last)
