@@ -29,12 +29,12 @@ N_AXES, YAW = 3, 2  # the first rows are the body axes; the row of yaw
 OPEN = 0.0  # branch of a current that is still to be found
 
 
-def _record(**fields: Any) -> np.dtype[Any]:
+def record(**fields: Any) -> np.dtype[Any]:
     """The type of a part: its fields with their shapes, () for one number."""
     return np.dtype((np.record, np.dtype([(name, "f8", shape) for name, shape in fields.items()], align=True)))
 
 
-BODY = _record(
+BODY = record(
     mass=(),  # M of the body [kg]
     least=(),  # [kg] the least that any direction has: M, but where the centre of mass stands off
     spin=(3, 3),  # [kg] what rotors and wheels, and a centre that stands off, add to M in all directions
@@ -61,7 +61,7 @@ BODY = _record(
     off=(),  # 1 where the centre of mass stands off
     gathers=(),  # 1 where an axis gathers momentum in Karnopp's band
 )
-ELEMENT = _record(
+ELEMENT = record(
     g=(3,),  # local speed = g . x
     viscous=(),  # [N s/m]
     coulomb=(2,),  # [N]
@@ -88,7 +88,7 @@ ELEMENT = _record(
     limit=(),
     efficiency=(),  # of its gear
 )
-TASK = _record(
+TASK = record(
     tau=(),  # length of the stage [s]
     goal=(3,),  # x* [m/s]
     push=(3,),  # constant wrench [N]
@@ -98,7 +98,7 @@ TASK = _record(
     aimed_bend=(2,),  # z* of its bristle [m]
     bend=(2,),  # and z at the solution
 )
-EACH = _record(
+EACH = record(
     sign=(),  # 1 and -1 slide forward and backward, 0 stuck, 2 no dry friction
     hold=(2,),  # what it holds at rest [N]
     loss=(2,),  # gear loss at rest [N]
@@ -112,12 +112,12 @@ EACH = _record(
     found=(),  # marks of the solver
     before=(),
 )
-EACH_STATE = _record(
+EACH_STATE = record(
     sign=(),  # as in EACH
     current=(),  # of a motor [A]
     bend=(),  # z of a bristle [m]; in Karnopp's band the speed gathered against it [m/s]
 )
-WORK = _record(
+WORK = record(
     residual=(3,),  # (M/tau)(x - x*) minus all forces but those of stuck elements [N]
     jacobian=(3, 3),  # its slopes by x
     close=(3,),  # how much of it is rounding

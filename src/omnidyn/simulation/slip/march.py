@@ -8,13 +8,15 @@ speed of a rim may be off by ten times as much as that of the body: it is light.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
+from omnidyn.model.layout import record
+from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.simulation.implicit.march import SIMPSON, advance_pose
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
@@ -24,8 +26,37 @@ from omnidyn.simulation.speed_loop import Loop, passed, tick_answer, tick_branch
 SHARE = 0.1  # of an error of the yaw rate, and of a rim, beside one of the speed
 SHORT, SHORTEST, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/march.py
 MOST = (1e6, 5e6)  # steps solved at tol 1e-6, and so many more per second
-ELLIPSE, TURNS = 3, 0.5  # the mark of the ellipse; [rad] by which travel may turn in a step
+TURNS = 0.5  # [rad] by which travel may turn in a step
 MEET = 1e-12  # of the speeds: a difference that is rounding
+
+
+SLIP_EACH = record(
+    sign=(),  # 1 and -1 forward and backward, 0 stuck, FREE without dry friction
+    contact=(),  # of a wheel: GRIPS, or the side to which it spins
+    force=(),  # of the floor on the body, through it [N]
+)
+
+
+class SlipState(NamedTuple):
+    """A state of n wheels. x (3 + n,): twist, rim speeds; each: shape (3 + n + 2,), of SLIP_EACH: the axes, the wheels,
+    and the ellipse along x and along y, its sign in the first of the two."""
+
+    x: Any
+    each: Any
+
+
+class SlipRoom(NamedTuple):
+    """What a run works in: the state of now, those after a whole step, one and two half steps, and of a stage the
+    wrench `pull` (3,), the goal x* (3 + n,), `space` (12,); counts: most sweeps, steps."""
+
+    now: SlipState
+    whole: SlipState
+    middle: SlipState
+    two: SlipState
+    pull: FloatArray
+    goal: FloatArray
+    space: FloatArray
+    counts: IntArray
 
 
 class SlipOutcome(NamedTuple):
@@ -53,7 +84,7 @@ def run_slipping(
     out = SlipOutcome(np.zeros((rows + 1, 3)), np.zeros((rows + 1, 3 + n)), np.zeros((rows + 1, n)), 0, np.zeros(n))
     out.pose[0], out.state[0] = pose, state
     most = (MOST[0] + MOST[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
-    row, capped = _march(plant, voltage, bound, dt, *loop, tol, most, out.pose, out.state, out.contact, out.lifted)
+    row, capped = _march(plant, voltage, bound, dt, loop, tol, most, out, _room(n))
     if row < rows:
         raise InputError(
             "this robot moves too fast to be followed", got=f"more than {most:.2g} steps up to row {row}",
@@ -62,6 +93,11 @@ def run_slipping(
             "(tol=None)",
         )  # fmt: skip
     return out._replace(capped=int(capped))
+
+
+def _room(n: int) -> SlipRoom:
+    now, whole, middle, two = (SlipState(np.zeros(3 + n), np.zeros(5 + n, SLIP_EACH)) for _ in range(4))
+    return SlipRoom(now, whole, middle, two, np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64))
 
 
 def rolling(plant: SlipPlant, twist: FloatArray) -> FloatArray:
@@ -79,13 +115,14 @@ def _pulled(plant, heading, pull):
 
 
 @part
-def _differ(a, b, modes_a, modes_b):
+def _differ(a, b):
     """Whether two states differ in what sticks, grips or in a direction of sliding."""
-    for j in range(len(modes_a)):
-        if modes_a[j] != modes_b[j]:
+    for e in range(len(a.each)):
+        if a.each[e].sign != b.each[e].sign or a.each[e].contact != b.each[e].contact:
             return True
-    if modes_a[ELLIPSE] == 1.0 and (a[0] != 0.0 or a[1] != 0.0):
-        cross, dot = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
+    x, y = a.x, b.x
+    if a.each[len(a.each) - 2].sign == 1.0 and (x[0] != 0.0 or x[1] != 0.0):
+        cross, dot = x[0] * y[1] - x[1] * y[0], x[0] * y[0] + x[1] * y[1]
         return (dot < 0.0) | (abs(cross) > TURNS * dot)
     return False
 
@@ -100,7 +137,7 @@ def _error(plant, one, two):
 
 
 @part
-def _unresolved(plant, volts, bound, hold, h):
+def _unresolved(plant, volts, bound, h):
     """A bound of how far an event inside a step of length h can lead astray [m/s]."""
     forces, worst = abs(plant.room[0]) + abs(plant.room[1]) + plant.ellipse[0] + plant.ellipse[1], 0.0
     for a in range(3):
@@ -116,35 +153,25 @@ def _unresolved(plant, volts, bound, hold, h):
 
 
 @part
-def _find(
-    plant, volts, bound, state, modes, pose, h, left, dt, tol, hold, spare, marks, holds, pull, goal, space, counts
-):  # fmt: skip
-    """Find a step from `state` that is good enough. spare, marks, holds: after a whole step, and after two halves.
-
-    Returns its length and the one to try next.
-    """
-    one, middle, two = spare[0], spare[1], spare[2]
+def _find(plant, volts, bound, pose, h, left, dt, tol, room):
+    """Find a step from `now` that is good enough. Returns its length and the one to try next."""
+    now, one, middle, two, pull, counts = room.now, room.whole, room.middle, room.two, room.pull, room.counts
     while True:
         if left - h < 1e-9 * dt:
             h = left
-        for k in range(3):
-            for j in range(len(hold)):
-                holds[k, j] = hold[j]
-            for j in range(len(modes)):
-                marks[k, j] = modes[j]
-        _pulled(plant, pose[2] + 0.5 * h * state[2], pull)
-        first = slip_step(plant, volts, bound, h, state, pull, one, holds[0], marks[0], goal, space)
-        _pulled(plant, pose[2] + 0.25 * h * state[2], pull)
-        second = slip_step(plant, volts, bound, 0.5 * h, state, pull, middle, holds[1], marks[1], goal, space)
-        for j in range(len(hold)):
-            holds[2, j] = holds[1, j]
-        _pulled(plant, pose[2] + 0.25 * h * state[2] + 0.5 * h * middle[2], pull)
-        third = slip_step(plant, volts, bound, 0.5 * h, middle, pull, two, holds[2], marks[2], goal, space)
+        _begin_as(one.each, now.each)
+        _pulled(plant, pose[2] + 0.5 * h * now.x[2], pull)
+        first = slip_step(plant, volts, bound, h, now.x, one, room)
+        _begin_as(middle.each, now.each)
+        _pulled(plant, pose[2] + 0.25 * h * now.x[2], pull)
+        second = slip_step(plant, volts, bound, 0.5 * h, now.x, middle, room)
+        _begin_as(two.each, middle.each)
+        _pulled(plant, pose[2] + 0.25 * h * now.x[2] + 0.5 * h * middle.x[2], pull)
+        third = slip_step(plant, volts, bound, 0.5 * h, middle.x, two, room)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
-        ratio = _error(plant, one, two) / max(tol / plant.memory * max(h, SHORT), ROUNDING)
-        event = _differ(state, middle, modes, marks[1]) or _differ(middle, two, marks[1], marks[2])
-        if event or _differ(state, one, modes, marks[0]):
-            astray = _unresolved(plant, volts, bound, hold, h)
+        ratio = _error(plant, one.x, two.x) / max(tol / plant.memory * max(h, SHORT), ROUNDING)
+        if _differ(now, middle) or _differ(middle, two) or _differ(now, one):
+            astray = _unresolved(plant, volts, bound, h)
             ratio = 0.5 if astray <= tol else max(ratio, 64.0)
         fitting = 0.9 * (ratio + 1e-12) ** (-1.0 / 3.0 if h < SHORT else -0.5)
         if ratio <= 1.0 or h <= SHORTEST:
@@ -153,35 +180,45 @@ def _find(
 
 
 @part
-def _seen(plant, state, modes, w):
-    """Speed of a wheel as its encoder shows it [rad/s]: exactly 0 where it sticks."""
-    return 0.0 if modes[4 + 2 * w] == 0.0 else state[3 + w] / plant.radius[w]
+def _begin_as(each, before):
+    """Take over signs, contacts and forces."""
+    for e in range(len(each)):
+        each[e] = before[e]
 
 
 @part
-def _count_lifted(plant, state, hold, lifted):
+def _seen(plant, state, w):
+    """Speed of a wheel as its encoder shows it [rad/s]: exactly 0 where it sticks."""
+    return 0.0 if state.each[3 + w].sign == 0.0 else state.x[3 + w] / plant.radius[w]
+
+
+@part
+def _count_lifted(plant, state, lifted):
     """Count the wheels whose load would be negative under the forces of the floor, where loads shift."""
     if len(plant.shift) == 0:
         return
-    f0, f1 = hold[0] + hold[3] - plant.viscous[0] * state[0], hold[1] + hold[4] - plant.viscous[1] * state[1]
-    for w in range(len(plant.spin)):
-        f0, f1 = f0 + plant.g[w, 0] * hold[5 + w], f1 + plant.g[w, 1] * hold[5 + w]
+    n, x, each = len(plant.spin), state.x, state.each
+    f0 = each[0].force + each[3 + n].force - plant.viscous[0] * x[0]
+    f1 = each[1].force + each[4 + n].force - plant.viscous[1] * x[1]
+    for w in range(n):
+        f0, f1 = f0 + plant.g[w, 0] * each[3 + w].force, f1 + plant.g[w, 1] * each[3 + w].force
     for w in range(len(plant.spin)):
         if plant.grip[w] > 0.0 and plant.grip[w] + plant.shift[w, 0] * f0 + plant.shift[w, 1] * f1 <= 0.0:
             lifted[w] += 1.0
 
 
 @part
-def _marks_of(plant, state, modes):
+def _mark(plant, state):
     """The marks of a state: what rests is taken to hold, a rim as fast as the ground under it to grip."""
+    x, each = state.x, state.each
     for a in range(3):
-        modes[a] = FREE if plant.dry[a] == 0.0 else _sign(state[a])
-    moves = state[0] != 0.0 or state[1] != 0.0
-    modes[ELLIPSE] = FREE if plant.ellipse[0] == 0.0 else (1.0 if moves else 0.0)
+        each[a].sign = FREE if plant.dry[a] == 0.0 else _sign(x[a])
+    moves = x[0] != 0.0 or x[1] != 0.0
+    each[len(each) - 2].sign = FREE if plant.ellipse[0] == 0.0 else (1.0 if moves else 0.0)
     for w in range(len(plant.spin)):
-        s, p = state[3 + w], plant.g[w, 0] * state[0] + plant.g[w, 1] * state[1] + plant.g[w, 2] * state[2]
-        modes[4 + 2 * w] = FREE if plant.forward[w] + plant.backward[w] == 0.0 else _sign(s)
-        modes[5 + 2 * w] = GRIPS if abs(s - p) <= MEET * (abs(s) + abs(p)) else _sign(s - p)
+        s, p = x[3 + w], plant.g[w, 0] * x[0] + plant.g[w, 1] * x[1] + plant.g[w, 2] * x[2]
+        each[3 + w].sign = FREE if plant.forward[w] + plant.backward[w] == 0.0 else _sign(s)
+        each[3 + w].contact = GRIPS if abs(s - p) <= MEET * (abs(s) + abs(p)) else _sign(s - p)
 
 
 @part
@@ -190,50 +227,47 @@ def _sign(value):
 
 
 @branching_kernel
-def _march(
-    plant, voltage, bound, dt, kp, ki, limit, radius, command, tick, period, total, dead, tol, most, poses, states,
-    contacts, lifted,
-):  # fmt: skip
+def _march(plant, voltage, bound, dt, loop, tol, most, out, room):
     """All rows; see run_slipping. Returns (rows done before `most` steps were, rows capped)."""
-    n = len(plant.spin)
-    state, pose, modes, hold = states[0].copy(), poses[0].copy(), np.zeros(4 + 2 * n), np.zeros(5 + n)
-    spare, marks, holds = np.zeros((3, 3 + n)), np.zeros((3, 4 + 2 * n)), np.zeros((3, 5 + n))
-    pull, goal, space, counts = np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64)
+    n, now, two, counts, pose = len(plant.spin), room.now, room.two, room.counts, out.pose[0].copy()
     volts, h, capped = np.zeros(n), dt[0], 0
-    _marks_of(plant, state, modes)
+    copy_row(now.x, out.state[0])
+    _mark(plant, now)
     for k in range(len(dt)):
         counts[0] = 0
         for w in range(n):
-            if len(command) > 0:
-                if tick[k]:
-                    error = command[k, w] - _seen(plant, state, modes, w)
-                    takes, side = tick_branch(kp[w], ki[w], limit[w], period, error, total[w])
-                    voltage[k, w], total[w] = tick_answer(
-                        kp[w], ki[w], limit[w], period, error, total[w], takes, side
+            if len(loop.command) > 0:
+                if loop.tick[k]:
+                    kp, ki, limit = loop.kp[w], loop.ki[w], loop.limit[w]
+                    error = loop.command[k, w] - _seen(plant, now, w)
+                    takes, side = tick_branch(kp, ki, limit, loop.period, error, loop.sum[w])
+                    voltage[k, w], loop.sum[w] = tick_answer(
+                        kp, ki, limit, loop.period, error, loop.sum[w], takes, side
                     )  # fmt: skip
                 else:
                     voltage[k, w] = voltage[k - 1, w]
-            volts[w] = passed(voltage[k, w], dead)
+            volts[w] = passed(voltage[k, w], loop.dead)
         left = dt[k]
         if tol > 0.0:
             while left > 0.0:
-                taken, h = _find(
-                    plant, volts, bound[k], state, modes, pose, h, left, dt[k], tol, hold, spare, marks, holds, pull,
-                    goal, space, counts,
-                )  # fmt: skip
-                advance_pose(pose, state, spare[1], spare[2], 1.0, taken, SIMPSON)
-                state[:], modes[:], hold[:] = spare[2], marks[2], holds[2]
+                taken, h = _find(plant, volts, bound[k], pose, h, left, dt[k], tol, room)
+                advance_pose(pose, now.x, room.middle.x, two.x, 1.0, taken, SIMPSON)
+                copy_row(now.x, two.x)
+                _begin_as(now.each, two.each)
                 left = left - taken if taken < left else 0.0
                 if counts[1] > most:
                     return k, capped
         else:
-            _pulled(plant, pose[2] + 0.5 * dt[k] * state[2], pull)
-            counts[0] = slip_step(plant, volts, bound[k], dt[k], state, pull, spare[2], hold, modes, goal, space)
-            advance_pose(pose, state, spare[2], spare[2], 1.0, dt[k], (0.5, 0.0, 0.5, 0.0, 0.0, 0.0))
-            state[:] = spare[2]
+            _begin_as(two.each, now.each)
+            _pulled(plant, pose[2] + 0.5 * dt[k] * now.x[2], room.pull)
+            counts[0] = slip_step(plant, volts, bound[k], dt[k], now.x, two, room)
+            advance_pose(pose, now.x, two.x, two.x, 1.0, dt[k], (0.5, 0.0, 0.5, 0.0, 0.0, 0.0))
+            copy_row(now.x, two.x)
+            _begin_as(now.each, two.each)
         capped += counts[0] >= SWEEPS
-        states[k + 1], poses[k + 1] = state, pose
+        copy_row(out.state[k + 1], now.x)
+        copy_row(out.pose[k + 1], pose)
         for w in range(n):
-            contacts[k + 1, w] = modes[5 + 2 * w]
-        _count_lifted(plant, state, hold, lifted)
+            out.contact[k + 1, w] = now.each[3 + w].contact
+        _count_lifted(plant, now, out.lifted)
     return len(dt), capped

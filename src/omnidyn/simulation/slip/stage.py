@@ -47,23 +47,25 @@ def _travel_speed(b, m, c):
 
 
 @part
-def _body_blocks(plant, heavy, total, hold, mode):
+def _body_blocks(plant, heavy, total, each):
     """Dry friction of the direction of travel, then of the axes, each given all other forces; in place."""
-    mode[3] = FREE
+    along, across = each[len(each) - 2], each[len(each) - 1]
+    along.sign = FREE
     if plant.ellipse[0] > 0.0:
-        b0, b1 = total[0] - hold[3], total[1] - hold[4]
+        b0, b1 = total[0] - along.force, total[1] - across.force
         t0, t1 = _travel_speed((b0, b1), (heavy[0], heavy[1]), (plant.ellipse[0], plant.ellipse[1]))
-        mode[3] = 0.0 if t0 == 0.0 and t1 == 0.0 else 1.0
+        along.sign = 0.0 if t0 == 0.0 and t1 == 0.0 else 1.0
         total[0], total[1] = heavy[0] * t0, heavy[1] * t1
-        hold[3], hold[4] = total[0] - b0, total[1] - b1
+        along.force, across.force = total[0] - b0, total[1] - b1
     for a in range(3):
-        mode[a] = FREE
+        axis = each[a]
+        axis.sign = FREE
         if plant.dry[a] > 0.0:
-            alone = total[a] - hold[a]
+            alone = total[a] - axis.force
             held = abs(alone) <= plant.dry[a]
-            mode[a] = 0.0 if held else math.copysign(1.0, alone)
+            axis.sign = 0.0 if held else math.copysign(1.0, alone)
             total[a] = 0.0 if held else alone - math.copysign(plant.dry[a], alone)
-            hold[a] = total[a] - alone
+            axis.force = total[a] - alone
 
 
 @part
@@ -83,31 +85,30 @@ def _frame(plant, tau, goal, v, total, frame):
 
 
 @part
-def solve_stage(plant, volts, bound, tau, goal, pull, x, hold, mode, space):
+def solve_stage(plant, volts, bound, tau, goal, pull, x, each, space):
     """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. goal: x*. pull (3,): wrench on the body.
 
-    hold (3 + 2 + n,) [N]: forces of the axes, the ellipse and the wheels, a first guess too. mode (3 + 1 + 2 n,): signs
-    of the axes and of the ellipse, then of each wheel and of its contact. space (12,). Returns the number of sweeps.
+    each: of a SlipState; its forces are a first guess too. space (12,). Returns the number of sweeps.
     """
     n, heavy, total, frame, offset = len(plant.spin), space[:3], space[3:6], space[6:9], space[9:12]
     for a in range(3):
         heavy[a] = plant.mass[a] / tau + plant.viscous[a]
         offset[a] = plant.mass[a] / tau * goal[a] + pull[a]
-        total[a] = offset[a] + hold[a]
+        total[a] = offset[a] + each[a].force
         frame[a] = 0.0
-    total[0], total[1] = total[0] + hold[3], total[1] + hold[4]
+    total[0], total[1] = total[0] + each[3 + n].force, total[1] + each[4 + n].force
     for w in range(n):
         for a in range(3):
-            total[a] += plant.g[w, a] * hold[5 + w]
+            total[a] += plant.g[w, a] * each[3 + w].force
     for sweep in range(SWEEPS):
         worst, size, loads = 0.0, 0.0, 0.0  # loads: forces of which what is left is the rounding
         v0, v1, v2 = total[0] / heavy[0], total[1] / heavy[1], total[2] / heavy[2]
         _frame(plant, tau, goal, (v0, v1, v2), total, frame)
         for w in range(n):
-            free = give = 0.0
+            free, give, own = 0.0, 0.0, each[3 + w]
             for a in range(3):
                 g = plant.g[w, a]
-                free += g * (total[a] - g * hold[5 + w]) / heavy[a]
+                free += g * (total[a] - g * own.force) / heavy[a]
                 give += g * g / heavy[a]
             limit = plant.grip[w]
             if len(plant.shift) > 0:  # the floor's force on the body, as far as it is known by now
@@ -118,44 +119,45 @@ def solve_stage(plant, volts, bound, tau, goal, pull, x, hold, mode, space):
                 plant, w, volts[w], bound[w], tau, goal[3 + w], free, give, limit
             )  # fmt: skip
             for a in range(3):
-                total[a] += plant.g[w, a] * (f - hold[5 + w])
-            hold[5 + w], x[3 + w] = f, s
+                total[a] += plant.g[w, a] * (f - own.force)
+            own.force, x[3 + w] = f, s
             loads += abs(f)
-            mode[4 + 2 * w], mode[5 + 2 * w] = sign, contact
-        _body_blocks(plant, heavy, total, hold, mode)
+            own.sign, own.contact = sign, contact
+        _body_blocks(plant, heavy, total, each)
         for a in range(3):
             now, was = total[a] / heavy[a], (v0 if a == 0 else (v1 if a == 1 else v2))
             reach = math.sqrt(plant.mass[a] / plant.mass[0])  # yaw as a length
             worst, size = max(worst, reach * abs(now - was)), max(size, reach * (abs(now) + abs(goal[a])))
         size += loads / (heavy[0] + heavy[1])
         if worst <= TIGHT * size or (worst == 0.0 and sweep > 0):
-            _finish(plant, total, heavy, x, mode)
+            _finish(plant, total, heavy, x, each)
             return sweep + 1
-    _finish(plant, total, heavy, x, mode)
+    _finish(plant, total, heavy, x, each)
     return SWEEPS
 
 
 @part
-def _finish(plant, total, heavy, x, mode):
+def _finish(plant, total, heavy, x, each):
     """The twist, and the rim speeds of what grips; a body that every wheel holds is at rest to the last bit."""
     n, held = len(plant.spin), True
     for w in range(n):
-        held &= mode[4 + 2 * w] == 0.0 and mode[5 + 2 * w] == GRIPS
+        held &= each[3 + w].sign == 0.0 and each[3 + w].contact == GRIPS
     for a in range(3):
         x[a] = 0.0 if held else total[a] / heavy[a]
     for w in range(n):
-        if mode[5 + 2 * w] == GRIPS:
+        if each[3 + w].contact == GRIPS:
             p = plant.g[w, 0] * x[0] + plant.g[w, 1] * x[1] + plant.g[w, 2] * x[2]
-            x[3 + w] = 0.0 if mode[4 + 2 * w] == 0.0 else p
+            x[3 + w] = 0.0 if each[3 + w].sign == 0.0 else p
 
 
 @part
-def slip_step(plant, volts, bound, h, start, pull, end, hold, mode, goal, space):
-    """One SDIRK2 step from `start` to `end`, both (3 + n,). Returns the most sweeps of a stage."""
-    tau = GAMMA * h
+def slip_step(plant, volts, bound, h, start, end, room):
+    """One SDIRK2 step from x (3 + n,) at its start to the state `end`, whose forces are a first guess. Returns the most
+    sweeps of a stage."""
+    tau, goal, x = GAMMA * h, room.goal, end.x
     for j in range(len(start)):
-        goal[j], end[j] = start[j], start[j]
-    count = solve_stage(plant, volts, bound, tau, goal, pull, end, hold, mode, space)
+        goal[j], x[j] = start[j], start[j]
+    count = solve_stage(plant, volts, bound, tau, goal, room.pull, x, end.each, room.space)
     for j in range(len(start)):
-        goal[j] = start[j] + BACK * (end[j] - start[j])
-    return max(count, solve_stage(plant, volts, bound, tau, goal, pull, end, hold, mode, space))
+        goal[j] = start[j] + BACK * (x[j] - start[j])
+    return max(count, solve_stage(plant, volts, bound, tau, goal, room.pull, x, end.each, room.space))
