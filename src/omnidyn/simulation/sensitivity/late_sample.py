@@ -18,6 +18,7 @@ from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
+from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands, current_bounds
 from omnidyn.simulation.implicit.march import capped
@@ -34,6 +35,7 @@ from omnidyn.simulation.sensitivity.loop import LoopRun, run_loop_with_derivativ
 from omnidyn.simulation.sensitivity.sample import MEET, PATH, TURN, Samples, empty_samples
 from omnidyn.simulation.simulate import as_tolerance
 
+PIECES, ROUGH = 16, 1e-3  # steps in a row, at most; [m/s] the tolerance where they were more
 PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
 
 
@@ -132,9 +134,9 @@ def late_samples(
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
     t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors, or (rows, n): see `held`; start: (3,)
-    twist; tol as for `simulate`; travel: what is wanted of the way, see sample.py. Also returns the number of rows in
-    which the friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which
-    is off.
+    twist; tol as for `simulate`, but ROUGH instead of None where friction falls so fast that a row took more than
+    PIECES steps; travel: what is wanted of the way, see sample.py. Also returns the number of rows in which the
+    friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
     """
     numbers, plants = _plants(robot, directions)
     rates = np.zeros((len(directions), *voltage.shape))
@@ -148,9 +150,14 @@ def late_samples(
     seen = _room(robot, t, late, len(directions), travel)
     outcome, _, _ = run_with_derivatives(
         numbers, directions_of(numbers, plants, rates), given, current_bounds(robot, given, len(given.dt)),
-        (np.asarray(start, dtype=float), np.zeros(3)), first, as_tolerance(tol), seen,
+        (np.asarray(start, dtype=float), np.zeros(3)), first, _within(tol, numbers, given.dt), seen,
     )  # fmt: skip
     return _looks(robot, directions, seen, (length, stretch), (seen.t, voltage, rates)), capped(outcome)
+
+
+def _within(tol: float | None, numbers: Plant, dt: FloatArray) -> float:
+    steep = float(np.median(dt)) * numbers.body.steep_sum > PIECES * MONOTONE
+    return ROUGH if tol is None and steep else as_tolerance(tol)
 
 
 def looped_samples(
