@@ -8,6 +8,7 @@ from dataclasses import replace
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.output_error.prepare import (
+    EXACT,
     Group,
     expand_keys,
     free_by_default,
@@ -59,7 +60,20 @@ def begun(name: str, runs: Sequence[Run], robot: Robot, question: Question, join
     asked_axes(robot, free, asked.fixed)
     keys = asked.free if asked.free is not None else guesses(robot)
     exact = exact and stays_exact(robot, [key for key in keys if key not in asked.fixed])
-    return make_group(name, records, robot, asked, exact, usual, alone=not joint), asked
+    group = make_group(name, records, robot, asked, exact, usual, alone=not joint)
+    _refuse_profile(group, asked)
+    return group, asked
+
+
+def _refuse_profile(group: Group, question: Question) -> None:
+    axes = asked_axes(group.robot, question.free or (), question.fixed)
+    if group.engine != EXACT and any(group.moved[axis] for axis in axes):
+        raise UnsupportedError(
+            "breakaway is profiled with the exact engine only", got=group.robot.name,
+            expected="friction on the body axes, as in the paper", where="free",
+            remedy="give friction.axes a stribeck_speed and free it too: what falls with the speed is fitted here; or "
+            "hold breakaway, at the force with which slow ramps first move the robot",
+        )  # fmt: skip
 
 
 def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Question:

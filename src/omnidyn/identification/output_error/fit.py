@@ -311,12 +311,6 @@ class Fit:
         ]
         if not axes:
             return solution, []
-        if group.engine != EXACT:
-            raise UnsupportedError(
-                "breakaway is profiled with the exact engine only", got=group.robot.name,
-                expected="friction on the body axes, as in the paper", where="free",
-                remedy="hold it: enter the force at which slow ramps first move the robot",
-            )  # fmt: skip
         kind = self.question.covariance
         known = trust(solution.solver, solution, SANDWICH if kind == AUTOREGRESSIVE else kind)
         return find_breakaway(solution, axes, known)

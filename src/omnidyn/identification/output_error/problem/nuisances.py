@@ -153,7 +153,7 @@ def pieces(
 
     start_std: of a start that was measured, None where it may be anywhere.
 
-    "auto": at rest where the log begins without voltage and without visible motion; else free.
+    "auto": at rest where the log begins with a voltage that is held and without visible motion; else free.
     """
     found = []
     for record in records:
@@ -185,10 +185,13 @@ def _piece(
 
 
 def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: int) -> bool:
-    """Whether a piece begins with rows of no voltage in which nothing visibly moves."""
+    """Whether a piece begins with rows of one voltage in which nothing visibly moves.
+
+    Of a voltage that breakaway holds, too: a start that is next to rest would slide away under it.
+    """
     stop = min(first + 10 * SILENT, last + 1)
-    driven = np.flatnonzero((record.voltage[first:stop] != 0.0).any(axis=1))
-    silent = int(driven[0]) if driven.size else stop - first
+    changed = np.flatnonzero((record.voltage[first:stop] != record.voltage[first]).any(axis=1))
+    silent = int(changed[0]) if changed.size else stop - first
     if silent < SILENT or twist is None:
         return False
     rows = twist[first : first + silent]

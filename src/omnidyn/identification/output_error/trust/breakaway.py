@@ -150,11 +150,12 @@ def _coulomb(solver: Solver, point: Point, axis: int) -> float:
 
 
 def _edges(solver: Solver, point: Point, axis: int, lowest: float) -> FloatArray:
-    """Drives of the log at which S may matter, increasing: from `lowest` to HIGHEST times twice that."""
+    """Drives of the log at which S may matter, increasing: from `lowest` to HIGHEST times twice that, and the next one,
+    where the last plateau below that ends."""
     assert isinstance(solver.engine, ExactEngine)
     drives = np.concatenate([np.abs(drive[:, axis]) for drive in solver.engine.drives(point)])
-    inside = drives[(drives >= lowest) & (drives <= 2.0 * HIGHEST * lowest)]
-    return np.unique(np.round(inside, 12)).astype(float)
+    every = np.unique(np.round(drives[drives >= lowest], 12)).astype(float)
+    return every[: np.searchsorted(every, 2.0 * HIGHEST * lowest, side="right") + 1]
 
 
 def _search(profile: _Profile, middles: FloatArray) -> tuple[int, int]:
