@@ -1,4 +1,4 @@
-"""The named parts that the compiled solvers work in: the constants of a robot, and a stage of one of its steps.
+"""The named parts that the compiled solvers work in: constants of a robot, the state of a run, a stage of a step.
 
     plant.body.mass, plant.element[e].coulomb[side]      constants: a Plant. No solver writes into one that it is given
     state.x[a], state.each[e].sign, .current, .bend      the State of a run

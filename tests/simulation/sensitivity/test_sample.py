@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.simulation.sensitivity.derivatives import derivatives
 from omnidyn.simulation.sensitivity.late_sample import Direction, late_samples
@@ -106,3 +106,16 @@ def test_derivatives_stay_numbers_where_an_ellipse_rests_for_a_moment(robot):
     found = derivatives(slow, ramp, 0.01, list(KEYS), tol=1e-4, twist=(0.0008046, -0.10423209, 0.2690644))
     assert np.isfinite(found.twist).all()
     assert (np.sign(found.run.twist[[0, -1], 1]) == [-1.0, 1.0]).all()
+
+
+@pytest.mark.parametrize(("speed", "adaptive"), [(1e-3, True), (0.05, False)])
+def test_a_row_that_would_be_cut_into_many_steps_is_run_within_a_tolerance(axebot, speed, adaptive):
+    """Steps of one length must resolve the steepest fall everywhere; adaptive ones do where it is."""
+    levels = {"coulomb": (2.2, 1.5, 0.099), "breakaway": (4.0, 3.0, 0.12), "viscous": (0.9, 0.9, 0.01)}
+    falls = AxesFriction(stribeck_speed=(speed, speed, 10.0 * speed), **levels)
+    robot, t, voltage = axebot.replace(friction=Friction(axes=falls)), np.arange(61) * 0.01, program(60)
+    rough, fixed, fine = (
+        late_samples(robot, t, voltage, [], np.zeros(3), [0.0], tol)[0][0] for tol in (1e-3, None, 1e-6)
+    )
+    assert np.array_equal(rough.twist, fixed.twist) == adaptive
+    np.testing.assert_allclose(fixed.twist, fine.twist, atol=1e-2)  # ten times 1e-3 in rad/s

@@ -17,7 +17,7 @@ from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
 from omnidyn.model.stick_slip.band import band_error, cross_band, crosses
-from omnidyn.model.stick_slip.copies import copy_row, copy_state, row_of_state, state_of_row
+from omnidyn.model.stick_slip.copies import copy_row, copy_state, row_of_state, signs_differ, state_of_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
 from omnidyn.model.stick_slip.release import put, settle, sticks, with_given_currents
@@ -153,9 +153,8 @@ def _turned(plant, state, h):
 @part
 def _event(a, b):
     """Whether two states differ in what sticks or in a direction of sliding; for the ellipse, by more than 0.5 rad."""
-    for e in range(len(a.each)):
-        if a.each[e].sign != b.each[e].sign:
-            return True
+    if signs_differ(a, b):
+        return True
     x, y = a.x, b.x
     if a.each[len(a.each) - 2].sign == 1.0 and (x[0] != 0.0 or x[1] != 0.0):
         cross, dot = x[0] * y[1] - x[1] * y[0], x[0] * y[0] + x[1] * y[1]

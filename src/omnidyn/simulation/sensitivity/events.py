@@ -8,7 +8,7 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES, OPEN, Plant, Stage
 from omnidyn.model.stick_slip.active_set import find_active_set, newton_direction
 from omnidyn.model.stick_slip.can_hold import worst_direction
-from omnidyn.model.stick_slip.copies import copy_state, copy_table
+from omnidyn.model.stick_slip.copies import copy_state, copy_table, signs_differ
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses, winding
 from omnidyn.model.stick_slip.laws import aim_bristles
 from omnidyn.model.stick_slip.release import put, settle, sticks
@@ -49,10 +49,8 @@ def _acceleration(plant, stage, state, x, out):
 @part
 def differ(a, b):
     """Whether two states differ in what sticks or in a direction of sliding."""
-    for e in range(len(a.each)):
-        if a.each[e].sign != b.each[e].sign:
-            return True
-    return (a.each[len(a.each) - 2].sign == 1.0) & (a.x[0] * b.x[0] + a.x[1] * b.x[1] < 0.0)
+    turned = (a.each[len(a.each) - 2].sign == 1.0) & (a.x[0] * b.x[0] + a.x[1] * b.x[1] < 0.0)
+    return turned | signs_differ(a, b)
 
 
 @part

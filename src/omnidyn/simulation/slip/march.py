@@ -16,7 +16,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import record
-from omnidyn.model.stick_slip.copies import copy_row
+from omnidyn.model.stick_slip.copies import copy_each, copy_row, signs_differ
 from omnidyn.simulation.implicit.march import SIMPSON, advance_pose
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
@@ -117,8 +117,10 @@ def _pulled(plant, heading, pull):
 @part
 def _differ(a, b):
     """Whether two states differ in what sticks, grips or in a direction of sliding."""
+    if signs_differ(a, b):
+        return True
     for e in range(len(a.each)):
-        if a.each[e].sign != b.each[e].sign or a.each[e].contact != b.each[e].contact:
+        if a.each[e].contact != b.each[e].contact:
             return True
     x, y = a.x, b.x
     if a.each[len(a.each) - 2].sign == 1.0 and (x[0] != 0.0 or x[1] != 0.0):
@@ -159,13 +161,13 @@ def _find(plant, volts, bound, pose, h, left, dt, tol, room):
     while True:
         if left - h < 1e-9 * dt:
             h = left
-        _begin_as(one.each, now.each)
+        copy_each(one.each, now.each)
         _pulled(plant, pose[2] + 0.5 * h * now.x[2], pull)
         first = slip_step(plant, volts, bound, h, now.x, one, room)
-        _begin_as(middle.each, now.each)
+        copy_each(middle.each, now.each)
         _pulled(plant, pose[2] + 0.25 * h * now.x[2], pull)
         second = slip_step(plant, volts, bound, 0.5 * h, now.x, middle, room)
-        _begin_as(two.each, middle.each)
+        copy_each(two.each, middle.each)
         _pulled(plant, pose[2] + 0.25 * h * now.x[2] + 0.5 * h * middle.x[2], pull)
         third = slip_step(plant, volts, bound, 0.5 * h, middle.x, two, room)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
@@ -177,13 +179,6 @@ def _find(plant, volts, bound, pose, h, left, dt, tol, room):
         if ratio <= 1.0 or h <= SHORTEST:
             return h, h * min(4.0, max(1.0, fitting))
         h = max(SHORTEST, h * max(0.125, fitting))
-
-
-@part
-def _begin_as(each, before):
-    """Take over signs, contacts and forces."""
-    for e in range(len(each)):
-        each[e] = before[e]
 
 
 @part
@@ -253,17 +248,17 @@ def _march(plant, voltage, bound, dt, loop, tol, most, out, room):
                 taken, h = _find(plant, volts, bound[k], pose, h, left, dt[k], tol, room)
                 advance_pose(pose, now.x, room.middle.x, two.x, 1.0, taken, SIMPSON)
                 copy_row(now.x, two.x)
-                _begin_as(now.each, two.each)
+                copy_each(now.each, two.each)
                 left = left - taken if taken < left else 0.0
                 if counts[1] > most:
                     return k, capped
         else:
-            _begin_as(two.each, now.each)
+            copy_each(two.each, now.each)
             _pulled(plant, pose[2] + 0.5 * dt[k] * now.x[2], room.pull)
             counts[0] = slip_step(plant, volts, bound[k], dt[k], now.x, two, room)
             advance_pose(pose, now.x, two.x, two.x, 1.0, dt[k], (0.5, 0.0, 0.5, 0.0, 0.0, 0.0))
             copy_row(now.x, two.x)
-            _begin_as(now.each, two.each)
+            copy_each(now.each, two.each)
         capped += counts[0] >= SWEEPS
         copy_row(out.state[k + 1], now.x)
         copy_row(out.pose[k + 1], pose)

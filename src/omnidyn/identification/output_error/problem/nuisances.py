@@ -187,19 +187,27 @@ def _piece(
 def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: int) -> bool:
     """Whether a piece begins with rows of one voltage in which nothing visibly moves.
 
-    Of a voltage that breakaway holds, too: a start that is next to rest would slide away under it.
+    Of a voltage that breakaway holds, too: a start that is next to rest would slide away under it. Such a voltage may
+    also turn a moving robot round: that takes more rows, and no trend either.
     """
     stop = min(first + 10 * SILENT, last + 1)
     changed = np.flatnonzero((record.voltage[first:stop] != record.voltage[first]).any(axis=1))
-    silent = int(changed[0]) if changed.size else stop - first
-    if silent < SILENT or twist is None:
+    rows, driven = int(changed[0]) if changed.size else stop - first, bool(record.voltage[first].any())
+    if rows < (4 * SILENT if driven else SILENT) or twist is None:
         return False
-    rows = twist[first : first + silent]
-    rows = rows[:, np.isfinite(rows).any(axis=0)]
-    if not rows.size:
-        return False
-    spread = np.nanstd(rows, axis=0) / np.sqrt(np.isfinite(rows).sum(axis=0))
-    return bool((np.abs(np.nanmean(rows, axis=0)) <= CLEAR * spread).all())
+    seen = twist[first : first + rows]
+    known = [seen[kept, axis] for axis in range(seen.shape[1]) if (kept := np.isfinite(seen[:, axis])).any()]
+    return bool(known) and all(_motion(each, driven) <= CLEAR for each in known)
+
+
+def _motion(speed: FloatArray, trend: bool) -> float:
+    """How many standard errors a speed is from 0, in the mean; in its trend, too, where that counts."""
+    n, mean = len(speed), float(speed.mean())
+    time = np.arange(n) - 0.5 * (n - 1)
+    slope = float(time @ speed) / max(float(time @ time), 1.0) if trend else 0.0
+    spread = float(np.std(speed - slope * time))
+    apart = np.hypot(mean * np.sqrt(n), slope * np.sqrt(time @ time))
+    return 0.0 if apart == 0.0 else float(apart / spread) if spread > 0.0 else np.inf
 
 
 def _mean(values: FloatArray) -> float:
