@@ -14,13 +14,18 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.identify import identify
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
+from omnidyn.model.surroundings.floor import GRAVITY
 from omnidyn.run import CHANNELS, Run
 
 NUISANCES = ("gain", "fade", "tilt", "push", "latency", "dead_band")
 USUAL = ("latency", "dead_band")  # what a default fit has
 SHAPES = {f"friction.{shape}": shape for shape in (BOX, ELLIPSE, WHEELS)}
 FRAME, LIMIT, FRICTION = "body.rotating_frame", "motor.current_limit_A", ("friction",)
-FALL = "friction.axes.stribeck_speed"
+FALL, GRIP = "friction.axes.stribeck_speed", "wheels.traction_mu"
+LIGHT, MOST = (
+    2e-5,
+    100.0,
+)  # [kg m^2] of a wheel, whose inertia no file here has; the largest traction_mu that one may have
 # Where a number begins that is off in the file.
 STARTS = {"motor.voltage_drop_V": 0.3, "motor.gear_efficiency": 0.95}
 
@@ -43,6 +48,10 @@ def refitted(key: str, case: Case, run: Run) -> Any:
             axes = axes.replace(breakaway=hold, stribeck_speed=(0.05, 0.05, 0.5))
             falling = robot.replace(friction=robot.friction.replace(axes=axes))
             return identify(run, falling, free=(*FRICTION, "friction.axes.breakaway", FALL))
+        if key == GRIP:
+            mu = 1.05 * case.world.traction * robot.wheels.count / (robot.body.mass * GRAVITY)
+            slippery = robot.wheels.replace(traction_mu=min(mu, MOST), wheel_inertia=LIGHT)
+            return identify(run, robot.replace(wheels=slippery), free=(*FRICTION, key))
         if key.partition(".")[0] in NUISANCES:
             return identify(run, robot, free=FRICTION, nuisances=tuple(dict.fromkeys((*USUAL, key))))
         return _with_number(key, case, run, robot)

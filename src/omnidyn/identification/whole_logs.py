@@ -17,7 +17,6 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, State
 from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import refuse_slip
 from omnidyn.run import Run, as_list
 
 
@@ -63,8 +62,6 @@ def solved(fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[s
     """The answer of a fit of some runs, with the ladder where that is asked for. groups: name of each run's group."""
     if not fit.question.ladder:
         return answered(fit, fit.solve(progress), progress)
-    for group in fit.groups:
-        refuse_slip(group.robot.wheels, "the ladder knows")
     from omnidyn.identification.structure.ladder.climb import climb  # here, for it takes time to load
 
     best, solution, ladder = climb(fit, fit.solve(progress), runs, progress, groups)
@@ -86,18 +83,10 @@ def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
             raise
         answer = fit.answer(plainer, progress)
     found = {
-        group: _with_study(estimate, seen)
+        group: replace(estimate, study=_study(seen))
         for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)
     }
     return replace(answer, estimates=found)
-
-
-def _with_study(estimate: OutputErrorEstimate, solution: Solution) -> OutputErrorEstimate:
-    """The estimate with what is asked of it beyond its numbers, of which nothing knows wheels that slip."""
-    if estimate.robot.wheels.traction_mu is None:
-        return replace(estimate, study=_study(solution))
-    words = "wheels may slip (traction_mu): whether the model is right, and what its numbers rest on, is not asked"
-    return replace(estimate, warnings=(*estimate.warnings, words))
 
 
 def _study(solution: Solution) -> Callable[[], Diagnosis]:

@@ -10,6 +10,8 @@ from omnidyn.identification.output_error.prepare import make_engine, make_proble
 from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.question import Question
+from omnidyn.identification.structure import laws
+from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
@@ -25,7 +27,7 @@ ROBOT = AXEBOT.replace(wheels=AXEBOT.wheels.replace(traction_mu=MU, wheel_inerti
 NOISE = {"twist": np.array([0.005, 0.005, 0.025]), "wheel_speed": 0.1}  # [m/s, m/s, rad/s], [rad/s]
 
 
-def log(seed, seconds, noisy=True):
+def log(seed, seconds, noisy=True, robot=ROBOT):
     """Starts in every direction, hard enough to slip, and stops: by DOP853 from event to event."""
     rng, moves = np.random.default_rng(seed), []
     while sum(map(len, moves)) * DT < seconds:
@@ -33,8 +35,8 @@ def log(seed, seconds, noisy=True):
         rim = np.array([np.cos(way), np.sin(way), rng.uniform(-0.1, 0.1)]) @ AXEBOT.wheels.wrench_matrix
         moves += [np.tile(rng.uniform(2.0, 6.0) * rim / np.abs(rim).max(), (20, 1)), np.zeros((10, 3))]
     voltage = np.concatenate(moves)
-    twist, rims, contact = Slip(ROBOT, wheel_loads(ROBOT).newtons).run(voltage, DT)
-    assert 0.2 < (contact != 0.0).mean() < 0.8
+    twist, rims, contact = Slip(robot, wheel_loads(robot).newtons).run(voltage, DT)
+    assert robot is not ROBOT or 0.2 < (contact != 0.0).mean() < 0.8
     seen = {"twist": twist, "wheel_speed": rims / ROBOT.wheels.radii}
     noise = {name: noisy * NOISE[name] * rng.normal(size=each.shape) for name, each in seen.items()}
     rows = min(len(each) for each in seen.values())
@@ -61,9 +63,30 @@ def test_what_the_floor_takes_comes_back_with_the_friction(fit):
     assert fit.std["wheels.traction_mu"] < 0.002
 
 
-def test_what_is_not_asked_of_wheels_that_slip_is_said(fit):
-    assert fit.lack_of_fit is None
-    assert any("wheels may slip" in words for words in fit.warnings)
+def test_a_right_model_of_wheels_that_slip_is_found_right(fit):
+    assert not fit.lack_of_fit.found
+    viscous = fit.rests_on["friction.axes.viscous[0]"]
+    assert 0.1 < abs(viscous["motor.resistance_ohm"]) < 10.0
+    assert abs(viscous["wheels.inertia_kg_m2"]) < 0.1  # [percent per percent]: light wheels
+
+
+def test_a_wrong_mass_is_found_though_wheels_slip():
+    heavy = ROBOT.replace(body=ROBOT.body.replace(mass=1.4 * ROBOT.body.mass))
+    wrong = fit_output_error(
+        log(1, 3.0), heavy, free=("friction", "wheels.traction_mu"), outputs=("twist", "wheel_speed"), nuisances=()
+    )
+    assert wrong.lack_of_fit.found
+
+
+def test_which_wheels_roll_is_seen_as_the_reference_has_it():
+    run = log(2, 3.0, noisy=False)
+    question = Question(
+        free=("friction.axes.coulomb[0]",), outputs=("twist", "wheel_speed"), nuisances=(), start="rest"
+    )
+    problem = make_problem(read_records([run], ROBOT, question), ROBOT, question)
+    (moved,) = motions(problem, problem.start())
+    _, _, contact = Slip(ROBOT, wheel_loads(ROBOT).newtons).run(run.voltage[:-1], DT)
+    assert (moved.rolls == (contact[: len(moved.rolls)] == 0.0)).mean() > 0.97
 
 
 def test_its_page_leaves_out_what_nobody_knows_of_wheels_that_slip(fit):
@@ -120,8 +143,28 @@ def test_what_an_axis_has_held_is_no_more_than_the_floor_takes():
     assert held[0] < drive[0]
 
 
-def test_a_ladder_is_refused_before_anything_is_fitted():
-    steps = []
-    with pytest.raises(UnsupportedError, match="the ladder knows no wheels that slip"):
-        fit_output_error(log(2, 1.5), ROBOT, ladder=True, watch=steps.append)
-    assert not steps
+def test_the_ladder_takes_the_grip_that_the_file_lacks():
+    """Of a file without traction_mu, nor any inertia of wheels; a floor that lets them slip at the hardest starts."""
+    grippy = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=1.6))
+    rolling = AXEBOT.replace(wheels=AXEBOT.wheels.replace(wheel_inertia=0.0))
+    run = log(1, 5.0, robot=grippy)
+    best = fit_output_error(run, rolling, free=("friction",), outputs=("twist", "wheel_speed"), ladder=True)
+    (step,) = best.ladder.taken
+    assert step.key == "wheels.traction_mu"
+    assert abs(best.value["wheels.traction_mu"] / 1.6 - 1.0) < 0.02
+    assert not best.lack_of_fit.found
+    for name in [name for name in best.value if name.startswith("friction")]:
+        assert abs(best.value[name] - Key.parse(name).get(ROBOT)) < 4.0 * best.std[name], name
+
+
+def test_a_fit_that_wheels_that_slip_led_astray_is_diagnosed_in_bounded_time(monkeypatch):
+    """Its friction about yaw went to 1e6 N m: bristles as stiff as that took minutes."""
+    grippy = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=0.8))
+    run = log(1, 8.0, robot=grippy)
+    astray = fit_output_error(run, AXEBOT, free=("friction",), outputs=("twist", "wheel_speed"))
+    assert any("at the end of its search range" in words for words in astray.warnings)
+    tried = []
+    raw = laws.bristled
+    monkeypatch.setattr(laws, "bristled", lambda robot, bend: tried.append(robot) or raw(robot, bend))
+    assert astray.lack_of_fit.found
+    assert max(robot.friction.axes.coulomb[2] for robot in tried) < 10.0

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.structure.candidates import CHANGE, STEP, Candidate, Trial, as_it_is, numbers, of_the_log
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
-from omnidyn.model.dynamics import frame_wrench
+from omnidyn.model.dynamics import drive_wrench, frame_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import COULOMB, LUGRE
 from omnidyn.model.friction.stribeck import USUAL as EXPONENT
@@ -19,8 +20,9 @@ from omnidyn.model.friction.stribeck import fallen
 from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
-from omnidyn.model.motor import per_wheel
+from omnidyn.model.motor import mass_at_rim, per_wheel, traction
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.slip.plant import grips
 
 NEARBY = 1e-4  # [m] of a centre of mass
 LOSS, SHARE = 0.05, 0.03  # of a gear; of the robot's mass that rotors may be, each a small one to try
@@ -30,6 +32,8 @@ SPEEDS = (0.01, 0.03, 0.1, 0.3)  # of the fastest speed, over which the level ma
 BENDS = (2e-4, 1e-3, 5e-3)  # [m] by which bristles may bend before they slip
 USUAL_FALL, USUAL_SPEED = 1.3, 0.05  # breakaway over Coulomb friction, and [m/s] over which it falls to it
 FALL_WORDS = "friction that falls with the speed from breakaway, above Coulomb friction (Stribeck)"
+LIGHT, AMPLE = 0.02, 1e6  # wheels, as a share of the robot's mass at their rims; a grip that no motor overcomes
+TRACTION = "wheels.traction_mu"
 FALL, BRISTLE = "stribeck_speed", "stiffness"  # numbers that laws begin with, in the table of the friction
 
 
@@ -37,7 +41,8 @@ def candidates(bench: Workbench) -> Iterator[Candidate]:
     """All that may be asked of a fit: numbers, laws, and what the log does; what is free already is left out."""
     taken = set(bench.problem.names)
     taken |= {key.name for name in bench.problem.names if (key := find_key(name))}
-    for one in (*numbers(bench), *_of_the_body(bench), *_of_motors(bench), *_of_friction(bench), *of_the_log(bench)):
+    of_laws = (*_of_the_body(bench), *_of_motors(bench), *_of_the_floor(bench), *_of_friction(bench))
+    for one in (*numbers(bench), *of_laws, *of_the_log(bench)):
         key = find_key(one.key)
         if one.key == CHANGE or not (one.key in taken or (key and key.name in taken)):
             yield one
@@ -105,6 +110,35 @@ def _limits(bench: Workbench) -> list[Trial]:
     most = np.concatenate([np.abs(m.current).max(axis=1) for m in bench.motions])
     levels = np.unique(np.quantile(most[most > 0.0], LIMITS)).tolist()
     return [Trial(bench.change(_with(bench.robot, current_limit=level)), level) for level in levels]
+
+
+def _of_the_floor(bench: Workbench) -> Iterator[Candidate]:
+    if bench.robot.wheels.traction_mu is None and bench.kind != LOOP:
+        yield Candidate(TRACTION, _grips, lambda _, at: f"wheels that slip, at about {at:.2g} of what they carry")
+
+
+def _grips(bench: Workbench) -> list[Trial]:
+    """The grip of the floor, as shares of the loads, below the largest traction of wheels that roll.
+
+    A wheel that slips leaps as its voltage does: as late as the fit has it, which such leaps lead astray, and on time.
+    """
+    whole, robot = slippery(bench.robot, 1.0), bench.robot
+    every = [np.abs(traction(robot.motor, robot.wheels, m.current)) / grips(whole) for m in bench.motions]
+    most = np.concatenate([own.max(axis=1) for own in every])
+    levels = np.unique(np.quantile(most[most > 0.0], LIMITS)).tolist() if most.any() else []
+    wide, low = slippery(robot, AMPLE), [slippery(robot, mu) for mu in levels]
+    shown = [*bench.changes(wide, low), *bench.on_time().changes(wide, low)]
+    return [Trial(own, mu) for own, mu in zip(shown, 2 * levels, strict=True)]
+
+
+def slippery(robot: Robot, mu: float) -> Robot:
+    """The robot on a floor that gives its wheels no more than mu of what they carry. Wheels without an inertia, which
+    slip at no speed that is known, get that of light ones."""
+    changes: dict[str, Any] = {"traction_mu": mu}
+    if (mass_at_rim(robot.motor, robot.wheels) <= 0.0).any():
+        share = LIGHT * robot.body.mass / robot.wheels.count
+        changes["wheel_inertia"] = float(share * np.mean(robot.wheels.radii**2))
+    return robot.model_copy(update={"wheels": robot.wheels.model_copy(update=changes)})
 
 
 def _of_friction(bench: Workbench) -> Iterator[Candidate]:
@@ -184,10 +218,15 @@ FORCES = {BODY_AXES: _of_axes, DIRECTION: _of_travel, WHEELS: _of_rims}  # of a 
 
 
 def _bending(bench: Workbench) -> list[Trial]:
-    """LuGre's bristles in the place of friction that holds exactly, at several lengths by which they bend."""
-    return [
-        Trial(bench.change(bench.robot.model_copy(update={"friction": bristled(bench.robot, z)})), z) for z in BENDS
-    ]
+    """LuGre's bristles in the place of friction that holds exactly, at several lengths by which they bend.
+
+    Levels that a fit drove far beyond what the motors give would make bristles as stiff, and steps as short.
+    """
+    axes = bench.robot.friction.axes
+    drive = np.max([np.abs(drive_wrench(m.robot, 0.0 * m.twist, m.voltage)).max(axis=0) for m in bench.motions], axis=0)
+    least = axes.model_copy(update={"coulomb": tuple(np.minimum(axes.coulomb, 2.0 * drive).tolist())})
+    robot = bench.robot.model_copy(update={"friction": bench.robot.friction.model_copy(update={"axes": least})})
+    return [Trial(bench.change(robot.model_copy(update={"friction": bristled(robot, z)})), z) for z in BENDS]
 
 
 def bristled(robot: Robot, bend: float) -> Friction:

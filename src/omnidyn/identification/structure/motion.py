@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.actuation import driver_of
 from omnidyn.identification.output_error.problem.heading import HEADING, facing_at_start
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
@@ -20,19 +20,20 @@ from omnidyn.model.drive import SPEED
 from omnidyn.model.dynamics import acceleration, settled_currents
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
-from omnidyn.model.motor import per_wheel
+from omnidyn.model.motor import per_wheel, settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.simulate import simulate
 
 SMALL = 1e-4  # [m/s, rad/s] of a change of speed for a slope
+SLIPS = 1e-6  # [m/s] between the rim of a wheel and the floor under it
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A piece as the fitted robot drives it. t (n,); twist (n, 3), pose (n, 3); voltage (n, W) at the motors from each
     row on, current (n, W); share (n,): of the run that has gone by; decay (n - 1, 3, 3), gain (n - 1, 3, 3): of a
-    change of the twist, and per force, over a row."""
+    change of the twist, and per force, over a row; rolls (n, W): whether a wheel does, or slips."""
 
     piece: Piece
     robot: Robot
@@ -44,6 +45,7 @@ class Motion:
     share: FloatArray
     decay: FloatArray
     gain: FloatArray
+    rolls: BoolArray
 
     def twist_by(self, force: FloatArray) -> FloatArray:
         """The change of the twist by forces [N, N, N m] from each row on. Shapes (n, K, 3) -> (n, K, 3)."""
@@ -68,13 +70,13 @@ class Motion:
         if name == "twist":
             return change
         if name == "wheel_speed":
-            return wheel_speed(self.robot.wheels, change)
+            return wheel_speed(self.robot.wheels, change) * self.rolls[:, None, :]
         if name == "current":
-            return settled_currents(self.robot, change, np.zeros(self.robot.wheels.count))
+            return settled_currents(self.robot, change, np.zeros(self.robot.wheels.count)) * self.rolls[:, None, :]
         step = np.diff(self.t)[:, None, None]
-        path = np.concatenate([np.zeros_like(change[:1]), np.cumsum(0.5 * (change[1:] + change[:-1]) * step, axis=0)])
         if name == "wheel_angle":
-            return wheel_speed(self.robot.wheels, path)
+            return _added_up(wheel_speed(self.robot.wheels, change) * self.rolls[:, None, :], step)
+        path = _added_up(change, step)
         return path[..., YAW:] if name == "heading" else self._position(change, path[..., YAW])
 
     def _position(self, change: FloatArray, turned: FloatArray) -> FloatArray:
@@ -82,8 +84,12 @@ class Motion:
         vx, vy = self.twist[:, :1], self.twist[:, 1:2]
         east = c * (change[..., 0] - vy * turned) - s * (change[..., 1] + vx * turned)
         north = s * (change[..., 0] - vy * turned) + c * (change[..., 1] + vx * turned)
-        both, step = np.stack([east, north], axis=-1), np.diff(self.t)[:, None, None]
-        return np.concatenate([np.zeros_like(both[:1]), np.cumsum(0.5 * (both[1:] + both[:-1]) * step, axis=0)])
+        return _added_up(np.stack([east, north], axis=-1), np.diff(self.t)[:, None, None])
+
+
+def _added_up(speed: FloatArray, step: FloatArray) -> FloatArray:
+    """The way of speeds (n, K, m) over rows of length step (n - 1, 1, 1)."""
+    return np.concatenate([np.zeros_like(speed[:1]), np.cumsum(0.5 * (speed[1:] + speed[:-1]) * step, axis=0)])
 
 
 def in_the_room(motion: Motion) -> FloatArray:
@@ -112,10 +118,12 @@ def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Mo
     assert run.twist is not None
     assert run.pose is not None
     assert run.voltage is not None
-    decay, gain = _answers(robot, run.twist, run.voltage, np.diff(t))
-    current = settled_currents(robot, run.twist, run.voltage)
+    assert run.wheel_speed is not None
+    rolls = np.abs(run.wheel_speed - wheel_speed(robot.wheels, run.twist)) * robot.wheels.radii < SLIPS
+    decay, gain = _answers(robot, run.twist, run.voltage, np.diff(t), rolls)
+    current = settled_current(robot.motor, run.voltage, run.wheel_speed)
     share = record.share[piece.first : piece.last + 1]
-    return Motion(piece, robot, t, run.twist, run.pose, run.voltage, current, share, decay, gain)
+    return Motion(piece, robot, t, run.twist, run.pose, run.voltage, current, share, decay, gain, rolls)
 
 
 def _ideal(robot: Robot) -> Robot:
@@ -124,8 +132,12 @@ def _ideal(robot: Robot) -> Robot:
     return robot.model_copy(update={"drive": drive})
 
 
-def _answers(robot: Robot, twist: FloatArray, voltage: FloatArray, dt: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _answers(
+    robot: Robot, twist: FloatArray, voltage: FloatArray, dt: FloatArray, rolls: BoolArray
+) -> tuple[FloatArray, FloatArray]:
     """(decay, gain) of every row, by the trapezoidal rule; an axis that rests at both ends of a row stays at rest."""
+    slips = ~rolls[1:] | ~rolls[:-1]
+    robot = robot.model_copy(update={"wheels": robot.wheels.model_copy(update={"traction_mu": None})})
     middle, held = 0.5 * (twist[1:] + twist[:-1]), voltage[:-1]
     rests = (twist[1:] == 0.0) & (twist[:-1] == 0.0)
     rate = np.empty((len(middle), N_AXES, N_AXES))
@@ -135,7 +147,11 @@ def _answers(robot: Robot, twist: FloatArray, voltage: FloatArray, dt: FloatArra
         rate[:, :, axis] = (up - down) / (2.0 * SMALL)
     per_force = np.broadcast_to(np.linalg.inv(mass_matrix(robot)), rate.shape).copy()
     if robot.drive.kind == SPEED and robot.drive.kp:
-        rate -= _by_the_loop(robot)
+        rate -= np.einsum("aw,wb->ab", *_by_speed(robot, per_wheel(robot.drive.kp, robot.wheels.count)))
+    if slips.any():  # whose push does not depend on the speed
+        each, turns = _by_speed(robot, per_wheel(robot.motor.emf_constant, robot.wheels.count))
+        ratio = per_wheel(robot.motor.gear_ratio, robot.wheels.count)
+        rate += np.einsum("aw,nw,wb->nab", each * ratio, slips, turns)
     rate[rests[:, :, None] | rests[:, None, :]] = 0.0
     per_force[rests] = 0.0
     # What crosses zero within a row jumps in its friction, not in its slope: no rate may be faster than a row.
@@ -149,10 +165,10 @@ def _answers(robot: Robot, twist: FloatArray, voltage: FloatArray, dt: FloatArra
     return decay, left @ (h * per_force)
 
 
-def _by_the_loop(robot: Robot) -> FloatArray:
-    """What the proportional part of the speed loop adds to the damping [1/s]. Shape (3, 3)."""
+def _by_speed(robot: Robot, volts: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What motors that lose so many volts per speed of their wheel [V s/rad] add to the damping [1/s]: the product of
+    two factors, (3, W) and (W, 3)."""
     g, motor, n = robot.wheels.wrench_matrix, robot.motor, robot.wheels.count
     push = per_wheel(motor.gear_ratio, n) * per_wheel(motor.torque_constant, n)
     push = push / (per_wheel(motor.resistance, n) * robot.wheels.radii)
-    kp = per_wheel(robot.drive.kp, n)
-    return np.linalg.inv(mass_matrix(robot)) @ (g * (push * kp / robot.wheels.radii)) @ g.T
+    return np.linalg.inv(mass_matrix(robot)) @ (g * (push * volts / robot.wheels.radii)), g.T

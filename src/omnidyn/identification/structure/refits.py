@@ -32,6 +32,7 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver, S
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.candidates import CHANGE, Candidate, Fitted, Trial
 from omnidyn.identification.structure.switches import Switch, simpler_first, switches, told
+from omnidyn.identification.structure.workbench import on_time
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
 BEST = 3  # candidates that are fitted beside the shapes
@@ -60,9 +61,10 @@ def refits(
 ) -> dict[str, tuple[Candidate, list[Trial]]]:  # fmt: skip
     """Key -> a candidate with what a fit with it shows. problem, parts: what was fitted, its rows at the best point.
 
-    ranked: by columns near the fit. Nothing of a speed loop, whose fit takes as long as all else.
+    ranked: by columns near the fit. Nothing of a speed loop, or of wheels that slip, whose fits take as long as all
+    else.
     """
-    if engine_kind(solution.solver.engine) == LOOP:
+    if engine_kind(solution.solver.engine) == LOOP or problem.robot.wheels.traction_mu is not None:
         return {}
     point, begun = solution.state.point, []
     try:
@@ -136,7 +138,11 @@ def _begun(
         values[k] = before.get(name, values[k])  # numbers of the robot stand in it where they were found
     engine = make_engine(kind, made) if kind == EXACT else _Coarse(made, off)
     solver = Solver(made, engine, solution.solver.nu, CLOSE, counted=False)
-    return _Refit(candidate, way, solver, solver.state(Point(values, solution.state.point.states)))
+    begins = [values]
+    if made.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray
+        begins.append(on_time(made.parameters, values))
+    states = [solver.state(Point(own, solution.state.point.states)) for own in begins]
+    return _Refit(candidate, way, solver, min(states, key=lambda state: state.objective))
 
 
 def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: Solution) -> Trial:

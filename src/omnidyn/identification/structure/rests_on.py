@@ -15,8 +15,8 @@ PERCENT = 0.01
 TRIED = 0.01  # relative change of a fixed number, either way is alike
 FIXED = (
     "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.resistance_ohm",
-    TORQUE, EMF, "motor.gear_ratio", "motor.rotor_inertia_kg_m2", "motor.voltage_drop_V", "motor.current_limit_A",
-    f"{CENTRE}[0]", f"{CENTRE}[1]",
+    TORQUE, EMF, "motor.gear_ratio", "motor.rotor_inertia_kg_m2", "wheels.inertia_kg_m2", "motor.voltage_drop_V",
+    "motor.current_limit_A", "wheels.traction_mu", f"{CENTRE}[0]", f"{CENTRE}[1]",
 )  # fmt: skip
 
 LEVELS = (f"{BODY_AXES}.breakaway", f"{DIRECTION}.breakaway", f"{DIRECTION}.yaw_breakaway", f"{WHEELS}.breakaway")

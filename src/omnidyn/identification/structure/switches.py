@@ -28,10 +28,12 @@ from omnidyn.identification.question import Question
 from omnidyn.identification.structure.laws import (
     BRISTLE,
     FALL,
+    TRACTION,
     along_axes,
     along_travel,
     arm,
     bristled,
+    slippery,
     table_of,
 )
 from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
@@ -130,6 +132,10 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
     elif key == LIMIT:
         limited = robot.replace(motor=robot.motor.replace(current_limit=remedy.at))
         yield Switch(limited, _free(asked, key), words)
+    elif key == TRACTION:
+        slips, spins = slippery(robot, remedy.at), "wheels.inertia_kg_m2"
+        guessed = [spins] if slips.wheels.wheel_inertia != robot.wheels.wheel_inertia else []
+        yield _rough(slips, _free(asked, key), guessed, words)
     elif key in OFF:
         on = robot.replace(motor=robot.motor.replace(**{OFF[key]: remedy.size[0]}))
         yield Switch(on, _free(asked, key), words)

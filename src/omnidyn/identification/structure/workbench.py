@@ -11,6 +11,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.output_error.prepare import EXACT, IMPLICIT, make_engine
+from omnidyn.identification.output_error.problem.nuisances import LATENCY
+from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.structure.motion import Motion
@@ -48,8 +50,17 @@ class Workbench:
         kind = self.kind if self.kind != EXACT else EXACT if is_exact(other) else IMPLICIT
         if kind not in self._before:
             self._before[kind] = self._residuals(self.robot, IDEAL, kind)
-        after = self._residuals(other, driver, kind)
-        return [np.nan_to_num(a - b)[:, :, None] for a, b in zip(self._before[kind], after, strict=True)]
+        return _apart(self._before[kind], self._residuals(other, driver, kind))
+
+    def changes(self, before: Robot, after: Sequence[Robot]) -> list[list[FloatArray]]:
+        """What the columns show of other robots less what they show of one that the same engine simulates."""
+        own = self._residuals(before, IDEAL, IMPLICIT)
+        return [_apart(own, self._residuals(other, IDEAL, IMPLICIT)) for other in after]
+
+    def on_time(self) -> Workbench:
+        """The same with channels that are not late."""
+        values = on_time(self.problem.parameters, self.point.values)
+        return replace(self, point=replace(self.point, values=values), _before={})
 
     def by_force(self, force: Callable[[Motion], FloatArray]) -> list[FloatArray]:
         """What forces (n, K, 3) on the body show. Of each piece (C, rows, K)."""
@@ -74,6 +85,10 @@ class Workbench:
         return [residual for residual, _, _ in parts]
 
 
+def _apart(before: Sequence[FloatArray], after: Sequence[FloatArray]) -> list[FloatArray]:
+    return [np.nan_to_num(a - b)[:, :, None] for a, b in zip(before, after, strict=True)]
+
+
 def _driven(piece: Piece, driver: Driver, records: dict[int, Record]) -> Record:
     """The record of a piece with what the driver makes of its voltages; each record once."""
     own = piece.record
@@ -82,6 +97,11 @@ def _driven(piece: Piece, driver: Driver, records: dict[int, Record]) -> Record:
     if id(own) not in records:
         records[id(own)] = replace(own, voltage=at_motors(own.voltage, own.share, driver)[0])
     return records[id(own)]
+
+
+def on_time(parameters: Sequence[Parameter], values: FloatArray) -> FloatArray:
+    """The values of parameters with no latency."""
+    return np.where([p.name.partition(".")[0] == LATENCY for p in parameters], 0.0, values)
 
 
 def scaled(robot: Robot, name: str, factor: float) -> Robot | None:
