@@ -168,3 +168,14 @@ def test_a_fit_that_wheels_that_slip_led_astray_is_diagnosed_in_bounded_time(mon
     monkeypatch.setattr(laws, "bristled", lambda robot, bend: tried.append(robot) or raw(robot, bend))
     assert astray.lack_of_fit.found
     assert max(robot.friction.axes.coulomb[2] for robot in tried) < 10.0
+
+
+def test_a_right_fit_asks_nothing_of_the_engine_of_wheels_that_slip(monkeypatch):
+    """It would have to be compiled, for half a minute, by everybody."""
+    asked = []
+    monkeypatch.setattr(laws, "slippery", lambda robot, mu: asked.append(mu))
+    rolls = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=50.0))
+    known = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=None))
+    fit = fit_output_error(log(1, 5.0, robot=rolls), known, free=("friction",), outputs=("twist",))
+    assert not fit.lack_of_fit.found
+    assert not asked

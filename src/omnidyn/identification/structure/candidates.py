@@ -51,13 +51,15 @@ class Trial:
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """key: of the robot file, a nuisance, or CHANGE. trials: one or more. told: its fitted change and where it was
-    tried, in words. least: a change below it makes no sense. offered: whether a robot file or a fit can hold it."""
+    tried, in words. least: a change below it makes no sense. offered: whether a robot file or a fit can hold it. late:
+    whether it has an engine of its own, and is asked only where something is left out."""
 
     key: str
     trials: Callable[[Workbench], list[Trial]]
     told: Callable[[float, float], str]
     least: float = -np.inf
     offered: bool = True
+    late: bool = False
 
     def tried(self, bench: Workbench) -> list[Trial]:
         """Its trials; none where the engine cannot simulate them."""

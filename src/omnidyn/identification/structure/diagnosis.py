@@ -58,11 +58,14 @@ def examine(solution: Solution) -> Examined:
     seen = misfit(rows, moved)
     stable = stability(seen.linear)
     bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
-    tried = [(one, one.tried(bench)) for one in (*candidates(bench), *unoffered(bench))]
-    tried = [each for each in tried if each[1]]
+    every = [*candidates(bench), *unoffered(bench)]
+    tried = _tried(bench, [one for one in every if not one.late])
     ranked = remedies(seen.linear, tried, seen.shown)
     count = int(sum(there.sum() for there in rows.there))
     found = bool(seen.found) or any(_chance(seen.linear, tried, r) * len(tried) < FALSE for r in ranked)
+    if found:
+        tried += _tried(bench, [one for one in every if one.late])
+        ranked = remedies(seen.linear, tried, seen.shown)
     told, cause = _fitted(solution, problem, parts, seen, tried, ranked) if found else ((), None)
     memory = memory_beside(rows, cause) if cause and not seen.found else seen.linear.memory
     seen = with_cause(seen, cause) if cause else seen
@@ -74,6 +77,12 @@ def examine(solution: Solution) -> Examined:
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
     return Examined(diagnosis, memory, len(tried), count)
+
+
+def _tried(bench: Workbench, every: Sequence[Candidate]) -> list[tuple[Candidate, list[Trial]]]:
+    """Candidates that can be simulated, with their trials."""
+    tried = [(one, one.tried(bench)) for one in every]
+    return [each for each in tried if each[1]]
 
 
 def _chance(linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], best: Remedy) -> float:

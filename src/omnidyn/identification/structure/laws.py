@@ -114,7 +114,8 @@ def _limits(bench: Workbench) -> list[Trial]:
 
 def _of_the_floor(bench: Workbench) -> Iterator[Candidate]:
     if bench.robot.wheels.traction_mu is None and bench.kind != LOOP:
-        yield Candidate(TRACTION, _grips, lambda _, at: f"wheels that slip, at about {at:.2g} of what they carry")
+        words: Callable[[float, float], str] = lambda _, at: f"wheels that slip, at about {at:.2g} of what they carry"  # noqa: E731
+        yield Candidate(TRACTION, _grips, words, late=True)
 
 
 def _grips(bench: Workbench) -> list[Trial]:
