@@ -4,6 +4,7 @@ OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in e
 """
 
 import os
+import signal
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -12,6 +13,10 @@ from omnidyn.model.robot_file import load_robot
 
 # Output is wrapped as it is without a terminal; the processes of pytest-xdist are told 80 columns.
 os.environ.pop("COLUMNS", None)
+
+# A shell script's `&` leaves SIGINT ignored, and children inherit that: the tests that send it would wait for ever.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile(
     "ci",
