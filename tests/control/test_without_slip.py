@@ -44,6 +44,40 @@ def test_the_others_drive_it_too(controller):
     assert np.isfinite(known.rmse_position)
 
 
+def test_a_run_says_which_wheels_slipped():
+    """As `simulate` does of the same voltages; a grip that is enough is nothing to speak of."""
+    floor = gripping(0.2)
+    found = omnidyn.track(gripping(None), "square:speed_m_s=0.5", "pid", plant=floor)
+    again = omnidyn.simulate(floor, found.run.voltage[:-1], found.dt, pose=found.run.pose[0])
+    assert any("wheels slip: wheel 1 in" in words for words in found.run.warnings)
+    assert found.run.warnings == again.warnings
+    assert found.run.warnings[-1] in found.summary()
+    assert not any(
+        "wheels slip" in words for words in omnidyn.track(AXEBOT, "circle", "pid", plant=gripping(9.0)).run.warnings
+    )
+
+
+def test_a_path_asks_no_more_than_the_floor_takes():
+    """The current at which a wheel slips is a limit, as that of a motor is: a floor that takes half as much."""
+    asked = omnidyn.demand(AXEBOT, "eight:period_s=4")
+    assert asked.follows
+    assert not asked.grip
+    amperes = (
+        0.1
+        * AXEBOT.body.mass
+        * 9.81
+        / 3.0
+        * AXEBOT.wheels.wheel_radius
+        / (AXEBOT.motor.gear_ratio * AXEBOT.motor.torque_constant)
+    )
+    found = omnidyn.demand(gripping(0.1), "eight:period_s=4")
+    assert found.current == pytest.approx(asked.current, rel=0.05)  # a wheel has some inertia here
+    assert found.current_limit == pytest.approx(amperes, rel=1e-9)
+    assert found.grip
+    assert found.follows == (found.current <= amperes)
+    assert "at which a wheel slips" in found.verdict
+
+
 def test_a_slope_is_still_refused():
     slope = gripping(0.5).replace(floor=AXEBOT.floor.replace(tilt=3.0))
     with pytest.raises(UnsupportedError, match="not level"):

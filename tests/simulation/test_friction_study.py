@@ -28,6 +28,14 @@ def test_the_paper_s_law_holds_at_every_rate_and_bends_nowhere():
         assert len(own.loop) == 0
 
 
+def test_wheels_that_may_slip_are_studied_as_they_roll():
+    slips = AXEBOT.replace(wheels=AXEBOT.wheels.replace(traction_mu=0.5, wheel_inertia=2e-6))
+    found, rolls = friction_study(slips), friction_study(AXEBOT)
+    for one, other in zip(found.axes, rolls.axes, strict=True):
+        np.testing.assert_array_equal(one.force, other.force)
+    assert any("traction_mu" in words for words in found.notes)
+
+
 def test_stribeck_falls_as_its_formula_says():
     own = study(breakaway=BREAKAWAY, stribeck_speed=(0.02, 0.02, 0.2), stribeck_exponent=1.5).axes[2]
     fall = np.exp(-((np.abs(own.speed) / 0.2) ** 1.5))

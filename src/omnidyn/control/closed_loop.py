@@ -139,7 +139,7 @@ def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstan
         if status != OK:
             words[status] = words.get(status, 0) + 1
     limit = np.asarray(controller.limit)
-    run = _run(plant, controller, t, sent, volts, state, around)
+    run = _run(plant, controller, t, sent, volts, state, around).replace(warnings=live.warnings)
     full = float(np.mean((np.abs(sent) >= limit * (1.0 - 1e-9)).any(axis=1)))
     return Tracking(
         controller.name, plant.name, path.name, run, path.at(t).pose, around.skip, dt, full, took, words,

@@ -13,6 +13,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.feedforward import effort_for
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
+from omnidyn.control.without_slip import without_slip
 from omnidyn.document import Document, Points, plain
 from omnidyn.model.inverse import inverse
 from omnidyn.model.robot import Robot
@@ -31,7 +32,8 @@ class Demand(Shown):
 
     robot, path: names. speed [m/s], turn [rad/s], acceleration [m/s^2], turn_acceleration [rad/s^2]: the largest.
     voltage, voltage_limit [V]: of the motor that comes nearest to its limit, or goes furthest beyond; the same for
-    current and current_limit [A], the limit None where there is none. share_beyond: of its time, that in which some
+    current and current_limit [A], the limit None where there is none. grip: whether that limit is the current at which
+    a wheel loses its grip of the floor. share_beyond: of its time, that in which some
     limit is exceeded. corners: places where its speed jumps, by `jump` [m/s] or `turn_jump` [rad/s] at the most.
     """
 
@@ -45,6 +47,7 @@ class Demand(Shown):
     voltage_limit: float
     current: float
     current_limit: float | None
+    grip: bool
     share_beyond: float
     corners: int
     jump: float
@@ -60,7 +63,8 @@ class Demand(Shown):
         """Whether it can, in a sentence."""
         volts = f"up to {self.voltage:.3g} V of {self.voltage_limit:.3g} V"
         if self.current_limit is not None:
-            volts += f" and {self.current:.3g} A of {self.current_limit:.3g} A"
+            slips = " at which a wheel slips" if self.grip else ""
+            volts += f" and {self.current:.3g} A of {self.current_limit:.3g} A{slips}"
         if not self.follows:
             return (
                 f"{self.robot} cannot follow {self.path} in {100.0 * self.share_beyond:.2g} % of its time: that takes "
@@ -92,7 +96,7 @@ class Demand(Shown):
 
 
 def demand(robot: Robot, path: Path | Run | str) -> Demand:
-    """What a path asks of a robot, and whether its motors can give that: by the inverse model, friction included.
+    """What a path asks of a robot, and whether its motors and the floor can give that: by the inverse model, friction included.
 
     path: a Path, or what `omnidyn.path` takes. The start from rest is not counted: a robot that begins at rest is late
     by it. Corners are counted by themselves.
@@ -101,10 +105,12 @@ def demand(robot: Robot, path: Path | Run | str) -> Demand:
     follow = path if isinstance(path, Path) else path_named(path)
     t = np.linspace(0.0, follow.duration, SAMPLES)
     _, twist, change = follow.twist_at(t)
-    effort = effort_for(inverse(robot), twist, change)
-    count, motor = robot.wheels.count, robot.motor
+    rolls = without_slip(robot)
+    effort = effort_for(inverse(rolls), twist, change)
+    count, motor = robot.wheels.count, rolls.motor
     limit = per_wheel(motor.voltage_limit, count)
     most = per_wheel(np.inf if motor.current_limit is None else motor.current_limit, count)
+    own = per_wheel(np.inf if robot.motor.current_limit is None else robot.motor.current_limit, count)
     volts, amperes = np.abs(effort.voltage), np.abs(effort.current)
     beyond = (volts > limit * (1.0 + 1e-9)).any(axis=1) | (amperes > most * (1.0 + 1e-9)).any(axis=1)
     worst = int(np.argmax(volts.max(axis=0) / limit))
@@ -113,7 +119,8 @@ def demand(robot: Robot, path: Path | Run | str) -> Demand:
     return Demand(
         robot.name, follow.name, _largest(twist[:, :2]), _largest(twist[:, 2:]), _largest(change[:, :2]),
         _largest(change[:, 2:]), float(volts[:, worst].max()), float(limit[worst]), float(amperes[:, hottest].max()),
-        None if motor.current_limit is None else float(most[hottest]), float(beyond.mean()), corners, jump, turn_jump,
+        None if motor.current_limit is None else float(most[hottest]), bool(most[hottest] < own[hottest]),
+        float(beyond.mean()), corners, jump, turn_jump,
     )  # fmt: skip
 
 

@@ -126,6 +126,11 @@ class Tracking(Shown):
         return make(FIGURE, self)
 
 
+def _of_run(tracking: Tracking, named: bool) -> list[str]:
+    """What the simulation of the robot itself has to say, such as of wheels that slip."""
+    return [f"{tracking.controller}: {words}" if named else words for words in tracking.run.warnings]
+
+
 def trackings_document(found: Sequence[Tracking], notes: Sequence[str] = ()) -> Document:
     """What controllers on one path did, side by side. notes: what is said beside, such as what the path asks for."""
     first = found[0]
@@ -144,7 +149,7 @@ def trackings_document(found: Sequence[Tracking], notes: Sequence[str] = ()) -> 
         "controller", "position mm", "heading mrad", "worst mm", "at limit %", "effort V", "change V", "step us",
         "p99 us",
     )  # fmt: skip
-    told = [words for each in found for words in _odd(each)]
+    told = [words for each in found for words in (*_odd(each), *_of_run(each, len(found) > 1))]
     parts: list[Part] = [
         head, "", Table(columns, rows, "<>", name="controllers"), "",
         "position, heading: rmse; effort: rms of a voltage; change: its mean change from step to step.",

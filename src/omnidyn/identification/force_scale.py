@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from omnidyn.model.keys import DEAD_BAND, EMF, GAINS, ROTOR, TORQUE, WHEEL, Key, unit
+from omnidyn.model.keys import DEAD_BAND, EMF, GAINS, ROTOR, TORQUE, WHEEL, Key, name_of, unit
 from omnidyn.model.mass import added_mass
 from omnidyn.model.robot import GIVEN, Prior, Robot
 from omnidyn.model.statespace import taken
@@ -102,5 +102,5 @@ def _known(robot: Robot, key: str) -> str:
 
 def _priors(robot: Robot, key: str) -> Iterator[Prior]:
     """What is known of a number, or of the entries of its list."""
-    found = [prior for name, prior in robot.priors.items() if Key.parse(name).name == key]
+    found = [prior for name, prior in robot.priors.items() if name_of(name) == key]
     yield from found or [Prior(origin=GIVEN)]

@@ -21,7 +21,7 @@ import numpy as np
 
 from omnidyn.model.drive import SPEED, Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
-from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, VISCOUS, Key, all_keys
+from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, VISCOUS, Key, all_keys, find_key, name_of
 from omnidyn.model.motor import Motor
 from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Origin, Prior, Robot
 from omnidyn.model.surroundings.floor import GRAVITY as GRAVITY
@@ -150,18 +150,18 @@ def with_gear(robot: Robot, gear_ratio: float, source: str, origin: Origin = MEA
     if ROTOR in robot.priors and robot.priors[ROTOR].origin == GUESS:
         motor, shares = motor.replace(rotor_inertia=_times(motor.rotor_inertia, share**2)), shares | {ROTOR: share**2}
     spreads = {
-        key: prior.replace(std=_round(prior.std * shares[Key.parse(key).name]))
+        key: prior.replace(std=_round(prior.std * shares[name_of(key)]))
         for key, prior in robot.priors.items()
-        if Key.parse(key).name in shares and prior.std is not None
+        if name_of(key) in shares and prior.std is not None
     }
-    priors = {key: prior for key, prior in robot.priors.items() if Key.parse(key).name != GEAR}
+    priors = {key: prior for key, prior in robot.priors.items() if name_of(key) != GEAR}
     return robot.replace(motor=motor, priors=priors | spreads | {GEAR: Prior(source=source, origin=origin)})
 
 
 def with_rotor(robot: Robot, rotor_inertia: float) -> Robot:
     """The robot with the inertia of a rotor as its maker gives it, at the motor shaft [kg m^2]."""
     motor = robot.motor.replace(rotor_inertia=rotor_inertia)
-    priors = {key: prior for key, prior in robot.priors.items() if Key.parse(key).name != ROTOR}
+    priors = {key: prior for key, prior in robot.priors.items() if name_of(key) != ROTOR}
     return robot.replace(motor=motor, priors=priors | {ROTOR: Prior(origin=GIVEN)})
 
 
@@ -296,7 +296,7 @@ def _times(value: Any, factor: float | tuple[float, ...]) -> Any:
 
 def guessed(robot: Robot) -> list[str]:
     """What of a robot is a guess, as short names: ["inertia", "resistance", ...]; all friction is one word."""
-    keys = [Key.parse(key) for key, prior in robot.priors.items() if prior.origin == GUESS]
+    keys = [place for key, prior in robot.priors.items() if prior.origin == GUESS and (place := find_key(key))]
     return list(dict.fromkeys(FRICTION if key.level else Key(key.name).words for key in keys))
 
 
@@ -308,7 +308,7 @@ def rests_on(robot: Robot, at_rest: bool = False) -> list[str]:
     """
     kept = {
         key: prior for key, prior in robot.priors.items()
-        if (prior.guessed or prior.origin != GUESS) and not (at_rest and _shows_in_motion(Key.parse(key)))
+        if (prior.guessed or prior.origin != GUESS) and not (at_rest and (place := find_key(key)) and _shows_in_motion(place))
     }  # fmt: skip
     return guessed(robot.model_copy(update={"priors": kept}))
 
@@ -331,7 +331,7 @@ def _shows_in_motion(key: Key) -> bool:
 
 def reasons(robot: Robot) -> list[tuple[str, str]]:
     """(key, why) of every guess of `first_guess`, in the order of the file."""
-    keys = dict.fromkeys(Key.parse(key).name for key, prior in robot.priors.items() if prior.origin == GUESS)
+    keys = dict.fromkeys(name_of(key) for key, prior in robot.priors.items() if prior.origin == GUESS)
     return [(key, WHY[key]) for key in keys if key in WHY]
 
 

@@ -266,6 +266,11 @@ def find_key(name: str) -> Key | None:
         return None
 
 
+def name_of(key: str) -> str:
+    """The name of a number without its index, also of one that is not the robot's own, such as of a variation."""
+    return key.partition("[")[0]
+
+
 def unit(name: str) -> str:
     """The unit of a number by its key; "" for a name that is no key."""
     key = find_key(name)

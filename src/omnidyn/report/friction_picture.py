@@ -15,6 +15,7 @@ from omnidyn.report.style import (
     VERMILLION,
     Picture,
     axis_panels,
+    log_scale,
     look,
     picture,
     thin_out,
@@ -50,7 +51,7 @@ def draw_friction(studies: Mapping[str, FrictionStudy], axis: int = 0) -> Pictur
         ):  # fmt: skip
             panel.set_title(title)
             panel.set_xlabel(below)
-        panels[2].set_xscale("log")
+        log_scale(panels[2], "x")
         for panel in panels[:2]:
             panel.axhline(0.0, color=INK, linewidth=0.6)
             panel.axvline(0.0, color=INK, linewidth=0.6)

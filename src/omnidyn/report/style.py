@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from omnidyn.model.frames import AXES
 from omnidyn.paper.tables import PAPER_AXES
@@ -146,6 +146,14 @@ def thin_out(axes: Axes, x: int | None = None, y: int | None = None) -> None:
         axes.locator_params(axis="x", nbins=x)
     if y is not None:
         axes.locator_params(axis="y", nbins=y)
+
+
+def log_scale(axes: Axes, which: str) -> None:
+    """A logarithmic "x" or "y" with plain labels: those of matplotlib are formulas, which no text here is read as."""
+    axes.set(**{f"{which}scale": "log"})
+    own = axes.xaxis if which == "x" else axes.yaxis
+    own.set_major_formatter(lambda value, _: f"{value:g}")
+    own.set_minor_formatter(NullFormatter())
 
 
 def axis_title(axis: str) -> str:

@@ -77,13 +77,14 @@ def friction_study(robot: Robot) -> FrictionStudy:
     """What friction does along each axis; of a robot whose motors can break it loose, at which rate it does, too.
 
     The ramps are simulated, with the motors of the robot; everything else is the law itself. A loop is slow: levels are
-    those of the least speed. Raises InputError for what is no robot.
+    those of the least speed. Wheels that may slip roll here: what slips is the floor's friction, not the robot's. Raises InputError for what is no robot.
     """
     check_order("friction_study(robot)", (robot, Robot))
-    numbers, top = plant(robot), top_speeds(robot)
-    patterns = axis_patterns(robot)
-    volts = breakaway_voltage(robot, patterns)
-    axes = tuple(_axis(robot, numbers, k, float(top[k]), patterns[k], float(volts[k])) for k in range(N_AXES))
+    rolls = robot.replace(wheels=robot.wheels.replace(traction_mu=None))
+    numbers, top = plant(rolls), top_speeds(rolls)
+    patterns = axis_patterns(rolls)
+    volts = breakaway_voltage(rolls, patterns)
+    axes = tuple(_axis(rolls, numbers, k, float(top[k]), patterns[k], float(volts[k])) for k in range(N_AXES))
     return FrictionStudy(robot, axes, tuple(_notes(robot, axes)))
 
 
@@ -225,6 +226,8 @@ def _notes(robot: Robot, axes: Sequence[AxisFriction]) -> list[str]:
         )
     if any(each.bends for each in kinds):
         notes.append("in a fast ramp the damping of bristles resists too")
+    if robot.wheels.traction_mu is not None:
+        notes.append("the wheels roll here: what the floor takes before they slip (traction_mu) is not looked at")
     weak = [each.axis for each in axes if np.isnan(each.rate).any()]
     if weak:
         notes.append(f"the motors cannot break it loose far enough along {', '.join(weak)}: no ramp is shown there")

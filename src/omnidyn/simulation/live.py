@@ -25,6 +25,7 @@ from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import ExactMarch, why_not_exact
 from omnidyn.simulation.implicit.march import room, run_implicit
 from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance
+from omnidyn.simulation.slip.grip import Grip
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
@@ -60,12 +61,18 @@ class LiveRobot:
         self._queue = [np.zeros(n) for _ in range(self._whole + (self._part > 0.0))]
         self.voltage, self._fresh = np.zeros(n), False
         self._turning: FloatArray | None = None
+        self._grip = Grip(robot) if robot.wheels.traction_mu is not None else None
         self._advance = self._engine(as_tolerance(tol))
 
     @property
     def wheel_speed(self) -> FloatArray:
         """How fast the wheels turn now [rad/s]. Shape (wheels,)."""
         return wheel_speed(self.robot.wheels, self.twist) if self._turning is None else self._turning
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be said of the way so far: which wheels slipped or lifted off, as `simulate` says it."""
+        return self._grip.words if self._grip is not None else ()
 
     def step(self, command: FloatArray) -> None:
         """Hold a command for dt: volts, a duty, or wheel speeds, shape (wheels,), whichever the drive takes."""
@@ -145,6 +152,8 @@ class LiveRobot:
             bound = np.tile(np.where(command == 0.0, 0.0, most) if robot.drive.coasts else most, (len(dts), 1))
             if wheels is not None:
                 slid = run_slipping(wheels, volts, bound, dts, rims, self.pose, given, tol)
+                assert self._grip is not None
+                self._grip.add(slid)
                 rims, self.pose = slid.state[-1], slid.pose[-1]
                 self.twist, self._turning = rims[:N_AXES].copy(), rims[N_AXES:] / robot.wheels.radii
             else:

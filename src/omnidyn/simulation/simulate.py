@@ -24,8 +24,8 @@ from omnidyn.simulation.commands import Commands, as_floats, commands, current_b
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import simulate_exact, why_not_exact
 from omnidyn.simulation.implicit.march import Outcome, capped, run_implicit
-from omnidyn.simulation.slip.loads import wheel_loads
-from omnidyn.simulation.slip.march import SlipOutcome, rolling, run_slipping
+from omnidyn.simulation.slip.grip import Grip
+from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
 from omnidyn.simulation.view import PLAIN, View, seen_at_once, seen_through
@@ -164,6 +164,8 @@ def _slipping(
     out = run_slipping(
         numbers, voltage, current_bounds(robot, acting, len(dt)), dt, rolling(numbers, start[0]), start[1], loop, tol
     )
+    grip = Grip(robot)
+    grip.add(out)
     asked, state = voltage[keep[:-1]], out.state[keep]
     motors = asked if acting.set_point is None else reaching(robot, asked)
     turning = state[:, N_AXES:] / robot.wheels.radii
@@ -171,21 +173,7 @@ def _slipping(
     current = settled_current(robot.motor, _with_last(motors - push), turning)
     done = Done(motors, state[:, :N_AXES], out.pose[keep], None, current, asked, turning)
     how = f"engine of wheels that slip, tol {tol:g} m/s" if tol else "engine of wheels that slip, fixed step"
-    return as_run(robot, given, acting, done, how, _slip_words(robot, out, len(dt)), view)
-
-
-def _slip_words(robot: Robot, out: SlipOutcome, rows: int) -> tuple[str, ...]:
-    """Which wheels lost their grip, and which have none."""
-    shares = 100.0 * (out.contact != 0.0).mean(axis=0)
-    spins = [f"wheel {w + 1} in {share:.2g} %" for w, share in enumerate(shares.tolist()) if share > 0.0]
-    words = [f"wheels slip: {', '.join(spins)} of the samples"] if spins else []
-    words += [f"the friction solver hit its cap in {out.capped} of {rows} rows: look there"] if out.capped else []
-    words += [
-        f"wheel {w + 1} lifts off in {100.0 * count / rows:.2g} % of the rows: it has no grip then, and that the robot "
-        "tips is not in the model"
-        for w, count in enumerate(out.lifted.tolist()) if count
-    ]  # fmt: skip
-    return (*wheel_loads(robot).words, *words)
+    return as_run(robot, given, acting, done, how, grip.words, view)
 
 
 def implicit_run(

@@ -5,6 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.errors import InputError
+from omnidyn.model.first_guess import guessed, rests_on, with_gear
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.model.surroundings.floor import Floor
@@ -197,3 +198,18 @@ def test_something_else_is_refused():
 def test_a_file_that_says_it_wrong_is_refused_by_its_key(table, says):
     with pytest.raises(InputError, match=says):
         parse_robot(PLAIN + "\n" + table)
+
+
+def test_what_is_known_of_a_variation_is_in_no_one_s_way():
+    """A std or a guess in its table is of no number of the robot itself."""
+    guess = TABLES.replace('origin = "measured"', 'origin = "guess"')
+    robot = parse_robot(PLAIN + guess)
+    assert guessed(robot) == guessed(load_robot("axebot"))
+    assert rests_on(robot, at_rest=True) == []
+    axes = robot.friction.axes
+    t = np.arange(600) * 0.02
+    volts = np.sin(t)[:, None] * [3.0, -3.0, 0.0] + np.cos(0.7 * t)[:, None] * [1.0, 1.0, 2.5]
+    run = omnidyn.simulate(robot, volts[:-1], 0.02)
+    found = omnidyn.identify(run, robot, free=("friction",))
+    assert found.value["friction.axes.coulomb[0]"] == pytest.approx(axes.coulomb[0], rel=0.01)
+    assert "variations.payload.2kg.mass_kg" in with_gear(found.robot, 20.0, "weighed").priors

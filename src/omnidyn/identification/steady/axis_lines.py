@@ -15,7 +15,7 @@ from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.frames import AXES
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import DIRECTION, WHEELS, Key
+from omnidyn.model.keys import DIRECTION, WHEELS
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -51,4 +51,4 @@ def steady_table(robot: Robot, points: ForcePoints, source: str = "") -> SteadyT
 
 
 def _without_other_friction(robot: Robot) -> dict:
-    return {key: prior for key, prior in robot.priors.items() if Key.parse(key).table not in (DIRECTION, WHEELS)}
+    return {key: prior for key, prior in robot.priors.items() if key.rpartition(".")[0] not in (DIRECTION, WHEELS)}

@@ -32,7 +32,7 @@ from omnidyn.identification.steady.study_parts import Difference, Travel, Viscou
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
+from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand, find_key
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.layout import YAW
@@ -236,7 +236,11 @@ def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: boo
 
 
 def _priors(robot: Robot, std: dict[str, float], kept: dict[str, float], data: str) -> dict[str, Prior]:
-    priors = {key: prior for key, prior in robot.priors.items() if not Key.parse(key).level or key in kept}
+    priors = {
+        key: prior
+        for key, prior in robot.priors.items()
+        if key in kept or not ((place := find_key(key)) and place.level)
+    }
     return priors | {key: identified(deviation, f"steady state, {data}") for key, deviation in std.items()}
 
 

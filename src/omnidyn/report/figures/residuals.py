@@ -10,7 +10,20 @@ from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import Trace, unit
 from omnidyn.comparison.whiteness import whiteness
 from omnidyn.logs.columns.mapping import component_channel
-from omnidyn.report.style import BLUE, GREY, INK, PALE, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
+from omnidyn.report.style import (
+    BLUE,
+    GREY,
+    INK,
+    PALE,
+    VERMILLION,
+    WIDTH,
+    Picture,
+    log_scale,
+    look,
+    new_figure,
+    picture,
+    thin_out,
+)
 
 MOST, LAGS, BINS, SPAN = 4, 20, 41, 4.5
 HEIGHT = 1.55  # inch, of a row
@@ -81,8 +94,7 @@ def _histogram(axes, scaled: FloatArray) -> None:
     middle = 0.5 * (edges[1:] + edges[:-1])
     axes.bar(middle, density, width=edges[1] - edges[0], color=BLUE, alpha=0.75)
     axes.plot(middle, np.exp(-0.5 * middle**2) / np.sqrt(2.0 * np.pi), "--", color=VERMILLION, linewidth=1.6)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")  # matplotlib's own writes formulas
+    log_scale(axes, "y")
     axes.set_ylim(1e-4, 1.0)
     axes.set_xlim(-SPAN, SPAN)
     axes.set_yticks([1e-4, 1e-2, 1.0])
