@@ -96,7 +96,7 @@ class Demand(Shown):
 
 
 def demand(robot: Robot, path: Path | Run | str) -> Demand:
-    """What a path asks of a robot, and whether its motors and the floor can give that: by the inverse model, friction included.
+    """What a path asks of a robot, and whether motors and floor can give that: by the inverse model, with friction.
 
     path: a Path, or what `omnidyn.path` takes. The start from rest is not counted: a robot that begins at rest is late
     by it. Corners are counted by themselves.

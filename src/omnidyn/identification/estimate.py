@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Points, Table, all_of, interval_cell, plain, sentence
 from omnidyn.errors import shortened
-from omnidyn.model.first_guess import rests_on, rests_on_guesses
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.model.first_guess import rests_on as guesses_under
+from omnidyn.model.first_guess import rests_on_guesses
 from omnidyn.model.keys import in_words, unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
@@ -50,6 +53,7 @@ class Estimate(Shown):
     data say no more (breakaway from rows at rest).
     warnings: what a reader must know, in words. method, data: how it was made, and from what (name, SHA-256).
     scale: what all forces scale with, in words: numbers that were taken as they stand.
+    study: makes the diagnosis, on first access.
     """
 
     robot: Robot
@@ -65,6 +69,22 @@ class Estimate(Shown):
     method: str = ""
     data: str = ""
     scale: str = ""
+    study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
+
+    @cached_property
+    def diagnosis(self) -> Diagnosis | None:
+        """What the fit leaves out and what its numbers rest on, found when it is first asked for; None without logs."""
+        return self.study() if self.study else None
+
+    @property
+    def lack_of_fit(self) -> LackOfFit | None:
+        """Whether the residuals hold more than noise, and what would explain it."""
+        return self.diagnosis.lack_of_fit if self.diagnosis else None
+
+    @property
+    def rests_on(self) -> Mapping[str, Mapping[str, float]]:
+        """Number -> key of a number that was taken as it stands -> relative change of the first per percent of it."""
+        return self.diagnosis.rests_on if self.diagnosis else {}
 
     def __repr__(self) -> str:
         numbers = ", ".join(f"{name} = {value:.4g}" for name, value in self.value.items())
@@ -154,7 +174,7 @@ class Estimate(Shown):
             "parameters": parameters,
             "lower_bound": self.lower_bound,
             "correlation": {"names": self.correlation.names, "matrix": self.correlation.matrix},
-            "rests_on_guesses": rests_on(self.robot),
+            "rests_on_guesses": guesses_under(self.robot),
             "warnings": self.warnings,
             "method": self.method,
             "data": self.data,

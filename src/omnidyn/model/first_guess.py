@@ -306,10 +306,9 @@ def rests_on(robot: Robot, at_rest: bool = False) -> list[str]:
     Numbers that only show together, and were fitted together, are right as the sum or product that any answer takes
     from them: they are not named. at_rest: of what a robot at rest does, which no mass, speed or back-EMF changes.
     """
-    kept = {
-        key: prior for key, prior in robot.priors.items()
-        if (prior.guessed or prior.origin != GUESS) and not (at_rest and (place := find_key(key)) and _shows_in_motion(place))
-    }  # fmt: skip
+    kept = {key: prior for key, prior in robot.priors.items() if prior.guessed or prior.origin != GUESS}
+    if at_rest:
+        kept = {key: prior for key, prior in kept.items() if (place := find_key(key)) and not _shows_in_motion(place)}
     return guessed(robot.model_copy(update={"priors": kept}))
 
 

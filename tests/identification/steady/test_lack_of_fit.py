@@ -87,11 +87,41 @@ def test_too_few_directions_are_not_tested_and_it_says_so():
     assert any("whether the shape fits was not tested" in words for words in found.statements)
 
 
+def test_an_estimate_tells_it_as_that_of_whole_logs_does():
+    """One contract: found, channels, remedies with their share of the held-out error, best first."""
+    one = study("rollers", 0)
+    lack = one.estimate.lack_of_fit
+    assert lack.found
+    assert 0.0 < lack.channels["force"] <= 1.0
+    assert lack.remedies[0].key == "rollers"
+    assert not lack.remedies[0].offered
+    best = one.lack_of_fit["all"].remedies[0]
+    assert lack.remedies[0].gain == pytest.approx(1.0 - (best.error / best.error_before) ** 2)
+    assert "rollers" in lack.words()
+    assert not study("box", 0).estimate.lack_of_fit.found
+
+
+def test_what_the_levels_rest_on_is_what_forces_are_made_with():
+    """F = K l i / r: every level grows with the torque constant and the gear; along the floor it falls with the radius
+    of the wheels, about the vertical it grows with that of the robot. The resistance says nothing beside currents.
+    Within 1 % of itself: the weights of a robust fit have a scale of their own."""
+    found = study("box", 0).estimate.rests_on
+    for name, by in found.items():
+        assert by["motor.torque_constant_Nm_A"] == pytest.approx(0.01, rel=0.01)
+        assert by["motor.resistance_ohm"] == pytest.approx(0.0, abs=1e-9)
+        assert by["motor.gear_ratio"] == pytest.approx(0.01, rel=0.01)
+        if "coulomb" in name:
+            assert by["wheels.wheel_radius_m"] == pytest.approx(1.0 / 1.01 - 1.0, rel=0.02)
+            arm = by["wheels.robot_radius_m"]
+            assert arm == pytest.approx(0.01 if name.endswith("[2]") else 0.0, abs=1e-4)
+
+
 def test_it_is_part_of_the_answer_in_text_and_for_machines():
     found = study("rollers", 0)
     told = found.document()
     assert "no offered shape fits" in told.to_text()
     record = json.loads(json.dumps(told.data))
-    assert record["lack_of_fit"] is True
+    assert record["lack_of_fit"] == record["groups"]["all"]["lack_of_fit"]
+    assert record["lack_of_fit"]["found"] is True
     assert record["groups"]["all"]["lack_of_fit"]["remedies"][0]["key"] == "rollers"
     assert any("look for what the shapes do not know" in words for words in found.advice)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 from omnidyn.document import Part, Points, Table, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
-from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.cures import Blind
@@ -56,7 +54,7 @@ class OutputErrorEstimate(Estimate):
     "autoregressive" or "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations,
     converged: of the minimisation. not_followed: outputs that the model does not follow. log_alone: name -> 95 %
     interval from the log alone, were what the robot file knows with a std exact; empty where it knows nothing so.
-    study: makes the diagnosis, on first access. ladder: what was switched on step by step, where that was asked for.
+    ladder: what was switched on step by step, where that was asked for.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -69,28 +67,12 @@ class OutputErrorEstimate(Estimate):
     converged: bool = True
     not_followed: tuple[str, ...] = ()
     log_alone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
     ladder: Ladder | None = None
 
     @property
     def blind(self) -> tuple[str, ...]:
         """What the data do not show, and what would, a sentence each."""
         return tuple(map(str, self.directions))
-
-    @cached_property
-    def diagnosis(self) -> Diagnosis | None:
-        """What the fit leaves out and what its numbers rest on, found when it is first asked for; None without logs."""
-        return self.study() if self.study else None
-
-    @property
-    def lack_of_fit(self) -> LackOfFit | None:
-        """Whether the residuals hold more than noise, and what would explain it."""
-        return self.diagnosis.lack_of_fit if self.diagnosis else None
-
-    @property
-    def rests_on(self) -> Mapping[str, Mapping[str, float]]:
-        """Number -> key of a number that was taken as it stands -> relative change of the first per percent of it."""
-        return self.diagnosis.rests_on if self.diagnosis else {}
 
     def beside(self, runs: Sequence[Run]) -> OutputErrorEstimate:
         """The same, where these logs are of the same series as those that were fitted, such as those held out: the file

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import fdtrc, stdtr
 
 from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification import lack_of_fit as common
 from omnidyn.identification.steady.choice import APART
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shape_fit import (
@@ -61,6 +62,12 @@ class Remedy:
     probability: float
     same_as: tuple[str, ...] = ()
 
+    def as_of_whole_logs(self) -> common.Remedy:
+        """See `LackOfFit.as_of_whole_logs`."""
+        before, after = self.error_before**2, self.error**2
+        std = 2.0 * self.error * self.gain_std / before
+        return common.Remedy(self.key, self.words, 1.0 - after / before, std, self.same_as, offered=False)
+
     def fits(self, force: float) -> bool:
         """Whether it is no chance, tells more of what was left out, and is as large as matters. force [N]: rms."""
         sure = self.probability < FALSE_ALARM and self.gain > APART * self.gain_std
@@ -78,6 +85,13 @@ class LackOfFit:
     share: float
     remedies: tuple[Remedy, ...]
     tested: tuple[str, ...]
+
+    def as_of_whole_logs(self) -> common.LackOfFit:
+        """The same in the words that every method has: the one channel is the force of friction, in directions that
+        were left out [N]; gains are shares of the squared error there. No robot file holds any of these remedies."""
+        told = tuple(each.as_of_whole_logs() for each in self.remedies)
+        size = {"force": max((each.size for each in self.remedies), default=0.0)}
+        return common.LackOfFit(self.found, {"force": self.share}, size, (), told, {})
 
 
 @dataclass(frozen=True)

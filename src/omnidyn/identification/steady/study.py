@@ -7,8 +7,9 @@ levels   of each group, with 95 % intervals; what differs between groups, and wh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import Unpack
 
@@ -19,13 +20,16 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
+from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import STEADY, STEADY_STATE, Question
+from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
-from omnidyn.identification.steady.lack_of_fit import lack_of_fit
+from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
 from omnidyn.identification.steady.moment import moments
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, force_points
+from omnidyn.identification.steady.rests_on import rests_on
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
@@ -79,6 +83,9 @@ def identify_steady(
     changed = moments(runs, robot, points.speed_from, points.force_from, asked.window)
     lack = {group: lack_of_fit(robot, own, choice.fit(group)) for group, own in parts.items()}
     turning = any(is_turning(robot, own) for own in parts.values())
+    for group, each in estimates.items():
+        made = partial(_examined, runs, robot, groups, asked, choice.chosen, lack[group], group, each.value)
+        estimates[group] = replace(each, study=made)
     return SteadyStudy(
         robot=robot, points=points, choice=choice, estimates=estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
@@ -94,6 +101,23 @@ def identify_steady(
         moments=changed,
         advice=words.lack_advice(lack) + words.advice(choice, viscous, turning, points.force_from),
     )  # fmt: skip
+
+
+def _examined(
+    runs: Sequence[Run], robot: Robot, groups: Sequence[str] | None, asked: Question, shape: str, lack: LackOfFit,
+    group: str, value: Mapping[str, float],
+) -> Diagnosis:  # fmt: skip
+    """What the shape of a group leaves out, and what its levels rest on; whether they last, `moments` says."""
+
+    def again(other: Robot) -> Mapping[str, float]:
+        points = force_points(
+            runs, other, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
+        )
+        choice = choose_shape(other, points, shape=shape, robust=asked.robust)
+        own = points.chosen(np.array([name == group for name in points.group]))
+        return _estimate(other, own, choice, group, asked.robust).value
+
+    return Diagnosis(lack.as_of_whole_logs(), rests_on(robot, value, again), Stability({}, ()))
 
 
 def _travel(points: ForcePoints) -> Travel:

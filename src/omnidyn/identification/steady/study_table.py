@@ -64,6 +64,17 @@ class SteadyStudy(Shown):
         return make(FIGURE, self)
 
 
+def _lack(lack: LackOfFit) -> dict[str, Any]:
+    """As every method tells it, each remedy with its forces beside."""
+    told = lack.as_of_whole_logs().to_dict()
+    own = [
+        {"size_N": each.size, "error_N": each.error, "error_before_N": each.error_before, "chance": each.probability}
+        for each in lack.remedies
+    ]  # fmt: skip
+    remedies = [one | more for one, more in zip(told["remedies"], own, strict=True)]
+    return told | {"remedies": remedies, "tested": list(lack.tested)}
+
+
 def _document(study: SteadyStudy) -> Document:
     """The study: what was used, the shapes, the levels, what it says and what it warns of."""
     points = study.points
@@ -143,12 +154,12 @@ def _data(study: SteadyStudy) -> dict[str, Any]:
                 "shape": study.choice.of(group),
                 "along_travel": asdict(study.travel[group]),
                 "viscous": [asdict(each) for each in study.viscous[group]],
-                "lack_of_fit": asdict(study.lack_of_fit[group]),
+                "lack_of_fit": _lack(study.lack_of_fit[group]),
                 "internal_force_N": study.internal.get(group),
             }
             for group in study.estimates
         },
-        "lack_of_fit": any(each.found for each in study.lack_of_fit.values()),
+        "lack_of_fit": _lack(next(iter(study.lack_of_fit.values()))),
         "moments": [asdict(each) for each in study.moments],
         "differences": [{**asdict(each), "differs": each.differs} for each in study.differences],
         "statements": list(study.statements),
