@@ -77,8 +77,8 @@ def friction_study(robot: Robot) -> FrictionStudy:
     """What friction does along each axis; of a robot whose motors can break it loose, at which rate it does, too.
 
     The ramps are simulated, with the motors of the robot; everything else is the law itself. A loop is slow: levels are
-    those of the least speed. Wheels that may slip roll here: what slips is the floor's friction, not the robot's. Raises
-    InputError for what is no robot.
+    those of the least speed. Wheels that may slip roll here: what slips is the floor's friction, not the robot's.
+    Raises InputError for what is no robot.
     """
     check_order("friction_study(robot)", (robot, Robot))
     rolls = robot.replace(wheels=robot.wheels.replace(traction_mu=None))
