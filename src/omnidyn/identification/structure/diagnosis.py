@@ -21,6 +21,7 @@ from omnidyn.identification.structure.laws import candidates
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
 from omnidyn.identification.structure.motion import motions
+from omnidyn.identification.structure.odometry import with_odometry
 from omnidyn.identification.structure.refits import refits
 from omnidyn.identification.structure.remedies import remedies
 from omnidyn.identification.structure.rests_on import rests_on
@@ -108,7 +109,7 @@ def _fitted(
         if again and one.key == again[0].key and (trial.fitted or trial.at == again[0].at)
     ]  # fmt: skip
     told = tuple(_with_first_step(one, near[one.key], anew) if one.key in near else one for one in again)
-    return told, shown[0] if shown else None
+    return with_odometry(told, problem.columns), shown[0] if shown else None
 
 
 def _with_first_step(again: Remedy, near: Remedy, fitted: Container[str]) -> Remedy:

@@ -30,6 +30,7 @@ from omnidyn.identification.structure.ladder.held_out import Errors, errors, mar
 from omnidyn.identification.structure.ladder.models import Model, Untried, can, moves, moves_apart, tried
 from omnidyn.identification.structure.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
 from omnidyn.identification.structure.motion import motions
+from omnidyn.identification.structure.odometry import hidden_by
 from omnidyn.identification.structure.switches import EACH_WHEEL, LIMIT, simpler_first, told
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
@@ -149,6 +150,7 @@ def judged(
         same = [o for o in paying if taken in (k, o) and o != k and k in paying and _is_same(by[k], by[o])]
         words = why[k] or _why_other(k, taken, alike, same)
         others = [models[o].key for o in same] + _not_fitted(models, each, own, before, seen)
+        others += hidden_by(each.key, each.solution.solver.problem.columns)
         rungs.append(_rung(step, each, own, before, count, k == taken, words, others, stands))
     rungs.sort(key=lambda rung: (not rung.taken, -rung.gain))
     rungs = [*{(rung.key, rung.words): rung for rung in reversed(rungs)}.values()][::-1]  # a limit found twice is one

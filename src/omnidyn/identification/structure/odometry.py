@@ -1,0 +1,36 @@
+"""What a log of nothing but a twist hides, if the robot computed that from its wheels, with a radius that is wrong.
+
+Wheels s times as large as said show v/s: exactly what motors of s^2 the resistance, or of 1/s^2 the voltage, and
+Coulomb friction over s do (M v' = G K (u - E G'v/(s r))/(R s r) - F sgn v); wheels s times as far out as said turn like
+a body of I/s^2. No fit to such a log can tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.model.actuation import GAIN
+
+HIDDEN = {
+    "motor.resistance_ohm": "wheels.wheel_radius_m", GAIN: "wheels.wheel_radius_m",
+    "body.inertia_kg_m2": "wheels.robot_radius_m",
+}  # fmt: skip
+
+
+def hidden_by(key: str, columns: Iterable[tuple[str, int]]) -> list[str]:
+    """The radius that looks like a change of a number, to logs of these columns: none, or one."""
+    return [HIDDEN[key]] if key in HIDDEN and {name for name, _ in columns} == {"twist"} else []
+
+
+def with_odometry(remedies: Sequence[Remedy], columns: Sequence[tuple[str, int]]) -> tuple[Remedy, ...]:
+    """The same; those that may be a radius name it, and the radius them."""
+    behind = {each.key: hidden_by(each.key, columns) for each in remedies}
+    found = []
+    for each in remedies:
+        looks = [key for key, radii in behind.items() if each.key in radii]
+        words = f"{each.words} (of another size if the twist is odometry)" if looks else each.words
+        same = tuple(dict.fromkeys((*each.same_as, *behind[each.key], *looks)))
+        found.append(replace(each, same_as=same, words=words))
+    return tuple(found)
