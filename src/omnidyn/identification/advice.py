@@ -9,7 +9,7 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
 from omnidyn.identification.output_error.trust.cures import MEASURED
-from omnidyn.identification.structure.candidates import CHANGE
+from omnidyn.identification.structure.missing.candidates import CHANGE
 from omnidyn.identification.validation import Validation
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit

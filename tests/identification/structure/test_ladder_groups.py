@@ -15,7 +15,7 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.held_out import errors, margins_of
 from omnidyn.identification.structure.ladder.models import Model, can, is_own, moves, moves_apart
-from omnidyn.identification.structure.switches import told
+from omnidyn.identification.structure.missing.switches import told
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.fit_page import render_fit

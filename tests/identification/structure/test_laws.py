@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.laws_ladder import of_law, right
-from omnidyn.identification.structure.laws import arm, bristled, may_fall
+from omnidyn.identification.structure.missing.laws import arm, bristled, may_fall
 from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import LUGRE
 from omnidyn.model.robot_file import load_robot

@@ -16,18 +16,18 @@ from omnidyn.identification.output_error.problem.problem import Parts, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
-from omnidyn.identification.structure.candidates import Candidate, Trial
-from omnidyn.identification.structure.laws import candidates
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
+from omnidyn.identification.structure.missing.candidates import Candidate, Trial
+from omnidyn.identification.structure.missing.laws import candidates
+from omnidyn.identification.structure.missing.odometry import with_odometry
+from omnidyn.identification.structure.missing.refits import refits
+from omnidyn.identification.structure.missing.remedies import remedies
+from omnidyn.identification.structure.missing.unoffered import unoffered
 from omnidyn.identification.structure.motion import motions
-from omnidyn.identification.structure.odometry import with_odometry
-from omnidyn.identification.structure.refits import refits
-from omnidyn.identification.structure.remedies import remedies
 from omnidyn.identification.structure.rests_on import rests_on
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import wild_samples
-from omnidyn.identification.structure.unoffered import unoffered
 from omnidyn.identification.structure.workbench import Workbench
 
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning

@@ -24,14 +24,14 @@ from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
-from omnidyn.identification.structure.candidates import CHANGE
 from omnidyn.identification.structure.diagnosis import Examined, examine
 from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
 from omnidyn.identification.structure.ladder.models import Model, Untried, can, moves, moves_apart, tried
-from omnidyn.identification.structure.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
+from omnidyn.identification.structure.missing.candidates import CHANGE
+from omnidyn.identification.structure.missing.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
+from omnidyn.identification.structure.missing.odometry import hidden_by
+from omnidyn.identification.structure.missing.switches import EACH_WHEEL, LIMIT, simpler_first, told
 from omnidyn.identification.structure.motion import motions
-from omnidyn.identification.structure.odometry import hidden_by
-from omnidyn.identification.structure.switches import EACH_WHEEL, LIMIT, simpler_first, told
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
 from omnidyn.run import Run

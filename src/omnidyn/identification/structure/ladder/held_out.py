@@ -17,7 +17,7 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.structure.linear import Linear, Rows
-from omnidyn.identification.structure.remedies import Blocks
+from omnidyn.identification.structure.missing.remedies import Blocks
 
 Memories = Sequence[AutoRegression] | Mapping[str, Sequence[AutoRegression]]
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning

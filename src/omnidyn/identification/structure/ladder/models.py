@@ -24,8 +24,8 @@ from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.laws import FALL, may_fall
-from omnidyn.identification.structure.switches import EACH_WHEEL, FALLS, Switch, as_it_ended, switches
+from omnidyn.identification.structure.missing.laws import FALL, may_fall
+from omnidyn.identification.structure.missing.switches import EACH_WHEEL, FALLS, Switch, as_it_ended, switches
 from omnidyn.model.friction import WheelFriction
 from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, find_key
 from omnidyn.model.robot import Robot

@@ -11,7 +11,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.lack_of_fit import UNOFFERED
-from omnidyn.identification.structure.candidates import Candidate, Trial, as_it_is
+from omnidyn.identification.structure.missing.candidates import Candidate, Trial, as_it_is
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.layout import N_AXES

@@ -25,7 +25,7 @@ from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.laws import (
+from omnidyn.identification.structure.missing.laws import (
     BRISTLE,
     FALL,
     TRACTION,

@@ -14,8 +14,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Remedy
-from omnidyn.identification.structure.candidates import Candidate, Trial
 from omnidyn.identification.structure.linear import SAME, Linear, Rows
+from omnidyn.identification.structure.missing.candidates import Candidate, Trial
 from omnidyn.model.keys import BODY_AXES, DIRECTION
 
 CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to

@@ -9,7 +9,15 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.prepare import LOOP
-from omnidyn.identification.structure.candidates import CHANGE, STEP, Candidate, Trial, as_it_is, numbers, of_the_log
+from omnidyn.identification.structure.missing.candidates import (
+    CHANGE,
+    STEP,
+    Candidate,
+    Trial,
+    as_it_is,
+    numbers,
+    of_the_log,
+)
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.dynamics import drive_wrench, frame_wrench

@@ -30,8 +30,8 @@ from omnidyn.identification.output_error.prepare import (
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.candidates import CHANGE, Candidate, Fitted, Trial
-from omnidyn.identification.structure.switches import Switch, simpler_first, switches, told
+from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
+from omnidyn.identification.structure.missing.switches import Switch, simpler_first, switches, told
 from omnidyn.identification.structure.workbench import on_time
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
