@@ -128,6 +128,19 @@ def test_a_latency_is_found(clean):
     assert std < 1e-3
 
 
+def test_a_latency_at_the_end_of_its_range_is_no_estimate(clean):
+    """The log shows what was half a second ago; so late is not searched."""
+    run = run_of(clean, BAND, 4)
+    late = np.vstack([np.zeros((50, 1)), run.wheel_speed[:-50]])
+    name = "latency.wheel_speed"
+    fit = fit_motor(run.replace(wheel_speed=late), latency=True, between="hold")
+    assert name in fit.unidentifiable
+    assert np.isnan(fit.std[name])
+    assert fit.ci95[name][0] < 0.0 < fit.ci95[name][1] < 0.5
+    assert "not determined" in fit.statement()
+    assert "nan" not in fit.statement()
+
+
 def test_a_free_run_on_another_log_is_as_good_as_its_noise(clean):
     fit = fit_motor(run_of(clean, BAND, 5), between="hold")
     other = run_of(clean, BAND, 6)

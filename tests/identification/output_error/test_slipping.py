@@ -10,7 +10,7 @@ from omnidyn.identification.output_error.prepare import make_engine, make_proble
 from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure import laws
+from omnidyn.identification.structure.missing import laws
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import Key

@@ -5,7 +5,8 @@ import pytest
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import logged, robot_of
 from benchmarks.wrong_worlds.score import FRICTION, drawn
-from omnidyn.identification.structure import diagnosis, refits
+from omnidyn.identification.structure import diagnosis
+from omnidyn.identification.structure.missing import refits
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import WHEELS
 from omnidyn.model.robot_file import load_robot

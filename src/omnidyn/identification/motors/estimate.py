@@ -82,7 +82,9 @@ class MotorEstimate:
         if self.ci95[LAG][0] > 0.0:
             words += f", lag {1e3 * self.value[LAG]:.3g} ms"
         for name, value in self.late.items():
-            words += f", {name.partition('.')[2]} late by {1e3 * value:.3g} +- {1e3 * self.std[name]:.2g} ms"
+            sure = f"+- {1e3 * self.std[name]:.2g} ms"
+            known = sure if name not in self.unidentifiable else "ms (the end of what was searched: not determined)"
+            words += f", {name.partition('.')[2]} late by {1e3 * value:.3g} {known}"
         if self.left_out:
             words += f" ({self.left_out} rows left out: their input changes too much from row to row)"
         if started and self.dead_band_seen:

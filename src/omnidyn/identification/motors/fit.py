@@ -18,7 +18,16 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors.bend import Bend, bend
 from omnidyn.identification.motors.between import CURVE, WORDS
 from omnidyn.identification.motors.engine import SPEED, MotorEngine, MotorProblem
-from omnidyn.identification.motors.estimate import BAND, FREE_RUN, INERTIA, LAG, SLOPE, MotorEstimate, named
+from omnidyn.identification.motors.estimate import (
+    BAND,
+    FREE_RUN,
+    INERTIA,
+    LAG,
+    LATENCY,
+    SLOPE,
+    MotorEstimate,
+    named,
+)
 from omnidyn.identification.motors.log import MotorLog, motor_logs
 from omnidyn.identification.motors.problem import begin, motor_problem, motor_record
 from omnidyn.identification.output_error.conclusion import intervals
@@ -141,6 +150,10 @@ def _answer(
         if value[BAND] >= 0.99 * high or std[BAND] > high:
             blind |= {BAND}
             std[BAND], ci95[BAND] = float("nan"), (problem.parameters[at].low, high)
+    for parameter, held in zip(problem.parameters, known.held, strict=True):
+        if held and parameter.name.startswith(LATENCY):  # the end of what was searched is no estimate
+            blind |= {parameter.name}
+            std[parameter.name], ci95[parameter.name] = float("nan"), (parameter.low, parameter.high)
     value[INERTIA] = value[SLOPE] * value[LAG]
     std[INERTIA], ci95[INERTIA] = _of_product(problem, known, value[INERTIA])
     names = [name for name in (SLOPE, BAND, LAG, INERTIA, *problem.names) if name in value]
