@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Unpack
 
 from omnidyn.arguments import check_order
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, State
 from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question
@@ -76,17 +78,24 @@ def solved(fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[s
 def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
     """What a solution says, each estimate with its diagnosis, which is made when it is first asked for."""
     try:
-        answer = fit.answer(solution, progress)
+        answer = fit.answer(solution, progress, _moved_by_the_file)
     except InsufficientDataError:
         plainer = fit.with_latencies_only(solution, progress)
         if plainer is None:
             raise
-        answer = fit.answer(plainer, progress)
+        answer = fit.answer(plainer, progress, _moved_by_the_file)
     found = {
         group: replace(estimate, study=_study(seen))
         for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)
     }
     return replace(answer, estimates=found)
+
+
+def _moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
+    """See structure/rests_on.py."""
+    from omnidyn.identification.structure.rests_on import moved_by_the_file  # here, for it takes time to load
+
+    return moved_by_the_file(sure, held)
 
 
 def _study(solution: Solution) -> Callable[[], Diagnosis]:

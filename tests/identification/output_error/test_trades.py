@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
 
 from benchmarks.wrong_worlds.log import NOISE, Case, Setup, logged, robot_of
 from benchmarks.wrong_worlds.world import World, drive
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.trust.ends import at_the_end
+from omnidyn.identification.structure.workbench import scaled
 from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.keys import Key, expand
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 
@@ -91,3 +94,47 @@ def test_the_log_alone_is_a_fit_of_the_same_log_with_the_file_taken_as_exact():
         assert high - low <= np.diff(free.ci95[name])[0] * (1.0 + 1e-9)
     assert held.log_alone == {}
     assert free.to_dict()["from_the_log_alone"] == {name: list(each) for name, each in free.log_alone.items()}
+
+
+HELD = {"wheels.robot_radius_m": 0.03, "motor.gear_ratio": 0.02, "body.mass_kg": 0.04}  # shares they may be off by
+
+
+@pytest.mark.parametrize("asked", [{"free": "friction"}, {"fixed": tuple(HELD)}])
+def test_a_number_that_is_not_fitted_counts_with_its_std(asked):
+    """Against fits of the same log with the number moved in the file; and the log alone stays beside it."""
+    run, plain = logged(Case(World(), World()), 971), robot_of(World())
+    size = {key: float(Key.parse(expand(key, plain)[0]).get(plain)) for key in HELD}
+    priors = {key: Prior(std=share * size[key], origin="measured") for key, share in HELD.items()}
+    told = fit_output_error(run, plain.replace(priors=priors), **asked, nuisances=())
+    alone = fit_output_error(run, plain, free="friction", nuisances=())
+    assert told.value == pytest.approx(alone.value, rel=1e-6)
+    variance = {name: std**2 for name, std in alone.std.items()}
+    for key, share in HELD.items():
+        other = fit_output_error(run, scaled(plain, key, 1.0 + 0.2 * share), free="friction", nuisances=())
+        for name in variance:
+            variance[name] += ((other.value[name] - alone.value[name]) / 0.2) ** 2
+    assert np.sqrt(list(variance.values())) == pytest.approx([told.std[name] for name in variance], rel=0.05)
+    assert max(told.std[name] / alone.std[name] for name in variance) > 3.0
+    for name, (low, high) in told.log_alone.items():
+        if name in alone.ci95:
+            assert (low, high) == pytest.approx(alone.ci95[name], rel=1e-6)
+    assert "from the log alone" in told.summary()
+    assert not alone.log_alone
+
+
+def test_a_number_that_is_not_fitted_and_is_off_is_in_the_interval():
+    """Worlds whose gear ratio is off the file's by what the file says of it: coverage of
+    viscous friction, which that moves by several of its other standard errors, far from its bound at 0."""
+    held, alone, share = [], [], 0.005
+    for k, seed in enumerate(range(975, 999)):
+        off = 1.0 + share * float(ndtri((k + 0.5) / 24))
+        world = World(gear_ratio=off * World().gear_ratio)
+        std = share * World().gear_ratio
+        told = robot_of(World()).replace(priors={"motor.gear_ratio": Prior(std=std, origin="datasheet")})
+        fit = fit_output_error(logged(Case(world, World()), seed), told, free="friction", nuisances=())
+        for axis in range(2):
+            name = f"friction.axes.viscous[{axis}]"
+            for found, (low, high) in ((held, fit.ci95[name]), (alone, fit.log_alone[name])):
+                found.append(low <= world.viscous[axis] <= high)
+    assert np.mean(held) >= 0.9
+    assert np.mean(alone) < 0.7

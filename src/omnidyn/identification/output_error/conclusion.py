@@ -44,11 +44,11 @@ SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted
 def conclude(
     solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], loss: str, more: Sequence[str],
     lower_bound: Mapping[str, float], moved: BoolArray, levels: Sequence[Breakaway] = (),
-    better: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None,
+    better: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None, exact: Trust | None = None,
 ) -> OutputErrorEstimate:  # fmt: skip
     """The Estimate of a solution. loss: of the fit, in words; more: warnings to join; lower_bound: for the Estimate;
     moved (3,): which axes did; levels: of breakaway that were asked for; better: name -> (std, interval) that replace
-    those of the covariance.
+    those of the covariance; exact: the trust were all that was taken as it stands exact, where `known` has more.
 
     Raises InsufficientDataError where the logs say nothing about any of the robot's numbers.
     """
@@ -93,7 +93,7 @@ def conclude(
         noise=noise_of(solver, solution),
         unidentifiable=open_,
         combinations=(*joint, *trades(problem, values, known, moved)),
-        log_alone=_log_alone(problem, values, known, open_),
+        log_alone=_log_alone(problem, values, exact or known, open_, exact not in (None, known)),
         directions=directions,
         covariance=known.kind,
         unused=_unused(records),
@@ -104,10 +104,13 @@ def conclude(
 
 
 def _log_alone(
-    problem: Problem, values: FloatArray, known: Trust, open_: Sequence[str]
+    problem: Problem, values: FloatArray, known: Trust, open_: Sequence[str], held: bool
 ) -> dict[str, tuple[float, float]]:
-    """Name -> 95 % interval were what the robot file knows with a std exact; empty where it knows nothing so."""
-    alone = from_the_log_alone(problem, known)
+    """Name -> 95 % interval were what the robot file knows with a std exact; empty where it knows nothing so.
+
+    held: whether it knows so what was not fitted.
+    """
+    alone = from_the_log_alone(problem, known) or (known if held else None)
     if alone is None:
         return {}
     found, of_file = intervals(problem, values, alone)[1], given(problem)

@@ -8,9 +8,10 @@ correlation that the shared numbers bring about.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
@@ -23,6 +24,8 @@ from omnidyn.identification.output_error.prepare import (
     IMPLICIT,
     LOOP,
     Group,
+    guesses,
+    known_priors,
     make_engine,
 )
 from omnidyn.identification.output_error.problem.band import band_words, with_band
@@ -44,6 +47,8 @@ from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
 from omnidyn.identification.recordings import count_once
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
+
+MovedBy = Callable[[Weighed, Mapping[str, float]], FloatArray]
 
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
@@ -111,13 +116,17 @@ class Fit:
             return self._settled(self.groups[0], progress)
         return self._solve_joint(self._settled_alone(progress), progress)
 
-    def answer(self, found: Solution | Best, progress: Progress | None = None) -> Answer:
+    def answer(
+        self, found: Solution | Best, progress: Progress | None = None, moved_by: MovedBy | None = None
+    ) -> Answer:
         """What the best point says; of the best so far without profile, bootstrap and breakaway.
+
+        moved_by: what numbers that are taken as they stand move the others by, a std each; see `known_so_far`.
 
         Raises InputError for a name to profile that is not free, InsufficientDataError where the logs say nothing about
         any of the robot's numbers.
         """
-        answer = self._answer(found, progress or Progress())
+        answer = self._answer(found, progress or Progress(), moved_by)
         words, estimates = band_words(self.began), answer.estimates
         return replace(
             answer,
@@ -127,7 +136,7 @@ class Fit:
             },
         )
 
-    def _answer(self, found: Solution | Best, progress: Progress) -> Answer:
+    def _answer(self, found: Solution | Best, progress: Progress, moved_by: MovedBy | None) -> Answer:
         """The same, of the robot that was fitted."""
         done = isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
@@ -145,12 +154,16 @@ class Fit:
         if len(self.groups) == 1:
             group = self.groups[0]
             known, held, told = without_a_fall(solution, known) if done else (known, {}, [])
+            exact, so_far = known, self.known_so_far(solver.problem)
+            if done and so_far and moved_by:
+                known = known.beside(moved_by(sure, so_far))
             words = [*warnings, *told, *group.warnings, *hints]
             estimate = conclude(
                 solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels,
-                held | dict(again.intervals)
+                held | dict(again.intervals), exact
             )  # fmt: skip
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
+        warnings += _taken_as_exact(self.known_so_far(solver.problem))
         engine, estimates, alones = solver.engine, {}, []
         assert isinstance(engine, JointEngine)
         for member in engine.members:
@@ -167,6 +180,12 @@ class Fit:
         shared = tuple(name for name in solver.problem.names if AT not in name)
         between = differences(by, known, again, own, [*estimates], profile, strata)
         return Answer(estimates, own, shared, between, tuple(alones))
+
+    def known_so_far(self, problem: Problem) -> dict[str, float]:
+        """Key -> std of what the robot file knows only so far, and the fit took as it stands."""
+        asked = {*problem.names, *(self.question.free or ())}
+        known, group = known_priors(self.began), self.groups[0]
+        return {key: known[key][1] for key in guesses(self.began, group.engine == LOOP) if key not in asked}
 
     def weighed(self, solution: Solution, progress: Progress | None = None, anew: bool = True) -> Weighed:
         """The trust in a solution; where its errors remember, that in the fit made anew for it, and its point.
@@ -324,6 +343,14 @@ def degrees(loss: str) -> float:
 def loss_words(loss: str) -> str:
     """A loss as an answer names it."""
     return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
+
+
+def _taken_as_exact(held: Iterable[str]) -> list[str]:
+    """What is to be said of numbers that the file knows only so far, where groups are fitted together without them."""
+    names = ", ".join(held)
+    return (
+        [f"{names}: held, with groups as if exact; leave them free, and their std is in the intervals"] if names else []
+    )
 
 
 def _in_each_group(names: Iterable[str], problem: Problem) -> list[str]:

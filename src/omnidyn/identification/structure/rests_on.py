@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.memory.whitening import Weighed
+from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.output_error.problem.bending import bending_keys
 from omnidyn.identification.output_error.problem.falling import falls
-from omnidyn.identification.structure.linear import Linear, solved
+from omnidyn.identification.output_error.problem.parameters import robot_parameter
+from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.output_error.solve.solver import RowEngine
+from omnidyn.identification.structure.linear import Linear, Rows, solved
 from omnidyn.identification.structure.workbench import Workbench, scaled
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 
 PERCENT = 0.01
+MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
 TRIED = 0.01  # relative change of a fixed number, either way is alike
 FIXED = (
     "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.resistance_ohm",
@@ -61,3 +71,34 @@ def _of_laws(bench: Workbench) -> list[str]:
     speeds = [key.replace(BREAKAWAY, "stribeck_speed").removesuffix("_backward") for key in levels]
     bends = [key for name in bending_keys(robot) for key in expand(name, robot)]
     return [key for key in dict.fromkeys((*levels, *speeds, *bends)) if key not in free]
+
+
+def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
+    """What one std of each number that the fit took as it stands moves its parameters by, in the numbers that the
+    solver sees. Shape (P, K). held: key -> std, as the robot file has it.
+
+    To first order, as in `rests_on`; 0 for what shows in no row, or cannot be simulated. The covariance of what is
+    fitted beside numbers that are taken as they stand: S. F. Schmidt, Adv. Control Syst. 3, 293 (1966).
+    """
+    solver, point = sure.plain.solver, sure.plain.state.point
+    assert isinstance(solver.problem, Problem)
+    problem, variance = solver.problem.shortened(MOST_ROWS), sure.plain.state.variance
+    engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
+    rows = Rows.of(problem, point, engine.residuals(point))
+    memory = [
+        sure.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
+        for c, column in enumerate(problem.columns)
+    ]
+    linear = Linear(rows, memory)
+    bench, (_, j) = Workbench(problem, point, engine_kind(solver.engine), ()), linear.whole()
+    found = np.zeros((j.shape[1], len(held)))
+    for k, (key, std) in enumerate(held.items()):
+        number = robot_parameter(bench.robot, key, None, tuple(held))
+        if number.value == 0.0:
+            continue
+        try:
+            shown = bench.change(number.on(bench.robot, (1.0 + TRIED) * number.value))
+        except OmnidynError:
+            continue
+        found[:, k] = solved(j, -linear.white(shown)[:, 0]) * std / (TRIED * abs(number.value))
+    return found

@@ -15,7 +15,7 @@ beyond chance. No variance is below the plain one, of a number or of what severa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,10 @@ class Trust:
     @property
     def std(self) -> FloatArray:
         return np.sqrt(np.diag(self.covariance))
+
+    def beside(self, moved: FloatArray) -> Trust:
+        """The same beside numbers that are only known so far: what a std of each moves the parameters by, (P, K)."""
+        return replace(self, covariance=self.covariance + moved @ moved.T)
 
     def rise(self, way: FloatArray) -> float:
         """2 (F - least F) at the ends of a 95 % interval of the sum of way (P,) times the parameters.
