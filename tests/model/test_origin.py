@@ -7,9 +7,9 @@ from typing import get_args
 
 import pytest
 
-from omnidyn.identification.output_error.prepare import known_priors
 from omnidyn.model.first_guess import guessed, reasons
 from omnidyn.model.keys import DIRECTION, EMF, TORQUE, all_keys
+from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Origin, Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, preset_names, robot_to_toml
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 NOT_DETERMINED = "not determined"  # in the place of an interval: the data do not give one
 UNKNOWN = {"std": None, "ci95": [None, None]}  # the same for machines
 NAMED = 4  # numbers that a sentence names
+WORTH = 0.1  # by which an interval must be wider for that to be worth a table
 UNKNOWN_FROM = 0.5  # std over value from which a number is as good as not known
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
@@ -53,6 +54,8 @@ class Estimate(Shown):
     data say no more (breakaway from rows at rest).
     warnings: what a reader must know, in words. method, data: how it was made, and from what (name, SHA-256).
     scale: what all forces scale with, in words: numbers that were taken as they stand.
+    log_alone: name -> 95 % interval from the log alone, were what the robot file knows with a std exact; empty where it
+    knows nothing so.
     study: makes the diagnosis, on first access.
     """
 
@@ -69,6 +72,7 @@ class Estimate(Shown):
     method: str = ""
     data: str = ""
     scale: str = ""
+    log_alone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
 
     @cached_property
@@ -145,7 +149,8 @@ class Estimate(Shown):
         head = [f"{self.robot.name}: {self.method}", f"data: {self.data}", ""]
         scale = [self.scale] if self.scale else []
         held = [words] if (words := rests_on_guesses(self.robot)) else []
-        return [*head, self._table(), *bounds, *scale, *held, Points(self.warnings, "warning:")]
+        alone = [table] if (table := self.alone_table()) else []
+        return [*head, self._table(), *alone, *bounds, *scale, *held, Points(self.warnings, "warning:")]
 
     def _table(self) -> Table:
         rows = []
@@ -158,6 +163,21 @@ class Estimate(Shown):
             rows.append((name, f"{value:.4g}", f"{self.std[name]:.3g}", interval, unit(name) + mark, in_words(name)))
         head = ("parameter", "value", "std error", "95 % interval", "unit", "in words")
         return Table(head, rows, "<>>><")
+
+    def alone_table(self) -> Table | None:
+        """What the intervals owe to what the robot file gives with a std; None where that is not worth a word."""
+        rows = []
+        for name, (low, high) in self.log_alone.items():
+            whole = self._whole(name)
+            if whole is not None and whole[1] - whole[0] > (1.0 + WORTH) * (high - low):
+                rows.append((name, interval_cell((low, high)), interval_cell(whole)))
+        return (
+            Table(("95 % intervals", "from the log alone", "with what is known of the robot"), rows) if rows else None
+        )
+
+    def _whole(self, name: str) -> tuple[float, float] | None:
+        """The interval of a number."""
+        return self.ci95.get(name)
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it: no NaN, no infinity (null instead); the robot as the text of its file."""
@@ -174,6 +194,7 @@ class Estimate(Shown):
             "parameters": parameters,
             "lower_bound": self.lower_bound,
             "correlation": {"names": self.correlation.names, "matrix": self.correlation.matrix},
+            "from_the_log_alone": self.log_alone,
             "rests_on_guesses": guesses_under(self.robot),
             "warnings": self.warnings,
             "method": self.method,

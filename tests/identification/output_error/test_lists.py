@@ -3,10 +3,10 @@ its entries."""
 
 import numpy as np
 
-from omnidyn.identification.output_error.prepare import known_priors
 from omnidyn.identification.output_error.problem.parameters import robot_parameters
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, expand
+from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate

@@ -9,6 +9,7 @@ from omnidyn.logs.plateaus import find_plateaus
 from omnidyn.model.robot import GUESS, Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.statistics import t_quantile
 from tests.support.plain_world import World, fan, steady_logs
 
 AXEBOT, MECANUM = load_robot("axebot"), load_robot("mecanum")
@@ -149,12 +150,16 @@ def test_viscous_friction_beside_a_guessed_motor_constant_is_the_sum_that_it_is(
     brake = 1.5 * push**2 / 1.69  # of three wheels, 120 degrees apart
     assert level.back_emf == pytest.approx(brake)
     assert level.value + level.back_emf == pytest.approx(3.0 + brake, rel=0.02)
-    assert level.std > 0.35 * brake
+    assert level.std == pytest.approx(0.2 * (brake - 3.0), rel=0.02)
     text = " ".join(found.document().to_text().split())
     assert "viscous friction cannot be told from back-EMF, for motor.torque_constant_Nm_A is a guess" in text
     assert "friction.direction.viscous: right together with the back-EMF of this file only" in text
     low, high = found.estimate.ci95["friction.direction.viscous"]
-    assert high - low > brake
+    alone = found.estimate.log_alone["friction.direction.viscous"]
+    # u l K/(R r) of the sum grows as K does, the brake as its square: dB = (B + brake) dK/K - 2 brake dK/K
+    half = 0.2 * (brake - 3.0) * t_quantile(found.estimate.degrees_of_freedom["friction.direction.viscous"])
+    assert 0.5 * (high - low) == pytest.approx(np.hypot(half, 0.5 * (alone[1] - alone[0])), rel=0.02)
+    assert found.estimate.std["friction.direction.viscous"] == pytest.approx(level.std, rel=0.02)
 
 
 @pytest.mark.parametrize("force_from, guessed", [("current", True), ("voltage", False)])
@@ -165,3 +170,17 @@ def test_currents_or_a_known_constant_separate_it(force_from, guessed):
     assert level.guesses == ()
     assert level.low <= 3.0 <= level.high
     assert any("viscous friction is seen" in words for words in found.statements)
+
+
+def test_what_the_file_knows_only_so_far_is_in_the_intervals():
+    """From currents every level is proportional to the torque constant, F = K l i/r: its std is a share of each."""
+    share, name = 0.05, "motor.torque_constant_Nm_A"
+    known = AXEBOT.replace(priors={name: Prior(std=share * AXEBOT.motor.torque_constant, origin="datasheet")})
+    told = identify_steady(viscous_runs(), known, force_from="current", shape="disc+viscous").estimate
+    alone = identify_steady(viscous_runs(), AXEBOT, force_from="current", shape="disc+viscous").estimate
+    assert told.value == pytest.approx(alone.value, rel=1e-9)
+    for key, value in told.value.items():
+        assert told.std[key] == pytest.approx(np.hypot(alone.std[key], share * value), rel=0.01)
+        assert told.log_alone[key] == pytest.approx(alone.ci95[key])
+    assert "from the log alone" in told.summary()
+    assert alone.log_alone == {}

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from omnidyn.document import Part, Points, Table, all_of, interval_cell, plain
+from omnidyn.document import Part, Points, all_of, interval_cell, plain
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
@@ -15,8 +15,6 @@ from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.model.fitted.log_effects import log_mark
 from omnidyn.run import Run
-
-WORTH = 0.1  # share by which an interval is wider, from which on that is said
 
 
 @dataclass(frozen=True)
@@ -52,9 +50,8 @@ class OutputErrorEstimate(Estimate):
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
     together. directions: of these numbers, that the data do not show, with what would. covariance: "white",
     "autoregressive" or "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations,
-    converged: of the minimisation. not_followed: outputs that the model does not follow. log_alone: name -> 95 %
-    interval from the log alone, were what the robot file knows with a std exact; empty where it knows nothing so.
-    ladder: what was switched on step by step, where that was asked for.
+    converged: of the minimisation. not_followed: outputs that the model does not
+    follow. ladder: what was switched on step by step, where that was asked for.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -66,7 +63,6 @@ class OutputErrorEstimate(Estimate):
     iterations: int = 0
     converged: bool = True
     not_followed: tuple[str, ...] = ()
-    log_alone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     ladder: Ladder | None = None
 
     @property
@@ -104,19 +100,11 @@ class OutputErrorEstimate(Estimate):
         ]
         noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
         left = [Points(self.blind, "not shown by the data:"), Points(self.unused, "not used:")]
-        alone = [table] if (table := self.alone_table()) else []
-        return [*super()._parts(), *alone, *sums, *logs, *noise, *left]
+        return [*super()._parts(), *sums, *logs, *noise, *left]
 
-    def alone_table(self) -> Table | None:
-        """What the intervals owe to what the robot file gives with a std; None where that is not worth a word."""
-        rows = []
-        for name, (low, high) in self.log_alone.items():
-            whole = self.ci95.get(name) or (self.nuisances[name].ci95 if name in self.nuisances else None)
-            if whole is not None and whole[1] - whole[0] > (1.0 + WORTH) * (high - low):
-                rows.append((name, interval_cell((low, high)), interval_cell(whole)))
-        return (
-            Table(("95 % intervals", "from the log alone", "with what is known of the robot"), rows) if rows else None
-        )
+    def _whole(self, name: str) -> tuple[float, float] | None:
+        """The interval of a number of the robot or of the log."""
+        return self.nuisances[name].ci95 if name in self.nuisances else super()._whole(name)
 
     @staticmethod
     def _of_log(own: Nuisance) -> str:
@@ -130,7 +118,7 @@ class OutputErrorEstimate(Estimate):
         return super().to_dict() | plain({
             "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable,
             "combinations": [asdict(one) for one in self.combinations], "blind": self.blind,
-            "from_the_log_alone": self.log_alone, "covariance": self.covariance, "unused": self.unused,
+            "covariance": self.covariance, "unused": self.unused,
             "converged": self.converged, **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
             "directions": [asdict(one) for one in self.directions],
         })  # fmt: skip

@@ -25,7 +25,6 @@ from omnidyn.identification.output_error.prepare import (
     LOOP,
     Group,
     guesses,
-    known_priors,
     make_engine,
 )
 from omnidyn.identification.output_error.problem.band import band_words, with_band
@@ -45,6 +44,7 @@ from omnidyn.identification.output_error.trust.support import supported, too_ear
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
 from omnidyn.identification.recordings import count_once
+from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 

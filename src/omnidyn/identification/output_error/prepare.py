@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -51,7 +50,8 @@ from omnidyn.model.keys import (
     unit,
 )
 from omnidyn.model.keys import LATENCY as DRIVE_LATENCY
-from omnidyn.model.robot import IDENTIFIED, Robot
+from omnidyn.model.known.told import known_priors
+from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
 EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
@@ -286,19 +286,6 @@ def guesses(robot: Robot, looped: bool = False) -> tuple[str, ...]:
         if not tied and not held and (key.level or key.get(robot) > 0.0):
             kept.append(name)
     return tuple(kept)
-
-
-def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
-    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry.
-
-    One of a number that this robot no longer has, because a part of it was exchanged, is left out.
-    """
-    found = {}
-    for name, prior in robot.priors.items():
-        if prior.std is not None and prior.origin != IDENTIFIED:
-            with contextlib.suppress(InputError):
-                found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
-    return found
 
 
 def expand_keys(names: str | Sequence[str], robot: Robot, usual: Sequence[str] = ()) -> tuple[str, ...]:

@@ -98,6 +98,25 @@ class ForcePoints:
         return replace(self, **parts, group=tuple(self.group[k] for k in index))
 
 
+@dataclass(frozen=True, eq=False)
+class SteadyWindows:
+    """The steady windows of runs, whatever the numbers of the robot are: (number of the run, run, window) of each.
+
+    names: group of each run. speed, origin: of the points that are made of them. notes: in words.
+    """
+
+    found: tuple[tuple[int, Run, Plateau], ...]
+    names: tuple[str, ...]
+    speed: str
+    origin: str
+    notes: tuple[str, ...]
+
+    def points(self, robot: Robot) -> ForcePoints:
+        """What the forces of a robot's motors are there. Errors: as of `force_points`."""
+        made = [(number, _point(run, robot, each, self.speed, self.origin), each) for number, run, each in self.found]
+        return _moving(_stacked(made, robot, self.names, self.speed, self.origin, [*self.notes]), robot)
+
+
 def force_points(
     runs: Sequence[Run],
     robot: Robot,
@@ -117,6 +136,14 @@ def force_points(
     Raises InputError for a run without what is asked for, InsufficientDataError when no window is steady and moves,
     UnsupportedError for losses in the gear.
     """
+    return steady_windows(runs, robot, groups=groups, speed=speed, force_from=force_from, window=window).points(robot)
+
+
+def steady_windows(
+    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, speed: str = WHEEL,
+    force_from: str = "", window: tuple[float, float] | None = None,
+) -> SteadyWindows:  # fmt: skip
+    """The windows that `force_points` makes its points of. Errors: as there."""
     if speed not in SPEEDS:
         raise InputError("no such speed", got=speed, expected=", ".join(SPEEDS), where="speed")
     refuse_losses(robot)
@@ -126,19 +153,17 @@ def force_points(
     kept, twice = count_once(runs, names)
     runs, names = [runs[k] for k in kept], tuple(names[k] for k in kept)
     origin = _origin(runs, force_from)
-    found, notes, empty = [], [*twice], []
+    found, empty = [], []
     for number, run in enumerate(runs):
         _check_wheels(run, robot)
         run = _with_voltage(run, robot) if origin == VOLTAGE else run
         windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
         empty += [] if windows else [run.source]
-        found += [(number, _point(run, robot, each, speed, origin), each) for each in windows]
-    if empty:
-        notes.append(f"{len(empty)} of {len(runs)} runs have no steady window, such as {empty[0] or 'run 0'}")
+        found += [(number, run, each) for each in windows]
+    lacking = f"{len(empty)} of {len(runs)} runs have no steady window, such as {empty[0] or 'run 0'}" if empty else ""
     if origin == CURRENT:
         _refuse_unsigned(runs, [each for *_, each in found])
-    points = _stacked(found, robot, names, speed, origin, notes)
-    return _moving(points, robot)
+    return SteadyWindows(tuple(found), names, speed, origin, (*twice, *([lacking] if lacking else [])))
 
 
 @dataclass(frozen=True, eq=False)

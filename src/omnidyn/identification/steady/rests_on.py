@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.model.keys import EMF, TORQUE, Key, expand
+from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 
 STEP = 0.01
 # Keys, with what follows them: those that forces and speeds are made with.
 FIXED = {
     TORQUE: (EMF,), "motor.resistance_ohm": (), "motor.gear_ratio": (), "wheels.wheel_radius_m": (),
-    "wheels.robot_radius_m": (),
+    "wheels.robot_radius_m": (), EMF: (),
 }  # fmt: skip
 
 
@@ -30,6 +34,27 @@ def rests_on(
             if now > 0.0 and name in other:
                 found[name][key] = other[name] / now - 1.0
     return found
+
+
+def moved_by_the_file(
+    robot: Robot, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
+) -> FloatArray:
+    """What one std of each number that the file of the robot knows only so far moves the numbers by, to first order.
+    Shape (numbers, K). A torque constant brings the EMF constant with it: both are one number of the magnet."""
+    known = {key: std for key, (_, std) in known_priors(robot).items() if Key.parse(key).name in FIXED}
+    magnet = any(Key.parse(key).name == TORQUE for key in known)
+    found = []
+    for key, std in known.items():
+        place = Key.parse(key)
+        if magnet and place.name == EMF:
+            continue
+        try:
+            other = again(_larger(robot, key, *(str(Key(name, place.index)) for name in FIXED[place.name])))
+        except OmnidynError:  # no number that these logs are read with
+            continue
+        size = STEP * float(place.get(robot))
+        found.append([std / size * (other.get(name, now) - now) for name, now in value.items()])
+    return np.array(found).reshape(-1, len(value)).T
 
 
 def _larger(robot: Robot, *names: str) -> Robot:

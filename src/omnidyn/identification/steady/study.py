@@ -7,7 +7,7 @@ levels   of each group, with 95 % intervals; what differs between groups, and wh
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -28,15 +28,15 @@ from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
 from omnidyn.identification.steady.moment import moments
-from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, force_points
-from omnidyn.identification.steady.rests_on import rests_on
+from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
+from omnidyn.identification.steady.rests_on import moved_by_the_file, rests_on
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand, find_key
+from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, find_key
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.layout import YAW
@@ -65,9 +65,10 @@ def identify_steady(
     runs = as_list(runs)
     asked = Question.for_method(STEADY_STATE, question, options)
     robust = asked.robust
-    points = force_points(
+    windows = steady_windows(
         runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
     )
+    points = windows.points(robot)
     choice = choose_shape(robot, points, shape=asked.shape, robust=robust)
     if not SHAPES[choice.chosen].in_model:
         raise InsufficientDataError(
@@ -76,16 +77,18 @@ def identify_steady(
         )  # fmt: skip
     parts = {group: points.chosen(np.array([name == group for name in points.group])) for group in points.groups}
     travel = {group: _travel(own) for group, own in parts.items()}
-    viscous = {group: _viscous(robot, choice, group, own, travel[group], robust) for group, own in parts.items()}
-    estimates = {group: _estimate(robot, own, choice, group, robust) for group, own in parts.items()}
+    viscous = {
+        group: _viscous(robot, windows, choice, group, own, travel[group], robust) for group, own in parts.items()
+    }
+    anew = {group: partial(_levels, windows, choice.of(group), group, robust) for group in parts}
+    estimates = {group: _estimate(robot, own, choice, group, robust, anew[group]) for group, own in parts.items()}
     differences = _differences(choice)
     internal = {group: _internal(robot, own) for group, own in parts.items()} if robot.wheels.count > 3 else {}
     changed = moments(runs, robot, points.speed_from, points.force_from, asked.window)
     lack = {group: lack_of_fit(robot, own, choice.fit(group)) for group, own in parts.items()}
     turning = any(is_turning(robot, own) for own in parts.values())
     for group, each in estimates.items():
-        made = partial(_examined, runs, robot, groups, asked, choice.chosen, lack[group], group, each.value)
-        estimates[group] = replace(each, study=made)
+        estimates[group] = replace(each, study=partial(_examined, robot, lack[group], each.value, anew[group]))
     return SteadyStudy(
         robot=robot, points=points, choice=choice, estimates=estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
@@ -103,20 +106,24 @@ def identify_steady(
     )  # fmt: skip
 
 
+def _levels(windows: SteadyWindows, shape: str, group: str, robust: bool, robot: Robot) -> dict[str, float]:
+    """The levels of a group were the robot another one; empty where the shape has none then."""
+    points = windows.points(robot)
+    own = points.chosen(np.array([name == group for name in points.group]))
+    turning = is_turning(robot, own)
+    fit = fit_shape(SHAPES[shape], robot, own, turning=turning, robust=robust)
+    return {} if fit is None else _free(fit)
+
+
+def _free(fit: ShapeFit) -> dict[str, float]:
+    """The levels of a fit without their bound at 0."""
+    return dict(zip(fit.keys, fit.free.tolist(), strict=True))
+
+
 def _examined(
-    runs: Sequence[Run], robot: Robot, groups: Sequence[str] | None, asked: Question, shape: str, lack: LackOfFit,
-    group: str, value: Mapping[str, float],
-) -> Diagnosis:  # fmt: skip
+    robot: Robot, lack: LackOfFit, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
+) -> Diagnosis:
     """What the shape of a group leaves out, and what its levels rest on; whether they last, `moments` says."""
-
-    def again(other: Robot) -> Mapping[str, float]:
-        points = force_points(
-            runs, other, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
-        )
-        choice = choose_shape(other, points, shape=shape, robust=asked.robust)
-        own = points.chosen(np.array([name == group for name in points.group]))
-        return _estimate(other, own, choice, group, asked.robust).value
-
     return Diagnosis(lack.as_of_whole_logs(), rests_on(robot, value, again), Stability({}, ()))
 
 
@@ -133,8 +140,9 @@ def _travel(points: ForcePoints) -> Travel:
 
 
 def _viscous(
-    robot: Robot, choice: ShapeChoice, group: str, points: ForcePoints, travel: Travel, robust: bool
-) -> tuple[Viscous, ...]:
+    robot: Robot, windows: SteadyWindows, choice: ShapeChoice, group: str, points: ForcePoints, travel: Travel,
+    robust: bool,
+) -> tuple[Viscous, ...]:  # fmt: skip
     """The viscous levels of the chosen shape, fitted beside its other levels."""
     name, found = base_name(choice.of(group)) + VISCOUS, []
     fit = choice.fits[name][group] if name in choice.fits else None
@@ -142,7 +150,8 @@ def _viscous(
         fit = fit_shape(SHAPES[name], robot, points, turning=is_turning(robot, points), robust=robust)
     if fit is None:
         return ()
-    emf = _back_emf(robot, points)
+    emf, fitted = _back_emf(robot, points), _free(fit)
+    moved = moved_by_the_file(robot, fitted, partial(_levels, windows, name, group, robust))
     for k, key in enumerate(fit.keys):
         name = Key.parse(key)
         if name.level != VISCOUS_LEVEL:
@@ -152,7 +161,7 @@ def _viscous(
             turned = np.abs(points.twist[points.turns, 2])
             level, slow, fast = float(np.abs(points.wrench[points.turns, 2]).mean()), turned.min(), turned.max()
         brake = emf.of(name)
-        value, std = float(fit.free[k]), float(np.hypot(fit.std[k], emf.relative_std * brake))
+        value, std = float(fit.free[k]), float(np.linalg.norm([fit.std[k], *moved[k]]))
         half = t_quantile(fit.degrees_of_freedom) * std
         low, high = value - half, value + half
         found.append(
@@ -168,13 +177,12 @@ class _BackEmf:
     """How the back-EMF brakes: forces from a voltage show its sum with viscous friction, and never one alone.
 
     brake: -d(wrench)/d(twist), shape (3, 3). at_rim: the same of one wheel [N s/m]. guesses: the motor constants that
-    are guesses of the robot file. relative_std: relative standard deviation of `brake` by these, as far as it is known.
+    are guesses of the robot file.
     """
 
     brake: FloatArray
     at_rim: float
     guesses: tuple[str, ...] = ()
-    relative_std: float = 0.0
 
     def of(self, key: Key) -> float:
         """The part of a viscous level that is back-EMF, in its unit."""
@@ -189,21 +197,18 @@ def _back_emf(robot: Robot, points: ForcePoints) -> _BackEmf:
         return _BackEmf(np.zeros((3, 3)), 0.0)
     brake = -drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count))
     matrix = robot.wheels.wrench_matrix
-    guesses = {key: prior for key, prior in robot.priors.items()
-               if prior.origin == GUESS and Key.parse(key).name in (TORQUE, EMF)}  # fmt: skip
-    shares = [float(prior.std / abs(np.mean(Key.parse(expand(key, robot)[0]).get(robot))))
-              for key, prior in guesses.items() if prior.std is not None]  # fmt: skip
-    # K_t and K_v are one number of a motor, and the brake has both
-    return _BackEmf(
-        brake, float(np.trace(brake) / np.sum(matrix**2)), tuple(guesses), 2.0 * max(shares, default=0.0)
-    )  # fmt: skip
+    guesses = [key for key, prior in robot.priors.items()
+               if prior.origin == GUESS and Key.parse(key).name in (TORQUE, EMF)]  # fmt: skip
+    return _BackEmf(brake, float(np.trace(brake) / np.sum(matrix**2)), tuple(guesses))
 
 
-def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool) -> Estimate:
-    fit, emf = choice.fit(group), _back_emf(robot, points)
-    extra = np.array([emf.relative_std * emf.of(Key.parse(key)) if Key.parse(key).level == VISCOUS_LEVEL else 0.0
-                      for key in fit.keys])  # fmt: skip
-    fit = replace(fit, covariance=fit.covariance + np.diag(extra**2))
+def _estimate(
+    robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool,
+    again: Callable[[Robot], Mapping[str, float]],
+) -> Estimate:  # fmt: skip
+    alone, emf = choice.fit(group), _back_emf(robot, points)
+    moved = moved_by_the_file(robot, _free(alone), again)
+    fit = replace(alone, covariance=alone.covariance + moved @ moved.T)
     value = dict(zip(fit.keys, fit.level.tolist(), strict=True))
     std = dict(zip(fit.keys, fit.std.tolist(), strict=True))
     turning = is_turning(robot, points)
@@ -223,6 +228,7 @@ def _estimate(robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str
         method=words.method(points, fit, robust),
         data=data,
         scale=scale_of_traction(robot, points.force_from == CURRENT),
+        log_alone=_intervals(alone) if moved.size else {},
     )
 
 

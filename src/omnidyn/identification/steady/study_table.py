@@ -85,7 +85,7 @@ def _document(study: SteadyStudy) -> Document:
     parts = [
         f"{study.robot.name}: steady state from logs; forces from {FORCES[points.force_from]}; friction over the "
         f"{SPEEDS[points.speed_from]}",
-        "", _travel_table(study), "", _shape_table(study), "", _level_table(study), "",
+        "", _travel_table(study), "", _shape_table(study), "", _level_table(study), *_alone_tables(study), "",
         Points(study.statements, name="statements"),
         Points(study.warnings, "warning:", "warnings"),
         Points(study.advice, "next:", "next"),
@@ -140,6 +140,11 @@ def _level_table(study: SteadyStudy) -> Table:
     )
 
 
+def _alone_tables(study: SteadyStudy) -> list[Table]:
+    """What the intervals of each group owe to what the robot file knows with a std, where that is worth a word."""
+    return [table for each in study.estimates.values() if (table := each.alone_table())]
+
+
 def _data(study: SteadyStudy) -> dict[str, Any]:
     """The study as JSON can hold it."""
     return {
@@ -155,6 +160,7 @@ def _data(study: SteadyStudy) -> dict[str, Any]:
                 "along_travel": asdict(study.travel[group]),
                 "viscous": [asdict(each) for each in study.viscous[group]],
                 "lack_of_fit": _lack(study.lack_of_fit[group]),
+                "rests_on": study.estimates[group].rests_on,
                 "internal_force_N": study.internal.get(group),
             }
             for group in study.estimates

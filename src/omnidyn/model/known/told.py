@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.fitted.correlation import KeyCorrelation, key_correlation
 from omnidyn.model.keys import BREAKAWAY, CENTRE, COULOMB, DEAD_BAND, LATENCY, VISCOUS, Key, expand, find_key
-from omnidyn.model.robot import Prior, Robot
+from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 
 NEAR = 0.5  # std over value, from which on a friction may be 0
 SIGNED = ("wheels.azimuth_deg", "wheels.roller_angle_deg", CENTRE)  # numbers that may as well be below 0
@@ -56,6 +57,19 @@ def numbers_told(robot: Robot) -> dict[str, Prior]:
     for name, prior in robot.priors.items():
         if find_key(name) is not None:
             found |= {key: prior for key in expand(name, robot) if _has(robot, key)}
+    return found
+
+
+def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
+    """Priors of the robot file that are independent of any log: key -> (mean, std); that of a list for each entry.
+
+    One of a number that this robot no longer has, because a part of it was exchanged, is left out.
+    """
+    found = {}
+    for name, prior in robot.priors.items():
+        if prior.std is not None and prior.origin != IDENTIFIED:
+            with contextlib.suppress(InputError):
+                found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
     return found
 
 
