@@ -34,7 +34,7 @@ FIRST_SEED = 7000  # of no log of laws_identified
 CLEAR = (5.0, 10.0, 30.0)  # standard errors (of their difference) by which breakaway exceeds Coulomb friction
 HELD, TAKEN, RICHER = 0.9, 0.95, 0.05
 BRISTLE = "friction.axes.stiffness"
-LAW_OF = {"Stribeck": (FALL,), "LuGre": (FALL, BRISTLE)}
+LAW_OF = {"Stribeck": (FALL,), "LuGre": (BRISTLE,)}
 
 NAMES = {"friction.axes.viscous[0]": TRUE["viscous"], "friction.axes.coulomb[0]": TRUE["coulomb"]}
 COLUMNS = ["world", "logs", "found", "1st or 2nd", "step", "law taken", "held before", "held after", "s a log"]
@@ -45,7 +45,8 @@ def measure() -> Table:
     table = Table("laws_ladder: a law of friction that the robot file lacks", COLUMNS)
     table.notes += [
         machine(), "held: 95 % intervals of viscous and Coulomb friction that hold the truth, with the file's law, and "
-        "with what the ladder took; law taken: of all logs, the first step is the law, or says it is the same",
+        "with what the ladder took; law taken: of all logs, a step is the law, or says it is the same: "
+        "of LuGre its bristles, not the fall of the level alone",
     ]  # fmt: skip
     for name, law in LAW_OF.items():
         for clear in CLEAR if name == "Stribeck" else CLEAR[-1:]:
@@ -106,7 +107,7 @@ def _on(twist: FloatArray, noise: float, seed: int, law: Sequence[str]) -> tuple
     out.seconds, out.found, out.words = time.process_time() - began, plain.lack_of_fit.found, best.ladder.words()
     steps = best.ladder.taken
     out.steps = len(steps)
-    out.cause = bool(steps) and any(key in (steps[0].key, *steps[0].same_as) for key in law)
+    out.cause = any(key in (step.key, *step.same_as) for step in steps for key in law)
     out.before, out.after = _held(plain), _held(best)
     told = plain.lack_of_fit.remedies
     first = [key for each in told[:2] for key in (each.key, *(each.same_as if each is told[0] else ()))]
