@@ -87,8 +87,9 @@ class Slip:
         return axis, contact
 
     def run(self, voltage, dt, twist=(0.0, 0.0, 0.0)):
-        """Twist, rim speeds and contacts after each row. Shapes (rows + 1, 3), (rows + 1, n), (rows + 1, n)."""
-        y = np.concatenate([twist, self.G.T @ twist])
+        """Twist, rim speeds and contacts after each row, shapes (rows + 1, 3), (rows + 1, n), (rows + 1, n); `pose`
+        then has the places (x, y, heading), shape (rows + 1, 3)."""
+        y = np.concatenate([twist, self.G.T @ twist, np.zeros(3)])
         axis, contact = np.sign(y[:3]), np.zeros(self.n)
         found, marks = [y.copy()], [contact.copy()]
         for u in voltage:
@@ -100,12 +101,14 @@ class Slip:
             found.append(y.copy())
             marks.append(contact.copy())
         found = np.array(found)
-        return found[:, :3], found[:, 3:], np.array(marks)
+        self.pose = found[:, 3 + self.n :]
+        return found[:, :3], found[:, 3 : 3 + self.n], np.array(marks)
 
     def _to_event(self, y, u, axis, contact, left):
         def rate(_, z):
             a, b, _, _ = self.forces(z, u, axis, contact)
-            return np.concatenate([a, b])
+            cos, sin = np.cos(z[-1]), np.sin(z[-1])
+            return np.concatenate([a, b, [cos * z[0] - sin * z[1], sin * z[0] + cos * z[1], z[2]]])
 
         def watch(k):
             def value(t, z):
