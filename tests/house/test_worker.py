@@ -1,0 +1,22 @@
+"""The process that benchmarks ask for one log at a time: slow, failing and dying ones are three different things."""
+
+import os
+import time
+
+import pytest
+
+from benchmarks.wrong_worlds import worker as module
+from benchmarks.wrong_worlds.worker import Worker
+
+
+def test_what_comes_back_and_what_does_not(monkeypatch):
+    with Worker() as worker:
+        assert worker.ask(max, 3, 5) == 5
+        with pytest.raises(ZeroDivisionError):
+            worker.ask(divmod, 1, 0)
+        with pytest.raises(RuntimeError, match="died, exit code 7"):
+            worker.ask(os._exit, 7)
+        monkeypatch.setattr(module, "LONGEST", 0.2)
+        assert worker.ask(time.sleep, 60.0) is None
+        monkeypatch.setattr(module, "LONGEST", 60.0)
+        assert worker.ask(max, 3, 5) == 5
