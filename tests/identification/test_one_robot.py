@@ -116,7 +116,7 @@ def test_two_methods_on_one_log_agree_or_say_why_not():
     for key, interval in whole.ci95.items():
         assert overlap(interval, again.ci95[key]), key
     assert not overlap(whole.ci95["friction.axes.coulomb[0]"], steady.ci95["friction.axes.coulomb[0]"])
-    assert "no dead band of the driver was taken off: every 0.1 V more would be 0.66 N, " in steady.scale
+    assert "no dead band of the driver was taken off: every 0.1 V more would be up to 0.66 N, " in steady.scale
     more = steady.value["friction.axes.coulomb[0]"] - whole.value["friction.axes.coulomb[0]"]
     assert more == pytest.approx(0.66 * DEAD / 0.1, rel=0.03)
     assert f"a dead band of {whole.robot.drive.dead_band:.4g} V, identified" in again.scale

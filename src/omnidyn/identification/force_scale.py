@@ -58,8 +58,8 @@ def _behind(robot: Robot) -> str:
     lost = [f"{STEP * force:.2g} {unit}" for force, unit in zip(taken(robot), ("N", "N", "N m"), strict=True)]
     band = f"a dead band of {_known(robot, DEAD_BAND)}" if robot.drive.dead_band else "no dead band of the driver"
     return (
-        f"of the voltages {band} was taken off: every {STEP:g} V more would be {_listed(lost)} less Coulomb friction "
-        "along x, y and about yaw, and a fit to whole logs, which tells the two apart, differs by that"
+        f"of the voltages {band} was taken off: every {STEP:g} V more would be up to {_listed(lost)} less Coulomb "
+        "friction along x, y and about yaw, and a fit to whole logs, which tells the two apart, differs by that"
     )
 
 
