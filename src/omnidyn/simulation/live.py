@@ -54,7 +54,7 @@ class LiveRobot:
         self.robot, self.dt, self.supply = robot, dt, supply
         self.pose, self.twist = as_start("pose", pose, 3), as_start("twist", twist, 3)
         self._kind, n = robot.drive.kind, robot.wheels.count
-        self._push = pushing(robot, push)
+        self._push = pushing(robot, push) if any(push) else None
         late = delay + robot.drive.latency / dt
         self._whole = int(np.floor(late + EDGE))
         self._part = late - self._whole if late - self._whole > EDGE else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,7 @@ from omnidyn.simulation.slip.grip import Grip
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
-from omnidyn.simulation.view import PLAIN, View, seen_at_once, seen_through
+from omnidyn.simulation.view import PLAIN, View, pushing, seen_at_once, seen_through
 
 TOLERANCE = 1e-6
 # Beyond these a step has no meaning and the implicit engine no end: [m/s, rad/s], [m, rad], [A].
@@ -82,15 +83,22 @@ def simulate_seen(
     tolerance = as_tolerance(tol)  # refused for either engine: which one runs is not what the caller chose
     acting = view.acting(robot, given)
     exact = given.set_point is None and given.open_circuit is None and view.room is None
+    exact &= view.push is None or robot.motor.electrical != DYNAMIC
     if exact and not why_not_exact(robot):
         assert acting.voltage is not None
         if robot.motor.electrical == DYNAMIC:
             twists, poses, currents = simulate_exact_inductance(robot, acting.voltage, acting.dt, *start, amperes)
         else:
-            (twists, poses), currents = simulate_exact(robot, acting.voltage, acting.dt, *start), None
+            (twists, poses), currents = simulate_exact(robot, _pushed(robot, acting, view), acting.dt, *start), None
         done = Done(acting.voltage, twists, poses, None, currents)
         return as_run(robot, given, acting, done, "exact engine", (), view)
     return _implicit(robot, given, acting, *start, amperes, tolerance, view)
+
+
+def _pushed(robot: Robot, acting: Commands, view: View) -> FloatArray:
+    """The voltages of what acts, and beside them those that push as hard as what pushes from outside."""
+    assert acting.voltage is not None
+    return acting.voltage if view.push is None else acting.voltage + pushing(robot, view.push)
 
 
 def _check_order(robot: Robot, voltage: object, dt: object) -> None:
@@ -136,6 +144,8 @@ def _implicit(
         return _slipping(robot, given, acting, (twist, pose), tol, view)
     numbers = plant(robot)
     numbers.body.room += (0.0, 0.0) if view.room is None else view.room
+    if view.push is not None:
+        numbers.body.push += np.array(view.push) / [1.0, 1.0, numbers.body.length]
     dt, voltage, loop, keep = _on_grid(robot, acting)
     bound = current_bounds(robot, acting, len(dt))
     outcome = run_implicit(numbers, voltage, bound, dt, start_state(numbers, twist, current), pose, loop, tol)
@@ -160,6 +170,8 @@ def _slipping(
     """Run the engine of wheels that slip, and say which did."""
     numbers = slip_plant(robot)
     numbers.room[:] += (0.0, 0.0) if view.room is None else view.room
+    if acting.set_point is None:
+        acting = replace(acting, voltage=_pushed(robot, acting, view))
     dt, voltage, loop, keep = _on_grid(robot, acting)
     out = run_slipping(
         numbers, voltage, current_bounds(robot, acting, len(dt)), dt, rolling(numbers, start[0]), start[1], loop, tol
@@ -169,7 +181,7 @@ def _slipping(
     asked, state = voltage[keep[:-1]], out.state[keep]
     motors = asked if acting.set_point is None else reaching(robot, asked)
     turning = state[:, N_AXES:] / robot.wheels.radii
-    push = 0.0 if view.push is None else view.push
+    push = 0.0 if view.push is None or acting.voltage is None else pushing(robot, view.push)  # not of the motors
     current = settled_current(robot.motor, _with_last(motors - push), turning)
     done = Done(motors, state[:, :N_AXES], out.pose[keep], None, current, asked, turning)
     how = f"engine of wheels that slip, tol {tol:g} m/s" if tol else "engine of wheels that slip, fixed step"
@@ -225,8 +237,7 @@ def as_run(
     elif outcome is not None and robot.motor.electrical == DYNAMIC:
         current = outcome.state.each["current"][:, N_AXES : N_AXES + n]
     else:
-        push = 0.0 if view.push is None else view.push  # of the floor, not of the motors
-        current = settled_currents(robot, done.twist, _with_last(done.voltage - push))
+        current = settled_currents(robot, done.twist, _with_last(done.voltage))
     if acting.open_circuit is not None:
         current = np.where(_with_last(acting.open_circuit), 0.0, current)
     if given.voltage is None:  # a speed loop makes it, at its own ticks

@@ -1,6 +1,6 @@
 """View: how commands reach the motors, and how a log shows what the robot does. From both a simulation is seen.
 
-    u = left gain (|u| - dead)+ sgn u + what pushes as hard as a push of the body
+    u = left gain (|u| - dead)+ sgn u
 
 A robot has a dead band and a latency of its own; a log may add a gain, a fade, a push, channels that are late, and a
 tilt: a force that stays in the room.
@@ -29,15 +29,16 @@ DIGITS = 12  # of a second: latenesses that differ by less are one
 class View:
     """clock: None, where nothing is late. late: channel -> which of the latenesses of the clock it has.
 
-    driver, share (rows,), push (wheels,) [V]: what becomes of voltages. held: whether the first command acted before it
-    was given, as in a log that begins in motion; else nothing did. room: a constant force there [N].
+    driver, share (rows,): what becomes of voltages. held: whether the first command acted before it was given, as in a
+    log that begins in motion; else nothing did. room: a constant force there [N]; push: a constant wrench on the body
+    [N, N, N m].
     """
 
     clock: Clock | None = None
     late: Mapping[str, int] = field(default_factory=dict)
     driver: Driver = Driver()  # noqa: RUF009
     share: FloatArray | None = None
-    push: FloatArray | None = None
+    push: tuple[float, float, float] | None = None
     held: bool = False
     room: tuple[float, float] | None = None
 
@@ -55,8 +56,6 @@ class View:
                 given, dt=self.clock.dt, set_point=self._stepped(given.set_point), open_circuit=self._open(given)
             )
             voltage = self._stepped(voltage)
-        if voltage is not None and self.push is not None:
-            voltage = voltage + self.push
         return given if voltage is given.voltage else replace(given, voltage=voltage)
 
     def of(self, channel: str, samples: FloatArray) -> FloatArray:
@@ -107,12 +106,10 @@ def seen_through(
     time = clock(dt, main, apart) if main or any(apart) else None
     at = {"voltage": apart.index(0.0)} | {name: apart.index(each) for name, each in late.items()}
     driver, room = Driver(log.gain, robot.drive.dead_band, log.fade), log.tilt if any(log.tilt) else None
-    return View(time, at, driver, share, pushing(robot, log.push), start is not None, room)
+    return View(time, at, driver, share, log.push if any(log.push) else None, start is not None, room)
 
 
-def pushing(robot: Robot, push: tuple[float, float, float]) -> FloatArray | None:
-    """The least volts that push the body at rest as hard as a wrench (3,) [N, N, N m]; None without one. (wheels,)."""
-    if not any(push):
-        return None
+def pushing(robot: Robot, push: tuple[float, float, float]) -> FloatArray:
+    """The least volts that push the body at rest as hard as a wrench (3,) [N, N, N m]. Shape (wheels,)."""
     per_volt = drive_wrench(linear_part(robot), np.zeros(3), np.eye(robot.wheels.count)).T
     return np.asarray(np.linalg.lstsq(per_volt, np.array(push), rcond=None)[0], dtype=float)

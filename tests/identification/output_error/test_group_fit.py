@@ -119,8 +119,9 @@ def test_refusals(clean):
         identify_groups(runs, AXEBOT, ["a", "b"], per_free=[MASS])
     with pytest.raises(InputError, match="nothing differs between the groups"):
         identify_groups(runs, AXEBOT, ["a", "b"], free=[TORQUE], nuisances=())
-    with pytest.raises(InputError, match=r"implicit engine, which does not know all that is asked for; got tilt\.x"):
-        identify_groups(runs, load_robot("robotino"), ["a", "b"], nuisances=["tilt"])
+    slips = AXEBOT.replace(wheels=AXEBOT.wheels.replace(traction_mu=0.4, wheel_inertia=2e-5))
+    with pytest.raises(InputError, match=r"an engine which does not know all that is asked for; got tilt\.x"):
+        identify_groups(runs, slips, ["a", "b"], nuisances=["tilt"])
     with pytest.raises(UnsupportedError, match="holds no voltage"):
         identify_groups([np_free(run) for run in runs], AXEBOT, ["a", "b"])
 

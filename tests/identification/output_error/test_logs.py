@@ -233,9 +233,9 @@ def test_logs_that_cannot_be_used(axebot, four_wheel, clean):
     fourth = log.replace(voltage=np.column_stack([log.voltage, np.full(len(log), np.nan)]), current=None)
     with pytest.raises(InputError, match=r"wheels without any input; got none for wheel 4; expected one for each of"):
         fit_output_error(fourth.replace(wheel_speed=None), four_wheel)
-    turning = axebot.replace(body=axebot.body.replace(rotating_frame=True))
+    slips = axebot.replace(wheels=axebot.wheels.replace(traction_mu=0.4, wheel_inertia=2e-5))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got tilt\.x"):
-        fit_output_error(log, turning, nuisances=["tilt.x"])
+        fit_output_error(log, slips, nuisances=["tilt.x"])
     still = np.random.default_rng(1).normal(size=log.twist.shape) * NOISE
     with pytest.raises(InsufficientDataError, match=r"the robot never visibly moved.*x held 0"):
         fit_output_error(log.replace(voltage=log.voltage * 0.01, twist=still), axebot)

@@ -135,13 +135,17 @@ def advance_pose(pose, x0, xm, x1, length, h, rule):
 
 @part
 def pull(plant, stage, ahead):
-    """Turn the force of the room into the axes of a body that has turned by `ahead` [rad] since the step began."""
+    """What pushes from outside: the wrench on the body, and the force of the room, turned into the axes of a body that
+    has turned by `ahead` [rad] since the step began."""
     body, task = plant.body, stage.task
+    for a in range(3):
+        task.push[a] = body.push[a]
     if body.room[0] != 0.0 or body.room[1] != 0.0:
         cos, sin = math.cos(task.facing + ahead), math.sin(task.facing + ahead)
-        task.push[0] = cos * body.room[0] + sin * body.room[1]
-        task.push[1] = cos * body.room[1] - sin * body.room[0]
-        task.push[2] = body.centre[0] * task.push[1] - body.centre[1] * task.push[0]
+        x, y = cos * body.room[0] + sin * body.room[1], cos * body.room[1] - sin * body.room[0]
+        task.push[0] += x
+        task.push[1] += y
+        task.push[2] += body.centre[0] * y - body.centre[1] * x
 
 
 @part

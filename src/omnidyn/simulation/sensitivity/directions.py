@@ -29,6 +29,7 @@ class Directions(NamedTuple):
     stages: Stage  # one of each plant
     arm: FloatArray  # (elements, K, 3) derivative of the directions g_e
     voltage: FloatArray  # (K, rows, n) derivative of the applied voltage
+    push: FloatArray  # (2 K + 1, rows, 3) wrench from outside on each of the plants; no rows where there is none
     lift: FloatArray  # (3, 6) rows of the elimination: stuck direction, and what it is made of
     held: IntArray  # (2, 3) which elements span what is stuck; pivots
     point: FloatArray  # (5, 3) points, accelerations
@@ -68,17 +69,20 @@ def prepared(robot: Robot, keys: Sequence[str]) -> Prepared:
     return Prepared(robot, tuple(keys), scale, robots, numbers, plants)
 
 
-def directions_of(numbers: Plant, plants: list[Plant], rates: FloatArray) -> Directions:
+def directions_of(
+    numbers: Plant, plants: list[Plant], rates: FloatArray, push: FloatArray | None = None
+) -> Directions:  # fmt: skip
     """Tables of the plants up and down each key, the robot's own as the last one, and room to work in.
 
-    rates: derivatives of the applied voltages, shape (K, rows, n).
+    rates: derivatives of the applied voltages, shape (K, rows, n). push: on each plant, (2 K + 1, rows, 3) [N].
     """
     own = many([*plants, numbers])
+    push = np.zeros((len(plants) + 1, 0, N_AXES)) if push is None else np.ascontiguousarray(push)
     count, n = len(plants) // 2, numbers.wheels
     arm = np.ascontiguousarray(np.swapaxes(difference(own.element["g"][:-1]), 0, 1))
     work = np.zeros((4, count, width(numbers)))
     return Directions(
-        plants=own, stages=new_stage(own), arm=arm, voltage=rates,
+        plants=own, stages=new_stage(own), arm=arm, voltage=rates, push=push,
         lift=np.zeros((3, 6)), held=np.zeros((2, 3), np.int64), point=np.zeros((5, 3)), aim=work[0], middle=work[1],
         half=work[2], first=new_state(numbers),
         last=new_state(numbers), gained=np.zeros(3), carry=np.zeros((3, n)),

@@ -195,13 +195,13 @@ def _gap(plant, stage, along, start, d, eps):
         point[a] = start.x[a] + eps * d[a]
     _at_instant(plant, stage, start, point, SHORTEST)
     for a in range(3):
-        stage.task.push[a] = along.point[4, a]
+        stage.task.push[a] = plant.body.push[a] + along.point[4, a]
     for w in range(m - N_AXES):
         stage.each[N_AXES + w].aimed_current += eps * d[3 + w]
         stage.each[N_AXES + w].branch = OPEN
     found = _least_gap(plant, stage, point)
     for a in range(3):
-        stage.task.push[a] = 0.0
+        stage.task.push[a] = plant.body.push[a]
     return found
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from omnidyn.simulation.commands import Commands, current_bounds
 from omnidyn.simulation.implicit.march import capped
 from omnidyn.simulation.sensitivity.derivatives import refuse_rate, run_with_derivatives
 from omnidyn.simulation.sensitivity.directions import (
+    EPS,
     current_derivatives,
     difference,
     directions_of,
@@ -43,8 +45,9 @@ PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
 class Direction:
     """A way to change a run; derivatives are by a number that is 0 for the run itself.
 
-    up, down: robots at +EPS and -EPS, None where the robot stays. voltage, of the shape of the voltages [V], and start
-    (3,): derivatives of them and of the twist at the start, None where they stay. name: for messages.
+    up, down: robots at +EPS and -EPS, None where the robot stays. voltage, of the shape of the voltages [V], start (3,)
+    and push (rows, 3): derivatives of them, of the twist at the start and of the wrench from outside, None where they
+    stay. name: for messages.
     """
 
     name: str
@@ -52,6 +55,17 @@ class Direction:
     down: Robot | None = None
     voltage: FloatArray | None = None
     start: FloatArray | None = None
+    push: FloatArray | None = None
+
+
+class Program(NamedTuple):
+    """Under what a run goes. t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors, or (rows, n): see
+    `held`; start: (3,) twist; push: a wrench from outside over each of these rows (., 3) [N, N, N m], or None."""
+
+    t: FloatArray
+    voltage: FloatArray
+    start: FloatArray
+    push: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,17 +142,16 @@ class LateSample:
 
 
 def late_samples(
-    robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
-    late: Sequence[float], tol: float | None, travel: int = TURN,
+    robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], tol: float | None,
+    travel: int = TURN,
 ) -> tuple[list[LateSample], int]:  # fmt: skip
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
-    t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors, or (rows, n): see `held`; start: (3,)
-    twist; tol as for `simulate`, but ROUGH instead of None where friction falls so fast that a row took more than
+    tol as for `simulate`, but ROUGH instead of None where friction falls so fast that a row took more than
     PIECES steps; travel: what is wanted of the way, see sample.py. Also returns the number of rows in which the
     friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
     """
-    numbers, plants = _plants(robot, directions)
+    (numbers, plants), (t, voltage, start, _) = _plants(robot, directions), program
     rates = np.zeros((len(directions), *voltage.shape))
     first, length = np.zeros((len(directions), width(numbers))), numbers.body.length
     stretch = _stretch(plants)
@@ -149,8 +162,9 @@ def late_samples(
     given = Commands(held(t, len(voltage), late), np.ascontiguousarray(voltage))
     seen = _room(robot, t, late, len(directions), travel)
     outcome, _, _ = run_with_derivatives(
-        numbers, directions_of(numbers, plants, rates), given, current_bounds(robot, given, len(given.dt)),
-        (np.asarray(start, dtype=float), np.zeros(3)), first, _within(tol, numbers, given.dt), seen,
+        numbers, directions_of(numbers, plants, rates, _pushes(program.push, directions, [*plants, numbers])), given,
+        current_bounds(robot, given, len(given.dt)), (np.asarray(start, dtype=float), np.zeros(3)), first,
+        _within(tol, numbers, given.dt), seen,
     )  # fmt: skip
     return _looks(robot, directions, seen, (length, stretch), (seen.t, voltage, rates)), capped(outcome)
 
@@ -212,6 +226,20 @@ def _plants(robot: Robot, directions: Sequence[Direction]) -> tuple[Plant, list[
     for k, one in enumerate(directions):
         refuse_switched_off(one.name, numbers, plants[2 * k])
     return numbers, plants
+
+
+def _pushes(push: FloatArray | None, directions: Sequence[Direction], plants: Sequence[Plant]) -> FloatArray | None:
+    """The wrench from outside as each plant counts it, with yaw over its length: those up and down each direction, and
+    the robot's own. Shape (2 K + 1, rows, 3)."""
+    if push is None:
+        return None
+    found = np.tile(push, (len(plants), 1, 1))
+    for k, one in enumerate(directions):
+        if one.push is not None:
+            found[2 * k] += EPS * one.push
+            found[2 * k + 1] -= EPS * one.push
+    found[..., 2] /= np.array([each.body.length for each in plants])[:, None]
+    return found
 
 
 def _stretch(plants: Sequence[Plant]) -> FloatArray:

@@ -147,6 +147,16 @@ def apply_row(stage, along, voltage, bound, dvoltage):
             along.stages.each[2 * k + 1, e].voltage = voltage[w] - EPS * dvoltage[k, w]
 
 
+@part
+def push_row(plant, stage, along, row):
+    """Push the robot, and the plants of each parameter, from outside as in a row."""
+    last = len(along.push) - 1
+    for a in range(3 if row < along.push.shape[1] else 0):
+        plant.body.push[a] = stage.task.push[a] = along.push[last, row, a]
+        for j in range(last):
+            along.plants.body[j].push[a] = along.push[j, row, a]
+
+
 @branching_kernel
 def march_with_derivatives(
     room, along, voltage, bound, dt, tol, out, first, ds, dposes, seen
@@ -160,6 +170,7 @@ def march_with_derivatives(
     kept, begin = len(ds) > 0, 0.0
     for r in range(len(dt)):
         apply_row(stage, along, voltage[r], bound[r], along.voltage[:, r])
+        push_row(plant, stage, along, r)
         h = row_with_derivatives(
             plant, stage, bare, spare, along, state, dt[r], tol, h, pose, d, dnext, dpose,
             counts, kept, seen, begin,

@@ -21,7 +21,7 @@ from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.commands import Commands, current_bounds
 from omnidyn.simulation.sensitivity.directions import EPS, difference
-from omnidyn.simulation.sensitivity.late_sample import Direction, held
+from omnidyn.simulation.sensitivity.late_sample import Direction, Program, held
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import no_loop
@@ -103,14 +103,14 @@ class SlipSample:
 
 
 def slipping_samples(
-    robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
-    late: Sequence[float], steps: int, tol: float,
+    robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], steps: int, tol: float
 ) -> list[SlipSample]:  # fmt: skip
     """Simulate under held voltages, and sample at t - late: one SlipSample for every latency.
 
     steps: of a row, for derivatives, and for all where tol is 0; else tol [m/s] is of the run. Others as of
     `late_samples`. Raises UnsupportedError for a robot that the engine does not know.
     """
+    t, voltage, start, _ = program
     ends = [(robot, voltage, start)]
     for one in directions:
         for end, side in ((one.up, EPS), (one.down, -EPS)):

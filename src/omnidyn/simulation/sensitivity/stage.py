@@ -73,7 +73,7 @@ def _same_problem(plant, stage, along, k, aim):
         own, eps = along.stages.task[2 * k + side], EPS * (1 - 2 * side)
         own.tau, own.ellipse = task.tau, task.ellipse
         for a in range(3):
-            own.goal[a], own.push[a] = task.goal[a] + eps * aim[a], task.push[a]
+            own.goal[a], own.push[a] = task.goal[a] + eps * aim[a], along.plants.body[2 * k + side].push[a]
         for e in range(m):
             at = each[e]
             one = along.stages.each[2 * k + side, e]

@@ -35,7 +35,7 @@ from omnidyn.identification.output_error.kernel.march_axis import (
     spread,
 )
 from omnidyn.identification.output_error.kernel.pull import Room
-from omnidyn.identification.output_error.problem.heading import facing_at_start, headings
+from omnidyn.identification.output_error.problem.heading import facing_at_start, headings, in_the_body
 from omnidyn.identification.output_error.problem.primitives import Mapping, Primitives
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import at_motors
@@ -294,12 +294,6 @@ def _maps(columns: Sequence[Column], now: Primitives, facing: float, more: tuple
         else:
             (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
     return [speed, travel, volts]
-
-
-def in_the_body(heading: FloatArray, force: FloatArray) -> FloatArray:
-    """What a body that faces so [rad] feels of a force (2,) in the room, as a wrench. Shape (rows, 3)."""
-    cos, sin = np.cos(heading), np.sin(heading)
-    return np.stack([cos * force[0] + sin * force[1], cos * force[1] - sin * force[0], np.zeros_like(cos)], axis=-1)
 
 
 def turned_by(facing: float) -> FloatArray:

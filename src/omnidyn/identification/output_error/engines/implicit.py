@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from threading import Lock
 from typing import Self
 
@@ -17,14 +18,15 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.beside import side_by_side
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
-from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, Weighting
+from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT, Weighting
 from omnidyn.identification.output_error.engines.sums import added
+from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
-from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, late_samples
+from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, Program, late_samples
 from omnidyn.simulation.sensitivity.sample import PATH, PLACE, TURN
 
 Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time derivative (rows, m), (rows, K, m)
@@ -55,17 +57,21 @@ class LastPoints:
 class ImplicitEngine:
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
-    Raises UnsupportedError for nuisances that it does not know.
+    A force that stays in the room is turned by the headings of the log. pushes: whether it knows such forces, and those
+    on the body. Raises UnsupportedError for nuisances that it does not know.
     """
+
+    pushes = True
 
     def __init__(self, problem: Problem, tol: float | None = None):
         self.problem, self.tol, self._columns = problem, tol, problem.columns
         nuisances = [p.name for p in problem.parameters[problem.robot_count :]]
-        other = [name for name in nuisances if not name.startswith(LATE) and name not in Driver._fields]
+        known = (*Driver._fields, *((*TILT, *PUSH) if self.pushes else ()))
+        other = [name for name in nuisances if not name.startswith(LATE) and name not in known]
         if other:
             raise UnsupportedError(
-                "this robot is fitted by the implicit engine, which does not know all that is asked for",
-                got=", ".join(other), expected=f"nuisances: latency, {', '.join(Driver._fields)}",
+                "this robot is fitted by an engine which does not know all that is asked for",
+                got=", ".join(other), expected=f"nuisances: latency, {', '.join(known)}",
                 remedy="leave it out of the nuisances", where=problem.robot.name,
             )  # fmt: skip
         self.last = LastPoints()
@@ -141,15 +147,39 @@ class ImplicitEngine:
         """(a look at the run for every latency, index of each direction among the slopes, their factors)."""
         t = piece.record.t[piece.first : piece.last + 1]
         voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
-        travel = travel_of(piece.record.columns)
-        return self._sampled(robot, t, voltage, directions, state[:N_AXES], late, travel), at, factors
+        push, more, where = self._forces(robot, moved, piece, values, directions)
+        program, travel = Program(t, voltage, state[:N_AXES], push), travel_of(piece.record.columns)
+        factors = np.concatenate([factors, np.ones(len(where))])
+        return self._sampled(robot, program, more, late, travel), [*at, *where], factors
+
+    def _forces(
+        self, robot: Robot, moved: list[tuple[Robot, ...]], piece: Piece, values: FloatArray,
+        directions: Sequence[Direction],
+    ) -> tuple[FloatArray | None, list[Direction], list[int]]:  # fmt: skip
+        """(the wrench from outside over the rows, None without one; the directions, those along its numbers behind; the
+        place of these among the parameters)."""
+        every = (*TILT, *PUSH)
+        known = {name: k for name in every if (k := self.problem.where(name)) >= 0}
+        if not known:
+            return None, list(directions), []
+        facing, own = _between(headings(piece, robot)), list(directions)
+        force = np.array([values[known[name]] if name in known else 0.0 for name in every])
+
+        def wrench(of: Robot, force: FloatArray) -> FloatArray:
+            return in_the_body(facing, force[:2], of.body.centre) + force[2:]
+
+        for k, (up, down) in enumerate(moved):
+            if up.body.centre != down.body.centre:
+                own[k] = replace(own[k], push=difference(np.array([wrench(up, force), wrench(down, force)]))[0])
+        one = np.eye(len(force))
+        own += [Direction(name, push=wrench(robot, one[j])) for j, name in enumerate(every) if name in known]
+        return wrench(robot, force), own, list(known.values())
 
     def _sampled(
-        self, robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
-        late: Sequence[float], travel: int,
-    ) -> list[LateSample]:  # fmt: skip
-        """The run under these voltages, seen with every latency."""
-        return late_samples(robot, t, voltage, directions, start, late, self.tol, travel)[0]
+        self, robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], travel: int
+    ) -> list[LateSample]:
+        """The run of this program, seen with every latency."""
+        return late_samples(robot, program, directions, late, self.tol, travel)[0]
 
     def _shown(self, seen: list[LateSample], number: int, name: str, facing: float) -> Shown:
         """What a channel of m columns shows at latency `number`, from the start; facing: the heading there [rad]."""
@@ -190,6 +220,11 @@ class ImplicitEngine:
         factors = np.ones(len(at))
         factors[: self.problem.robot_count] = 1.0 / np.array(scales[: self.problem.robot_count])
         return voltage, directions, at, factors
+
+
+def _between(headings: FloatArray) -> FloatArray:
+    """The heading in the middle of each row [rad]; at the last one its own."""
+    return np.append(0.5 * (headings[1:] + headings[:-1]), headings[-1:])
 
 
 def through_the_end(commands: FloatArray) -> FloatArray:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast
 
-from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample
+from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, Program
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
 
 STEPS = 2  # a row, of derivatives at the end of a fit; it begins with one
@@ -19,12 +18,13 @@ LEAST_TOL = 1e-5  # [m/s] of the run itself
 class SlipEngine(ImplicitEngine):
     """Residuals and sensitivities of a problem whose robot has a `traction_mu`, by differences of whole runs."""
 
+    pushes = False
+
     def _sampled(
-        self, robot: Robot, t: FloatArray, voltage: FloatArray, directions: Sequence[Direction], start: FloatArray,
-        late: Sequence[float], travel: int,
-    ) -> list[LateSample]:  # fmt: skip
+        self, robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], travel: int
+    ) -> list[LateSample]:
         steps, tol = (1, 0.0) if self.tol is None else (STEPS, max(self.tol, LEAST_TOL))
-        seen = slipping_samples(robot, t, voltage, directions, start, late, steps, tol)
+        seen = slipping_samples(robot, program, directions, late, steps, tol)
         return cast(list[LateSample], seen)  # what is asked of both is the same
 
 

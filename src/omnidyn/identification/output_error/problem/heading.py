@@ -26,6 +26,16 @@ def headings(piece: Piece, robot: Robot) -> FloatArray:
     return _integral(record, robot)[rows]
 
 
+def in_the_body(heading: FloatArray, force: FloatArray, centre: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
+    """What a body that faces so [rad] feels of a force (2,) in the room [N], as a wrench. Shape (rows, 3) [N, N, N m].
+
+    centre: of mass, on which it acts [m].
+    """
+    cos, sin = np.cos(heading), np.sin(heading)
+    x, y = cos * force[0] + sin * force[1], cos * force[1] - sin * force[0]
+    return np.stack([x, y, centre[0] * y - centre[1] * x], axis=-1)
+
+
 def facing_at_start(piece: Piece, robot: Robot) -> float:
     """The heading at the start of a piece [rad]; 0 at that of a log without headings."""
     return 0.0 if piece.first == 0 else float(headings(piece, robot)[0])
