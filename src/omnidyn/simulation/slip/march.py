@@ -30,7 +30,7 @@ from omnidyn.simulation.slip.bounds import (
 )  # fmt: skip
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
-from omnidyn.simulation.slip.wheel import FREE, GRIPS
+from omnidyn.simulation.slip.wheel import FREE, GRIPS, LINE
 from omnidyn.simulation.speed_loop import Loop, passed, tick_answer, tick_branch
 
 SHORT, SHORTEST, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/march.py
@@ -58,13 +58,15 @@ class SlipState(NamedTuple):
 
 class SlipRoom(NamedTuple):
     """What a run works in: the state of now, those after a whole step, one and two half steps, and of a stage its parts
-    as of model/layout.py, the wrench `pull` (3,), the goal x* (3 + n,), `space` (12,); counts: most sweeps, steps."""
+    as of model/layout.py, motors as `lines` (n,) of LINE, the wrench `pull` (3,), the goal x* (3 + n,), `space` (12,);
+    counts: most sweeps, steps."""
 
     now: SlipState
     whole: SlipState
     middle: SlipState
     two: SlipState
     stage: Stage
+    lines: Any
     pull: FloatArray
     goal: FloatArray
     space: FloatArray
@@ -129,8 +131,8 @@ def _room(plant: SlipPlant) -> SlipRoom:
     n = len(plant.spin)
     now, whole, middle, two = (SlipState(np.zeros(3 + n), np.zeros(5 + n, SLIP_EACH)) for _ in range(4))
     stage = new_stage(Plant(plant.body, plant.element[None]))
-    counts = np.zeros(2, np.int64)
-    return SlipRoom(now, whole, middle, two, stage, np.zeros(3), np.zeros(3 + n), np.zeros(12), counts)
+    space = np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64)
+    return SlipRoom(now, whole, middle, two, stage, np.zeros(n, LINE), *space)
 
 
 def rolling(plant: SlipPlant, twist: FloatArray, current: FloatArray | None = None) -> FloatArray:

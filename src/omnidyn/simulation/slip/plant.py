@@ -130,6 +130,7 @@ def _refuse(robot: Robot) -> None:
     if found:
         raise UnsupportedError(
             "wheels that slip are simulated without some of what this robot has", got="; ".join(found),
-            expected="wheels with an inertia; laws that stick, or bend on axes and wheels", where="[wheels] traction_mu",
+            expected="wheels with an inertia; laws that stick, or bend on axes and wheels",
+            where="[wheels] traction_mu",
             remedy="change that, or leave traction_mu out",
         )  # fmt: skip

@@ -17,11 +17,10 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.bristle import bristle_force
 from omnidyn.model.layout import Plant
 from omnidyn.model.stick_slip.copies import copy_row
-from omnidyn.model.stick_slip.forces import winding
 from omnidyn.model.stick_slip.laws import aim_bristles
 from omnidyn.simulation.implicit.step import BACK, GAMMA, STIFF
 from omnidyn.simulation.slip.levels import begin_levels, follow_speeds, give_way, stops
-from omnidyn.simulation.slip.wheel import FREE, GRIPS, STEPS, wheel_answer
+from omnidyn.simulation.slip.wheel import FREE, GRIPS, STEPS, current_at, set_line, wheel_answer
 
 SWEEPS = 4000
 TIGHT = 2e-15  # of the speeds at hand: a change that is rounding
@@ -120,12 +119,13 @@ def _frame(plant, tau, goal, v, total, frame):
 
 
 @part
-def solve_stage(plant, stage, start, goal, pull, x, each, space):
-    """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. goal: x*. pull (3,): wrench on the body.
+def solve_stage(plant, stage, start, room, x, each):
+    """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. start: x of before the step.
 
-    start: x of before the step. each: of a SlipState; its forces are a first guess too. space (12,). Returns the number
-    of sweeps.
+    room: its goal is x*, its pull the wrench on the body. each: of a SlipState; its forces are a first guess too.
+    Returns the number of sweeps.
     """
+    goal, pull, space, lines = room.goal, room.pull, room.space, room.lines
     n, heavy, total, frame, offset = len(plant.spin), space[:3], space[3:6], space[6:9], space[9:12]
     tau, falls = stage.task.tau, plant.steep > 0.0
     for a in range(3):
@@ -135,6 +135,7 @@ def solve_stage(plant, stage, start, goal, pull, x, each, space):
         frame[a] = 0.0
     total[0], total[1] = total[0] + each[3 + n].force, total[1] + each[4 + n].force
     for w in range(n):
+        set_line(lines[w], plant.element[3 + w], stage.each[3 + w], tau)
         for a in range(3):
             total[a] += plant.g[w, a] * each[3 + w].force
     for sweep in range(SWEEPS):
@@ -153,7 +154,7 @@ def solve_stage(plant, stage, start, goal, pull, x, each, space):
                 f0, f1 = f0 - plant.element[0].viscous * v0, f1 - plant.element[1].viscous * v1
                 limit = max(limit + plant.shift[w, 0] * f0 + plant.shift[w, 1] * f1, 0.0)
             f, s, sign, contact = wheel_answer(
-                plant.element[3 + w], stage.each[3 + w], tau, plant.spin[w], goal[3 + w], (free, give), limit
+                plant.element[3 + w], stage.each[3 + w], lines[w], tau, plant.spin[w], goal[3 + w], (free, give), limit
             )  # fmt: skip
             for a in range(3):
                 total[a] += plant.g[w, a] * (f - own.force)
@@ -171,14 +172,14 @@ def solve_stage(plant, stage, start, goal, pull, x, each, space):
             worst = max(worst, follow_speeds(plant, stage, x, each) / (heavy[0] + heavy[1]))
         solved = worst <= TIGHT * size or (worst == 0.0 and sweep > 0)
         if solved and (plant.gaps == 0.0 or not give_way(plant, stage, start, x, each)):
-            _finish(plant, stage, x, each)
+            _finish(plant, stage, lines, x, each)
             return sweep + 1
-    _finish(plant, stage, x, each)
+    _finish(plant, stage, lines, x, each)
     return SWEEPS
 
 
 @part
-def _finish(plant, stage, x, each):
+def _finish(plant, stage, lines, x, each):
     """The rim speeds of what grips, currents and bristles; a body that every wheel holds is at rest to the last bit."""
     n, held = len(plant.spin), True
     for w in range(n):
@@ -193,10 +194,7 @@ def _finish(plant, stage, x, each):
         for e in range(3 + n):
             own, at = plant.element[e], stage.each[e]
             if own.inductance > 0.0:
-                at.current = winding(
-                    x[e], at.voltage, at.aimed_current, stage.task.tau, own.emf, own.resistance, own.inductance,
-                    own.drop, at.bound,
-                )[0]  # fmt: skip
+                at.current = current_at(lines[e - 3], x[e])[0]
             if own.stiffness > 0.0:
                 at.bend = bristle_force(own, x[e], at.aimed_bend, stage.task.tau)[2]
 
@@ -235,11 +233,11 @@ def slip_step(plant, stage, h, start, end, room):
     copy_row(x, start.x)
     begin_levels(plant, stage, start)
     _aim(plant, stage, start, end, goal, 0.0)
-    count = solve_stage(plant, stage, start.x, goal, room.pull, x, end.each, room.space)
+    count = solve_stage(plant, stage, start.x, room, x, end.each)
     euler = plant.gaps != 0.0 and stops(plant, start, end)
     if not euler:
         _aim(plant, stage, start, end, goal, BACK)
-        count = max(count, solve_stage(plant, stage, start.x, goal, room.pull, x, end.each, room.space))
+        count = max(count, solve_stage(plant, stage, start.x, room, x, end.each))
         euler = plant.gaps != 0.0 and stops(plant, start, end)
         euler |= plant.remembers != 0.0 and _torn_loose(plant, stage, start, end)
     if euler:
@@ -247,7 +245,7 @@ def slip_step(plant, stage, h, start, end, room):
         copy_row(x, start.x)
         begin_levels(plant, stage, start)
         _aim(plant, stage, start, end, goal, 0.0)
-        count = max(count, solve_stage(plant, stage, start.x, goal, room.pull, x, end.each, room.space))
+        count = max(count, solve_stage(plant, stage, start.x, room, x, end.each))
     if plant.remembers != 0.0:
         for e in range(len(plant.element)):
             end.each[e].current, end.each[e].bend = stage.each[e].current, stage.each[e].bend
