@@ -6,6 +6,7 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.stick_slip.step_bound import MONOTONE, grown, share_left
+from omnidyn.simulation.slip.wheel import current_at
 
 SHARE = 0.1  # of an error of the yaw rate, and of a rim, beside one of the speed
 CURRENT_SHARE = 1e-2  # and of a current
@@ -71,8 +72,11 @@ def _steep_near(plant, x, reach, reach_of_rims):
 
 
 @part
-def growth(plant, start, end, h):
-    """By how much friction that falls may let an error of a step grow; as of stick_slip/step_bound.py."""
+def growth(plant, lines, start, end, h):
+    """By how much friction that falls may let an error of a step grow; as of stick_slip/step_bound.py.
+
+    A rim that its motor damps more than its friction falls, at any speed, forgets errors.
+    """
     body, worst = plant.body[0], 1.0
     for e in range(len(plant.element)):
         own = plant.element[e]
@@ -80,6 +84,8 @@ def growth(plant, start, end, h):
             more = max(own.breakaway[0] - own.coulomb[0], own.breakaway[1] - own.coulomb[1])
             more = max(more, own.bristle_breakaway[0] - own.bristle_coulomb[0])
             heavy = plant.alone * plant.mass[e] if e < 3 else plant.spin[e - 3]
+            if e >= 3 and own.viscous - own.thrust * current_at(lines[e - 3], end.x[e])[1] >= own.steep * heavy:
+                continue
             gain = abs(end.x[e] - start.x[e]) / h
             worst = max(worst, grown(heavy, abs(start.x[e]) * own.fall, own.form, own.exponent, more, gain))
     m = len(plant.element)

@@ -180,16 +180,15 @@ def _error(plant, one, two):
 
 
 @part
-def _beyond(plant, now, middle, two, h, tol, ratio):
-    """(the ratio of the error of a step to what it may be, how far kinks may lead it astray), where friction falls
-    with the speed or anything has a memory."""
-    astray = 0.0
-    if plant.steep > 0.0:
-        ratio *= growth(plant, now, two, h)
+def _beyond(plant, room, h, error):
+    """(what the error of a step counts as, how far kinks may lead it astray), where friction falls with the speed or
+    anything has a memory. What is rounding does not grow."""
+    now, middle, two, astray = room.now, room.middle, room.two, 0.0
+    if plant.steep > 0.0 and error > ROUNDING:
+        error *= growth(plant, room.lines, now, two, h)
     if plant.remembers != 0.0:
-        ratio = max(ratio, bristle_turns(plant, now, two, h) / tol)
         astray = max(reverses(plant, now, middle, h), reverses(plant, middle, two, h))
-    return ratio, astray
+    return error, astray
 
 
 @part
@@ -211,9 +210,12 @@ def _find(plant, stage, pose, h, left, dt, tol, room):
         _pulled(plant, pose[2] + 0.25 * h * now.x[2] + 0.5 * h * middle.x[2], pull)
         third = slip_step(plant, stage, 0.5 * h, middle, two, room)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
-        ratio, astray = _error(plant, one, two) / max(tol / plant.memory * max(h, SHORT), ROUNDING), 0.0
+        error, astray = _error(plant, one, two), 0.0
         if plant.steep > 0.0 or plant.remembers != 0.0:
-            ratio, astray = _beyond(plant, now, middle, two, h, tol, ratio)
+            error, astray = _beyond(plant, room, h, error)
+        ratio = error / max(tol / plant.memory * max(h, SHORT), ROUNDING)
+        if plant.remembers != 0.0:
+            ratio = max(ratio, bristle_turns(plant, now, two, h) / tol)
         if _differ(now, middle) or _differ(middle, two) or _differ(now, one):
             astray = max(astray, unresolved(plant, stage, h))
         if astray > 0.0:
