@@ -169,6 +169,11 @@ class Slip:
 
     def decided(self, y, u, mode, shrink=0.0):
         """The mode after all that cannot hold has given way. shrink: a share by which levels are taken to be less."""
+        mode = mode.copy()
+        for e in np.flatnonzero(mode):  # what rests because others do
+            held = self.D[mode == 0]
+            if len(held) and np.abs(self.D[e] - np.linalg.lstsq(held.T, self.D[e], rcond=1e-9)[0] @ held).max() < 1e-9:
+                mode[e] = 0.0
         at_rest, slides, a = np.flatnonzero(mode == 0), set(), np.zeros(self.k)
         if not len(at_rest):
             return mode

@@ -13,6 +13,8 @@ import math
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.bristle import level_at
 
+EXCESS = 1e-10  # of its level, by which a force must exceed it to move anything
+
 
 @part
 def begin_levels(plant, stage, start):
@@ -55,6 +57,20 @@ def follow_speeds(plant, stage, x, each):
             worst = max(worst, abs(level - stage.task.hold[a]))
             stage.task.hold[a] = level
     return worst
+
+
+@part
+def settle_rest(plant, stage, x, each):
+    """Let rest what moves by rounding alone: where others share its load it may stand at the edge of its levels."""
+    tau, m = stage.task.tau, len(plant.element)
+    for e in range(m):
+        at, sign = stage.each[e], each[e].sign
+        heavy = plant.mass[e] if e < 3 else plant.spin[e - 3]
+        if (sign == 1.0 or sign == -1.0) and abs(x[e]) * heavy <= EXCESS * tau * max(at.hold[0], at.hold[1]):
+            x[e] = each[e].sign = 0.0
+    most = max(stage.task.hold[0], stage.task.hold[1])
+    if each[m].sign == 1.0 and math.hypot(x[0], x[1]) * plant.mass[0] <= EXCESS * tau * most:
+        x[0] = x[1] = each[m].sign = 0.0
 
 
 @part

@@ -19,7 +19,7 @@ from omnidyn.model.layout import Plant
 from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.model.stick_slip.laws import aim_bristles
 from omnidyn.simulation.implicit.step import BACK, GAMMA, STIFF
-from omnidyn.simulation.slip.levels import begin_levels, follow_speeds, give_way, stops
+from omnidyn.simulation.slip.levels import begin_levels, follow_speeds, give_way, settle_rest, stops
 from omnidyn.simulation.slip.wheel import FREE, GRIPS, STEPS, current_at, set_line, wheel_answer
 
 SWEEPS = 4000
@@ -171,6 +171,8 @@ def solve_stage(plant, stage, start, room, x, each):
         if falls:
             worst = max(worst, follow_speeds(plant, stage, x, each) / (heavy[0] + heavy[1]))
         solved = worst <= TIGHT * size or (worst == 0.0 and sweep > 0)
+        if solved and (falls or plant.gaps != 0.0):
+            settle_rest(plant, stage, x, each)
         if solved and (plant.gaps == 0.0 or not give_way(plant, stage, start, x, each)):
             _finish(plant, stage, lines, x, each)
             return sweep + 1
