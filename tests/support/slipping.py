@@ -187,7 +187,11 @@ class Slip:
                     force = force - self.D[e] * mode[e] * level
                 both = self.bounds(y, u, a, turn, slides)[at_rest] * (1.0 - shrink) + 1e-15
                 out = lsq_linear(
-                    self.root @ self.D[at_rest].T, self.root @ force, (-both[:, 1], both[:, 0]), method="bvls", tol=1e-15
+                    self.root @ self.D[at_rest].T,
+                    self.root @ force,
+                    (-both[:, 1], both[:, 0]),
+                    method="bvls",
+                    tol=1e-15,
                 )
                 before, a = a, np.linalg.solve(self.M, force - self.D[at_rest].T @ out.x)
                 if np.abs(a - before).max() <= 1e-12 * (1.0 + np.abs(a).max()):
@@ -216,7 +220,9 @@ class Slip:
             return np.minimum(both[:, 0] - r[held], both[:, 1] + r[held])
         # most t with D^T r = load, -back + t <= r <= hold - t
         rows, k = len(held), len(held) + 1
-        above = np.vstack([np.hstack([np.eye(rows), np.ones((rows, 1))]), np.hstack([-np.eye(rows), np.ones((rows, 1))])])
+        above = np.vstack(
+            [np.hstack([np.eye(rows), np.ones((rows, 1))]), np.hstack([-np.eye(rows), np.ones((rows, 1))])]
+        )
         basis = np.linalg.svd(self.D[held].T)[0][:, : np.linalg.matrix_rank(self.D[held])].T
         same = np.hstack([basis @ self.D[held].T, np.zeros((len(basis), 1))])
         out = linprog(

@@ -25,6 +25,8 @@ POWERS = {
     "viscous": 2, "stiffness": 2, "damping": 2,
 }  # fmt: skip
 """Of the length by which yaw is measured, in each field of ELEMENT."""
+
+
 class SlipPlant(NamedTuple):
     """Body: mass (3,) [kg, kg, kg m^2], about the centre of the wheels; centre (2,) of mass [m]; alone: the share of it
     that is left to a force where the centre stands off; turning [kg], the mass in the terms of a turning frame, or 0;
