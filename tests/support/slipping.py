@@ -1,11 +1,11 @@
-"""Wheels that slip, event by event: modes of what holds and slides, DOP853 between events. Shares no code with the engine.
+"""Wheels that slip, event by event: modes of what holds and slides, DOP853 between events. No code of the engine.
 
 a = (v', s'), of the body and of the rims, under forces F and elements e of dry friction along d_e with multipliers r_e:
 
     M a = F - sum_e d_e r_e,    d_e . a = 0 and -back_e <= r_e <= hold_e at rest,    r_e = sign C_e(d_e . (v, s)) moving
 
-Elements are the axes, the friction of the wheels, and their contacts: d = s - g . v, level mu N. The mass of the body is
-that of its centre, M = T^T diag(m, m, I) T. What gives way is told by least squares within bounds, its levels those
+Elements are the axes, the friction of the wheels, and their contacts: d = s - g . v, level mu N. The mass of the body
+is that of its centre, M = T^T diag(m, m, I) T. What gives way is told by least squares within bounds, its levels those
 that hold; what it says moves slides from then on, and the question is asked again.
 """
 
