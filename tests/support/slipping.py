@@ -1,145 +1,286 @@
-"""Wheels that slip, event by event: modes of grip and stick, DOP853 between events. Shares no code with the engine.
+"""Wheels that slip, event by event: modes of what holds and slides, DOP853 between events. No code of the engine.
 
-M v' = G f + h,  m s' = K (u - E s)/R - f;   grip: s' = g . v', |f| <= mu N;   an axis at rest: v' = 0, |h| <= C
+a = (v', s'), of the body and of the rims, under forces F and elements e of dry friction along d_e with multipliers r_e:
 
-The first line is that of the centre of mass: M = diag(m, m, I) moves with the twist T v, and wrenches of the centre of
-the wheels act there as T^-T w.
+    M a = F - sum_e d_e r_e,    d_e . a = 0 and -back_e <= r_e <= hold_e at rest,    r_e = sign C_e(d_e . (v, s)) moving
+
+Elements are the axes, the friction of the wheels, and their contacts: d = s - g . v, level mu N. The mass of the body
+is that of its centre, M = T^T diag(m, m, I) T. What gives way is told by least squares within bounds, its levels those
+that hold; what it says moves slides from then on, and the question is asked again.
 """
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.optimize import linprog, lsq_linear
 
 from omnidyn.model.wheels import per_wheel
 
-EDGE = 1e-9  # [N] by which what holds and what drives must differ, for a draw to count
+EDGE = 1e-9  # [N, m/s^2] by which what holds and what drives must differ, for a draw to count
 TINY = 1e-13  # [m/s] at which what was let go begins to move
+MOVES = 1e-7  # [m/s^2] of an acceleration that is no rounding of the bounded least squares
+
+
+def falling(law, speed, slide, hold, inverse):
+    """The level at a speed; inverse: 1/v_s."""
+    u = (abs(speed) * inverse) ** law.stribeck_exponent
+    return slide + (hold - slide) * (np.exp(-u) if law.stribeck_shape == "exponential" else 1.0 / (1.0 + u))
+
+
+class Element:
+    """One place of dry friction: levels (2,) forward and backward; of what bends, a force with a state."""
+
+    def __init__(self, law, d, slide, hold, fall, bristle=None):
+        self.law, self.d, self.slide, self.hold, self.fall, self.bristle = law, d, slide, hold, fall, bristle
+
+    def moving(self, speed, sign):
+        """Level while it slides to one side."""
+        side = 0 if sign > 0 else 1
+        if self.fall == 0.0:
+            return self.slide[side]
+        return falling(self.law, speed, self.slide[side], self.hold[side], self.fall)
+
+    def bends(self, speed, z):
+        """(force, z') of a LuGre or Dahl bristle."""
+        stiffness, damping = self.bristle
+        g = self.moving(speed, speed)
+        rate = speed - stiffness * abs(speed) / g * z
+        return stiffness * z + damping * rate, rate
 
 
 class Slip:
-    """A robot with friction on the axes alone; load (n,) of the wheels [N]."""
+    """A robot with friction on the axes and at the wheels; load (n,) of the wheels [N]."""
 
     def __init__(self, robot, load, shift=None):
         n, motor = robot.wheels.count, robot.motor
         at_rim = motor.gear_ratio / robot.wheels.radii
-        self.G, self.n = robot.wheels.wrench_matrix, n
-        self.M = np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
+        self.G, self.n, self.k = robot.wheels.wrench_matrix, n, 3 + n
         spins = motor.rotor_inertia * motor.gear_ratio**2 + per_wheel(robot.wheels.wheel_inertia, n)
-        self.m = spins / robot.wheels.radii**2
         self.kt, self.ke, self.R = at_rim * motor.torque_constant, at_rim * motor.emf_constant, motor.resistance
-        self.B, self.C = np.array(robot.friction.axes.viscous), np.array(robot.friction.axes.coulomb)
+        self.L = motor.inductance if motor.electrical == "dynamic" else 0.0
+        self.eta = per_wheel(motor.gear_efficiency, n)
+        self.B, self.b = np.array(robot.friction.axes.viscous), per_wheel(robot.friction.wheels.viscous, n)
         self.limit = robot.wheels.traction_mu * load
         self.shift = robot.wheels.traction_mu * (np.zeros((n, 2)) if shift is None else shift)
         self.turning = robot.body.mass * robot.body.rotating_frame
         x, y = robot.body.centre
         self.T = np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
-        self.there = np.linalg.inv(self.T).T
+        body = self.T.T @ np.diag([robot.body.mass, robot.body.mass, robot.body.inertia]) @ self.T
+        self.M = np.zeros((self.k, self.k))
+        self.M[:3, :3], self.M[3:, 3:] = body, np.diag(spins / robot.wheels.radii**2)
+        self.root = np.linalg.cholesky(np.linalg.inv(self.M)).T  # M^-1 = root^T root
+        self._fill(robot.friction)
         self.least = np.inf  # how near to an edge any decision was
 
-    def forces(self, y, u, axis, contact):
-        """(v', s', friction of the axes, traction) in a mode: axis (3,), contact (n,), 0 where held."""
-        v, s, n = y[:3], y[3 : 3 + self.n], self.n
-        driven = self.kt / self.R * (u - self.ke * s)
+    def _fill(self, friction):
+        """Elements: dry ones of axes and wheels, then the contacts; and what bends."""
+        every, unit = [], np.eye(self.k)
+        axes, wheels, n = friction.axes, friction.wheels, self.n
+        for law, count, first in ((axes, 3, 0), (wheels, n, 3)):
+            slide, back = (np.broadcast_to(own, count) for own in (law.coulomb, law.backward))
+            fore = np.broadcast_to(law.coulomb if law.breakaway is None else law.breakaway, count)
+            speed = np.broadcast_to(np.inf if law.stribeck_speed is None else law.stribeck_speed, count)
+            for j in range(count):
+                hold = np.broadcast_to(law.hold_backward, count)[j]
+                bristle = None
+                if law.law in ("lugre", "dahl"):
+                    damping = 0.0 if law.damping is None else np.broadcast_to(law.damping, count)[j]
+                    bristle = np.broadcast_to(law.stiffness, count)[j], damping
+                levels = np.array([slide[j], back[j]]), np.array([fore[j], hold])
+                if levels[1].any() or (first and self.eta[j] != 1.0):
+                    every.append(Element(law, unit[first + j], *levels, 1.0 / speed[j], bristle))
+        self.bristles = [e for e in every if e.bristle]
+        self.dry = [e for e in every if not e.bristle]
+        for e in self.dry:
+            wheel = np.flatnonzero(e.d[3:])
+            e.wheel = int(wheel[0]) if len(wheel) and self.eta[wheel[0]] != 1.0 else -1  # whose gear loses
+        contacts = np.hstack([-self.G.T, np.eye(n)])
+        self.D = np.array([*(e.d for e in self.dry), *contacts])
+        self.m = len(self.D)
+
+    def currents(self, y, u):
+        """(i, i') of the motors."""
+        if self.L == 0.0:
+            return (u - self.ke * y[3 : self.k]) / self.R, np.zeros(self.n)
+        i = y[self.k : self.k + self.n]
+        return i, (u - self.R * i - self.ke * y[3 : self.k]) / self.L
+
+    def smooth(self, y, u, mode):
+        """All forces but of dry elements, and the rates of bristles."""
+        v, s = y[:3], y[3 : self.k]
+        i, _ = self.currents(y, u)
+        gain = self.kt.copy()
+        for e, sign in zip(self.dry, mode, strict=False):
+            if e.wheel >= 0 and sign != 0:
+                gain[e.wheel] *= self.eta[e.wheel] ** np.sign(sign * i[e.wheel])
         c = self.T @ v
-        free = self.there @ (-self.B * v) + self.turning * c[2] * np.array([c[1], -c[0], 0.0])
-        # unknowns: v' (3), s' (n), h (3), f (n)
-        a, b = np.zeros((6 + 2 * n, 6 + 2 * n)), np.zeros(6 + 2 * n)
-        a[:3, :3], a[:3, 3 + n : 6 + n] = self.M[:, None] * self.T, -self.there
-        a[:3, 6 + n :], b[:3] = -self.there @ self.G, free
-        for k in range(3):
-            row = 3 + n + k
-            if axis[k] == 0:
-                a[row, k] = 1.0
-            else:
-                a[row, row], b[row] = 1.0, -axis[k] * self.C[k]
-        for w in range(n):
-            a[3 + w, 3 + w], a[3 + w, 6 + n + w], b[3 + w] = self.m[w], 1.0, driven[w]
-            row = 6 + n + w
-            if contact[w] == 0:
-                a[row, 3 + w], a[row, :3] = 1.0, -self.G[:, w]
-            else:
-                a[row, row] += 1.0
-                b[row] = contact[w] * (self.limit[w] - self.shift[w] @ (self.B * v)[:2])
-                a[row, 3 + n : 5 + n] -= contact[w] * self.shift[w]
-                a[row, 6 + n :] -= contact[w] * self.shift[w] @ self.G[:2]
-        x = np.linalg.solve(a, b)
-        return x[:3], x[3 : 3 + n], x[3 + n : 6 + n], x[6 + n :]
+        self_turn = self.T.T @ (self.turning * c[2] * np.array([c[1], -c[0], 0.0]))
+        force, rates = np.concatenate([self_turn - self.B * v, gain * i - self.b * s]), []
+        for e, z in zip(self.bristles, y[self.k + self.n : self.k + self.n + len(self.bristles)], strict=True):
+            bent, rate = e.bends(e.d @ y[: self.k], z)
+            force -= e.d * bent
+            rates.append(rate)
+        return force, self_turn, np.array(rates)
 
-    def limits(self, y, h, f):
-        """What the floor takes of each wheel, by the forces it exerts itself."""
-        return self.limit + self.shift @ (self.G[:2] @ f + h[:2] - (self.B * y[:3])[:2])
+    def loss(self, y, u, e):
+        """What a gear holds beside its levels, forward and backward."""
+        if e.wheel < 0:
+            return np.zeros(2)
+        i, gain, eta = self.currents(y, u)[0][e.wheel], self.kt[e.wheel], self.eta[e.wheel]
+        return np.array([i * gain * (1.0 - eta ** np.sign(i)), i * gain * (eta ** -np.sign(i) - 1.0)])
 
-    def settled(self, y, u, axis, contact):
-        """The mode after what cannot hold was let go, the worst first."""
-        axis, contact = axis.copy(), contact.copy()
-        for _ in range(3 + self.n):
-            _, _, h, f = self.forces(y, u, axis, contact)
-            over = np.concatenate([np.abs(h) / self.C, np.abs(f) / self.limits(y, h, f)]) - 1.0
-            over[np.concatenate([axis, contact]) != 0] = -np.inf
-            held = over[np.isfinite(over)]
-            self.least = min([self.least, *np.abs(held)])
-            worst = int(np.argmax(over))
-            if over[worst] <= 0.0:
+    def floor(self, w, a, turn):
+        """What the floor takes of a wheel under an acceleration, by the forces that it exerts itself."""
+        return self.limit[w] + self.shift[w] @ ((self.M[:3, :3] @ a[:3])[:2] - turn[:2])
+
+    def solve(self, y, u, mode):
+        """(a, r, smooth forces) in a mode: a sign of each element, 0 where it holds."""
+        force, turn, _ = self.smooth(y, u, mode)
+        held, k = np.flatnonzero(mode == 0), self.k
+        matrix, right = np.zeros((k + len(held),) * 2), np.zeros(k + len(held))
+        matrix[:k, :k], matrix[:k, k:], matrix[k:, :k] = self.M, self.D[held].T, self.D[held]
+        right[:k] = force
+        levels = np.zeros(self.m)
+        for e in np.flatnonzero(mode):
+            d, sign, w = self.D[e], mode[e], e - len(self.dry)
+            if w < 0:
+                levels[e] = sign * self.dry[e].moving(d @ y[:k], sign)
+                right[:k] -= d * levels[e]
+            else:
+                right[:k] -= d * sign * (self.limit[w] - self.shift[w] @ turn[:2])
+                matrix[:k, :3] += sign * np.outer(d, self.shift[w] @ self.M[:2, :3])
+        if np.linalg.matrix_rank(self.D[held]) == len(held):
+            x = np.linalg.solve(matrix, right)
+        else:
+            x = np.linalg.lstsq(matrix, right, rcond=1e-13)[0]
+        levels[held] = x[k:]
+        return x[:k], levels, turn
+
+    def bounds(self, y, u, a, turn, slides):
+        """(forward, backward) of every element at rest; slides: those that have given way."""
+        both = np.zeros((self.m, 2))
+        for e in range(self.m):
+            if e < len(self.dry):
+                own = self.dry[e]
+                level = own.slide if e in slides and own.fall == 0.0 else own.hold
+                both[e] = level + self.loss(y, u, own)
+            else:
+                both[e] = self.floor(e - len(self.dry), a, turn)
+        return both
+
+    def decided(self, y, u, mode, shrink=0.0):
+        """The mode after all that cannot hold has given way. shrink: a share by which levels are taken to be less."""
+        mode = mode.copy()
+        for e in np.flatnonzero(mode):  # what rests because others do
+            held = self.D[mode == 0]
+            if len(held) and np.abs(self.D[e] - np.linalg.lstsq(held.T, self.D[e], rcond=1e-9)[0] @ held).max() < 1e-9:
+                mode[e] = 0.0
+        at_rest, slides, a = np.flatnonzero(mode == 0), set(), np.zeros(self.k)
+        if not len(at_rest):
+            return mode
+        for _ in range(20):
+            found = mode.copy()
+            for _ in range(200):  # loads depend on the acceleration
+                force, turn, _ = self.smooth(y, u, mode)
+                for e in np.flatnonzero(mode):
+                    w = e - len(self.dry)
+                    level = self.floor(w, a, turn) if w >= 0 else self.dry[e].moving(self.D[e] @ y[: self.k], mode[e])
+                    force = force - self.D[e] * mode[e] * level
+                both = self.bounds(y, u, a, turn, slides)[at_rest] * (1.0 - shrink) + 1e-15
+                out = lsq_linear(
+                    self.root @ self.D[at_rest].T,
+                    self.root @ force,
+                    (-both[:, 1], both[:, 0]),
+                    method="bvls",
+                    tol=1e-15,
+                )
+                before, a = a, np.linalg.solve(self.M, force - self.D[at_rest].T @ out.x)
+                if np.abs(a - before).max() <= 1e-12 * (1.0 + np.abs(a).max()):
+                    break
+            speeds = self.D[at_rest] @ a
+            moves = np.abs(speeds) > MOVES
+            if not shrink:
+                self.least = min([self.least, *(np.abs(speeds[moves]) - MOVES)])
+            found[at_rest[moves]] = np.sign(speeds[moves])
+            new = set(at_rest[moves].tolist())
+            if new <= slides:
                 break
-            if worst < 3:
-                axis[worst] = -np.sign(h[worst])
-            else:
-                contact[worst - 3] = np.sign(f[worst - 3])
-        return axis, contact
+            slides |= new
+        if not shrink:
+            self.least = min([self.least, *np.abs(self.margins(y, u, found))])
+        return found
+
+    def margins(self, y, u, mode):
+        """How far what holds is from giving way [N]: each, or all together where they share their load."""
+        held = np.flatnonzero(mode == 0)
+        if not len(held):
+            return np.zeros(0)
+        a, r, turn = self.solve(y, u, mode)
+        both = self.bounds(y, u, a, turn, set())[held]
+        if np.linalg.matrix_rank(self.D[held]) == len(held):
+            return np.minimum(both[:, 0] - r[held], both[:, 1] + r[held])
+        # most t with D^T r = load, -back + t <= r <= hold - t
+        rows, k = len(held), len(held) + 1
+        above = np.vstack(
+            [np.hstack([np.eye(rows), np.ones((rows, 1))]), np.hstack([-np.eye(rows), np.ones((rows, 1))])]
+        )
+        basis = np.linalg.svd(self.D[held].T)[0][:, : np.linalg.matrix_rank(self.D[held])].T
+        same = np.hstack([basis @ self.D[held].T, np.zeros((len(basis), 1))])
+        out = linprog(
+            -np.eye(k)[-1], above, np.concatenate([both[:, 0], both[:, 1]]), same,
+            basis @ self.D[held].T @ r[held], [(None, None)] * k,
+        )  # fmt: skip
+        return np.array([out.x[-1]])
 
     def run(self, voltage, dt, twist=(0.0, 0.0, 0.0)):
         """Twist, rim speeds and contacts after each row, shapes (rows + 1, 3), (rows + 1, n), (rows + 1, n); `pose`
-        then has the places (x, y, heading), shape (rows + 1, 3)."""
-        y = np.concatenate([twist, self.G.T @ twist, np.zeros(3)])
-        axis, contact = np.sign(y[:3]), np.zeros(self.n)
-        found, marks = [y.copy()], [contact.copy()]
+        then has the places (x, y, heading), shape (rows + 1, 3), and `current` the currents of windings."""
+        y = np.concatenate([twist, self.G.T @ twist, np.zeros(self.n + len(self.bristles) + 3)])
+        mode = np.sign(self.D @ y[: self.k])
+        mode[len(self.dry) :] = 0.0
+        found, marks = [y.copy()], [mode[len(self.dry) :].copy()]
         for u in voltage:
             left = dt
-            axis, contact = self.settled(y, u, axis, contact)
+            mode = self.decided(y, u, mode)
             while left > 1e-13:
-                y, axis, contact, took = self._to_event(y, u, axis, contact, left)
+                y, mode, took = self._to_event(y, u, mode, left)
                 left -= took
             found.append(y.copy())
-            marks.append(contact.copy())
+            marks.append(mode[len(self.dry) :].copy())
         found = np.array(found)
-        self.pose = found[:, 3 + self.n :]
-        return found[:, :3], found[:, 3 : 3 + self.n], np.array(marks)
+        self.pose, self.current = found[:, -3:], found[:, self.k : self.k + self.n]
+        return found[:, :3], found[:, 3 : self.k], np.array(marks)
 
-    def _to_event(self, y, u, axis, contact, left):
+    def _to_event(self, y, u, mode, left):
+        held, moving = np.flatnonzero(mode == 0), np.flatnonzero(mode)
+        each = len(held) and np.linalg.matrix_rank(self.D[held]) == len(held)
+
         def rate(_, z):
-            a, b, _, _ = self.forces(z, u, axis, contact)
+            a = self.solve(z, u, mode)[0]
             cos, sin = np.cos(z[-1]), np.sin(z[-1])
-            return np.concatenate([a, b, [cos * z[0] - sin * z[1], sin * z[0] + cos * z[1], z[2]]])
+            place = [cos * z[0] - sin * z[1], sin * z[0] + cos * z[1], z[2]]
+            return np.concatenate([a, self.currents(z, u)[1], self.smooth(z, u, mode)[2], place])
 
-        def watch(k):
-            def value(t, z):
-                _, _, h, f = self.forces(z, u, axis, contact)
-                if k < 3:
-                    return z[k] * axis[k] + TINY if axis[k] else self.C[k] - abs(h[k])
-                w = k - 3
-                slips = (z[3 + w] - self.G[:, w] @ z[:3]) * contact[w]
-                return slips + TINY if contact[w] else self.limits(z, h, f)[w] - abs(f[w])
+        def stop(e):
+            return lambda t, z: self.D[e] @ z[: self.k] * mode[e] + TINY
 
-            value.terminal, value.direction = True, -1.0
-            return value
+        def release(j):
+            return lambda t, z: self.margins(z, u, mode)[j]
 
-        events = [watch(k) for k in range(3 + self.n)]
+        events = [stop(e) for e in moving] + [release(j) for j in range(len(held) if each else min(len(held), 1))]
+        for event in events:
+            event.terminal, event.direction = True, -1.0
         out = solve_ivp(rate, (0.0, left), y, method="DOP853", rtol=1e-10, atol=1e-12, max_step=0.02, events=events)
-        z, took = out.y[:, -1].copy(), out.t[-1]
+        z, took, mode = out.y[:, -1].copy(), out.t[-1], mode.copy()
         if out.status == 1:
-            for k in range(3 + self.n):
-                if len(out.t_events[k]):
-                    if k < 3 and axis[k]:
-                        z[k], axis = 0.0, np.where(np.arange(3) == k, 0.0, axis)
-                    elif k >= 3 and contact[k - 3]:
-                        z[k] = self.G[:, k - 3] @ z[:3]
-                        contact = np.where(np.arange(self.n) == k - 3, 0.0, contact)
-                    elif k < 3:
-                        axis = np.where(np.arange(3) == k, -np.sign(self.forces(z, u, axis, contact)[2][k]), axis)
-                    else:
-                        pushed = np.sign(self.forces(z, u, axis, contact)[3][k - 3])
-                        contact = np.where(np.arange(self.n) == k - 3, pushed, contact)
-            axis, contact = self.settled(z, u, axis, contact)
-        for w in range(self.n):
-            if contact[w] == 0:
-                z[3 + w] = self.G[:, w] @ z[:3]
-        return z, axis, contact, took
+            pushed, shrink = self.solve(z, u, mode)[1], 0.0
+            for j in np.flatnonzero([len(times) > 0 for times in out.t_events]):
+                if j < len(moving):
+                    mode[moving[j]] = 0.0
+                elif each:
+                    mode[held[j - len(moving)]] = np.sign(pushed[held[j - len(moving)]])
+                else:
+                    shrink = 1e-6
+            z[: self.k] -= np.linalg.pinv(self.D[mode == 0]) @ (self.D[mode == 0] @ z[: self.k])
+            mode = self.decided(z, u, mode, shrink)
+        z[: self.k] -= np.linalg.pinv(self.D[mode == 0]) @ (self.D[mode == 0] @ z[: self.k])
+        return z, mode, took

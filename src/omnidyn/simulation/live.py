@@ -15,7 +15,6 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.actuation import clip_voltage, reaching
 from omnidyn.model.drive import DUTY, SPEED
-from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
@@ -133,7 +132,7 @@ class LiveRobot:
         most = per_wheel(np.inf if limit is None else limit, n)
         state, work = start_state(numbers, self.twist, np.zeros(n)), room(numbers)
         wheels = slip_plant(robot) if slips else None
-        rims = np.zeros(0) if wheels is None else rolling(wheels, self.twist)
+        slid_to = np.zeros(0) if wheels is None else rolling(wheels, self.twist)
         loop: Loop = no_loop(n)
         if self._kind == SPEED:
             loop = loop_of(robot, np.zeros((1, n)), np.ones(1, np.bool_))
@@ -141,7 +140,7 @@ class LiveRobot:
 
         def advance(length: float, command: FloatArray) -> None:
             """Go on by a length of time [s] with a command held, from the state that the last call left."""
-            nonlocal state, rims, now, asked
+            nonlocal state, slid_to, now, asked
             dts, ticks = _ticks(now, length, period) if period else (np.array([length]), np.ones(1, np.bool_))
             volts = np.empty((len(dts), n))
             if period:
@@ -151,11 +150,11 @@ class LiveRobot:
                 volts[:], given = self._at_motors(self._volts(command)), loop
             bound = np.tile(np.where(command == 0.0, 0.0, most) if robot.drive.coasts else most, (len(dts), 1))
             if wheels is not None:
-                slid = run_slipping(wheels, volts, bound, dts, rims, self.pose, given, tol)
+                slid = run_slipping(wheels, volts, bound, dts, slid_to, self.pose, given, tol)
                 assert self._grip is not None
                 self._grip.add(slid)
-                rims, self.pose = slid.state[-1], slid.pose[-1]
-                self.twist, self._turning = rims[:N_AXES].copy(), rims[N_AXES:] / robot.wheels.radii
+                slid_to, self.pose = slid.state[-1], slid.pose[-1]
+                self.twist, self._turning = slid.twist[-1].copy(), slid.rims[-1] / robot.wheels.radii
             else:
                 out = run_implicit(numbers, volts, bound, dts, state, self.pose, given, tol, work)
                 state, self.pose = out.state.at(-1), out.pose[-1]

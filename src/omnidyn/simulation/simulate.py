@@ -141,7 +141,7 @@ def _implicit(
     Of wheels that slip: theirs.
     """
     if robot.wheels.traction_mu is not None:
-        return _slipping(robot, given, acting, (twist, pose), tol, view)
+        return _slipping(robot, given, acting, (twist, pose, current), tol, view)
     numbers = plant(robot)
     numbers.body.room += (0.0, 0.0) if view.room is None else view.room
     if view.push is not None:
@@ -165,25 +165,27 @@ def _on_grid(robot: Robot, acting: Commands) -> tuple[FloatArray, FloatArray, Lo
 
 
 def _slipping(
-    robot: Robot, given: Commands, acting: Commands, start: tuple[FloatArray, FloatArray], tol: float, view: View
-) -> Run:
-    """Run the engine of wheels that slip, and say which did."""
+    robot: Robot, given: Commands, acting: Commands, start: tuple[FloatArray, FloatArray, FloatArray], tol: float,
+    view: View,
+) -> Run:  # fmt: skip
+    """Run the engine of wheels that slip from (twist, pose, current), and say which did."""
     numbers = slip_plant(robot)
     numbers.room[:] += (0.0, 0.0) if view.room is None else view.room
     if acting.set_point is None:
         acting = replace(acting, voltage=_pushed(robot, acting, view))
     dt, voltage, loop, keep = _on_grid(robot, acting)
-    out = run_slipping(
-        numbers, voltage, current_bounds(robot, acting, len(dt)), dt, rolling(numbers, start[0]), start[1], loop, tol
-    )
+    begin = rolling(numbers, start[0], start[2])
+    out = run_slipping(numbers, voltage, current_bounds(robot, acting, len(dt)), dt, begin, start[1], loop, tol)
     grip = Grip(robot)
     grip.add(out)
-    asked, state = voltage[keep[:-1]], out.state[keep]
+    asked = voltage[keep[:-1]]
     motors = asked if acting.set_point is None else reaching(robot, asked)
-    turning = state[:, N_AXES:] / robot.wheels.radii
+    turning = out.rims[keep] / robot.wheels.radii
     push = 0.0 if view.push is None or acting.voltage is None else pushing(robot, view.push)  # not of the motors
-    current = settled_current(robot.motor, _with_last(motors - push), turning)
-    done = Done(motors, state[:, :N_AXES], out.pose[keep], None, current, asked, turning)
+    current = out.current[keep]
+    if robot.motor.electrical != DYNAMIC:
+        current = settled_current(robot.motor, _with_last(motors - push), turning)
+    done = Done(motors, out.twist[keep], out.pose[keep], None, current, asked, turning)
     how = f"engine of wheels that slip, tol {tol:g} m/s" if tol else "engine of wheels that slip, fixed step"
     return as_run(robot, given, acting, done, how, grip.words, view)
 

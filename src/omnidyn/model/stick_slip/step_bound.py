@@ -47,14 +47,14 @@ def _steep_near(plant, stage, x, reach, rests):
             g0, g1, g2 = own.g[0], own.g[1], own.g[2]
             size = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2)
             least = abs(g0 * x[0] + g1 * x[1] + g2 * x[2]) - size * reach
-            found += own.steep * _share_left(own, least)
+            found += own.steep * share_left(own, least)
     if body.steep > 0.0 and (rests or stage.task.ellipse != 0.0):
-        found += body.steep * _share_left(body, math.hypot(x[0], x[1]) - reach)
+        found += body.steep * share_left(body, math.hypot(x[0], x[1]) - reach)
     return found
 
 
 @part
-def _share_left(own, speed):
+def share_left(own, speed):
     """How much of its STEEP an element has left at a speed [m/s] and beyond; all of it where its damping fades."""
     if own.fade > 0.0 or own.fall == 0.0:
         return 1.0
@@ -81,7 +81,7 @@ def growth(plant, stage, start, end, h):
             for a in range(3):
                 g = g0 if a == 0 else (g1 if a == 1 else g2)
                 gain += g * (end.x[a] - start.x[a]) / h
-            worst = max(worst, _grown(plant, speed * own.fall, own.form, own.exponent, more * size, abs(gain)))
+            worst = max(worst, grown(body.least, speed * own.fall, own.form, own.exponent, more * size, abs(gain)))
     m = len(plant.element)
     if body.fall > 0.0 and not (start.each[m].sign == 0.0 and end.each[m].sign == 0.0):
         more = max(stage.task.hold[0] - body.coulomb[0], stage.task.hold[1] - body.coulomb[1])
@@ -92,14 +92,14 @@ def growth(plant, stage, start, end, h):
         )
         u = math.hypot(start.x[0], start.x[1])
         gain = math.hypot(end.x[0] - start.x[0], end.x[1] - start.x[1]) / h
-        worst = max(worst, _grown(plant, u * body.fall, body.form, body.exponent, more, gain))
+        worst = max(worst, grown(body.least, u * body.fall, body.form, body.exponent, more, gain))
     return worst
 
 
 @part
-def _grown(plant, u, shape, exponent, more, gain):
-    """The growth of one element: more [N] can be lost, `gain` [m/s^2] is its acceleration."""
-    left = more * fall(u, shape, exponent)[0] / plant.body.least
+def grown(mass, u, shape, exponent, more, gain):
+    """The growth of one element on a mass [kg]: more [N] can be lost, `gain` [m/s^2] is its acceleration."""
+    left = more * fall(u, shape, exponent)[0] / mass
     return min(1.0 + left / max(gain, 1e-300), GROWS) if left > 1e-6 * gain else 1.0
 
 

@@ -16,8 +16,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.beside import side_by_side
 from omnidyn.model.frames import body_to_world
-from omnidyn.model.layout import N_AXES
-from omnidyn.model.motor import settled_current
+from omnidyn.model.motor import DYNAMIC, settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.commands import Commands, current_bounds
 from omnidyn.simulation.sensitivity.directions import EPS, difference
@@ -143,7 +142,7 @@ def _looks(
         plant, given.voltage, current_bounds(robot, given, len(given.dt)), given.dt, rolling(plant, start), np.zeros(3),
         no_loop(n), tol,
     )  # fmt: skip
-    turning = out.state[:, N_AXES:] / robot.wheels.radii
+    turning = out.rims / robot.wheels.radii
     middle = 0.5 * (turning[1:] + turning[:-1]) * given.dt[:, None]
     turned = np.concatenate([np.zeros((1, n)), np.cumsum(middle, axis=0)])
     held_on = np.concatenate([given.voltage, given.voltage[-1:]])
@@ -151,8 +150,9 @@ def _looks(
     for each in seen:
         own = np.clip(np.searchsorted(grid, each), 0, len(grid) - 1)
         outside = (each < grid[0]) | (each > grid[-1])
-        state, shown = out.state[own], turning[own]
-        current = settled_current(robot.motor, held_on[own], shown)
-        parts_of = (state[:, :N_AXES], out.pose[own], shown, turned[own], current)
+        shown, current = turning[own], out.current[own]
+        if robot.motor.electrical != DYNAMIC:
+            current = settled_current(robot.motor, held_on[own], shown)
+        parts_of = (out.twist[own], out.pose[own], shown, turned[own], current)
         looks.append(Look(*(np.where(outside[:, None], np.nan, part) for part in parts_of)))
     return looks

@@ -15,15 +15,24 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
-from omnidyn.model.layout import record
+from omnidyn.model.layout import N_AXES, Plant, Stage, new_stage, record
 from omnidyn.model.stick_slip.copies import copy_each, copy_row, signs_differ
+from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.simulation.implicit.march import SIMPSON, advance_pose
+from omnidyn.simulation.slip.bounds import (
+    SHARE,
+    bristle_turns,
+    growth,
+    longest_step,
+    memory_error,
+    reverses,
+    unresolved,
+)  # fmt: skip
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
-from omnidyn.simulation.slip.wheel import FREE, GRIPS
+from omnidyn.simulation.slip.wheel import FREE, GRIPS, LINE
 from omnidyn.simulation.speed_loop import Loop, passed, tick_answer, tick_branch
 
-SHARE = 0.1  # of an error of the yaw rate, and of a rim, beside one of the speed
 SHORT, SHORTEST, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/march.py
 MOST = (1e6, 5e6)  # steps solved at tol 1e-6, and so many more per second
 TURNS = 0.5  # [rad] by which travel may turn in a step
@@ -34,6 +43,8 @@ SLIP_EACH = record(
     sign=(),  # 1 and -1 forward and backward, 0 stuck, FREE without dry friction
     contact=(),  # of a wheel: GRIPS, or the side to which it spins
     force=(),  # of the floor on the body, through it [N]
+    current=(),  # of a motor [A]
+    bend=(),  # of a bristle [m, or rad about yaw]
 )
 
 
@@ -46,13 +57,16 @@ class SlipState(NamedTuple):
 
 
 class SlipRoom(NamedTuple):
-    """What a run works in: the state of now, those after a whole step, one and two half steps, and of a stage the
-    wrench `pull` (3,), the goal x* (3 + n,), `space` (12,); counts: most sweeps, steps."""
+    """What a run works in: the state of now, those after a whole step, one and two half steps, and of a stage its parts
+    as of model/layout.py, motors as `lines` (n,) of LINE, the wrench `pull` (3,), the goal x* (3 + n,), `space` (12,);
+    counts: most sweeps, steps."""
 
     now: SlipState
     whole: SlipState
     middle: SlipState
     two: SlipState
+    stage: Stage
+    lines: Any
     pull: FloatArray
     goal: FloatArray
     space: FloatArray
@@ -60,15 +74,32 @@ class SlipRoom(NamedTuple):
 
 
 class SlipOutcome(NamedTuple):
-    """Row 0 is the start. pose (rows + 1, 3); state (rows + 1, 3 + n): twist, rim speeds; contact (rows + 1, n): 0
-    where a wheel grips, else the side to which it spins; capped: rows in which the solver gave up its last
-    digits; lifted (n,): rows at the end of which a wheel would have to be held down."""
+    """Row 0 is the start. pose (rows + 1, 3); state (rows + 1, 6 + 3 n): twist, rim speeds [m/s], currents of windings
+    [A], bends of the axes [m, m, rad] and of the wheels [m]; contact (rows + 1, n): 0 where a wheel grips, else the
+    side to which it spins; capped: rows in which the solver gave up its last digits; lifted (n,): rows at the end of
+    which a wheel would have to be held down."""
 
     pose: FloatArray
     state: FloatArray
     contact: FloatArray
     capped: int
     lifted: FloatArray
+
+    @property
+    def twist(self) -> FloatArray:
+        """Shape (rows + 1, 3)."""
+        return self.state[:, :N_AXES]
+
+    @property
+    def rims(self) -> FloatArray:
+        """Speeds of the rims [m/s]. Shape (rows + 1, n)."""
+        return self.state[:, N_AXES : N_AXES + len(self.lifted)]
+
+    @property
+    def current(self) -> FloatArray:
+        """Currents of windings [A], 0 of motors without. Shape (rows + 1, n)."""
+        n = len(self.lifted)
+        return self.state[:, N_AXES + n : N_AXES + 2 * n]
 
 
 def run_slipping(
@@ -77,14 +108,15 @@ def run_slipping(
 ) -> SlipOutcome:  # fmt: skip
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: a step a row.
 
-    voltage [V], bound [A]: (rows, n); state (3 + n,), see `rolling`. Raises InputError where motion is so fast that no
-    patience would do.
+    voltage [V], bound [A]: (rows, n); state (6 + 3 n,), see `rolling`. Raises InputError where motion is so fast that
+    no patience would do.
     """
     rows, n = len(dt), len(plant.spin)
-    out = SlipOutcome(np.zeros((rows + 1, 3)), np.zeros((rows + 1, 3 + n)), np.zeros((rows + 1, n)), 0, np.zeros(n))
+    pose_, states, contact = (np.zeros((rows + 1, width)) for width in (3, 6 + 3 * n, n))
+    out = SlipOutcome(pose_, states, contact, 0, np.zeros(n))
     out.pose[0], out.state[0] = pose, state
     most = (MOST[0] + MOST[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
-    row, capped = _march(plant, voltage, bound, dt, loop, tol, most, out, _room(n))
+    row, capped = _march(plant, voltage, bound, dt, loop, tol, most, out, _room(plant))
     if row < rows:
         raise InputError(
             "this robot moves too fast to be followed", got=f"more than {most:.2g} steps up to row {row}",
@@ -95,14 +127,20 @@ def run_slipping(
     return out._replace(capped=int(capped))
 
 
-def _room(n: int) -> SlipRoom:
+def _room(plant: SlipPlant) -> SlipRoom:
+    n = len(plant.spin)
     now, whole, middle, two = (SlipState(np.zeros(3 + n), np.zeros(5 + n, SLIP_EACH)) for _ in range(4))
-    return SlipRoom(now, whole, middle, two, np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64))
+    stage = new_stage(Plant(plant.body, plant.element[None]))
+    space = np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64)
+    return SlipRoom(now, whole, middle, two, stage, np.zeros(n, LINE), *space)
 
 
-def rolling(plant: SlipPlant, twist: FloatArray) -> FloatArray:
-    """The state of a robot whose wheels all grip: its twist, then the speeds of their rims. Shape (3 + n,)."""
-    return np.concatenate([twist, plant.g @ twist])
+def rolling(plant: SlipPlant, twist: FloatArray, current: FloatArray | None = None) -> FloatArray:
+    """The state of a robot whose wheels all grip, as SlipOutcome has it: its twist, the speeds of their rims, currents
+    [A], no bend. Shape (6 + 3 n,)."""
+    n = len(plant.spin)
+    flows = np.zeros(n) if current is None else current
+    return np.concatenate([twist, plant.g @ twist, flows, np.zeros(N_AXES + n)])
 
 
 @part
@@ -132,48 +170,55 @@ def _differ(a, b):
 @part
 def _error(plant, one, two):
     """Estimated error of `two`, half steps against one whole step, in m/s."""
-    worst = max(abs(two[0] - one[0]), abs(two[1] - one[1]), SHARE * abs(two[2] - one[2]))
+    x, y = one.x, two.x
+    worst = max(abs(y[0] - x[0]), abs(y[1] - x[1]), SHARE * abs(y[2] - x[2]))
     for w in range(len(plant.spin)):
-        worst = max(worst, SHARE * abs(two[3 + w] - one[3 + w]))
+        worst = max(worst, SHARE * abs(y[3 + w] - x[3 + w]))
+    if plant.remembers != 0.0:
+        worst = max(worst, memory_error(plant, one, two))
     return worst / 3.0
 
 
 @part
-def _unresolved(plant, volts, bound, h):
-    """A bound of how far an event inside a step of length h can lead astray [m/s]."""
-    forces, worst = abs(plant.room[0]) + abs(plant.room[1]) + plant.ellipse[0] + plant.ellipse[1], 0.0
-    for a in range(3):
-        forces += plant.dry[a] if a < 2 else 0.0
-    for w in range(len(plant.spin)):
-        motor = plant.thrust[w] * min(bound[w], abs(volts[w]) / plant.resistance[w])
-        motor += max(plant.forward[w], plant.backward[w])
-        contact = min(plant.grip[w], motor)
-        forces += contact
-        worst = max(worst, SHARE * (motor + contact) / plant.spin[w])
-    lightest = min(plant.mass[0], SHARE**-1 * plant.mass[2] / math.sqrt(plant.mass[2] / plant.mass[0]))
-    return 2.0 * h * max(worst, forces / (plant.alone * lightest))
+def _beyond(plant, room, h, error):
+    """(what the error of a step counts as, how far kinks may lead it astray), where friction falls with the speed or
+    anything has a memory. What is rounding does not grow."""
+    now, middle, two, astray = room.now, room.middle, room.two, 0.0
+    if plant.steep > 0.0 and error > ROUNDING:
+        error *= growth(plant, room.lines, now, two, h)
+    if plant.remembers != 0.0:
+        astray = max(reverses(plant, now, middle, h), reverses(plant, middle, two, h))
+    return error, astray
 
 
 @part
-def _find(plant, volts, bound, pose, h, left, dt, tol, room):
+def _find(plant, stage, pose, h, left, dt, tol, room):
     """Find a step from `now` that is good enough. Returns its length and the one to try next."""
     now, one, middle, two, pull, counts = room.now, room.whole, room.middle, room.two, room.pull, room.counts
+    if plant.steep > 0.0:
+        h = longest_step(plant, stage, now.x, h)
     while True:
         if left - h < 1e-9 * dt:
             h = left
         copy_each(one.each, now.each)
         _pulled(plant, pose[2] + 0.5 * h * now.x[2], pull)
-        first = slip_step(plant, volts, bound, h, now.x, one, room)
+        first = slip_step(plant, stage, h, now, one, room)
         copy_each(middle.each, now.each)
         _pulled(plant, pose[2] + 0.25 * h * now.x[2], pull)
-        second = slip_step(plant, volts, bound, 0.5 * h, now.x, middle, room)
+        second = slip_step(plant, stage, 0.5 * h, now, middle, room)
         copy_each(two.each, middle.each)
         _pulled(plant, pose[2] + 0.25 * h * now.x[2] + 0.5 * h * middle.x[2], pull)
-        third = slip_step(plant, volts, bound, 0.5 * h, middle.x, two, room)
+        third = slip_step(plant, stage, 0.5 * h, middle, two, room)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
-        ratio = _error(plant, one.x, two.x) / max(tol / plant.memory * max(h, SHORT), ROUNDING)
+        error, astray = _error(plant, one, two), 0.0
+        if plant.steep > 0.0 or plant.remembers != 0.0:
+            error, astray = _beyond(plant, room, h, error)
+        ratio = error / max(tol / plant.memory * max(h, SHORT), ROUNDING)
+        if plant.remembers != 0.0:
+            ratio = max(ratio, bristle_turns(plant, now, two, h) / tol)
         if _differ(now, middle) or _differ(middle, two) or _differ(now, one):
-            astray = _unresolved(plant, volts, bound, h)
+            astray = max(astray, unresolved(plant, stage, h))
+        if astray > 0.0:
             ratio = 0.5 if astray <= tol else max(ratio, 64.0)
         fitting = 0.9 * (ratio + 1e-12) ** (-1.0 / 3.0 if h < SHORT else -0.5)
         if ratio <= 1.0 or h <= SHORTEST:
@@ -193,8 +238,8 @@ def _count_lifted(plant, state, lifted):
     if len(plant.shift) == 0:
         return
     n, x, each = len(plant.spin), state.x, state.each
-    f0 = each[0].force + each[3 + n].force - plant.viscous[0] * x[0]
-    f1 = each[1].force + each[4 + n].force - plant.viscous[1] * x[1]
+    f0 = each[0].force + each[3 + n].force - plant.element[0].viscous * x[0]
+    f1 = each[1].force + each[4 + n].force - plant.element[1].viscous * x[1]
     for w in range(n):
         f0, f1 = f0 + plant.g[w, 0] * each[3 + w].force, f1 + plant.g[w, 1] * each[3 + w].force
     for w in range(len(plant.spin)):
@@ -207,12 +252,12 @@ def _mark(plant, state):
     """The marks of a state: what rests is taken to hold, a rim as fast as the ground under it to grip."""
     x, each = state.x, state.each
     for a in range(3):
-        each[a].sign = FREE if plant.dry[a] == 0.0 else _sign(x[a])
+        each[a].sign = FREE if plant.element[a].active == 0.0 else _sign(x[a])
     moves = x[0] != 0.0 or x[1] != 0.0
-    each[len(each) - 2].sign = FREE if plant.ellipse[0] == 0.0 else (1.0 if moves else 0.0)
+    each[len(each) - 2].sign = FREE if plant.body[0].active == 0.0 else (1.0 if moves else 0.0)
     for w in range(len(plant.spin)):
         s, p = x[3 + w], plant.g[w, 0] * x[0] + plant.g[w, 1] * x[1] + plant.g[w, 2] * x[2]
-        each[3 + w].sign = FREE if plant.forward[w] + plant.backward[w] == 0.0 else _sign(s)
+        each[3 + w].sign = FREE if plant.element[3 + w].active == 0.0 else _sign(s)
         each[3 + w].contact = GRIPS if abs(s - p) <= MEET * (abs(s) + abs(p)) else _sign(s - p)
 
 
@@ -221,31 +266,58 @@ def _sign(value):
     return 1.0 if value > 0.0 else (-1.0 if value < 0.0 else 0.0)
 
 
+@part
+def _load(state, row):
+    """Begin with a row of an outcome: see SlipOutcome."""
+    n = len(state.x) - 3
+    for j in range(3 + n):
+        state.x[j] = row[j]
+    for e in range(3 + n):
+        state.each[e].current = row[n + e] if e >= 3 else 0.0
+        state.each[e].bend = row[3 + 2 * n + e]
+
+
+@part
+def _keep(state, row):
+    """Make a row of an outcome of a state."""
+    n = len(state.x) - 3
+    for j in range(3 + n):
+        row[j] = state.x[j]
+    for e in range(3 + n):
+        if e >= 3:
+            row[n + e] = state.each[e].current
+        row[3 + 2 * n + e] = state.each[e].bend
+
+
+@part
+def _command(plant, stage, voltage, bound, loop, k, now):
+    """Put what row k gives into the stage: a speed loop fills its voltage."""
+    for w in range(len(plant.spin)):
+        if len(loop.command) > 0:
+            if loop.tick[k]:
+                kp, ki, limit = loop.kp[w], loop.ki[w], loop.limit[w]
+                error = loop.command[k, w] - _seen(plant, now, w)
+                takes, side = tick_branch(kp, ki, limit, loop.period, error, loop.sum[w])
+                voltage[k, w], loop.sum[w] = tick_answer(kp, ki, limit, loop.period, error, loop.sum[w], takes, side)
+            else:
+                voltage[k, w] = voltage[k - 1, w]
+        stage.each[3 + w].voltage, stage.each[3 + w].bound = passed(voltage[k, w], loop.dead), bound[k, w]
+
+
 @branching_kernel
 def _march(plant, voltage, bound, dt, loop, tol, most, out, room):
     """All rows; see run_slipping. Returns (rows done before `most` steps were, rows capped)."""
     n, now, two, counts, pose = len(plant.spin), room.now, room.two, room.counts, out.pose[0].copy()
-    volts, h, capped = np.zeros(n), dt[0], 0
-    copy_row(now.x, out.state[0])
+    stage, h, capped = Stage(room.stage.task[0], room.stage.each[0], room.stage.work[0]), dt[0], 0
+    _load(now, out.state[0])
     _mark(plant, now)
     for k in range(len(dt)):
         counts[0] = 0
-        for w in range(n):
-            if len(loop.command) > 0:
-                if loop.tick[k]:
-                    kp, ki, limit = loop.kp[w], loop.ki[w], loop.limit[w]
-                    error = loop.command[k, w] - _seen(plant, now, w)
-                    takes, side = tick_branch(kp, ki, limit, loop.period, error, loop.sum[w])
-                    voltage[k, w], loop.sum[w] = tick_answer(
-                        kp, ki, limit, loop.period, error, loop.sum[w], takes, side
-                    )  # fmt: skip
-                else:
-                    voltage[k, w] = voltage[k - 1, w]
-            volts[w] = passed(voltage[k, w], loop.dead)
+        _command(plant, stage, voltage, bound, loop, k, now)
         left = dt[k]
         if tol > 0.0:
             while left > 0.0:
-                taken, h = _find(plant, volts, bound[k], pose, h, left, dt[k], tol, room)
+                taken, h = _find(plant, stage, pose, h, left, dt[k], tol, room)
                 advance_pose(pose, now.x, room.middle.x, two.x, 1.0, taken, SIMPSON)
                 copy_row(now.x, two.x)
                 copy_each(now.each, two.each)
@@ -253,14 +325,17 @@ def _march(plant, voltage, bound, dt, loop, tol, most, out, room):
                 if counts[1] > most:
                     return k, capped
         else:
-            copy_each(two.each, now.each)
-            _pulled(plant, pose[2] + 0.5 * dt[k] * now.x[2], room.pull)
-            counts[0] = slip_step(plant, volts, bound[k], dt[k], now.x, two, room)
-            advance_pose(pose, now.x, two.x, two.x, 1.0, dt[k], (0.5, 0.0, 0.5, 0.0, 0.0, 0.0))
-            copy_row(now.x, two.x)
-            copy_each(now.each, two.each)
+            pieces = max(1, math.ceil(dt[k] * plant.steep / MONOTONE))
+            for _ in range(pieces):
+                piece = dt[k] / pieces
+                copy_each(two.each, now.each)
+                _pulled(plant, pose[2] + 0.5 * piece * now.x[2], room.pull)
+                counts[0] = max(counts[0], slip_step(plant, stage, piece, now, two, room))
+                advance_pose(pose, now.x, two.x, two.x, 1.0, piece, (0.5, 0.0, 0.5, 0.0, 0.0, 0.0))
+                copy_row(now.x, two.x)
+                copy_each(now.each, two.each)
         capped += counts[0] >= SWEEPS
-        copy_row(out.state[k + 1], now.x)
+        _keep(now, out.state[k + 1])
         copy_row(out.pose[k + 1], pose)
         for w in range(n):
             out.contact[k + 1, w] = now.each[3 + w].contact

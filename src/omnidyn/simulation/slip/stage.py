@@ -14,10 +14,14 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.simulation.slip.wheel import FREE, GRIPS, wheel_answer
+from omnidyn.model.friction.bristle import bristle_force
+from omnidyn.model.layout import Plant
+from omnidyn.model.stick_slip.copies import copy_row
+from omnidyn.model.stick_slip.laws import aim_bristles
+from omnidyn.simulation.implicit.step import BACK, GAMMA, STIFF
+from omnidyn.simulation.slip.levels import begin_levels, follow_speeds, give_way, settle_rest, stops
+from omnidyn.simulation.slip.wheel import FREE, GRIPS, STEPS, current_at, set_line, wheel_answer
 
-GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
-BACK = (1.0 - GAMMA) / GAMMA
 SWEEPS = 4000
 TIGHT = 2e-15  # of the speeds at hand: a change that is rounding
 
@@ -47,24 +51,54 @@ def _travel_speed(b, m, c):
 
 
 @part
-def _body_blocks(plant, heavy, total, each):
+def _axis_speed(own, at, tau, heavy, alone, level):
+    """v with heavy v = alone + bristle(v) - level: an axis that slides to the side of its level."""
+    v, inner, outer = 0.0, 0.0, math.inf  # of |v|
+    side = math.copysign(1.0, alone + bristle_force(own, 0.0, at.aimed_bend, tau)[0] - level)
+    for _ in range(STEPS):
+        bent, steep, _ = bristle_force(own, v, at.aimed_bend, tau)
+        off, slope = heavy * v - alone - bent + level, heavy - steep
+        if side * off <= 0.0:
+            inner = side * v
+        else:
+            outer = side * v
+        following = v - off / slope
+        if not inner <= side * following <= outer:
+            following = side * 0.5 * (inner + outer)
+        before, v = v, following
+        if abs(v - before) <= 1e-16 * abs(v) or off == 0.0:
+            break
+    return v
+
+
+@part
+def _body_blocks(plant, stage, heavy, total, each):
     """Dry friction of the direction of travel, then of the axes, each given all other forces; in place."""
-    along, across = each[len(each) - 2], each[len(each) - 1]
+    along, across, hold = each[len(each) - 2], each[len(each) - 1], stage.task.hold
     along.sign = FREE
-    if plant.ellipse[0] > 0.0:
+    if hold[0] > 0.0:
         b0, b1 = total[0] - along.force, total[1] - across.force
-        t0, t1 = _travel_speed((b0, b1), (heavy[0], heavy[1]), (plant.ellipse[0], plant.ellipse[1]))
+        t0, t1 = _travel_speed((b0, b1), (heavy[0], heavy[1]), (hold[0], hold[1]))
         along.sign = 0.0 if t0 == 0.0 and t1 == 0.0 else 1.0
         total[0], total[1] = heavy[0] * t0, heavy[1] * t1
         along.force, across.force = total[0] - b0, total[1] - b1
     for a in range(3):
-        axis = each[a]
+        axis, own, at = each[a], plant.element[a], stage.each[a]
         axis.sign = FREE
-        if plant.dry[a] > 0.0:
-            alone = total[a] - axis.force
-            held = abs(alone) <= plant.dry[a]
-            axis.sign = 0.0 if held else math.copysign(1.0, alone)
-            total[a] = 0.0 if held else alone - math.copysign(plant.dry[a], alone)
+        bends = own.stiffness > 0.0
+        if own.active != 0.0 or bends:
+            alone, bent = total[a] - axis.force, 0.0
+            if bends:
+                bent = bristle_force(own, 0.0, at.aimed_bend, stage.task.tau)[0]
+            driven = alone + bent
+            held = -at.hold[1] <= driven <= at.hold[0]
+            level = at.hold[0] if driven > 0.0 else -at.hold[1]
+            if own.active != 0.0:
+                axis.sign = 0.0 if held else math.copysign(1.0, driven)
+            if bends and not held:
+                total[a] = heavy[a] * _axis_speed(own, at, stage.task.tau, heavy[a], alone, level)
+            else:
+                total[a] = 0.0 if held else alone - level
             axis.force = total[a] - alone
 
 
@@ -85,19 +119,23 @@ def _frame(plant, tau, goal, v, total, frame):
 
 
 @part
-def solve_stage(plant, volts, bound, tau, goal, pull, x, each, space):
-    """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. goal: x*. pull (3,): wrench on the body.
+def solve_stage(plant, stage, start, room, x, each):
+    """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. start: x of before the step.
 
-    each: of a SlipState; its forces are a first guess too. space (12,). Returns the number of sweeps.
+    room: its goal is x*, its pull the wrench on the body. each: of a SlipState; its forces are a first guess too.
+    Returns the number of sweeps.
     """
+    goal, pull, space, lines = room.goal, room.pull, room.space, room.lines
     n, heavy, total, frame, offset = len(plant.spin), space[:3], space[3:6], space[6:9], space[9:12]
+    tau, falls = stage.task.tau, plant.steep > 0.0
     for a in range(3):
-        heavy[a] = plant.mass[a] / tau + plant.viscous[a]
+        heavy[a] = plant.mass[a] / tau + plant.element[a].viscous
         offset[a] = plant.mass[a] / tau * goal[a] + pull[a]
         total[a] = offset[a] + each[a].force
         frame[a] = 0.0
     total[0], total[1] = total[0] + each[3 + n].force, total[1] + each[4 + n].force
     for w in range(n):
+        set_line(lines[w], plant.element[3 + w], stage.each[3 + w], tau)
         for a in range(3):
             total[a] += plant.g[w, a] * each[3 + w].force
     for sweep in range(SWEEPS):
@@ -113,51 +151,104 @@ def solve_stage(plant, volts, bound, tau, goal, pull, x, each, space):
             limit = plant.grip[w]
             if len(plant.shift) > 0:  # the floor's force on the body, as far as it is known by now
                 f0, f1 = total[0] - offset[0] - frame[0], total[1] - offset[1] - frame[1]
-                f0, f1 = f0 - plant.viscous[0] * v0, f1 - plant.viscous[1] * v1
+                f0, f1 = f0 - plant.element[0].viscous * v0, f1 - plant.element[1].viscous * v1
                 limit = max(limit + plant.shift[w, 0] * f0 + plant.shift[w, 1] * f1, 0.0)
             f, s, sign, contact = wheel_answer(
-                plant, w, volts[w], bound[w], tau, goal[3 + w], free, give, limit
+                plant.element[3 + w], stage.each[3 + w], lines[w], tau, plant.spin[w], goal[3 + w], (free, give), limit
             )  # fmt: skip
             for a in range(3):
                 total[a] += plant.g[w, a] * (f - own.force)
             own.force, x[3 + w] = f, s
             loads += abs(f)
             own.sign, own.contact = sign, contact
-        _body_blocks(plant, heavy, total, each)
+        _body_blocks(plant, stage, heavy, total, each)
         for a in range(3):
             now, was = total[a] / heavy[a], (v0 if a == 0 else (v1 if a == 1 else v2))
             reach = math.sqrt(plant.mass[a] / plant.mass[0])  # yaw as a length
             worst, size = max(worst, reach * abs(now - was)), max(size, reach * (abs(now) + abs(goal[a])))
+            x[a] = now
         size += loads / (heavy[0] + heavy[1])
-        if worst <= TIGHT * size or (worst == 0.0 and sweep > 0):
-            _finish(plant, total, heavy, x, each)
+        if falls:
+            worst = max(worst, follow_speeds(plant, stage, x, each) / (heavy[0] + heavy[1]))
+        solved = worst <= TIGHT * size or (worst == 0.0 and sweep > 0)
+        if solved and (falls or plant.gaps != 0.0):
+            settle_rest(plant, stage, x, each)
+        if solved and (plant.gaps == 0.0 or not give_way(plant, stage, start, x, each)):
+            _finish(plant, stage, lines, x, each)
             return sweep + 1
-    _finish(plant, total, heavy, x, each)
+    _finish(plant, stage, lines, x, each)
     return SWEEPS
 
 
 @part
-def _finish(plant, total, heavy, x, each):
-    """The twist, and the rim speeds of what grips; a body that every wheel holds is at rest to the last bit."""
+def _finish(plant, stage, lines, x, each):
+    """The rim speeds of what grips, currents and bristles; a body that every wheel holds is at rest to the last bit."""
     n, held = len(plant.spin), True
     for w in range(n):
         held &= each[3 + w].sign == 0.0 and each[3 + w].contact == GRIPS
-    for a in range(3):
-        x[a] = 0.0 if held else total[a] / heavy[a]
+    if held:
+        x[0] = x[1] = x[2] = 0.0
     for w in range(n):
         if each[3 + w].contact == GRIPS:
             p = plant.g[w, 0] * x[0] + plant.g[w, 1] * x[1] + plant.g[w, 2] * x[2]
             x[3 + w] = 0.0 if each[3 + w].sign == 0.0 else p
+    if plant.remembers != 0.0:
+        for e in range(3 + n):
+            own, at = plant.element[e], stage.each[e]
+            if own.inductance > 0.0:
+                at.current = current_at(lines[e - 3], x[e])[0]
+            if own.stiffness > 0.0:
+                at.bend = bristle_force(own, x[e], at.aimed_bend, stage.task.tau)[2]
 
 
 @part
-def slip_step(plant, volts, bound, h, start, end, room):
-    """One SDIRK2 step from x (3 + n,) at its start to the state `end`, whose forces are a first guess. Returns the most
-    sweeps of a stage."""
-    tau, goal, x = GAMMA * h, room.goal, end.x
-    for j in range(len(start)):
-        goal[j], x[j] = start[j], start[j]
-    count = solve_stage(plant, volts, bound, tau, goal, room.pull, x, end.each, room.space)
-    for j in range(len(start)):
-        goal[j] = start[j] + BACK * (x[j] - start[j])
-    return max(count, solve_stage(plant, volts, bound, tau, goal, room.pull, x, end.each, room.space))
+def _aim(plant, stage, start, end, goal, back):
+    """Set x*, i* and z* of a stage: start + back (stage 1 - start); the guess of x is that of the stage before."""
+    for j in range(len(start.x)):
+        goal[j] = start.x[j] + back * (end.x[j] - start.x[j])
+    if plant.remembers != 0.0:
+        for e in range(3, len(plant.element)):
+            i = start.each[e].current
+            stage.each[e].aimed_current = i + back * (stage.each[e].current - i) if back != 0.0 else i
+        aim_bristles(Plant(plant.body[0], plant.element), stage, start, back)
+
+
+@part
+def _torn_loose(plant, stage, start, end):
+    """Whether a wheel at rest gave way in a step so long, h R/L > 1 + sqrt 2, that its current overshoots."""
+    for e in range(3, len(plant.element)):
+        own = plant.element[e]
+        stiff = own.inductance > 0.0 and stage.task.tau * own.resistance > STIFF * own.inductance
+        if stiff and start.each[e].sign == 0.0 and end.each[e].sign != 0.0:
+            return True
+    return False
+
+
+@part
+def slip_step(plant, stage, h, start, end, room):
+    """One step of length h from a state to the state `end`, whose forces are a first guess. Returns the most sweeps.
+
+    SDIRK2, but one implicit Euler stage where something stops that breakaway holds: see implicit/step.py.
+    """
+    goal, x = room.goal, end.x
+    stage.task.tau = GAMMA * h
+    copy_row(x, start.x)
+    begin_levels(plant, stage, start)
+    _aim(plant, stage, start, end, goal, 0.0)
+    count = solve_stage(plant, stage, start.x, room, x, end.each)
+    euler = plant.gaps != 0.0 and stops(plant, start, end)
+    if not euler:
+        _aim(plant, stage, start, end, goal, BACK)
+        count = max(count, solve_stage(plant, stage, start.x, room, x, end.each))
+        euler = plant.gaps != 0.0 and stops(plant, start, end)
+        euler |= plant.remembers != 0.0 and _torn_loose(plant, stage, start, end)
+    if euler:
+        stage.task.tau = h
+        copy_row(x, start.x)
+        begin_levels(plant, stage, start)
+        _aim(plant, stage, start, end, goal, 0.0)
+        count = max(count, solve_stage(plant, stage, start.x, room, x, end.each))
+    if plant.remembers != 0.0:
+        for e in range(len(plant.element)):
+            end.each[e].current, end.each[e].bend = stage.each[e].current, stage.each[e].bend
+    return count

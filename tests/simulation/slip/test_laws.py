@@ -1,0 +1,227 @@
+"""Every law of friction under wheels that slip, and windings and gears: random robots by the event-driven reference."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.model.robot_file import load_robot
+from omnidyn.simulation.sensitivity.directions import EPS
+from omnidyn.simulation.sensitivity.late_sample import Direction
+from omnidyn.simulation.sensitivity.slipping import slipping_samples
+from omnidyn.simulation.slip.loads import load_shift, wheel_loads
+from tests.simulation.slip.test_random_robots import DT, drawn
+from tests.support.friction_shapes import shaped
+from tests.support.slipping import EDGE, Slip
+
+AXEBOT, ROBOTS = load_robot("axebot"), 20
+REJECTED = 4  # draws of 24 at which a decision is within rounding of its edge
+LAWS = ("breakaway", "stribeck", "wheels", "wheels stribeck", "winding", "gear", "bristles")
+
+
+def pieces(robot, rng):
+    """(levels of the axes, of the wheels): half of the friction of a robot each."""
+    axes = robot.friction.axes
+    return np.array(axes.coulomb), float(axes.coulomb[0]) / 2.0 / robot.wheels.count * rng.uniform(0.7, 1.3)
+
+
+def falls(rng):
+    return {"stribeck_shape": str(rng.choice(["exponential", "lorentzian"])),
+            "stribeck_exponent": float(rng.choice([1.0, 1.5, 2.0]))}  # fmt: skip
+
+
+def with_law(robot, law, rng):
+    """The robot with a law, its levels and its numbers drawn."""
+    coulomb, rim = pieces(robot, rng)
+    arm, more = float(np.mean(robot.wheels.robot_radius)), rng.uniform(1.1, 1.5, 3)
+    speed, friction, motor = rng.uniform(0.02, 0.1), robot.friction, robot.motor
+    axes, wheels, half = friction.axes, friction.wheels, friction.axes.replace(coulomb=tuple(0.5 * coulomb))
+    rims = {"coulomb": rim, "coulomb_backward": 0.9 * rim, "breakaway": 1.3 * rim, "breakaway_backward": 1.2 * rim,
+            "viscous": 0.2 * rim}  # fmt: skip
+    if law == "breakaway":
+        axes = axes.replace(breakaway=tuple(coulomb * more), coulomb_backward=tuple(0.9 * coulomb),
+                            breakaway_backward=tuple(coulomb))  # fmt: skip
+    elif law == "stribeck":
+        axes = axes.replace(breakaway=tuple(coulomb * more), stribeck_speed=(speed, speed, speed / arm), **falls(rng))
+    elif law == "wheels":
+        axes, wheels = half.replace(breakaway=tuple(0.5 * coulomb * more)), wheels.replace(**rims)
+    elif law == "wheels stribeck":
+        axes, wheels = half, wheels.replace(**rims, stribeck_speed=speed, **falls(rng))
+    elif law == "winding":
+        settles = rng.uniform(0.3, 3.0) * 1e-3
+        axes = axes.replace(breakaway=tuple(coulomb * more))
+        motor = motor.replace(electrical="dynamic", inductance=settles * motor.resistance)
+    elif law == "gear":
+        axes = axes.replace(breakaway=tuple(coulomb * more))
+        motor = motor.replace(gear_efficiency=tuple(rng.uniform(0.75, 0.95, robot.wheels.count)))
+    else:
+        stiff = coulomb / 1e-3
+        axes = axes.replace(law="lugre", breakaway=tuple(coulomb * more), stribeck_speed=(speed, speed, speed / arm),
+                            stiffness=(stiff[0], stiff[1], stiff[2] * arm), damping=(10.0, 10.0, 10.0 * arm**2),
+                            coulomb=tuple(coulomb))  # fmt: skip
+        wheels = wheels.replace(law="dahl", coulomb=rim, stiffness=rim / 2e-3)
+    return robot.replace(friction=friction.replace(axes=axes, wheels=wheels), motor=motor)
+
+
+@cache
+def reference(number):
+    """(robot, levels, twist, rims, place, contacts, how many draws were rejected) of a draw that counts."""
+    for rejected in range(REJECTED):
+        seed = 100 + number + 100 * rejected
+        robot, levels = drawn(seed)
+        robot = with_law(robot, LAWS[number % len(LAWS)], np.random.default_rng([seed, 10]))
+        found = Slip(robot, wheel_loads(robot).newtons, load_shift(robot))
+        twist, rims, contact = found.run(levels, DT)
+        if found.least >= EDGE:
+            return robot, levels, twist, rims, found.pose, contact, rejected
+    raise AssertionError(f"draw {number}: nothing but edges")
+
+
+def meets_the_events(number, tol):
+    robot, levels, twist, rims, pose, _, _ = reference(number)
+    run = omnidyn.simulate(robot, levels, DT, tol=tol)
+    assert (np.abs(run.twist - twist) / [1.0, 1.0, 10.0]).max() < tol
+    assert (np.abs(run.pose - pose) / [1.0, 1.0, 10.0]).max() < tol
+    assert np.abs(run.wheel_speed * robot.wheels.radii - rims).max() < 10.0 * tol
+    assert not any("cap" in words for words in run.warnings)
+
+
+@pytest.mark.parametrize("number", range(len(LAWS)), ids=LAWS)
+def test_each_law_against_the_events(number):
+    """Within tol [m/s] and [m], 10 tol [rad/s] and [rad]; rims within 10 tol [m/s]."""
+    meets_the_events(number, 1e-6)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("tol", [1e-5, 1e-6, 1e-7])
+@pytest.mark.parametrize("number", range(ROBOTS))
+def test_twenty_robots_against_the_events(number, tol):
+    meets_the_events(number, tol)
+
+
+@pytest.mark.long
+def test_few_draws_are_rejected_and_most_slip():
+    found = [reference(number) for number in range(ROBOTS)]
+    assert sum(each[-1] for each in found) <= REJECTED
+    assert sum(bool(each[-2].any()) for each in found) >= 0.9 * ROBOTS
+
+
+# --- wheels that roll -------------------------------------------------------------------------------------------------
+
+
+def slippery(robot, mu, inertia=2e-5):
+    return robot.replace(wheels=robot.wheels.replace(traction_mu=mu, wheel_inertia=inertia))
+
+
+def changed(name, place=None, **keys):
+    """A robot of tests/support/friction_shapes, or the preset, with other keys of a friction table, or of its motor."""
+    robot = AXEBOT if name == "axes" else shaped(name)
+    if place is None:
+        return robot.replace(motor=robot.motor.replace(**keys))
+    table = getattr(robot.friction, place).replace(**keys)
+    return robot.replace(friction=robot.friction.replace(**{place: table}))
+
+
+HOLD, SPEEDS = (2.9, 2.0, 0.13), (0.05, 0.05, 0.4)
+ROBOTS_OF = {
+    "breakaway": changed("axes", "axes", breakaway=HOLD),
+    "backward": changed("axes", "axes", coulomb_backward=(1.9, 1.2, 0.08), breakaway_backward=(2.5, 1.9, 0.1)),
+    "stribeck": changed("axes", "axes", breakaway=HOLD, stribeck_speed=SPEEDS),
+    "lorentzian": changed("axes", "axes", breakaway=HOLD, stribeck_speed=SPEEDS, stribeck_shape="lorentzian",
+                          stribeck_exponent=1.0),
+    "wheels": changed("wheels", "wheels", breakaway=1.2),
+    "wheels stribeck": changed("wheels", "wheels", breakaway=1.2, stribeck_speed=0.05),
+    "direction": changed("ellipse", "direction", breakaway=(2.9, 1.7), yaw_breakaway=0.12),
+    "direction stribeck": changed("ellipse", "direction", breakaway=(2.9, 1.7), stribeck_speed=0.05),
+    "gear": changed("axes", gear_efficiency=0.8),
+    "gear and wheels": changed("wheels", gear_efficiency=0.8),
+    "winding": changed("axes", electrical="dynamic", inductance=3e-3),
+    "winding, drop and limit": changed("axes", electrical="dynamic", inductance=3e-3, voltage_drop=0.3,
+                                       current_limit=1.5),
+    "lugre": changed("axes", "axes", law="lugre", stiffness=(1e4, 1e4, 300.0), breakaway=HOLD, stribeck_speed=SPEEDS),
+    "dahl": changed("axes", "axes", law="dahl", stiffness=(1e4, 1e4, 300.0)),
+    "dahl, exponent": changed("axes", "axes", law="dahl", stiffness=(1e4, 1e4, 300.0), dahl_exponent=1.5),
+    "lugre at the wheels": changed("wheels", "wheels", law="lugre", stiffness=1e4),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ROBOTS_OF)
+def test_with_more_grip_than_is_asked_for_it_is_the_engine_of_wheels_that_roll(name):
+    grips = slippery(ROBOTS_OF[name], 100.0)
+    rolls, u = grips.replace(wheels=grips.wheels.replace(traction_mu=None)), volts(3)
+    run, plain = (omnidyn.simulate(each, u, 0.25, tol=1e-6) for each in (grips, rolls))
+    assert not run.warnings
+    assert (np.abs(run.twist - plain.twist) / [1.0, 1.0, 10.0]).max() < 2e-6
+    assert np.abs(run.wheel_speed - plain.wheel_speed).max() * 0.035 < 2e-5
+    np.testing.assert_allclose(run.current, plain.current, atol=2e-5)
+    np.testing.assert_allclose(run.pose, plain.pose, atol=1e-5)
+
+
+def volts(seed, rows=8):
+    found = np.random.default_rng(seed).uniform(-6.0, 6.0, (rows, 3))
+    found[rows // 2] = 0.0
+    return found
+
+
+# --- rest, energy, derivatives ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [each for each in ROBOTS_OF if "dahl" not in each and "lugre" not in each])
+@pytest.mark.parametrize("tol", [1e-6, None])
+def test_below_breakaway_it_rests_exactly(name, tol):
+    run = omnidyn.simulate(slippery(ROBOTS_OF[name], 0.4), np.tile([0.0, 0.25, -0.25], (20, 1)), 0.05, tol=tol)
+    assert not run.twist.any()
+    assert not run.wheel_speed.any()
+
+
+def test_between_coulomb_and_breakaway_what_rests_stays_and_what_moves_goes_on():
+    """3.2 N at the rims, F = K u/R sqrt(3), lie between the levels of 2.2 and 3.6 N."""
+    robot = slippery(changed("axes", "axes", breakaway=(3.6, 2.0, 0.13)), 0.6)
+    rim = 19.0 * 0.0059 / 0.035 / 1.69 * np.sqrt(3.0)
+    pushed = np.tile([0.0, 3.2 / rim, -3.2 / rim], (10, 1))
+    assert not omnidyn.simulate(robot, pushed, 0.1).twist.any()
+    moving = omnidyn.simulate(robot, pushed, 0.1, twist=(0.05, 0.0, 0.0))
+    assert moving.twist[-1, 0] > 0.03
+
+
+@pytest.mark.parametrize("name", ["breakaway", "stribeck", "wheels", "wheels stribeck", "direction", "gear"])
+def test_it_takes_energy_and_gives_none(name):
+    """Kinetic energy, of the wheels too, never grows beyond what the motors put in."""
+    robot = slippery(ROBOTS_OF[name], 0.3)
+    u = np.repeat(volts(8, 6), 250, axis=0)
+    run = omnidyn.simulate(robot, u, 1e-3, tol=1e-6)
+    rims, spin, body = run.wheel_speed * 0.035, 2e-5 / 0.035**2, robot.body
+    kinetic = 0.5 * np.sum([body.mass, body.mass, body.inertia] * run.twist**2, axis=1)
+    kinetic += 0.5 * spin * np.sum(rims**2, axis=1)
+    thrust = 19.0 * 0.0059 / 0.035
+
+    def power(rim):
+        return np.sum(thrust * (u - thrust * rim) / 1.69 * rim, axis=1)
+
+    work = np.cumsum(0.5e-3 * (power(rims[:-1]) + power(rims[1:])))
+    lost = work - (kinetic[1:] - kinetic[0])
+    assert (np.diff(lost) > -1e-4).all()
+    assert lost[-1] > 1.0
+
+
+@pytest.mark.parametrize(
+    "name, key", [("breakaway", "coulomb"), ("stribeck", "breakaway"), ("lugre", "coulomb"), ("winding", "viscous")]
+)
+def test_derivatives_follow(name, key):
+    """Those of slipping_samples, by runs in fixed steps, are near differences of far more accurate runs."""
+    robot, u = slippery(ROBOTS_OF[name], 0.3), np.repeat(volts(4, 4), 40, axis=0)
+    dt, step = 0.005, 1e-3
+
+    def moved(side):
+        levels = getattr(robot.friction.axes, key)
+        axes = robot.friction.axes.replace(**{key: (levels[0] + side, *levels[1:])})
+        return robot.replace(friction=robot.friction.replace(axes=axes))
+
+    t = np.arange(len(u) + 1) * dt
+    one = Direction(key, moved(EPS), moved(-EPS))
+    found = slipping_samples(robot, t, u, [one], np.zeros(3), [0.0], 4, 1e-6)[0].dtwist[:, 0, 0]
+    far, near = (omnidyn.simulate(moved(side), u, dt, tol=1e-9).twist[:, 0] for side in (step, -step))
+    expected = (far - near) / (2.0 * step)
+    assert np.abs(expected).max() > 1e-3
+    assert np.median(np.abs(found - expected)) < 0.05 * np.abs(expected).max()
