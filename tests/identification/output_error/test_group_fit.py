@@ -1,5 +1,7 @@
 """Groups fitted together: shared and own numbers against simulated floors, and against what must be equal to it."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.output_error.prepare import expand_keys
 from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.keys import BOX, Key
+from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
@@ -129,3 +132,33 @@ def test_refusals(clean):
 def np_free(run):
     """Without inputs."""
     return run.replace(voltage=None, current=np.asarray(run.current))
+
+
+def test_a_held_number_that_the_file_knows_only_so_far_moves_all_groups_at_once():
+    """Against fits of the same logs with the number moved by its std in the file, up and down: of the numbers and of
+    what is between groups."""
+    plain, keys = AXEBOT.replace(priors={}), ("motor.gear_ratio", MASS)
+    size = {key: float(Key.parse(key).get(plain)) for key in keys}
+    std = {key: share * size[key] for key, share in zip(keys, (0.02, 0.04), strict=True)}
+    floors = (Key.parse(COULOMB).set(plain, level) for level in (2.2, ROUGH))
+    runs = [noisy_draw(simulate(own, excitation(15.0, seed=k), 0.01), k) for k, own in enumerate(floors)]
+    fit = partial(identify_groups, runs, groups=["a", "b"], free="friction", nuisances=(), start="rest")
+    told, alone = fit(plain.replace(priors={key: Prior(std=std[key], origin="measured") for key in keys})), fit(plain)
+
+    def each(study, of):
+        values = [getattr(own, of)[name] for own in study.estimates.values() for name in BOX]
+        between = [d.std if of == "std" else d.difference for d in study.differences]
+        return np.array(values + between)
+
+    variance = each(alone, "std") ** 2
+    for key in keys:
+        up, down = (each(fit(Key.parse(key).set(plain, size[key] + way * std[key])), "value") for way in (1.0, -1.0))
+        variance += (0.5 * (up - down)) ** 2
+    np.testing.assert_allclose(each(told, "std"), np.sqrt(variance), rtol=0.15)  # a whole std goes over kinks
+    wider = each(told, "std") / each(alone, "std")
+    assert wider[:2].min() > 2.0
+    assert wider[-6:].max() < 0.6 * wider[:2].min()  # both groups go the same way
+    for own, before in zip(told.estimates.values(), alone.estimates.values(), strict=True):
+        for name in BOX:
+            assert own.log_alone[name] == pytest.approx(before.ci95[name], rel=1e-6)
+        assert not any("exact" in words for words in own.warnings)

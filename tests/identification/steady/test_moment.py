@@ -1,6 +1,6 @@
 """A change inside a run at constant speeds: runs of a simulator that shares no code with ours, Coulomb friction only.
 
-So the force at every command is the level of the floor."""
+So the force at every command is the level of the floor; where none comes again, that of the shape."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.blind.log import robot_of
-from benchmarks.wrong_worlds.world import World, drive
+from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World, drive
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.run import Run
@@ -25,15 +25,20 @@ def run(seed, rounds=6, change=1e9, factor=1.0):
     shape = np.linalg.pinv(WORLD.G)[:, :2]
     shape /= np.abs(shape).max(axis=0)
     order = np.concatenate([rng.permutation(len(WAYS)) for _ in range(rounds)])
-    volts = np.repeat(7.0 * WAYS[order] @ shape.T, round(HOLD * RATE), axis=0)
-    t = np.arange(len(volts)) / RATE
     world = replace(WORLD, change=change, after_friction=factor)
+    return logged(world, 7.0 * WAYS[order] @ shape.T, rng, f"run {seed}")
+
+
+def logged(world, commands, rng, source):
+    """A run under commands (n, wheels) [V] that hold for HOLD each."""
+    volts = np.repeat(commands, round(HOLD * RATE), axis=0)
+    t = np.arange(len(volts)) / RATE
     moved = drive(world, t, volts, t)
     back = moved.wheel_speed * world.gear_ratio * np.array(world.torque_constant)
     current = (volts - back) / np.array(world.resistance)
     return Run(
         t, voltage=volts, wheel_speed=moved.wheel_speed + 0.1 * rng.normal(size=volts.shape),
-        current=current + 0.03 * rng.normal(size=volts.shape), source=f"run {seed}",
+        current=current + 0.03 * rng.normal(size=volts.shape), source=source,
     )  # fmt: skip
 
 
@@ -66,5 +71,59 @@ def test_the_run_that_changed_is_named():
     assert found.document().data["moments"][0]["source"] == "run 3"
 
 
-def test_commands_that_are_given_once_tell_nothing():
-    assert not identify_steady([run(4, rounds=1, change=3.0, factor=1.3)], robot_of(WORLD)).moments
+ROUND = {"coulomb": (3.9, 3.0, 0.2), "viscous": (0.0, 0.0, 0.0), "rim": (1.6, 0.0)}
+
+
+def once(seed, world, count, swept=False, change=1e9, factor=1.0):
+    """Directions of which none comes again, each at a level of its own, in an order of their own or one round."""
+    rng = np.random.default_rng([seed, count])
+    angle = 2.0 * np.pi / count * (np.arange(count) + rng.uniform(0.2, 0.8, count))
+    angle = angle if swept else rng.permutation(angle)
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.pinv(world.G)[:, :2].T
+    rim *= rng.uniform(5.0, 8.0, (count, 1)) / np.abs(rim).max(axis=1, keepdims=True)
+    return logged(replace(world, change=change, after_friction=factor), rim, rng, f"run {seed}")
+
+
+@pytest.mark.parametrize(("shape", "count", "factor"), [(BOX, 12, 1.1), (ELLIPSE, 16, 0.95), (WHEELS, 12, 1.05)])
+def test_a_change_is_found_by_the_shape_where_no_command_comes_again(shape, count, factor):
+    world, changed = World(shape=shape, **ROUND), 0.55 * count * HOLD
+    study = identify_steady([once(5, world, count, change=changed, factor=factor)], robot_of(world))
+    (moment,) = study.moments
+    assert moment.between[0] <= changed <= moment.between[1]
+    assert moment.at == pytest.approx(changed, abs=HOLD)
+    assert moment.ci95[0] <= factor - 1.0 <= moment.ci95[1]
+    assert moment.after / moment.before == pytest.approx(factor, abs=0.015)
+    assert moment.before_ci95[0] < moment.before < moment.before_ci95[1]
+    assert moment.shape == study.choice.chosen
+    (words,) = (words for words in study.warnings if "changes within the run" in words)
+    assert "it is one only if that shape is right" in words
+
+
+@pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
+def test_a_right_shape_does_not_change(shape):
+    world = World(shape=shape, **ROUND)
+    assert not identify_steady([once(6, world, 14)], robot_of(world)).moments
+
+
+def test_a_wrong_shape_that_is_driven_round_is_no_change():
+    """A box turned by 25 degrees against the body: what it leaves over follows the direction, which follows time."""
+    world = World(shape=BOX, **ROUND)
+    told = replace(world, azimuth=tuple(angle - 25.0 for angle in world.azimuth))
+    assert not identify_steady([once(7, world, 24, swept=True)], robot_of(told)).moments
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
+def test_changes_by_the_shape_many_times(shape):
+    world, found, held, wrong = World(shape=shape, **ROUND), 0, 0, 0
+    for seed in range(33):
+        count = 12 + seed % 13
+        wrong += bool(identify_steady([once(seed, world, count, seed % 2 == 0)], robot_of(world)).moments)
+        changed, factor = (0.35 + 0.3 * seed / 33) * count * HOLD, (1.05, 1.1)[seed % 2]
+        run = once(100 + seed, world, count, change=changed, factor=factor)
+        for moment in identify_steady([run], robot_of(world)).moments:
+            found += moment.between[0] <= changed <= moment.between[1]
+            held += moment.ci95[0] <= factor - 1.0 <= moment.ci95[1]
+    assert wrong <= 1
+    assert found >= 30
+    assert held >= 28

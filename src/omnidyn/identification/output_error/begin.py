@@ -8,7 +8,7 @@ from dataclasses import replace
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.output_error.prepare import (
-    EXACT,
+    LOOP,
     Group,
     expand_keys,
     free_by_default,
@@ -24,7 +24,6 @@ from omnidyn.identification.output_error.trust.breakaway import KEY, asked_axes
 from omnidyn.identification.question import Question
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.simulation.exact.march import why_not_exact
 
 WHOLE = "all"  # the name of the group where there are none
 
@@ -68,11 +67,13 @@ def begun(name: str, runs: Sequence[Run], robot: Robot, question: Question, join
 
 def _refuse_profile(group: Group, question: Question) -> None:
     axes = asked_axes(group.robot, question.free or (), question.fixed)
-    if group.engine != EXACT and any(group.moved[axis] for axis in axes):
-        why = why_not_exact(group.robot) or ["winding inductance, or a number of one wheel among those fitted"]
+    why = "a speed loop" if group.engine == LOOP else ""
+    if group.robot.wheels.traction_mu is not None:
+        why = "wheels that may slip"
+    if why and any(group.moved[axis] for axis in axes):
         raise UnsupportedError(
-            "breakaway is profiled with the exact engine only", got="; ".join(why),
-            expected="a robot that the exact engine runs", where="free",
+            "breakaway is profiled over voltages that are known, of wheels that roll", got=why,
+            expected="neither a speed loop nor a traction limit", where="free",
             remedy="give friction.axes a stribeck_speed and free it too: what falls with the speed is fitted here; or "
             "hold breakaway, at the force with which slow ramps first move the robot",
         )  # fmt: skip

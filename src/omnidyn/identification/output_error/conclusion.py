@@ -17,7 +17,7 @@ from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.belonging import key_of, with_nuisances
 from omnidyn.identification.output_error.combinations import combinations
-from omnidyn.identification.output_error.problem.falling import falls
+from omnidyn.identification.output_error.problem.falling import breaking_at, falls
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
@@ -68,6 +68,7 @@ def conclude(
         std[name], ci95[name] = std[name] if spread is None else spread, interval
     data, names = _data(records), [p.name for p in problem.parameters]
     own_levels, joint = _levels(levels, ci95), combinations(problem, values, known, moved)
+    endless = [name for name, (_, (_, high)) in own_levels.items() if high == math.inf]
     fitted = problem.parameters[:own]
     robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)
     robot = with_nuisances(robot, problem, values, std, open_, records, data)
@@ -83,7 +84,7 @@ def conclude(
         at_bound=tuple(name for name, held in zip(names[:own], known.held, strict=False) if held),
         warnings=tuple(warnings),
         method=f"output error, maximum likelihood, {loss}, {known.kind} covariance",
-        lower_bound=dict(lower_bound),
+        lower_bound={**lower_bound, **{name: own_levels[name][1][0] for name in endless}},
         data=data,
         scale=_scale(problem),
         nuisances={
@@ -91,7 +92,7 @@ def conclude(
             for j, name in enumerate(names[own:])
         },
         noise=noise_of(solver, solution),
-        unidentifiable=open_,
+        unidentifiable=(*open_, *endless),
         combinations=(*joint, *trades(problem, values, known, moved)),
         log_alone=_log_alone(problem, values, exact or known, open_, exact not in (None, known)),
         directions=directions,
@@ -256,18 +257,13 @@ def _robot(
                 found[key] = before.replace(std=float(before.std * share), source=source)
     axes = robot.friction.axes
     if axes.breakaway is not None:
-        robot = _breaking_at(robot, [max(s, c) for s, c in zip(axes.breakaway, axes.coulomb, strict=True)])
+        robot = breaking_at(robot, np.array(axes.breakaway))
     return with_priors(robot, found)
 
 
 def prior_of(robot: Robot, key: str) -> Prior | None:
     """What the file knows of a number, by itself or as an entry of a list."""
     return robot.priors.get(key) or robot.priors.get(Key.parse(key).name)
-
-
-def _breaking_at(robot: Robot, levels: Sequence[float]) -> Robot:
-    axes = robot.friction.axes.model_copy(update={"breakaway": tuple(levels)})
-    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"axes": axes})})
 
 
 def _levels(
@@ -299,7 +295,7 @@ def _with_levels(robot: Robot, levels: Mapping[str, tuple[float, tuple[float, fl
         if key in levels:
             hold[axis] = max(levels[key][0], coulomb[axis])
             found[key] = identified(_spread(levels[key][1]), "output error, profile over the drives of the log")
-    return with_priors(_breaking_at(robot, hold.tolist()), found)
+    return with_priors(breaking_at(robot, hold), found)
 
 
 def _correlation(names: Sequence[str], known: Trust) -> Correlation:

@@ -11,6 +11,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.answer import Answer
@@ -41,7 +43,7 @@ from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
-from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, trust
+from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
 from omnidyn.identification.recordings import count_once
 from omnidyn.model.known.told import known_priors
@@ -141,7 +143,7 @@ class Fit:
         done = isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
         warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution)]
-        solution, levels = self.with_levels(solution) if done else (solution, [])
+        solution, levels = self.with_levels(solution, progress) if done else (solution, [])
         progress.doing("finding how sure the numbers are")
         sure = self.weighed(solution, progress, anew=done)
         known, by, warnings = sure.known, sure.solution, [*warnings, *sure.warnings]
@@ -153,26 +155,28 @@ class Fit:
         loss = loss_words(self.question.loss)
         if len(self.groups) == 1:
             group = self.groups[0]
-            known, held, told = without_a_fall(solution, known) if done else (known, {}, [])
-            exact, so_far = known, self.known_so_far(solver.problem)
-            if done and so_far and moved_by:
-                known = known.beside(moved_by(sure, so_far))
+            moves = [one.moves for one in levels if one.moves is not None]
+            known = known.beside(np.concatenate(moves, axis=1)) if moves else known
+            exact, held, told = without_a_fall(solution, known) if done else (known, {}, [])
+            known = self._beside_what_is_held(exact, sure, moved_by if done else None)
             words = [*warnings, *told, *group.warnings, *hints]
             estimate = conclude(
                 solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels,
                 held | dict(again.intervals), exact
             )  # fmt: skip
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
-        warnings += _taken_as_exact(self.known_so_far(solver.problem))
+        exact, known = known, self._beside_what_is_held(known, sure, moved_by if done else None)
         engine, estimates, alones = solver.engine, {}, []
         assert isinstance(engine, JointEngine)
         for member in engine.members:
             words = [*warnings, *member.group.warnings]
             better = engine.named_alone(member, again.intervals)
             seen, alone = engine.seen_alone(member, solution, known)
+            as_exact = alone if exact is known else engine.seen_alone(member, solution, exact)[1]
             estimate = conclude(
-                seen.solver, seen, alone, member.group.records, loss, words, {}, member.group.moved, (), better
-            )
+                seen.solver, seen, alone, member.group.records, loss, words, {}, member.group.moved, (), better,
+                as_exact,
+            )  # fmt: skip
             others = ", ".join(each.name for each in engine.members if each is not member)
             alones.append(seen)
             estimates[member.name] = replace(estimate, method=f"{estimate.method}; fitted together with {others}")
@@ -181,9 +185,14 @@ class Fit:
         between = differences(by, known, again, own, [*estimates], profile, strata)
         return Answer(estimates, own, shared, between, tuple(alones))
 
+    def _beside_what_is_held(self, known: Trust, sure: Weighed, moved_by: MovedBy | None) -> Trust:
+        """The same trust, with what the file knows only so far; the same number moves all groups at once."""
+        so_far = self.known_so_far(sure.plain.solver.problem)
+        return known.beside(moved_by(sure, so_far)) if so_far and moved_by else known
+
     def known_so_far(self, problem: Problem) -> dict[str, float]:
         """Key -> std of what the robot file knows only so far, and the fit took as it stands."""
-        asked = {*problem.names, *(self.question.free or ())}
+        asked = {*(name.partition(AT)[0] for name in problem.names), *(self.question.free or ())}
         known, group = known_priors(self.began), self.groups[0]
         return {key: known[key][1] for key in guesses(self.began, group.engine == LOOP) if key not in asked}
 
@@ -322,7 +331,7 @@ class Fit:
         alone = len(self.groups) == 1 and group.engine == LOOP
         return left_out(group.records, solution.solver.problem.pieces) if alone else []
 
-    def with_levels(self, solution: Solution) -> tuple[Solution, list[Breakaway]]:
+    def with_levels(self, solution: Solution, progress: Progress | None = None) -> tuple[Solution, list[Breakaway]]:
         """Breakaway of the axes that were asked for, and the fit with it."""
         group = self.groups[0]
         axes = [
@@ -332,7 +341,7 @@ class Fit:
             return solution, []
         kind = self.question.covariance
         known = trust(solution.solver, solution, SANDWICH if kind == AUTOREGRESSIVE else kind)
-        return find_breakaway(solution, axes, known)
+        return find_breakaway(solution, axes, known, progress)
 
 
 def degrees(loss: str) -> float:
@@ -343,14 +352,6 @@ def degrees(loss: str) -> float:
 def loss_words(loss: str) -> str:
     """A loss as an answer names it."""
     return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
-
-
-def _taken_as_exact(held: Iterable[str]) -> list[str]:
-    """What is to be said of numbers that the file knows only so far, where groups are fitted together without them."""
-    names = ", ".join(held)
-    return (
-        [f"{names}: held, with groups as if exact; leave them free, and their std is in the intervals"] if names else []
-    )
 
 
 def _in_each_group(names: Iterable[str], problem: Problem) -> list[str]:

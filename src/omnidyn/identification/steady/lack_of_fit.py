@@ -104,14 +104,11 @@ class _Rival:
 
 def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
     """Test the fitted shape of one group of points."""
-    slow = element_speeds(fit.shape, robot, points)
-    fastest = np.linalg.norm(points.twist * [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))], axis=1)
-    bound = np.maximum(STILL_TIMES * points.still, SLOW_SHARE * fastest)
-    moving = points.chosen(np.asarray((slow > bound[:, None]).all(axis=1)))
+    moving = all_moving(robot, points, fit)
     turning = is_turning(robot, points) and bool(moving.turns.any())
     if not len(moving) or int(fold_numbers(moving).max()) + 1 < len(fit.keys) + SPARE:
         return LackOfFit(False, 0.0, (), ())
-    problem = _Linear(robot, moving, fit, turning)
+    problem = LinearShape(robot, moving, fit, turning)
     plain = problem.solve(np.zeros((*problem.target.shape, 0)))
     if plain is None:
         return LackOfFit(False, 0.0, (), ())
@@ -131,6 +128,14 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
     return LackOfFit(
         found, share, _tied(remedies), (*(rival.key for rival, *_ in tried), *([REPEATS] if repeated.tested else []))
     )
+
+
+def all_moving(robot: Robot, points: ForcePoints, fit: ShapeFit) -> ForcePoints:
+    """The points at which every part of a shape moves: one at rest holds any force."""
+    slow = element_speeds(fit.shape, robot, points)
+    fastest = np.linalg.norm(points.twist * [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))], axis=1)
+    bound = np.maximum(STILL_TIMES * points.still, SLOW_SHARE * fastest)
+    return points.chosen(np.asarray((slow > bound[:, None]).all(axis=1)))
 
 
 def _share(remedies: Sequence[Remedy]) -> float:
@@ -159,13 +164,13 @@ class _Solved:
     new: int
 
 
-class _Linear:
+class LinearShape:
     """The chosen shape, linear about its fitted levels, with more columns beside it."""
 
     def __init__(self, robot: Robot, points: ForcePoints, fit: ShapeFit, turning: bool):
         self.arm, self.seen = float(np.mean(robot.wheels.robot_radius)), seen_components(points, turning)
         wrench, slope = fit.shape.table(robot, points, is_turning_fit(fit), fit.free)
-        self.base = self.components(slope)
+        self.base, self.force = self.components(slope), self.components(wrench[:, :, None])
         self.target = self.components((points.wrench - wrench)[:, :, None])[:, :, 0] + self.base @ fit.free
         self.fold, self.count = fold_numbers(points), int(fold_numbers(points).max()) + 1
         self.sizes = np.linalg.norm(self.base, axis=(0, 1)) > 0.0
@@ -240,7 +245,7 @@ class _Repeated:
     tested: bool = False
 
 
-def _repeated(plain: _Solved, problem: _Linear, levels: int) -> _Repeated:
+def _repeated(plain: _Solved, problem: LinearShape, levels: int) -> _Repeated:
     """Whether the errors of one direction agree more than by chance: spread of their means, beside that within."""
     counts = np.bincount(problem.fold, minlength=problem.count)
     again = counts[problem.fold] > 1
@@ -278,6 +283,11 @@ def _rivals() -> list[_Rival]:
         _Rival("turning left and right", "another level turning left than right",
                lambda r, p: _on_axis(p, np.ones(len(p)), 2), yaw=True),
     ]  # fmt: skip
+
+
+def rival_columns(robot: Robot, points: ForcePoints, problem: LinearShape, turning: bool) -> list[FloatArray]:
+    """What each part that is not offered would add, in components of a problem: (points, components, levels) each."""
+    return [problem.components(r.columns(robot, points)) for r in _rivals() if turning or not r.yaw]
 
 
 def _turned_box(points: ForcePoints, angle: float) -> FloatArray:

@@ -30,7 +30,8 @@ MATTERS = 0.02  # of the force: a smaller change does not matter
 class Moment:
     """A change inside a run. at: its time [s], and from where to where it may be. before, after: force of the motors
     that friction balances [N], mean of the commands that were given on both sides, with 95 % intervals. change: the
-    second over the first, less 1; ci95: of it. p: the chance of as much."""
+    second over the first, less 1; ci95: of it. p: the chance of as much. shape: of friction, that this rests on where
+    no command came again."""
 
     source: str
     at: float
@@ -42,16 +43,21 @@ class Moment:
     change: float
     ci95: tuple[float, float]
     p: float
+    shape: str = ""
 
     def words(self) -> str:
         """In a sentence."""
         low, high = (100.0 * end for end in self.ci95)
+        what, rests = "at the same command", ""
+        if self.shape:
+            what = f"over that of the fitted shape ({self.shape})"
+            rests = "; no command tells it by itself, so it is one only if that shape is right"
         return (
-            f"{self.source or 'the run'}: the force at the same command changes within the run, most likely at "
+            f"{self.source or 'the run'}: the force {what} changes within the run, most likely at "
             f"{self.at:.4g} s (between {self.between[0]:.4g} and {self.between[1]:.4g} s): from {self.before:.3g} N "
             f"[{self.before_ci95[0]:.3g}, {self.before_ci95[1]:.3g}] to {self.after:.3g} N "
             f"[{self.after_ci95[0]:.3g}, {self.after_ci95[1]:.3g}], {100.0 * self.change:+.2g} % "
-            f"[{low:.2g}, {high:.2g}]; the levels of the fit lie between both"
+            f"[{low:.2g}, {high:.2g}]; the levels of the fit lie between both{rests}"
         )
 
 

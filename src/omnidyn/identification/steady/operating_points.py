@@ -50,7 +50,7 @@ class ForcePoints:
     motion slower than this is not known to move. travels, turns: whether the point has a direction of travel, and
     whether it turns, (points,); a turn on the spot has no direction of travel. direction: of the commanded motion
     [degree], or of the twist where no command was logged. group: name of each point's group. run: number of its run.
-    rows: rows of the log behind it.
+    rows: rows of the log behind it. span: start and end of its window [s], shape (points, 2).
     speed_from: "wheel", "set" or "ground". force_from: "current" or "voltage". notes: in words.
     """
 
@@ -65,6 +65,7 @@ class ForcePoints:
     group: tuple[str, ...]
     run: IntArray
     rows: IntArray
+    span: FloatArray
     speed_from: str
     force_from: str
     notes: tuple[str, ...] = ()
@@ -93,7 +94,8 @@ class ForcePoints:
     def chosen(self, keep: NDArray) -> ForcePoints:
         """Some of the points: a mask or indices."""
         index = np.arange(len(self))[keep]
-        arrays = ("twist", "traction", "wrench", "wrench_std", "still", "travels", "turns", "direction", "run", "rows")
+        arrays = ("twist", "traction", "wrench", "wrench_std", "still", "travels", "turns", "direction", "run", "rows",
+                  "span")  # fmt: skip
         parts = {name: getattr(self, name)[index] for name in arrays}
         return replace(self, **parts, group=tuple(self.group[k] for k in index))
 
@@ -362,6 +364,7 @@ def _stacked(
         group=tuple(names[number] for number, _, _ in found),
         run=np.array([number for number, _, _ in found]),
         rows=np.array([each.count for *_, each in found]),
+        span=np.array([(each.start, each.end) for *_, each in found]),
         speed_from=speed,
         force_from=origin,
         notes=tuple(notes),

@@ -28,6 +28,7 @@ from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
 from omnidyn.identification.steady.moment import moments
+from omnidyn.identification.steady.moment_by_shape import moments_by_shape
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
 from omnidyn.identification.steady.rests_on import moved_by_the_file, rests_on
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
@@ -85,6 +86,8 @@ def identify_steady(
     differences = _differences(choice)
     internal = {group: _internal(robot, own) for group, own in parts.items()} if robot.wheels.count > 3 else {}
     changed = moments(runs, robot, points.speed_from, points.force_from, asked.window)
+    sources = {number: run.source for number, run, _ in windows.found}
+    changed += moments_by_shape(robot, points, choice.fit, sources, changed)
     lack = {group: lack_of_fit(robot, own, choice.fit(group)) for group, own in parts.items()}
     turning = any(is_turning(robot, own) for own in parts.values())
     for group, each in estimates.items():

@@ -12,6 +12,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
+from omnidyn.identification.output_error.problem.falling import breaking_at
 from omnidyn.identification.output_error.problem.problem import Parts, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
@@ -124,10 +125,7 @@ def with_levels(problem: Problem, levels: Sequence[float] | None) -> Problem:
     """The problem of a robot with the levels of breakaway that were found beside its numbers."""
     if levels is None:
         return problem
-    friction = problem.robot.friction
-    axes = friction.axes.model_copy(update={"breakaway": tuple(levels)})
-    robot = problem.robot.model_copy(update={"friction": friction.model_copy(update={"axes": axes})})
-    return replace(problem, robot=robot)
+    return replace(problem, robot=breaking_at(problem.robot, np.array(levels)))
 
 
 def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:

@@ -6,15 +6,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import OmnidynError
+from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.output_error.problem.bending import bending_keys
 from omnidyn.identification.output_error.problem.falling import falls
 from omnidyn.identification.output_error.problem.parameters import robot_parameter
-from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.output_error.problem.problem import Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine
 from omnidyn.identification.structure.linear import Linear, Rows, solved
 from omnidyn.identification.structure.workbench import Workbench, scaled
@@ -75,7 +76,7 @@ def _of_laws(bench: Workbench) -> list[str]:
 
 def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     """What one std of each number that the fit took as it stands moves its parameters by, in the numbers that the
-    solver sees. Shape (P, K). held: key -> std, as the robot file has it.
+    solver sees. Shape (P, K). held: key -> std, as the robot file has it; with groups it is the same number in all.
 
     To first order, as in `rests_on`; 0 for what shows in no row, or cannot be simulated. The covariance of what is
     fitted beside numbers that are taken as they stand: S. F. Schmidt, Adv. Control Syst. 3, 293 (1966).
@@ -90,15 +91,28 @@ def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
         for c, column in enumerate(problem.columns)
     ]
     linear = Linear(rows, memory)
-    bench, (_, j) = Workbench(problem, point, engine_kind(solver.engine), ()), linear.whole()
+    benches, (_, j) = _benches(engine, problem, point), linear.whole()
     found = np.zeros((j.shape[1], len(held)))
     for k, (key, std) in enumerate(held.items()):
-        number = robot_parameter(bench.robot, key, None, tuple(held))
-        if number.value == 0.0:
-            continue
+        shown = [np.zeros((*own.shape, 1)) for own in rows.residual]
         try:
-            shown = bench.change(number.on(bench.robot, (1.0 + TRIED) * number.value))
+            for bench, places in benches:
+                number = robot_parameter(bench.robot, key, None, tuple(held))
+                if number.value == 0.0:
+                    continue
+                change = bench.change(number.on(bench.robot, (1.0 + TRIED) * number.value))
+                for place, own in zip(places, change, strict=True):
+                    shown[place] = own / (TRIED * abs(number.value))
         except OmnidynError:
             continue
-        found[:, k] = solved(j, -linear.white(shown)[:, 0]) * std / (TRIED * abs(number.value))
+        found[:, k] = solved(j, -linear.white(shown)[:, 0]) * std
     return found
+
+
+def _benches(engine: RowEngine, problem: Problem, point: Point) -> list[tuple[Workbench, IntArray]]:
+    """(what simulates, which pieces of all are its own) of each group; of one where there are none."""
+    if not isinstance(engine, JointEngine):
+        return [(Workbench(problem, point, engine_kind(engine), ()), np.arange(len(problem.pieces)))]
+    return [
+        (Workbench(own.problem, own.point(point), engine_kind(own.engine), ()), own.places) for own in engine.members
+    ]

@@ -1,7 +1,12 @@
 """Breakaway between the drives of a log: runs of the reference integrator, which goes from event to event."""
 
 import numpy as np
+import pytest
 
+from benchmarks.wrong_worlds.log import NOISE as SENSOR
+from benchmarks.wrong_worlds.log import Case, commands, robot_of, truths
+from benchmarks.wrong_worlds.world import World, drive
+from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
@@ -37,3 +42,52 @@ def test_it_is_found_above_the_last_drive_below_three_times_coulomb():
         low, high = fit.ci95[key]
         assert 4.9 < low < HOLDS < high < 8.3
     assert fit.noise["twist[0]"] < 1.1 * NOISE
+
+
+RATIO = 1.3
+LEVELS = [f"friction.axes.breakaway[{axis}]" for axis in range(3)]
+
+
+def in_a_turning_frame(seed, **options):
+    """(fit, truth) of 30 s in a turning frame, by the simulator of the wrong worlds, which shares no code with src.
+
+    At 0.4 of its voltages, so that some of its drives lie between Coulomb friction and breakaway.
+    """
+    world = World(frame=True, breakaway=RATIO)
+    asked = 0.4 * commands(Case(world, world), np.random.default_rng([seed, 2]))
+    t = np.arange(len(asked)) / 100.0
+    speed = drive(world, t, asked, t).wheel_speed
+    speed = speed + SENSOR * np.random.default_rng([seed, 3]).normal(size=speed.shape)
+    log = Run(t, voltage=asked, wheel_speed=speed)
+    fit = fit_output_error(log, robot_of(world), free=["friction", *LEVELS], **options)
+    levels = zip(LEVELS, (RATIO * level for level in world.coulomb), strict=True)
+    return fit, truths(world, "axes") | dict(levels)
+
+
+def held(fit, truth):
+    return {key: fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in truth.items()}
+
+
+def test_it_is_found_in_a_turning_frame_too():
+    """The implicit engine runs it. Two axes are told well here, turning from below only: that is said."""
+    words = []
+    fit, truth = in_a_turning_frame(8, watch=Progress(words=words.append))
+    assert all(held(fit, truth).values())
+    for key in LEVELS[:2]:
+        low, high = fit.ci95[key]
+        assert 1.1 * truth[key.replace("breakaway", "coulomb")] < low < high < 1.2 * truth[key]
+        assert fit.robot.priors[key].std == pytest.approx(fit.std[key])
+    assert fit.unidentifiable == (LEVELS[2],)
+    assert fit.lower_bound == {LEVELS[2]: fit.ci95[LEVELS[2]][0]}
+    assert fit.robot.priors[LEVELS[2]].std is None
+    assert any(each.startswith("how much y holds, fit ") for each in words)
+    assert sum(each.startswith("how much") for each in words) < 300
+
+
+@pytest.mark.long
+def test_intervals_in_a_turning_frame_hold_the_truth():
+    every = [held(*in_a_turning_frame(seed)) for seed in range(12)]
+    levels = [each[key] for each in every for key in LEVELS]
+    others = [each[key] for each in every for key in each if key not in LEVELS]
+    assert np.mean(levels) >= 0.9
+    assert np.mean(others) >= 0.9

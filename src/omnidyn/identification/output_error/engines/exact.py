@@ -86,6 +86,11 @@ class ExactEngine:
         engine.problem, engine._columns = problem, problem.columns
         return engine
 
+    @property
+    def breakaway(self) -> FloatArray:
+        """Fixed levels of breakaway (3,) [N, N, N m]; NaN where S follows coulomb."""
+        return self.mapping.breakaway
+
     def with_breakaway(self, breakaway: FloatArray) -> ExactEngine:
         """The same engine with other fixed levels of breakaway, shape (3,) [N, N, N m], NaN where S follows coulomb."""
         engine = copy.copy(self)

@@ -20,6 +20,7 @@ from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT, Weighting
 from omnidyn.identification.output_error.engines.sums import added
+from omnidyn.identification.output_error.problem.falling import breaking_at
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
@@ -75,6 +76,14 @@ class ImplicitEngine:
                 remedy="leave it out of the nuisances", where=problem.robot.name,
             )  # fmt: skip
         self.last = LastPoints()
+        self.breakaway: FloatArray | None = None
+
+    def with_breakaway(self, breakaway: FloatArray) -> Self:
+        """The same engine with other fixed levels of breakaway of the body axes, shape (3,), NaN where S follows
+        coulomb; by default as the robot has it."""
+        engine = copy.copy(self)
+        engine.breakaway, engine.last = breakaway, LastPoints()
+        return engine
 
     def on(self, problem: Problem) -> Self:
         """The same engine on other pieces of the same logs, with the same parameters."""
@@ -95,16 +104,19 @@ class ImplicitEngine:
         return self.last.at(point, self._simulated)
 
     def _simulated(self, point: Point) -> list[Parts]:
-        robot, values = self.problem.robot_at(point.values), point.values
+        robot, values = self._holding(self.problem.robot_at(point.values)), point.values
         scales = [abs(float(value)) or 1.0 for value in values]
         moved = [
-            tuple(p.on(robot, float(value) + side * EPS * scale) for side in (1.0, -1.0))
+            tuple(self._holding(p.on(robot, float(value) + side * EPS * scale)) for side in (1.0, -1.0))
             for p, value, scale in zip(self.problem.robot_parameters, values, scales, strict=False)
         ]
         return side_by_side(
             lambda own: self._piece(robot, moved, scales, own[0], own[1], values),
             zip(self.problem.pieces, point.states, strict=True),
         )
+
+    def _holding(self, robot: Robot) -> Robot:
+        return robot if self.breakaway is None else breaking_at(robot, self.breakaway)
 
     def _piece(
         self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,

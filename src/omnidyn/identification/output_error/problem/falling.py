@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.parameters import AT, Parameter
 from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BREAKAWAY, COULOMB, Key, find_key
@@ -25,6 +28,14 @@ def falls(name: str, robot: Robot) -> bool:
     law = getattr(robot.friction, key.table.rpartition(".")[2])
     speed = "yaw_stribeck_speed" if key.field.startswith("yaw_") else "stribeck_speed"
     return KINDS[law.law].falls and getattr(law, speed, None) is not None
+
+
+def breaking_at(robot: Robot, levels: FloatArray) -> Robot:
+    """The robot with these levels of breakaway of the body axes (3,) [N, N, N m], not checked: where one is NaN, or
+    below Coulomb friction, it is that."""
+    axes = robot.friction.axes
+    held = axes.model_copy(update={"breakaway": tuple(np.fmax(levels, axes.coulomb).tolist())})
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"axes": held})})
 
 
 def coulomb_below(name: str, robot: Robot | None = None) -> str:

@@ -25,7 +25,14 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing.laws import FALL, may_fall
-from omnidyn.identification.structure.missing.switches import EACH_WHEEL, FALLS, Switch, as_it_ended, switches
+from omnidyn.identification.structure.missing.switches import (
+    EACH_WHEEL,
+    FALLS,
+    Switch,
+    as_it_ended,
+    switches,
+    with_levels_as_they_are,
+)
 from omnidyn.model.friction import WheelFriction
 from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, find_key
 from omnidyn.model.robot import Robot
@@ -186,7 +193,7 @@ def tried(
         begins = _begins(stands, dict(zip(every, ways, strict=True)))
         try:
             fit = _fit(stands, begins, runs, names, aside)
-            solution, _ = fit.with_levels(fit.solve(aside))
+            solution, _ = fit.with_levels(fit.solve(aside), aside)
         except OmnidynError as error:
             found.append(Untried(move, words, str(error)))
             continue
@@ -200,6 +207,7 @@ def _begins(stands: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot,
     found = {}
     for group, start in stands.begins.items():
         way = ways.get(group) or as_it_ended(*start, stands.alone[group])
+        way = way if len(stands.begins) == 1 else with_levels_as_they_are(way)  # groups profile none
         found[group] = way.robot, way.question
     return found
 

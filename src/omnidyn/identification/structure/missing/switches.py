@@ -15,9 +15,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
-from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
-from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
+from omnidyn.identification.output_error.prepare import LOOP, engine_kind, expand_keys, guesses
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import AT, EFFICIENCY, WITHIN
@@ -74,7 +73,7 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
     """
     start, asked = _where_it_ended(robot, found), _as_it_settled(robot, question, found)
     try:
-        return [_with_levels_as_they_are(way) for way in _ways(remedy, start, asked)]
+        return [_as_far_as_profiled(way, found) for way in _ways(remedy, start, asked)]
     except OmnidynError:  # a size that no robot file may have
         return []
 
@@ -82,7 +81,7 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
 def as_it_ended(robot: Robot, question: Question, found: Solution) -> Switch:
     """A fit as it ended, nothing switched on."""
     way = Switch(_where_it_ended(robot, found), _as_it_settled(robot, question, found), "")
-    return _with_levels_as_they_are(way)
+    return _as_far_as_profiled(way, found)
 
 
 def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
@@ -172,13 +171,18 @@ def _free(asked: Question, *keys: str) -> Question:
     return replace(asked, free=tuple(dict.fromkeys((*(asked.free or ()), *keys))))
 
 
-def _with_levels_as_they_are(way: Switch) -> Switch:
-    """The same; where the engine cannot look for levels of breakaway, they stay."""
+def _as_far_as_profiled(way: Switch, found: Solution) -> Switch:
+    """The same; where no engine looks for levels of breakaway, of a speed loop or wheels that slip, they stay."""
+    if way.robot.wheels.traction_mu is None and engine_kind(found.solver.engine) != LOOP:
+        return way
+    return with_levels_as_they_are(way)
+
+
+def with_levels_as_they_are(way: Switch) -> Switch:
+    """The same, levels of breakaway that would be profiled held where they stand."""
     keys = expand_keys(way.question.free or (), way.robot)
     kept = tuple(key for key in keys if not is_profiled(key, way.robot))
-    if kept == keys or (is_exact(way.robot) and stays_exact(way.robot, kept)):
-        return way
-    return replace(way, question=replace(way.question, free=kept))
+    return way if kept == keys else replace(way, question=replace(way.question, free=kept))
 
 
 def _balanced(robot: Robot, by: Sequence[float]) -> Robot:
@@ -194,7 +198,7 @@ def _of_another_shape(asked: Question) -> Question:
 
 
 def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
-    """Levels above Coulomb friction as the first step has them; the exact engine finds better ones."""
+    """Levels above Coulomb friction as the first step has them; a profile finds better ones."""
     axes = robot.friction.axes
     above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
     levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
