@@ -156,7 +156,7 @@ class LackOfFit:
     what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst. wild: outputs
     with wild samples, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's.
     noise: of outputs whose noise the log shows without the model, by the best source; None where that was not asked.
-    at_rest: the same where the robot rests, for comparison.
+    beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
     """
 
     found: bool
@@ -168,6 +168,7 @@ class LackOfFit:
     pictures: tuple[Binned, ...] = ()
     wild: Mapping[str, Wild] = field(default_factory=dict)
     noise: Mapping[str, Noise] | None = None
+    beyond: tuple[str, ...] = ()
     at_rest: Mapping[str, Noise] = field(default_factory=dict)
 
     def words(self) -> str:
@@ -197,9 +198,9 @@ class LackOfFit:
 
     def _beyond_noise(self) -> str:
         """The output whose residual is most surely beyond its noise, in words; "" where none is."""
-        found = {name: each for name, each in (self.noise or {}).items() if each.decides}
-        worst = min(found, key=lambda name: found[name].p, default="")
-        return f": {found[worst].words(worst)}" if worst else ""
+        noise = {name: (self.noise or {})[name] for name in self.beyond}
+        worst = min(noise, key=lambda name: noise[name].p, default="")
+        return f": {noise[worst].words(worst)}" if worst else ""
 
     def alike(self, remedy: Remedy) -> str:
         """What the log cannot tell from a remedy, with their values: "gain 0.94, torque constant -6 %"."""
@@ -281,6 +282,7 @@ class LackOfFit:
             "remedies": [asdict(each) for each in self.remedies], "tested": self.tested,
             "wild": {name: asdict(each) for name, each in self.wild.items()},
             "noise": {name: asdict(each) for name, each in (self.noise or {}).items()},
+            "beyond_noise": self.beyond,
             "at_rest": {name: asdict(each) for name, each in self.at_rest.items()},
         })  # fmt: skip
 

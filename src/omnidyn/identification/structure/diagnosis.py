@@ -77,7 +77,8 @@ def examine(solution: Solution) -> Examined:
     pictures = binned(rows, moved, int(np.argmax([*channels.values()]))) if found else ()
     lack = LackOfFit(
         found, channels, levels.sizes(_sizes(seen, names)), seen.found, told, seen.tested, pictures,
-        {} if solver.nu else wild_samples(seen), levels.noise, levels.at_rest,
+        {} if solver.nu else wild_samples(seen), levels.noise, levels.beyond,
+        levels.at_rest,
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
     return Examined(diagnosis, memory, len(tried), count)

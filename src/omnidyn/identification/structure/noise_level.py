@@ -28,6 +28,7 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.problem.outputs import SPEEDS, TRAVEL
 from omnidyn.identification.structure.binned import unit_of
 from omnidyn.identification.structure.linear import TINY, Linear, Rows
+from omnidyn.identification.structure.misfit import left_beside
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.windows import Shown, Windows, shown
 from omnidyn.statistics import sensor_step, stretches
@@ -61,8 +62,12 @@ class Levels:
 
 
 def noise_levels(linear: Linear, motions: Sequence[Motion]) -> Levels:
-    """What the log shows of the noise of each output, and whether the fit leaves more."""
-    rows = linear.rows
+    """What the log shows of the noise of each output, and whether the fit leaves more.
+
+    Of residuals without what the parameters make of them in white rows: errors with a memory may have pulled them off.
+    """
+    none = [np.zeros((*each.shape, 0)) for each in linear.rows.residual]
+    rows = replace(linear.rows, residual=left_beside(linear.rows, linear, none)[0])
     every = {
         f"{column[0]}[{column[1]}]": _of_column(rows, c, own, linear.memory[c])
         for c, (own, column) in enumerate(zip(shown(rows, motions), rows.problem.columns, strict=True))

@@ -21,7 +21,7 @@ from omnidyn.identification.structure.motion import Motion
 from omnidyn.logs.plateaus import COMMANDS, command_changes
 from omnidyn.statistics import stretches
 
-SETTLED = 5.0  # time constants after which a robot has forgotten how it began
+FORGOTTEN, SETTLED = 5.0, 3.0  # time constants after which nothing is left of a start, and what is left is modelled
 LEAST = 12  # rows of a window
 EQUAL = 1e-3  # of the largest command: commands that differ by less are the same
 EVEN = 0.2  # of a row: rows that are longer or shorter are not as long
@@ -115,23 +115,24 @@ class _Column:
         return found
 
 
-def settling(motions: Sequence[Motion]) -> float:
-    """Time in which the fitted robot forgets how it began [s]: SETTLED time constants, in the median of rows."""
+def slowest(motions: Sequence[Motion]) -> float:
+    """The slowest time constant of the fitted robot [s], in the median of rows."""
     found = []
     for motion in motions:
         left = np.abs(np.linalg.eigvals(motion.decay)).max(axis=1)
         decays = (left > 0.0) & (left < 1.0)
         found.append(-np.diff(motion.t)[decays] / np.log(left[decays]))
     every = np.concatenate(found)
-    return SETTLED * float(np.median(every)) if every.size else np.inf
+    return float(np.median(every)) if every.size else np.inf
 
 
 def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
     """The windows of each column of the problem."""
-    settled = settling(motions)
+    constant = slowest(motions)
     commands = _commands(rows.pieces)
     holds = [_holds(piece, own) for piece, own in zip(rows.pieces, commands, strict=True)]
-    repeats = _repeats(rows.pieces, commands, settled)
+    repeats = _repeats(rows.pieces, commands, FORGOTTEN * constant)
+    settled = SETTLED * constant
     return [_of_column(rows, motions, c, settled, repeats, holds) for c in range(len(rows.problem.columns))]
 
 
@@ -215,7 +216,7 @@ def _holds(piece: Piece, commands: FloatArray) -> tuple[FloatArray, IntArray]:
     return t - t[begun], which.reshape(-1)
 
 
-def _repeats(pieces: Sequence[Piece], commands: Sequence[FloatArray], settled: float) -> list[_Set]:
+def _repeats(pieces: Sequence[Piece], commands: Sequence[FloatArray], forgotten: float) -> list[_Set]:
     """Stretches of rows whose commands, and those of the time before them in which a robot forgets, came again.
 
     A row is known by all commands of that time and by the rows since the last change. Commands become random numbers,
@@ -223,9 +224,9 @@ def _repeats(pieces: Sequence[Piece], commands: Sequence[FloatArray], settled: f
     """
     steps = [np.diff(piece.record.t[piece.first : piece.last + 1]) for piece in pieces]
     usual = float(np.median(np.concatenate(steps)))
-    if not settled / usual < max(map(len, steps)):
+    if not forgotten / usual < max(map(len, steps)):
         return []
-    before = int(np.ceil(settled / usual))
+    before = int(np.ceil(forgotten / usual))
     if len({own.shape[1] for own in commands}) > 1:
         return []
     _, which = np.unique(np.concatenate(commands), axis=0, return_inverse=True)
