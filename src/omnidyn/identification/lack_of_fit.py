@@ -22,10 +22,11 @@ UNOFFERED = {
     "heat": "motors that weaken as they warm up",
     "filter": "speeds that went through a filter",
 }
-REPEATS, HOLDS, NEIGHBOURS, REST = "repeats", "holds", "neighbours", "rest"  # where a level of noise comes from
+REPEATS, HOLDS, NEIGHBOURS, REST, ROUNDING = "repeats", "holds", "neighbours", "rest", "rounding"  # sources of a level
 WHERE = {  # how a log shows its noise, and what is said of more than that
     REPEATS: ("repeats within", "no noise"), HOLDS: ("scatters, while commands are held, by", "no noise"),
     NEIGHBOURS: ("scatters from row to row by", "misfit, or noise that is slower"),
+    ROUNDING: ("is rounded within", "misfit, or noise beside what the encoder rounds"),
     REST: ("scatters at rest by", "misfit, or noise that comes of motion"),
 }  # fmt: skip
 UNTOLD = "this log cannot tell its noise from misfit: repeat a command, or let the robot rest for a second"
@@ -58,10 +59,10 @@ class Wild:
 class Noise:
     """Of an output, how large its noise is by what the log shows without the model, and what the fit leaves there.
 
-    source: REPEATS, HOLDS, NEIGHBOURS or REST. level, residual: root mean square of both, in the unit of the output;
-    chi2: their ratio squared; p: chance of as much where the model is right. degrees: of freedom of the level. share:
-    of the variance of the residual that is no noise; of_moves: the level over what the output moves by. from_hz: slower
-    errors count in neither."""
+    source: REPEATS, HOLDS, NEIGHBOURS, REST, or ROUNDING, which is known: tick/sqrt(12). level, residual: root mean
+    square of both, in the unit of the output; chi2: their ratio squared; p: chance of as much where the model is right.
+    degrees: of freedom of the level. share: of the variance of the residual that is no noise; of_moves: the level over
+    what the output moves by. from_hz: slower errors count in neither."""
 
     source: str
     level: float

@@ -23,7 +23,7 @@ from scipy.linalg import toeplitz
 from scipy.special import fdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST, Noise
+from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST, ROUNDING, Noise
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.outputs import SPEEDS, TRAVEL
 from omnidyn.identification.structure.binned import unit_of
@@ -33,11 +33,15 @@ from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.windows import Shown, Windows, shown
 from omnidyn.statistics import sensor_step, stretches
 
-FALSE = 0.005  # of right models in which the fit leaves more than the noise, all tests together
+FALSE = 0.002  # of right models in which the fit leaves more than the noise, all tests together
+MARGIN = 0.1  # share of the residual, below which noise may be a little more in some rows than in others
 PARABOLA, NOTHING = 2, -1  # degree of what is taken out of a window
 FEW_HOLDS, FEW_SETS, TOLD = 6, 3, 10.0  # groups, and degrees of freedom, without which nothing is told
 FORGOTTEN = 0.05  # correlation of repeats below which slow errors differ in them
+ENOUGH = 50.0  # degrees of freedom of errors as they are, slow ones too, below which slow ones are left out
 FOLLOWED, LEAST_ROWS = 1000, 200  # rows by which errors have forgotten; differences without which nothing is told
+COARSE = 0.5  # of a step of the sensor: less noise leaves rounding that repeats itself
+KNOWN = 1e9  # degrees of freedom of what is known
 THIRD = np.array([1.0, -3.0, 3.0, -1.0])
 WHITE = 0.1  # relative difference of the variance by second and by fourth differences up to which noise is white
 
@@ -75,7 +79,7 @@ def noise_levels(linear: Linear, motions: Sequence[Motion]) -> Levels:
     likely = FALSE / max(sum(each.decides for own in every.values() for each in own), 1)
     noise, beyond = dict[str, Noise](), list[str]()
     for name, own in every.items():
-        clear = [each for each in own if each.decides and each.p < likely]
+        clear = [each for each in own if each.decides and each.p < likely and each.share >= MARGIN]
         if own:
             noise[name] = min(clear, key=lambda each: each.p) if clear else own[0]
         if clear:
@@ -87,12 +91,13 @@ def noise_levels(linear: Linear, motions: Sequence[Motion]) -> Levels:
 def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression) -> list[Noise]:
     """By every source that tells, best first."""
     name, i = rows.problem.columns[c]
-    tests = [(REPEATS, _repeated(own, memory, name in TRAVEL)), (HOLDS, _held(own, memory))]
-    if tests[0][1] is None and tests[1][1] is None:
-        tests.append((NEIGHBOURS, _neighbours(rows, c, memory)))
-    tests.append((REST, _rested(own)))
     more, moves, unit = _taken(rows), _moves(rows, c), unit_of(name, i)
-    return [test.noise(source, more, moves, own.step, unit) for source, test in tests if test is not None]
+    tests = [(REPEATS, _repeated(own, memory, name in TRAVEL)), (HOLDS, _held(own, memory)), (REST, _rested(own))]
+    told = [(source, test) for source, test in tests if test is not None and test.level > COARSE * _step(rows, c)]
+    if not any(source != REST for source, _ in told):
+        other = [(ROUNDING, _rounded(rows, c)), (NEIGHBOURS, _neighbours(rows, c, memory))]
+        told = [*[(source, test) for source, test in other if test is not None][:1], *told]
+    return [test.noise(source, more, moves, own.step, unit) for source, test in told]
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +193,8 @@ def _repeated(own: Shown, memory: AutoRegression, counts_on: bool) -> _Test | No
     lags = memory.autocovariance(min(own.apart, FOLLOWED) + 1)
     far = abs(lags[-1]) < FORGOTTEN * lags[0] and not memory.adds_up and not counts_on
     way = _Way.of(own.again.values.shape[1], NOTHING if far else PARABOLA, memory)
+    if far and way.each * (len(own.again.groups) - own.again.several) < ENOUGH:  # too few to know slow errors
+        way = _Way.of(way.rows, PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
         seen, groups = way.seen(own.again.values), own.again.groups
@@ -209,8 +216,7 @@ def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
     if memory.remembers:
         return None
     series = [
-        rows.pieces[k].record.outputs[rows.pieces[k].first : rows.pieces[k].last + 1, j][rows.there[k][j]][a:b]
-        for k, columns in enumerate(rows.column) for j, column in enumerate(columns) if column == c
+        own[a:b] for own, (k, j) in zip(_shown(rows, c), _where(rows, c), strict=True)
         for a, b in stretches(np.append(rows.steps[k][j][1:] == 1, False)).tolist()
     ]  # fmt: skip
     second, third, fourth = (
@@ -221,25 +227,45 @@ def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
     lags = np.correlate(THIRD, THIRD, "full")[len(THIRD) - 1 :]
     noise = float(np.mean(third**2)) / lags[0]
     degrees = len(third) / (1.0 + 2.0 * float(((lags[1:] / lags[0]) ** 2).sum()))
-    left = np.concatenate([
-        rows.residual[k][j][rows.there[k][j]]
-        for k, columns in enumerate(rows.column) for j, column in enumerate(columns) if column == c
-    ])  # fmt: skip
+    return _beside_all(rows, c, noise, degrees)
+
+
+def _rounded(rows: Rows, c: int) -> _Test | None:
+    """Of outputs that an encoder counts, whose noise is little more than what it rounds: tick^2/12."""
+    tick = float(rows.problem.tick[c])
+    return _beside_all(rows, c, tick**2 / 12.0, KNOWN) if tick > 0.0 else None
+
+
+def _beside_all(rows: Rows, c: int, noise: float, degrees: float) -> _Test:
+    """A variance of noise beside all residuals of a column."""
+    left = np.concatenate([rows.residual[k][j][rows.there[k][j]] for k, j in _where(rows, c)])
     both = float(np.mean(left**2))
     p = float(fdtrc(len(left), degrees, both / max(noise, TINY)))
     return _Test(noise**0.5, both**0.5, p, degrees, max(1.0 - noise / max(both, TINY), 0.0), len(left), 0)
 
 
+def _where(rows: Rows, c: int) -> list[tuple[int, int]]:
+    """Pieces that have a column and known rows of it, and which of theirs it is."""
+    every = [(k, columns.index(c)) for k, columns in enumerate(rows.column) if c in columns]
+    return [(k, j) for k, j in every if rows.there[k][j].any()]
+
+
+def _shown(rows: Rows, c: int) -> list[FloatArray]:
+    """What the log shows of a column in the known rows of each of these pieces."""
+    whole = [(rows.pieces[k], rows.there[k][j], j) for k, j in _where(rows, c)]
+    return [piece.record.outputs[piece.first : piece.last + 1, j][there] for piece, there, j in whole]
+
+
+def _step(rows: Rows, c: int) -> float:
+    """The step in which a column was measured, 0 where none shows."""
+    shown = _shown(rows, c)
+    return max(float(rows.problem.tick[c]), sensor_step(np.concatenate(shown)) if shown else 0.0)
+
+
 def _moves(rows: Rows, c: int) -> float:
     """Root mean square of what an output shows; of what is no speed, about its mean."""
-    shown = [
-        rows.pieces[k].record.outputs[rows.pieces[k].first : rows.pieces[k].last + 1, columns.index(c)][
-            rows.there[k][columns.index(c)]
-        ]
-        for k, columns in enumerate(rows.column) if c in columns
-    ]  # fmt: skip
-    values = np.concatenate(shown or [np.zeros(1)])
-    own = values if rows.problem.columns[c][0] in SPEEDS else values - values.mean()
+    values = np.concatenate([*_shown(rows, c), np.zeros(0)])
+    own = values if rows.problem.columns[c][0] in SPEEDS or not values.size else values - values.mean()
     return float(np.sqrt(np.mean(own**2))) if own.size else 0.0
 
 
