@@ -22,6 +22,15 @@ UNOFFERED = {
     "heat": "motors that weaken as they warm up",
     "filter": "speeds that went through a filter",
 }
+REPEATS, HOLDS, NEIGHBOURS, REST, ROUNDING = "repeats", "holds", "neighbours", "rest", "rounding"  # sources of a level
+WHERE = {  # how a log shows its noise, and what is said of more than that
+    REPEATS: ("repeats within", "no noise"), HOLDS: ("scatters, while commands are held, by", "no noise"),
+    NEIGHBOURS: ("scatters from row to row by", "misfit, or noise that is slower"),
+    ROUNDING: ("is rounded within", "misfit, or noise beside what the encoder rounds"),
+    REST: ("scatters at rest by", "misfit, or noise that comes of motion"),
+}  # fmt: skip
+UNTOLD = "this log cannot tell its noise from misfit: repeat a command, or let the robot rest for a second"
+FAR = 0.001, 0.1  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
 WORTH = 0.01  # share of the variance of a residual that is worth a line
 CHANGED, SEEN = 2, 0.02  # numbers that a remedy would change that are named; relative change that is worth it
 NONE = 1e-3  # of what a number was, below which nothing is left of it
@@ -44,6 +53,41 @@ class Wild:
 
     share: float
     held: float
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Of an output, how large its noise is by what the log shows without the model, and what the fit leaves there.
+
+    source: REPEATS, HOLDS, NEIGHBOURS, REST, or ROUNDING, which is known: tick/sqrt(12). level, residual: root mean
+    square of both, in the unit of the output; chi2: their ratio squared; p: chance of as much where the model is right.
+    degrees: of freedom of the level. share: of the variance of the residual that is no noise; of_moves: the level over
+    what the output moves by. from_hz: slower errors count in neither."""
+
+    source: str
+    level: float
+    residual: float
+    chi2: float
+    p: float
+    degrees: float
+    share: float
+    of_moves: float
+    from_hz: float
+    unit: str
+
+    @property
+    def decides(self) -> bool:
+        """Whether all noise shows in it: at rest that of motion may be missing, neighbours do not see what is slow."""
+        return self.source in (REPEATS, HOLDS)
+
+    def words(self, output: str) -> str:
+        """ "the residual of twist[0] is 0.31 m/s where the log repeats within 0.12 m/s (3 % of what moves): ..."."""
+        where, more = WHERE[self.source]
+        return (
+            f"the residual of {output} is {self.residual:.2g} {self.unit} where the log {where} {self.level:.2g} "
+            f"{self.unit} ({100.0 * self.of_moves:.2g} % of what moves): {100.0 * self.share:.0f} % of its variance is "
+            f"{more}"
+        )
 
 
 @dataclass(frozen=True)
@@ -112,6 +156,8 @@ class LackOfFit:
     most. remedies: best first; those that the log cannot tell from each other name each other in `same_as`. tested:
     what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst. wild: outputs
     with wild samples, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's.
+    noise: of outputs whose noise the log shows without the model, by the best source; None where that was not asked.
+    beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
     """
 
     found: bool
@@ -122,6 +168,9 @@ class LackOfFit:
     tested: Mapping[str, float]
     pictures: tuple[Binned, ...] = ()
     wild: Mapping[str, Wild] = field(default_factory=dict)
+    noise: Mapping[str, Noise] | None = None
+    beyond: tuple[str, ...] = ()
+    at_rest: Mapping[str, Noise] = field(default_factory=dict)
 
     def words(self) -> str:
         """In a sentence, "" for a model that fits."""
@@ -130,9 +179,8 @@ class LackOfFit:
         worst = max(self.channels, key=lambda name: self.channels[name], default="")
         share = f" ({100.0 * self.channels[worst]:.0f} % of the residual of {worst} is no noise)" if worst else ""
         what = all_of([each.theme for each in self.follows[:2]])
-        words = f"the model leaves something out: what it misses follows {what}{share}" if what else (
-            "the model leaves something out"
-        )  # fmt: skip
+        beyond = "" if what or self.remedies else self._beyond_noise()
+        words = "the model leaves something out" + (f": what it misses follows {what}{share}" if what else beyond)
         if not self.remedies:
             return f"{words}; no cause that is known here explains it"
         if not self.remedies[0].confident:
@@ -148,6 +196,12 @@ class LackOfFit:
         best = self.remedies[0]
         same = f", or what this log cannot tell from it ({self.alike(best)})" if best.same_as else ""
         return f"{words}; most likely {best.words}{same}"
+
+    def _beyond_noise(self) -> str:
+        """The output whose residual is most surely beyond its noise, in words; "" where none is."""
+        noise = {name: (self.noise or {})[name] for name in self.beyond}
+        worst = min(noise, key=lambda name: noise[name].p, default="")
+        return f": {noise[worst].words(worst)}" if worst else ""
 
     def alike(self, remedy: Remedy) -> str:
         """What the log cannot tell from a remedy, with their values: "gain 0.94, torque constant -6 %"."""
@@ -169,12 +223,41 @@ class LackOfFit:
     def statements(self) -> list[str]:
         """What was found, a sentence each."""
         if not self.found:
-            return ["the residuals hold nothing but noise, as far as these logs tell", *self._tails()]
+            calm = "follow nothing that a model should know" if self._beyond_rest() else "hold nothing but noise"
+            return [f"the residuals {calm}, as far as these logs tell", *self._levels(), *self._tails()]
         shares = [
             f"{name}: {self.sizes[name]:.2g} of its residual is no noise, {100.0 * share:.0f} % of the variance"
             for name, share in self.channels.items() if share >= WORTH
         ]  # fmt: skip
-        return [self.words(), *shares, *self._tails()]
+        return [self.words(), *shares, *self._levels(), *self._tails()]
+
+    def _levels(self) -> list[str]:
+        """The noise by each source, and where the robot in motion leaves more than at rest."""
+        if self.noise is None:
+            return []
+        told = [] if self.noise else [UNTOLD]
+        for source, (where, _) in WHERE.items():
+            own = {name: each for name, each in self.noise.items() if each.source == source}
+            if own:
+                levels = ", ".join(f"{name} {each.level:.2g} {each.unit}" for name, each in own.items())
+                moves = max(each.of_moves for each in own.values())
+                chi2 = " to ".join(
+                    dict.fromkeys(f"{pick(each.chi2 for each in own.values()):.2f}" for pick in (min, max))
+                )
+                told.append(
+                    f"noise: the log {where} {levels}, at most {100.0 * moves:.2g} % of what moves; chi2 of the "
+                    f"residuals by that: {chi2}"
+                )
+        return [*told, *self._beyond_rest()]
+
+    def _beyond_rest(self) -> list[str]:
+        """Of the output that most surely leaves more in motion than at rest, in words; nothing where none does."""
+        beyond = {
+            name: each for name, each in self.at_rest.items()
+            if each.p * len(self.at_rest) < FAR[0] and each.share > FAR[1]
+        }  # fmt: skip
+        worst = min(beyond, key=lambda name: beyond[name].p, default="")
+        return [beyond[worst].words(worst)] if worst else []
 
     def _tails(self) -> list[str]:
         """What is to be said of wild samples: nothing, or a sentence."""
@@ -199,6 +282,9 @@ class LackOfFit:
             "follows": [asdict(each) for each in self.follows],
             "remedies": [asdict(each) for each in self.remedies], "tested": self.tested,
             "wild": {name: asdict(each) for name, each in self.wild.items()},
+            "noise": {name: asdict(each) for name, each in (self.noise or {}).items()},
+            "beyond_noise": self.beyond,
+            "at_rest": {name: asdict(each) for name, each in self.at_rest.items()},
         })  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from omnidyn.statistics import difference_noise, find_tick, robust_std
 STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
 FITTED, HELD_OUT = "fitted", "held out"
 POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
-LASTING = 2.0  # errors over their scatter from row to row, beyond which most of them is no noise
+MOSTLY, WORTH = 0.5, 0.01  # share of the variance of errors that is no noise, from which on most is, or any
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
 
@@ -36,7 +36,8 @@ NOT_WHITE = 0.01
 @dataclass(frozen=True)
 class Score:
     """One component of some logs. rmse in SI; fit_percent [%] and whiteness as in comparison.Metrics; chi2: mean square
-    of the error over the noise that the fit found, 1 where the model leaves nothing but noise, None without a noise;
+    of the error over the noise, 1 where the model leaves nothing but noise, None without one. The noise is what the fit
+    leaves, or where the log shows without the model that this is more than noise, the less that it shows;
     after a fit by Student's t from the median size of the error, for outliers have no part in that noise. chi2 of what
     counts from the start (a pose, the angle of a wheel) is without what the start was off by; that of a counted angle
     allows for the tick of its encoder, tick^2/12.
@@ -60,14 +61,15 @@ def coloured(scores: Mapping[str, Score]) -> list[str]:
 class Validation:
     """Comparisons with the fitted robot, and the scores in them: "fitted" and "held out" -> component -> Score.
 
-    held_out is None where no log was held out. All are free runs from the measured start. explained: whether the errors
-    that the fit left follow nothing that a model should know, `Estimate.lack_of_fit`: then what lasts in them is noise.
+    held_out is None where no log was held out. All are free runs from the measured start. misfit: component -> share of
+    what the fit left there that is no noise, by `Estimate.lack_of_fit`; empty where nothing was found, None where
+    nothing was asked.
     """
 
     fitted: Comparison
     held_out: Comparison | None
     scores: dict[str, dict[str, Score]]
-    explained: bool = False
+    misfit: Mapping[str, float] | None = None
 
     def table(self) -> Table:
         """The scores, a row per component."""
@@ -87,34 +89,31 @@ class Validation:
             return
         far = [name for name, s in found.items() if s.chi2 is not None and s.chi2 > FAR]
         if far:
-            worst = max(found[name].chi2 or 0.0 for name in far)
+            worst, fitted = max(found[name].chi2 or 0.0 for name in far), self.scores[FITTED]
+            too = all(name in fitted and (fitted[name].chi2 or 0.0) > FAR for name in far)
             yield (
                 f"on held-out logs the errors of {', '.join(far)} are larger than noise (chi2 up to {worst:.3g}): the "
-                "model misses something that differs between the logs"
+                f"model misses something{', on the fitted logs too' if too else ' that differs between the logs'}"
             )
-            return
-        names = coloured(found)
-        if names and self.explained:
-            yield (
-                f"on held-out logs the errors of {', '.join(names)} are no larger than on the fitted ones; they are "
-                "not white, but follow nothing that the model should know: noise that remembers"
-            )
-            return
-        shares = {name: self._lasting(name) for name in names}
-        if (worst := max(shares.values(), default=0.0)) > LASTING:
-            lasting = [name for name, share in shares.items() if share > LASTING]
-            yield (
-                f"on held-out logs the errors of {', '.join(lasting)} are no larger than on the fitted ones, but up to "
-                f"{worst:.2g} times what they scatter by from row to row: most of them is no noise, the model misses "
-                "that much"
-            )
-        elif names:
-            yield (
-                f"on held-out logs the errors of {', '.join(names)} are no larger than noise, but not white: the "
-                "model misses something small that lasts"
-            )
+        elif names := coloured(found):
+            no_larger = f"the errors of {', '.join(names)} are no larger than on the fitted ones"
+            yield f"on held-out logs {no_larger}{self._colour(names)}"
         else:
             yield "held-out logs are predicted as well as the noise allows"
+
+    def _colour(self, names: Sequence[str]) -> str:
+        """What errors that are not white hold, by what was found of the fitted ones: colour alone is no misfit."""
+        if self.misfit is None:
+            return ", but not white: noise that remembers, or something that the model misses"
+        share = max((self.misfit.get(name, 0.0) for name in names), default=0.0)
+        if share < WORTH:
+            follow = "follow nothing that the model should know" if not self.misfit else "are not what the model misses"
+            return f"; they are not white, but {follow}: noise that remembers"
+        most, much = (
+            "most of them" if share > MOSTLY else "some of them",
+            f"up to {100.0 * share:.0f} % of their variance",
+        )
+        return f", but {most} is no noise ({much}): the model misses that much"
 
     def not_followed(self, fitted: Collection[str]) -> dict[str, float]:
         """Component -> fit [%] of what the model does not follow, by the rule above. fitted: names of outputs."""
@@ -128,16 +127,6 @@ class Validation:
             if is_missed(1.0 - score.fit_percent / 100.0, score.rmse, _scatter(comparison, name)):
                 found[name] = score.fit_percent
         return found
-
-    def _lasting(self, name: str) -> float:
-        """Errors on held-out logs over what white noise, which differs from row to row, makes of them."""
-        found = self.held_out
-        assert found is not None
-        errors = _errors(found, name)
-        steps = np.concatenate([np.diff(each) for each in errors])
-        scatter = float(np.sqrt(0.5 * np.nanmean(steps**2))) if np.isfinite(steps).any() else 0.0
-        size = float(np.sqrt(np.nanmean(np.concatenate(errors) ** 2)))
-        return size / scatter if scatter > 0.0 else 0.0
 
     def summary(self) -> str:
         """A plain table, for reading."""
@@ -176,8 +165,15 @@ def validate(
     fitted = _compared(fit, runs, progress)
     other = _compared(fit, held_out, progress) if held_out else None
     scores = {FITTED: _scores(fit, fitted, runs)} | ({HELD_OUT: _scores(fit, other, held_out)} if other else {})
-    lack = fit.lack_of_fit if coloured(scores.get(HELD_OUT, {})) else None  # else there is nothing to be asked
-    return Validation(fitted, other, scores, lack is not None and not lack.found)
+    return Validation(fitted, other, scores, _misfit(fit, scores[FITTED]))
+
+
+def _misfit(fit: OutputErrorEstimate, components: Collection[str]) -> dict[str, float] | None:
+    """Component -> share of what the fit left there that is no noise."""
+    lack = fit.lack_of_fit
+    if lack is None:
+        return None
+    return {name: lack.channels.get(output_name(name), 0.0) for name in components} if lack.found else {}
 
 
 def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[[str], object] | None) -> Comparison:
@@ -222,14 +218,18 @@ def _tick(logged: Sequence[Run], name: str) -> float:
 
 
 def _chi2(fit: OutputErrorEstimate, found: Comparison, name: str, tick: float) -> float | None:
-    noise = fit.noise.get(output_name(name))
+    output, lack = output_name(name), fit.lack_of_fit
+    noise = fit.noise.get(output)
     if not noise:
         return None
+    by_students_t = STUDENT_WORDS in fit.method
+    if lack is not None and lack.noise and output in lack.beyond and not (tick or by_students_t):
+        noise /= max(lack.noise[output].chi2, 1.0) ** 0.5
     errors = np.concatenate(_errors(found, name))
     errors = errors[np.isfinite(errors)]
     if not errors.size:
         return None
-    square = robust_std(errors, 0.0) ** 2 if STUDENT_WORDS in fit.method else np.mean(errors**2)
+    square = robust_std(errors, 0.0) ** 2 if by_students_t else np.mean(errors**2)
     return float(square / (noise**2 + tick**2 / 12.0))
 
 

@@ -167,7 +167,7 @@ def holds(run: Run) -> list[slice]:
 
     Where no command comes in steps: windows of `WINDOW` seconds between gaps.
     """
-    changes = _changes(run)
+    changes = command_changes(run)
     if changes is None:
         return [window for segment in segments(run.t) for window in _cut(run.t, segment)]
     cuts = np.flatnonzero(changes)
@@ -180,7 +180,7 @@ def _between_gaps(run_segments: Sequence[slice], hold: slice) -> list[slice]:
     return [segment for segment in cut if segment.stop > segment.start]
 
 
-def _changes(run: Run) -> BoolArray | None:
+def command_changes(run: Run) -> BoolArray | None:
     """Rows with another command than the row before; None where no command comes in steps."""
     changed, known = np.zeros(len(run), dtype=bool), False
     if len(run) < 2:

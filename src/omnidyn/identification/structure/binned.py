@@ -36,7 +36,8 @@ def binned(rows: Rows, motions: Sequence[Motion], column: int) -> tuple[Binned, 
             against.setdefault(words, []).append(values[there])
     error = np.concatenate(residual) if residual else np.zeros(0)
     found = (
-        _bins(error, np.concatenate(values), f"{name}[{i}]", _unit(name, i), words) for words, values in against.items()
+        _bins(error, np.concatenate(values), f"{name}[{i}]", unit_of(name, i), words)
+        for words, values in against.items()
     )
     return tuple(each for each in found if len(each.at) > 1)
 
@@ -50,7 +51,7 @@ def _bins(error: FloatArray, values: FloatArray, output: str, unit: str, against
     return Binned(output, unit, against, np.array([values[rows].mean() for rows in own]), mean, std)
 
 
-def _unit(name: str, i: int) -> str:
+def unit_of(name: str, i: int) -> str:
     """The unit of an output: of a channel of a run, or of a part of the pose."""
     units = UNITS.get(name) or {"position": "m", "heading": "rad"}[name]
     return units.split(", ")[i] if "," in units else units

@@ -26,6 +26,7 @@ from omnidyn.identification.structure.missing.refits import refits
 from omnidyn.identification.structure.missing.remedies import remedies
 from omnidyn.identification.structure.missing.unoffered import unoffered
 from omnidyn.identification.structure.motion import motions
+from omnidyn.identification.structure.noise_level import noise_levels
 from omnidyn.identification.structure.rests_on import rests_on
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import wild_samples
@@ -71,11 +72,14 @@ def examine(solution: Solution) -> Examined:
     told, cause = _fitted(solution, problem, parts, seen, tried, ranked) if found else ((), None)
     memory = memory_beside(rows, cause) if cause and not seen.found else seen.linear.memory
     seen = with_cause(seen, cause) if cause else seen
-    names = [f"{name}[{i}]" for name, i in problem.columns]
-    pictures = binned(rows, moved, int(np.argmax(seen.shares))) if found else ()
+    names, levels = [f"{name}[{i}]" for name, i in problem.columns], noise_levels(seen.linear, moved)
+    found = found or bool(levels.beyond)
+    channels = levels.channels(dict(zip(names, seen.shares.tolist(), strict=True)))
+    pictures = binned(rows, moved, int(np.argmax([*channels.values()]))) if found else ()
     lack = LackOfFit(
-        found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
-        pictures, {} if solver.nu else wild_samples(seen),
+        found, channels, levels.sizes(_sizes(seen, names)), seen.found, told, seen.tested, pictures,
+        {} if solver.nu else wild_samples(seen), levels.noise, levels.beyond,
+        levels.at_rest,
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
     return Examined(diagnosis, memory, len(tried), count)

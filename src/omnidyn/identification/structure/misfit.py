@@ -75,7 +75,9 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
 def with_cause(seen: Misfit, cause: Sequence[FloatArray]) -> Misfit:
     """The same with what a cause shows (C, rows, K) of each piece beside what was found: it may explain far more."""
     rows = seen.linear.rows
-    left, _ = _left(rows, seen.linear, [np.concatenate(both, axis=2) for both in zip(seen.shown, cause, strict=True)])
+    left, _ = left_beside(
+        rows, seen.linear, [np.concatenate(both, axis=2) for both in zip(seen.shown, cause, strict=True)]
+    )
     shares, explained = _shares(rows, left, True)
     return replace(seen, shares=shares, explained=explained) if shares.sum() > seen.shares.sum() else seen
 
@@ -147,7 +149,7 @@ def _whitened(rows: Rows, kept: Sequence[FloatArray]) -> tuple[Linear, list[Floa
     """
     linear, left = Linear(rows, _memories(rows, rows.residual, None)), list(rows.residual)
     for _ in range(ROUNDS):
-        left, taken = _left(rows, linear, kept)
+        left, taken = left_beside(rows, linear, kept)
         linear = Linear(rows, _memories(rows, left, taken))
     return linear, left
 
@@ -170,7 +172,7 @@ def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray
     return found
 
 
-def _left(rows: Rows, linear: Linear, kept: Sequence[FloatArray]) -> tuple[list[FloatArray], list[FloatArray]]:
+def left_beside(rows: Rows, linear: Linear, kept: Sequence[FloatArray]) -> tuple[list[FloatArray], list[FloatArray]]:
     """(residuals without what parameters, `kept` and the start of each piece explain, what that may be off by)."""
     e, j = linear.whole()
     z = np.hstack([j, linear.white(kept)]) if kept[0].shape[2] else j

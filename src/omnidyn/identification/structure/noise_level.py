@@ -1,0 +1,344 @@
+"""The level of the noise by what a log shows without the model, and whether a fit leaves more: so that chi2 can fail.
+
+*Repeats*: the same commands came again: half the mean square difference. *Holds*: the scatter about a parabola while a
+command is held and the robot has settled. *Rest*: the same at rest, which may lack noise that comes of motion.
+*Neighbours*: third differences, where these are those of white noise. Each is compared with what the fit leaves in
+stretches as long, through the same projection, so that slow errors count in both or in neither:
+
+    F = (mean square that the fit leaves)/(mean square of the noise), F(d1, d0),
+
+repeats by the mean of a set times the root of how many it has, which without misfit is as large as their differences
+(pure error, N. R. Draper, H. Smith, Applied Regression Analysis, 1998, section 2.1); holds by all other rows in
+motion. Both as they are and made white by the memory of the residuals. d by F. E. Satterthwaite, Biometrics Bull. 2,
+110 (1946): (tr C)^2/tr C^2 of the covariance by that memory, no more than the scatter between groups allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import toeplitz
+from scipy.special import fdtrc
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST, ROUNDING, Noise
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.outputs import SPEEDS, TRAVEL
+from omnidyn.identification.structure.binned import unit_of
+from omnidyn.identification.structure.linear import TINY, Linear, Rows
+from omnidyn.identification.structure.misfit import left_beside
+from omnidyn.identification.structure.motion import Motion
+from omnidyn.identification.structure.windows import Shown, Windows, shown
+from omnidyn.statistics import sensor_step, stretches
+
+FALSE = 0.002  # of right models in which the fit leaves more than the noise, all tests together
+MARGIN = 0.1  # share of the residual, below which noise may be a little more in some rows than in others
+PARABOLA, NOTHING = 2, -1  # degree of what is taken out of a window
+FEW_HOLDS, FEW_SETS, TOLD = 6, 3, 10.0  # groups, and degrees of freedom, without which nothing is told
+FORGOTTEN = 0.05  # correlation of repeats below which slow errors differ in them
+ENOUGH = 50.0  # degrees of freedom of errors as they are, slow ones too, below which slow ones are left out
+FOLLOWED, LEAST_ROWS = 1000, 200  # rows by which errors have forgotten; differences without which nothing is told
+COARSE = 0.5  # of a step of the sensor: less noise leaves rounding that repeats itself
+KNOWN = 1e9  # degrees of freedom of what is known
+THIRD = np.array([1.0, -3.0, 3.0, -1.0])
+WHITE = 0.1  # relative difference of the variance by second and by fourth differences up to which noise is white
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """noise: output -> its level by the best source that tells it; at_rest: where the robot rests; beyond: outputs in
+    which the fit leaves more than the noise, by a source that decides."""
+
+    noise: dict[str, Noise]
+    at_rest: dict[str, Noise]
+    beyond: tuple[str, ...]
+
+    def channels(self, shares: Mapping[str, float]) -> dict[str, float]:
+        """Shares of the variance of residuals that are no noise, by what they follow or by the level of the noise."""
+        return dict(shares) | {name: max(shares[name], self.noise[name].share) for name in self.beyond}
+
+    def sizes(self, sizes: Mapping[str, float]) -> dict[str, float]:
+        """How large that is, in the unit of each output."""
+        own = {name: self.noise[name].share ** 0.5 * self.noise[name].residual for name in self.beyond}
+        return dict(sizes) | {name: max(sizes[name], size) for name, size in own.items()}
+
+
+def noise_levels(linear: Linear, motions: Sequence[Motion]) -> Levels:
+    """What the log shows of the noise of each output, and whether the fit leaves more.
+
+    Of residuals without what the parameters make of them in white rows: errors with a memory may have pulled them off.
+    """
+    none = [np.zeros((*each.shape, 0)) for each in linear.rows.residual]
+    rows = replace(linear.rows, residual=left_beside(linear.rows, linear, none)[0])
+    every = {
+        f"{column[0]}[{column[1]}]": _of_column(rows, c, own, linear.memory[c])
+        for c, (own, column) in enumerate(zip(shown(rows, motions), rows.problem.columns, strict=True))
+    }
+    likely = FALSE / max(sum(each.decides for own in every.values() for each in own), 1)
+    noise, beyond = dict[str, Noise](), list[str]()
+    for name, own in every.items():
+        clear = [each for each in own if each.decides and each.p < likely and each.share >= MARGIN]
+        if own:
+            noise[name] = min(clear, key=lambda each: each.p) if clear else own[0]
+        if clear:
+            beyond.append(name)
+    at_rest = {name: each for name, own in every.items() for each in own if each.source == REST}
+    return Levels(noise, at_rest, tuple(beyond))
+
+
+def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression) -> list[Noise]:
+    """By every source that tells, best first."""
+    name, i = rows.problem.columns[c]
+    more, moves, unit = _taken(rows), _moves(rows, c), unit_of(name, i)
+    tests = [(REPEATS, _repeated(own, memory, name in TRAVEL)), (HOLDS, _held(own, memory)), (REST, _rested(own))]
+    told = [(source, test) for source, test in tests if test is not None and test.level > COARSE * _step(rows, c)]
+    if not any(source != REST for source, _ in told):
+        other = [(ROUNDING, _rounded(rows, c)), (NEIGHBOURS, _neighbours(rows, c, memory))]
+        told = [*[(source, test) for source, test in other if test is not None][:1], *told]
+    return [test.noise(source, more, moves, own.step, unit) for source, test in told]
+
+
+@dataclass(frozen=True, eq=False)
+class _Power:
+    """Squares (g,) of groups of windows, and how many windows they count as (g,); numbers, degrees: of a window."""
+
+    squares: FloatArray
+    counts: FloatArray
+    numbers: int
+    each: float
+
+    @property
+    def mean(self) -> float:
+        """Mean square of a number."""
+        return float(self.squares.sum() / (self.counts.sum() * self.numbers))
+
+    @property
+    def degrees(self) -> float:
+        """Of freedom: by the memory, no more than the scatter of the groups allows: 2 mean^2/variance of the mean."""
+        many, total = len(self.squares), float(self.counts.sum())
+        off = self.squares - self.counts * self.squares.sum() / total
+        scatter = many / max(many - 1, 1) * float((off**2).sum())
+        return min(self.each * total, 2.0 * float(self.squares.sum()) ** 2 / max(scatter, TINY))
+
+
+@dataclass(frozen=True)
+class _Test:
+    """level, residual: in their unit; p; degrees: of the level; share: of the residual that is no noise; rows, removed:
+    of a window."""
+
+    level: float
+    residual: float
+    p: float
+    degrees: float
+    share: float
+    rows: int
+    removed: int
+
+    def noise(self, source: str, more: float, moves: float, step: float, unit: str) -> Noise:
+        """As people read it. more: what a fit leaves is smaller by, for it has taken some; moves: of the output."""
+        residual = self.residual * np.sqrt(more)
+        slowest = self.removed / (2.0 * self.rows * step)
+        return Noise(
+            source, self.level, float(residual), float((residual / max(self.level, TINY)) ** 2), self.p, self.degrees,
+            self.share, self.level / max(moves, TINY), slowest, unit,
+        )  # fmt: skip
+
+
+def _test(noise: _Power, left: _Power, both: float, rows: int, removed: int) -> _Test | None:
+    """Of what is left beside the noise. both: mean square of all residuals."""
+    if noise.degrees < TOLD or left.degrees < TOLD or noise.mean <= 0.0:
+        return None
+    p = float(fdtrc(left.degrees, noise.degrees, left.mean / noise.mean))
+    share = max(1.0 - noise.mean / max(both, TINY), 0.0)
+    return _Test(float(np.sqrt(noise.mean)), float(np.sqrt(both)), p, noise.degrees, share, rows, removed)
+
+
+def _both_ways(plain: _Test | None, white: _Test | None) -> _Test | None:
+    """Rows as they are, in their units, with the better chance of the two."""
+    if plain is None or white is None:
+        return plain
+    return replace(plain, p=min(1.0, 2.0 * min(plain.p, white.p)), share=max(plain.share, white.share))
+
+
+def _held(own: Shown, memory: AutoRegression) -> _Test | None:
+    if own.held.several < FEW_HOLDS or own.busy.several < FEW_HOLDS:
+        return None
+    way = _Way.of(own.held.values.shape[1], PARABOLA, memory)
+
+    def test(way: _Way) -> _Test | None:
+        held, busy = way.power(own.held), way.power(own.busy)
+        both = (held.squares.sum() + busy.squares.sum()) / ((held.counts.sum() + busy.counts.sum()) * held.numbers)
+        return _test(held, busy, float(both), way.rows, way.removed)
+
+    return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
+
+
+def _rested(own: Shown) -> _Test | None:
+    moving, resting = own.held + own.busy, own.resting
+    if not len(resting.values) or not len(moving.values):
+        return None
+    way = _Way.of(moving.values.shape[1], PARABOLA, None)
+    rest, left = way.power(resting), way.power(moving)
+    found = _test(rest, left, left.mean, way.rows, way.removed)
+    coarse = max(sensor_step(each) for each in (*resting.values, resting.values.ravel()))
+    return None if found is None or coarse > found.level else found
+
+
+def _repeated(own: Shown, memory: AutoRegression, counts_on: bool) -> _Test | None:
+    """counts_on: whether what is logged counts from a start, which differs between repeats."""
+    if own.again.several < FEW_SETS:
+        return None
+    lags = memory.autocovariance(min(own.apart, FOLLOWED) + 1)
+    far = abs(lags[-1]) < FORGOTTEN * lags[0] and not memory.adds_up and not counts_on
+    way = _Way.of(own.again.values.shape[1], NOTHING if far else PARABOLA, memory)
+    if far and way.each * (len(own.again.groups) - own.again.several) < ENOUGH:  # too few to know slow errors
+        way = _Way.of(way.rows, PARABOLA, memory)
+
+    def test(way: _Way) -> _Test | None:
+        seen, groups = way.seen(own.again.values), own.again.groups
+        many = _summed(groups, np.ones(len(groups)))
+        mean = np.stack([_summed(groups, column) for column in seen.T], axis=1) / many[:, None]
+        common = many * (mean**2).sum(axis=1)
+        every = _summed(groups, (seen**2).sum(axis=1))
+        apart, alike = (
+            _Power(squares, count, seen.shape[1], way.each)
+            for squares, count in ((every - common, many - 1.0), (common, np.ones_like(many)))
+        )
+        return _test(apart, alike, float(every.sum() / seen.size), way.rows, way.removed)
+
+    return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
+
+
+def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
+    """Of outputs whose rows are fast: second and fourth differences are then those of white noise, as what is left."""
+    if memory.remembers:
+        return None
+    series = [
+        own[a:b] for own, (k, j) in zip(_shown(rows, c), _where(rows, c), strict=True)
+        for a, b in stretches(np.append(rows.steps[k][j][1:] == 1, False)).tolist()
+    ]  # fmt: skip
+    second, third, fourth = (
+        np.concatenate([np.diff(each, n) for each in series if len(each) > n] or [np.zeros(0)]) for n in (2, 3, 4)
+    )
+    if len(fourth) < LEAST_ROWS or abs(np.mean(fourth**2) / 70.0 / max(np.mean(second**2) / 6.0, TINY) - 1.0) > WHITE:
+        return None
+    lags = np.correlate(THIRD, THIRD, "full")[len(THIRD) - 1 :]
+    noise = float(np.mean(third**2)) / lags[0]
+    degrees = len(third) / (1.0 + 2.0 * float(((lags[1:] / lags[0]) ** 2).sum()))
+    return _beside_all(rows, c, noise, degrees)
+
+
+def _rounded(rows: Rows, c: int) -> _Test | None:
+    """Of outputs that an encoder counts, whose noise is little more than what it rounds: tick^2/12."""
+    tick = float(rows.problem.tick[c])
+    return _beside_all(rows, c, tick**2 / 12.0, KNOWN) if tick > 0.0 else None
+
+
+def _beside_all(rows: Rows, c: int, noise: float, degrees: float) -> _Test:
+    """A variance of noise beside all residuals of a column."""
+    left = np.concatenate([rows.residual[k][j][rows.there[k][j]] for k, j in _where(rows, c)])
+    both = float(np.mean(left**2))
+    p = float(fdtrc(len(left), degrees, both / max(noise, TINY)))
+    return _Test(noise**0.5, both**0.5, p, degrees, max(1.0 - noise / max(both, TINY), 0.0), len(left), 0)
+
+
+def _where(rows: Rows, c: int) -> list[tuple[int, int]]:
+    """Pieces that have a column and known rows of it, and which of theirs it is."""
+    every = [(k, columns.index(c)) for k, columns in enumerate(rows.column) if c in columns]
+    return [(k, j) for k, j in every if rows.there[k][j].any()]
+
+
+def _shown(rows: Rows, c: int) -> list[FloatArray]:
+    """What the log shows of a column in the known rows of each of these pieces."""
+    whole = [(rows.pieces[k], rows.there[k][j], j) for k, j in _where(rows, c)]
+    return [piece.record.outputs[piece.first : piece.last + 1, j][there] for piece, there, j in whole]
+
+
+def _step(rows: Rows, c: int) -> float:
+    """The step in which a column was measured, 0 where none shows."""
+    shown = _shown(rows, c)
+    return max(float(rows.problem.tick[c]), sensor_step(np.concatenate(shown)) if shown else 0.0)
+
+
+def _moves(rows: Rows, c: int) -> float:
+    """Root mean square of what an output shows; of what is no speed, about its mean."""
+    values = np.concatenate([*_shown(rows, c), np.zeros(0)])
+    own = values if rows.problem.columns[c][0] in SPEEDS or not values.size else values - values.mean()
+    return float(np.sqrt(np.mean(own**2))) if own.size else 0.0
+
+
+def _taken(rows: Rows) -> float:
+    """Rows over those that are left once the fit has taken some for its numbers and starts."""
+    total = sum(int(there.sum()) for there in rows.there)
+    free = len(rows.problem.parameters) + sum(int(piece.free.sum()) for piece in rows.pieces)
+    return total / max(total - free, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """How windows are looked at: along `ways` (L, d), orthonormal, with polynomials taken out, `removed` of them, once
+    `memory` has made the rows white. each: degrees of freedom of a window."""
+
+    ways: FloatArray
+    removed: int
+    each: float
+    memory: AutoRegression | None = None
+
+    @property
+    def rows(self) -> int:
+        return len(self.ways)
+
+    @classmethod
+    def of(cls, rows: int, degree: int, memory: AutoRegression | None) -> _Way:
+        """Of rows as they are, which have this memory."""
+        ways = _beside(_polynomials(rows, degree))
+        numbers = float(ways.shape[1])
+        if memory is None or not memory.remembers:
+            return cls(ways, degree + 1, numbers)
+        if degree == NOTHING:  # windows side by side are not independent
+            lags = memory.autocovariance(FOLLOWED)
+            return cls(ways, 0, rows / (2.0 * float(((lags / lags[0]) ** 2).sum()) - 1.0))
+        covariance = toeplitz(memory.autocovariance(rows))
+        if memory.adds_up:
+            covariance = np.tri(rows) @ covariance @ np.tri(rows).T
+        own = ways.T @ covariance @ ways
+        return cls(ways, degree + 1, float(np.trace(own) ** 2 / (own**2).sum()))
+
+    def white(self, memory: AutoRegression) -> _Way:
+        """The same of rows made white."""
+        ways = _beside(_through(memory, _polynomials(self.rows, self.removed - 1)))
+        return _Way(ways, self.removed, float(ways.shape[1]), memory)
+
+    def seen(self, values: FloatArray) -> FloatArray:
+        """Windows (m, L) along these ways, (m, d)."""
+        return (values if self.memory is None else _through(self.memory, values.T).T) @ self.ways
+
+    def power(self, windows: Windows) -> _Power:
+        """By groups."""
+        squares = _summed(windows.groups, (self.seen(windows.values) ** 2).sum(axis=1))
+        return _Power(squares, _summed(windows.groups, np.ones(len(windows.groups))), self.ways.shape[1], self.each)
+
+
+def _summed(groups: IntArray, values: FloatArray) -> FloatArray:
+    """Values (m,) of each group added up."""
+    return np.asarray(np.bincount(groups, values), dtype=np.float64)
+
+
+def _polynomials(rows: int, degree: int) -> FloatArray:
+    """Of degree 0 to `degree`, (rows, degree + 1)."""
+    at = np.linspace(-1.0, 1.0, rows)
+    return np.stack([at**k for k in range(degree + 1)], axis=1) if degree >= 0 else np.zeros((rows, 0))
+
+
+def _beside(columns: FloatArray) -> FloatArray:
+    """An orthonormal basis of all that some columns (L, k) do not span, (L, L - k)."""
+    return np.linalg.qr(columns, mode="complete")[0][:, columns.shape[1] :] if columns.size else np.eye(len(columns))
+
+
+def _through(memory: AutoRegression, columns: FloatArray) -> FloatArray:
+    """Columns (L, K) made white, each by itself from its first row on."""
+    steps = np.ones(len(columns), dtype=np.intp)
+    steps[0] = 0
+    return memory.new(np.ascontiguousarray(columns), steps, np.ones(len(columns), dtype=bool))

@@ -1,0 +1,266 @@
+"""Windows: short stretches of rows, all as long, in which a log shows the noise of a column without the model.
+
+held: the same command for long enough that the robot has settled, while it moves; busy: all else in which it moves;
+resting: it stands. again: the same commands as at other times, for long enough before and in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.identification.output_error.problem.problem import Piece
+from omnidyn.identification.structure.linear import TINY, Rows
+from omnidyn.identification.structure.motion import Motion
+from omnidyn.logs.plateaus import COMMANDS, command_changes
+from omnidyn.statistics import stretches
+
+FORGOTTEN, SETTLED = 5.0, 3.0  # time constants after which nothing is left of a start, and what is left is modelled
+LEAST = 12  # rows of a window
+EQUAL = 1e-3  # of the largest command: commands that differ by less are the same
+EVEN = 0.2  # of a row: rows that are longer or shorter are not as long
+MOST = 0.5  # of the rows of a window in which it moves
+NEVER = 10**9  # rows
+MIX = np.uint64(0x9E3779B97F4A7C15)  # odd, so that no power of it is 0 in 64 bits
+Found = tuple[int, int, int, Hashable]  # piece, column in it, first known row, group
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """values (m, L): residuals in m windows; groups (m,): those of one command, or of one set of repeats."""
+
+    values: FloatArray
+    groups: IntArray
+
+    def __add__(self, other: Windows) -> Windows:
+        """Both, the groups apart."""
+        groups = np.concatenate([self.groups, other.groups + self.groups.max(initial=-1) + 1])
+        return Windows(np.concatenate([self.values, other.values]), groups)
+
+    @classmethod
+    def of(cls, rows: Rows, found: Sequence[Found], length: int) -> Windows:
+        """Of (piece, column in it, first known row, group)."""
+        names = {name: i for i, name in enumerate(dict.fromkeys(name for *_, name in found))}
+        values = [rows.residual[k][j][rows.there[k][j]][first : first + length] for k, j, first, _ in found]
+        return cls(np.array(values).reshape(-1, length), np.array([names[name] for *_, name in found], dtype=int))
+
+    @property
+    def several(self) -> int:
+        """How many groups there are."""
+        return len(np.unique(self.groups))
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """The windows of one column. step [s]: of its rows. again: those with repeats, by sets."""
+
+    step: float
+    held: Windows
+    busy: Windows
+    resting: Windows
+    again: Windows
+    apart: int  # rows that repeats are from each other, at least
+
+
+@dataclass(frozen=True, eq=False)
+class _Set:
+    """Stretches of `length` rows with the same commands: pieces (m,), rows (m,) that they begin at there; apart: rows
+    from one to the next, at least."""
+
+    pieces: IntArray
+    rows: IntArray
+    length: int
+    apart: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """A column in a piece, by its known rows: k, j; rows (n,) of the piece; joined (n,): whether the row before is
+    known, too; moves, rests (n,); since (n,) [s] the last change of command, 0 where none comes in steps; holds (n,):
+    which hold, by its command; step [s]."""
+
+    k: int
+    j: int
+    rows: IntArray
+    joined: BoolArray
+    moves: BoolArray
+    rests: BoolArray
+    since: FloatArray
+    holds: IntArray
+    step: float
+
+    def whole(self, row: int, length: int) -> int | None:
+        """The index of a row from which on so many are known, and in most of which it moves; None where not."""
+        at = int(np.searchsorted(self.rows, row))
+        own = self.rows[at : at + length]
+        return at if len(own) == length and own[0] == row and own[-1] == row + length - 1 and (
+            self.moves[at : at + length].mean() >= MOST
+        ) else None  # fmt: skip
+
+    def runs(self, mask: BoolArray, by_hold: bool = False) -> list[tuple[int, int]]:
+        """Stretches of joined rows in which a mask holds, (first, behind the last); each within one hold."""
+        cut = ~self.joined
+        if by_hold:
+            cut = cut | (np.diff(self.holds, prepend=self.holds[:1]) != 0)
+        found = []
+        for a, b in stretches(mask).tolist():
+            edges = [a, *(np.flatnonzero(cut[a + 1 : b]) + a + 1).tolist(), b]
+            found += [(x, y) for x, y in pairwise(edges) if y - x >= LEAST]
+        return found
+
+
+def slowest(motions: Sequence[Motion]) -> float:
+    """The slowest time constant of the fitted robot [s], in the median of rows."""
+    found = []
+    for motion in motions:
+        left = np.abs(np.linalg.eigvals(motion.decay)).max(axis=1)
+        decays = (left > 0.0) & (left < 1.0)
+        found.append(-np.diff(motion.t)[decays] / np.log(left[decays]))
+    every = np.concatenate(found)
+    return float(np.median(every)) if every.size else np.inf
+
+
+def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
+    """The windows of each column of the problem."""
+    constant = slowest(motions)
+    commands = _commands(rows.pieces)
+    holds = [_holds(piece, own) for piece, own in zip(rows.pieces, commands, strict=True)]
+    repeats = _repeats(rows.pieces, commands, FORGOTTEN * constant)
+    settled = SETTLED * constant
+    return [_of_column(rows, motions, c, settled, repeats, holds) for c in range(len(rows.problem.columns))]
+
+
+def _of_column(
+    rows: Rows, motions: Sequence[Motion], c: int, settled: float, repeats: Sequence[_Set],
+    holds: Sequence[tuple[FloatArray, IntArray]],
+) -> Shown:  # fmt: skip
+    parts = [
+        _column(rows, motions[k], k, own.index(c), settled, *holds[k])
+        for k, own in enumerate(rows.column) if c in own and rows.there[k][own.index(c)].sum() >= LEAST
+    ]  # fmt: skip
+    step = float(np.median([each.step for each in parts])) if parts else 1.0
+    still = [each.runs((each.since >= settled) & each.moves, by_hold=True) for each in parts]
+    lengths = [b - a for own in still for a, b in own]
+    length = max(LEAST, int(min(settled / step, float(np.median(lengths)) if lengths else 1e3)))
+    held, busy, resting = list[Found](), list[Found](), list[Found]()
+    for each, own in zip(parts, still, strict=True):
+        used = np.zeros(len(each.rows), dtype=bool)
+        for a, b in own:
+            for first in range(b - length, a - 1, -length):
+                held.append((each.k, each.j, first, int(each.holds[first])))
+                used[first : first + length] = True
+        for mask, into in ((each.moves & ~used, busy), (each.rests, resting)):
+            for a, b in each.runs(mask):
+                into += [(each.k, each.j, first, (each.k, first)) for first in range(a, b - length + 1, length)]
+    again, apart = _again(parts, repeats, length)
+    made = [Windows.of(rows, found, length) for found in (held, busy, resting, again)]
+    return Shown(step, made[0], made[1], made[2], made[3], apart)
+
+
+def _column(
+    rows: Rows, motion: Motion, k: int, j: int, settled: float, since: FloatArray, holds: IntArray
+) -> _Column:  # fmt: skip
+    known, at = np.flatnonzero(rows.there[k][j]), np.arange(len(motion.t))
+    stands = (motion.twist == 0.0).all(axis=1)
+    moved = np.maximum.accumulate(np.where(stands, 0, at))
+    rests = stands & (motion.t - motion.t[moved] >= settled)
+    step = float(np.median(np.diff(motion.t[known])))
+    moves = rows.moves[k][j] & ~stands
+    return _Column(k, j, known, rows.steps[k][j] == 1, moves[known], rests[known], since[known], holds[known], step)
+
+
+def _again(parts: Sequence[_Column], repeats: Sequence[_Set], length: int) -> tuple[list[Found], int]:
+    """(windows of what came again: piece, column in it, first known row, set; rows that they are apart, at least)."""
+    of, found, apart = {each.k: each for each in parts}, [], NEVER
+    for number, one in enumerate(repeats):
+        for first in range(0, one.length - length + 1, length):
+            own = [
+                (k, of[k].j, at, (number, first)) for k, row in zip(one.pieces.tolist(), one.rows.tolist(), strict=True)
+                if k in of and (at := of[k].whole(row + first, length)) is not None
+            ]  # fmt: skip
+            if len(own) > 1:
+                found += own
+                apart = min(apart, one.apart)
+    return found, apart
+
+
+def _commands(pieces: Sequence[Piece]) -> list[FloatArray]:
+    """What is commanded in the rows of each piece, in steps of EQUAL of the largest command, (rows, any)."""
+    found = []
+    for piece in pieces:
+        record, rows = piece.record, slice(piece.first, piece.last + 1)
+        channels = record.run.channels if record.run is not None else {}
+        given = next((channels[name] for name in COMMANDS if name in channels), None)
+        if given is None or not np.isfinite(given[piece.first : piece.last]).all():
+            given = record.voltage if record.set_point is None else record.set_point
+        found.append(np.nan_to_num(given[rows]))
+    top = max(float(np.abs(own).max()) for own in found)
+    return [np.round(own / (EQUAL * max(top, TINY))) for own in found]
+
+
+def _holds(piece: Piece, commands: FloatArray) -> tuple[FloatArray, IntArray]:
+    """(time since the last change of command [s], 0 where none comes in steps, a number of the command) of each row."""
+    t, at = piece.record.t[piece.first : piece.last + 1], np.arange(len(commands))
+    changes = command_changes(piece.record.run) if piece.record.run is not None else None
+    if changes is None:
+        return np.zeros(len(t)), np.zeros(len(t), dtype=int)
+    changed = changes[piece.first : piece.last + 1] | (at == 0)
+    begun = np.maximum.accumulate(np.where(changed, at, 0))
+    _, which = np.unique(commands[begun], axis=0, return_inverse=True)
+    return t - t[begun], which.reshape(-1)
+
+
+def _repeats(pieces: Sequence[Piece], commands: Sequence[FloatArray], forgotten: float) -> list[_Set]:
+    """Stretches of rows whose commands, and those of the time before them in which a robot forgets, came again.
+
+    A row is known by all commands of that time and by the rows since the last change. Commands become random numbers,
+    those of a time a sum of such, each times a power of an odd one: two that differ have the same in one of 2^64.
+    """
+    steps = [np.diff(piece.record.t[piece.first : piece.last + 1]) for piece in pieces]
+    usual = float(np.median(np.concatenate(steps)))
+    if not forgotten / usual < max(map(len, steps)):
+        return []
+    before = int(np.ceil(forgotten / usual))
+    if len({own.shape[1] for own in commands}) > 1:
+        return []
+    _, which = np.unique(np.concatenate(commands), axis=0, return_inverse=True)
+    random = np.random.default_rng(0).integers(0, 2**63, size=int(which.max()) + 1, dtype=np.uint64)
+    power = MIX ** np.arange(before + 1, dtype=np.uint64)
+    starts = np.cumsum([0, *map(len, commands)])
+    keys = np.arange(starts[-1], dtype=np.uint64)  # of a row of which not enough is known: its own
+    for step, start, end in zip(steps, starts, starts[1:], strict=False):
+        if end - start <= before:
+            continue
+        own = which.reshape(-1)[start:end]
+        changed = np.diff(own, prepend=-1) != 0
+        at = np.arange(end - start)
+        since = at[:-1] - np.maximum.accumulate(np.where(changed, at, 0))[:-1]  # of the command that led to a row
+        past = sliding_window_view(random[own[:-1]], before) @ power[:before]
+        uneven = np.cumsum([0, *(np.abs(step / usual - 1.0) > EVEN)])
+        told = uneven[before:] == uneven[: end - start - before]
+        keys[start + before : end][told] = (past + since[before - 1 :].astype(np.uint64) * power[before])[told]
+    return _joined(keys, starts)
+
+
+def _joined(keys: NDArray[np.uint64], starts: IntArray) -> list[_Set]:
+    """Rows of one key in stretches whose rows all come again at the same places."""
+    _, which = np.unique(keys, return_inverse=True)
+    order = np.argsort(which, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(which[order])) + 1)
+    found: list[tuple[IntArray, int]] = []
+    for group in sorted((each for each in groups if len(each) > 1), key=lambda each: int(each[0])):
+        if found and len(found[-1][0]) == len(group) and (found[-1][0] + found[-1][1] == group).all():
+            found[-1] = (found[-1][0], found[-1][1] + 1)
+        else:
+            found.append((group, 1))
+    pieces = [np.searchsorted(starts, group, side="right") - 1 for group, _ in found]
+    return [
+        _Set(piece, group - starts[piece], length, int(np.diff(group).min()))
+        for piece, (group, length) in zip(pieces, found, strict=True) if length >= LEAST
+    ]  # fmt: skip
