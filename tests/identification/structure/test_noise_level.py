@@ -4,6 +4,7 @@ follows nothing, which only such a level tells from noise."""
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST, UNTOLD
 from omnidyn.identification.validation import validate
@@ -158,3 +159,20 @@ def test_a_sensor_that_rounds_says_nothing_at_rest():
     step = 4.0 * NOISE
     lack = lack_of(commands(4), twist=lambda values: np.round(values / step) * step)
     assert REST not in {one.source for one in (*lack.noise.values(), *lack.at_rest.values())}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("rho", "least"), [(0.0, 0.9), (0.5, 0.9), (0.9, 0.88)])
+def test_levels_of_many_logs_and_their_degrees_of_freedom(rho, least):
+    """Bias of the level by repeats, and how often its 95 % interval by chi squared holds the noise that was put in."""
+    ratio, held, beyond = [], [], 0
+    for seed in range(40):
+        lack = lack_of(np.tile(commands(seed, 10.0), (3, 1)), rho=rho, seed=seed)
+        beyond += bool(lack.beyond)
+        for one, std in zip(lack.noise.values(), NOISE, strict=True):
+            low, high = one.level * np.sqrt(one.degrees / chi2.ppf([0.975, 0.025], one.degrees))
+            ratio.append(one.level / std)
+            held.append(low < std < high)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.025)
+    assert np.mean(held) >= least
+    assert beyond <= 1
