@@ -4,8 +4,10 @@ follows nothing, which only such a level tells from noise."""
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST, UNTOLD
+from omnidyn.identification.validation import validate
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -31,12 +33,16 @@ def coloured(rho, rows, rng):
     return lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], white, axis=0)[600:] * NOISE
 
 
-def lack_of(voltage, disturbed=lambda clean, rng: 0.0, rho=0.0, seed=1, twist=lambda values: values):
-    """Of a fit to a log of the right robot, its twist disturbed."""
+def log_of(voltage, disturbed=lambda clean, rng: 0.0, rho=0.0, seed=1, twist=lambda values: values):
+    """A log of the right robot, its twist disturbed."""
     clean, rng = simulate(AXEBOT, voltage, 1.0 / RATE), np.random.default_rng([seed, 2])
     values = clean.twist + coloured(rho, len(clean.t), rng) + disturbed(clean, rng)
-    run = Run(t=clean.t, voltage=clean.voltage, twist=twist(values), source="log")
-    return fit_output_error(run, AXEBOT, nuisances=()).lack_of_fit
+    return Run(t=clean.t, voltage=clean.voltage, twist=twist(values), source="log")
+
+
+def lack_of(*args, **options):
+    """Of a fit to such a log."""
+    return fit_output_error(log_of(*args, **options), AXEBOT, nuisances=()).lack_of_fit
 
 
 def assert_levels(lack, source):
@@ -95,10 +101,14 @@ def test_misfit_that_follows_nothing_is_found_by_holds_and_leads_the_verdict():
     assert lack.to_dict()["noise"]["twist[0]"]["source"] == HOLDS
 
 
-def test_misfit_that_comes_again_with_the_commands_is_found_by_repeats():
+def test_misfit_that_comes_again_with_the_commands_is_found_by_repeats_and_chi2_fails():
     """White, so that nothing else finds it, but the same each time."""
     again = 1.5 * NOISE * np.random.default_rng(5).normal(size=(1000, 3))
-    lack = lack_of(np.tile(commands(1, 10.0), (3, 1)), lambda clean, rng: np.resize(again, clean.twist.shape))
+    log = log_of(np.tile(commands(1, 10.0), (3, 1)), lambda clean, rng: np.resize(again, clean.twist.shape))
+    fit = fit_output_error(log, AXEBOT, nuisances=())
+    lack, seen = fit.lack_of_fit, validate(fit, [log], [log])
+    assert all(score.chi2 == pytest.approx(1.0 + 1.5**2, rel=0.25) for score in seen.scores["fitted"].values())
+    assert any("are larger than noise" in words and "on the fitted logs too" in words for words in seen.statements())
     assert lack.found
     assert {"twist[0]", "twist[1]", "twist[2]"} == set(lack.beyond)
     for one, std in zip(lack.noise.values(), NOISE, strict=True):
@@ -149,3 +159,20 @@ def test_a_sensor_that_rounds_says_nothing_at_rest():
     step = 4.0 * NOISE
     lack = lack_of(commands(4), twist=lambda values: np.round(values / step) * step)
     assert REST not in {one.source for one in (*lack.noise.values(), *lack.at_rest.values())}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("rho", "least"), [(0.0, 0.9), (0.5, 0.9), (0.9, 0.88)])
+def test_levels_of_many_logs_and_their_degrees_of_freedom(rho, least):
+    """Bias of the level by repeats, and how often its 95 % interval by chi squared holds the noise that was put in."""
+    ratio, held, beyond = [], [], 0
+    for seed in range(40):
+        lack = lack_of(np.tile(commands(seed, 10.0), (3, 1)), rho=rho, seed=seed)
+        beyond += bool(lack.beyond)
+        for one, std in zip(lack.noise.values(), NOISE, strict=True):
+            low, high = one.level * np.sqrt(one.degrees / chi2.ppf([0.975, 0.025], one.degrees))
+            ratio.append(one.level / std)
+            held.append(low < std < high)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.025)
+    assert np.mean(held) >= least
+    assert beyond <= 1
