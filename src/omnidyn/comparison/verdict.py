@@ -92,11 +92,11 @@ def nothing_followed(found: Sequence[Followed]) -> bool:
     return bool(found) and all(each.level >= HARDLY for each in found)
 
 
-def is_missed(share: float, error: float, scatter: float) -> bool:
+def is_missed(share: float, error: float, scatter: float = 0.0) -> bool:
     """Whether a model misses a signal: its errors are more than half of the spread, and no noise.
 
     share: error over spread. error: its rms. scatter: by how much the signal scatters from row to row
-    (`statistics.difference_noise`), in the same unit; a signal of mere noise is not to blame.
+    (`statistics.difference_noise`), in the same unit; a signal of mere noise is not to blame. At 0: of no noise.
     """
     return share > HALF and error > ROUGH * scatter
 

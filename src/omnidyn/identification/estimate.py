@@ -212,4 +212,5 @@ def identified(std: float | None, source: str) -> Prior:
 
 def printable(source: str) -> str:
     """The words of a source as a robot file takes them."""
-    return shortened("".join(c if c.isprintable() else " " for c in source), SOURCE_LENGTH)
+    clean = source if source.isprintable() else "".join(c if c.isprintable() else " " for c in source)
+    return shortened(clean, SOURCE_LENGTH)

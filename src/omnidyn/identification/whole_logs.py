@@ -63,10 +63,10 @@ def identify_groups(
 def solved(fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[str] | None = None) -> Answer:
     """The answer of a fit of some runs, with the ladder where that is asked for. groups: name of each run's group."""
     if not fit.question.ladder:
-        return answered(fit, fit.solve(progress), progress)
+        return answered(fit, fit.solve(progress, _unearned), progress)
     from omnidyn.identification.structure.ladder.climb import climb  # here, for it takes time to load
 
-    best, solution, ladder = climb(fit, fit.solve(progress), runs, progress, groups)
+    best, solution, ladder = climb(fit, fit.solve(progress, _unearned), runs, progress, groups)
     answer = answered(best, solution, progress)
     estimates = {
         name: replace(own, ladder=ladder, warnings=(*own.warnings, *ladder.warnings()))
@@ -96,6 +96,13 @@ def _moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     from omnidyn.identification.structure.rests_on import moved_by_the_file  # here, for it takes time to load
 
     return moved_by_the_file(sure, held)
+
+
+def _unearned(found: Solution) -> tuple[str, ...]:
+    """See structure/earned.py."""
+    from omnidyn.identification.structure.earned import unearned  # here, for it takes time to load
+
+    return unearned(found)
 
 
 def _study(solution: Solution) -> Callable[[], Diagnosis]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.statistics import median
 
 GAP = 3.5  # a step so many times the usual one is a gap: three samples or more are lost
 
@@ -18,7 +19,7 @@ def segments(t: FloatArray, gap: float = GAP) -> list[slice]:
     if len(t) < 3:
         return [slice(0, len(t))]
     steps = np.diff(t)
-    long = gap * float(np.median(steps))
+    long = gap * median(steps)
     if not (steps > long).any():
         return [slice(0, len(t))]
     limit = max(long, 2.0 * float(np.quantile(steps, 0.95)))

@@ -23,12 +23,12 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, new_states
 from omnidyn.model.mass import masses_couple, per_mass
-from omnidyn.model.motor import QUASI_STATIC, settled_current, traction
+from omnidyn.model.motor import QUASI_STATIC, Motor, settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import accelerations, moving_states, with_given_currents
 from omnidyn.model.surroundings.floor import refuse_slope
-from omnidyn.model.wheels import refuse_slip, wheel_speed, wrench_from_traction
+from omnidyn.model.wheels import Wheels, refuse_slip, wheel_speed, wrench_from_traction
 
 
 def settled_currents(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
@@ -49,7 +49,13 @@ def drive_wrench(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArr
 
     `twist` [m/s, m/s, rad/s], shape (*batch, 3); `voltage` [V], shape (*batch, wheels). Returns (*batch, 3).
     """
-    return wrench_from_currents(robot, settled_currents(robot, twist, voltage))
+    return wrench_of_motors(robot.motor, robot.wheels, twist, voltage)
+
+
+def wrench_of_motors(motor: Motor, wheels: Wheels, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
+    """The same, of motors and wheels alone: nothing else of a robot has a part in it."""
+    current = settled_current(motor, voltage, wheel_speed(wheels, twist))
+    return wrench_from_traction(wheels, traction(motor, wheels, current))
 
 
 def linear_part(robot: Robot) -> Robot:

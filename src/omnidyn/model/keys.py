@@ -249,6 +249,8 @@ def with_priors(robot: Robot, known: Mapping[str, Prior]) -> Robot:
 
     What was known of a list as a whole goes to all its entries where more is known of one of them.
     """
+    if not known:
+        return robot
     priors = dict(robot.priors)
     for key in map(Key.parse, known):
         if key.index is not None and key.name in priors:

@@ -52,6 +52,8 @@ def added_mass(robot: Robot) -> FloatArray:
 
 def of_body_alone(robot: Robot) -> Robot:
     """The same robot, rotors and wheels as light as a feather, its centre of mass in the middle: M is diagonal."""
+    if not any(robot.body.centre) and robot.motor.rotor_inertia == 0.0 and robot.wheels.wheel_inertia == 0.0:
+        return robot
     motor = robot.motor.model_copy(update={"rotor_inertia": 0.0})  # valid: not checked again
     wheels = robot.wheels.model_copy(update={"wheel_inertia": 0.0})
     body = robot.body.model_copy(update={"centre": (0.0, 0.0)})

@@ -11,6 +11,7 @@ what drives an axis at rest, up to its breakaway.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,9 +20,11 @@ from numpy.typing import ArrayLike
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import axis_patterns
-from omnidyn.model.dynamics import drive_wrench, linear_part
+from omnidyn.model.dynamics import drive_wrench, linear_part, wrench_of_motors
 from omnidyn.model.mass import per_mass
+from omnidyn.model.motor import Motor
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import Wheels
 
 
 @dataclass(frozen=True)
@@ -54,11 +57,21 @@ class MotorWrench(NamedTuple):
 
 
 def motor_wrench(robot: Robot) -> MotorWrench:
-    """The motors of a robot, without their drop and limit."""
-    linear, count = linear_part(robot), robot.wheels.count
-    return MotorWrench(
-        drive_wrench(linear, np.eye(3), np.zeros(count)), drive_wrench(linear, np.zeros(3), np.eye(count))
+    """The motors of a robot, without their drop and limit. Its arrays are read-only."""
+    return _motor_wrench(linear_part(robot).motor, robot.wheels)  # pyright: ignore[reportArgumentType]
+
+
+@lru_cache(maxsize=64)
+def _motor_wrench(motor: Motor, wheels: Wheels) -> MotorWrench:
+    """Asked for several times in each fit, mostly of the same motors."""
+    at_rest, no_volts = np.zeros(3), np.zeros(wheels.count)
+    found = MotorWrench(
+        wrench_of_motors(motor, wheels, np.eye(3), no_volts),
+        wrench_of_motors(motor, wheels, at_rest, np.eye(wheels.count)),
     )
+    for each in found:
+        each.flags.writeable = False
+    return found
 
 
 def state_space(robot: Robot, motors: MotorWrench | None = None) -> StateSpace:

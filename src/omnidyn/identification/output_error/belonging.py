@@ -32,6 +32,9 @@ def with_nuisances(
 
     std: of the parameters by name; open_: those that the data do not determine, which only go with the others.
     """
+    angles = any(name == "wheel_angle" for name, _ in problem.columns)
+    if problem.robot_count == len(problem.parameters) and not angles and robot.log is None:
+        return robot
     found = {p.name: float(v) for p, v in zip(problem.parameters, values, strict=True)}
     seconds, where = late_by(problem, values, problem.columns)
     late = {name: each for (name, _), each in zip(problem.columns, seconds, strict=True)}

@@ -69,17 +69,17 @@ def conclude(
     data, names = _data(records), [p.name for p in problem.parameters]
     own_levels, joint = _levels(levels, ci95), combinations(problem, values, known, moved)
     endless = [name for name, (_, (_, high)) in own_levels.items() if high == math.inf]
-    fitted = problem.parameters[:own]
+    fitted, correlation = problem.parameters[:own], _correlation(names, known)
     robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)
     robot = with_nuisances(robot, problem, values, std, open_, records, data)
     warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-        robot=_together(robot, problem.parameters, std, known),
+        robot=_together(robot, problem.parameters, std, known, correlation.matrix),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
         ci95={name: ci95[name] for name in names[:own]} | {k: i for k, (_, i) in own_levels.items()},
-        correlation=_correlation(names, known),
+        correlation=correlation,
         degrees_of_freedom={name: known.degrees for name in (*names[:own], *own_levels)},
         at_bound=tuple(name for name, held in zip(names[:own], known.held, strict=False) if held),
         warnings=tuple(warnings),
@@ -148,8 +148,9 @@ def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
         spread = float(np.std(np.concatenate(parts))) if parts else 0.0
         if solver.tick[c] or not spread:
             continue
-        if is_missed(left / spread, left, difference_noise(*parts)):
-            found[_column(column)] = left / spread
+        share = left / spread
+        if is_missed(share, left) and is_missed(share, left, difference_noise(*parts)):  # the noise takes time to find
+            found[_column(column)] = share
     return found
 
 
@@ -306,10 +307,12 @@ def _correlation(names: Sequence[str], known: Trust) -> Correlation:
     return Correlation(tuple(names), matrix)
 
 
-def _together(robot: Robot, fitted: Sequence[Parameter], std: Mapping[str, float], known: Trust) -> Robot:
+def _together(
+    robot: Robot, fitted: Sequence[Parameter], std: Mapping[str, float], known: Trust, correlation: FloatArray
+) -> Robot:
     """The robot with what the fit knows of how its numbers are off together; what is tied to a number goes with it.
 
-    Numbers without a std of this fit have no part in it, nor have those of the logs.
+    correlation (P, P): of `fitted`. Numbers without a std of this fit have no part in it, nor have those of the logs.
     """
     tied = [
         (j, key, std[p.name] * factor) for j, p in enumerate(fitted)
@@ -317,7 +320,7 @@ def _together(robot: Robot, fitted: Sequence[Parameter], std: Mapping[str, float
         for key, factor in ((key_of(p.name, robot), 1.0), *p.also) if key
     ]  # fmt: skip
     at = [j for j, _, _ in tied]
-    matrix = _correlation([p.name for p in fitted], known).matrix[np.ix_(at, at)]
+    matrix = correlation[np.ix_(at, at)]
     return with_correlation(robot, [key for _, key, _ in tied], matrix, [spread for *_, spread in tied])
 
 

@@ -51,10 +51,15 @@ from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 
 MovedBy = Callable[[Weighed, Mapping[str, float]], FloatArray]
+Unearned = Callable[[Solution], Sequence[str]]
 
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
+HARMS = (
+    "soaks up what the model misses in a part of the log: the likelihood is sure of it, and blocks of the log that are "
+    "left out of the fit are predicted better without"
+)
 INTERRUPTED = "the fit was interrupted: the numbers are the best so far, their intervals are those of that point"
 
 
@@ -111,12 +116,15 @@ class Fit:
         """Degrees of freedom of the loss; 0 for Gaussian noise."""
         return degrees(self.question.loss)
 
-    def solve(self, progress: Progress | None = None) -> Solution:
-        """The best point; `progress` sees every better state on the way, and hears in words what is done."""
+    def solve(self, progress: Progress | None = None, unearned: Unearned | None = None) -> Solution:
+        """The best point; `progress` sees every better state on the way, and hears in words what is done.
+
+        unearned: which automatic nuisances a log is better without, see structure/earned.py.
+        """
         progress = progress or Progress()
         if len(self.groups) == 1:
-            return self._settled(self.groups[0], progress)
-        return self._solve_joint(self._settled_alone(progress), progress)
+            return self._settled(self.groups[0], progress, unearned)
+        return self._solve_joint(self._settled_alone(progress, unearned), progress)
 
     def answer(
         self, found: Solution | Best, progress: Progress | None = None, moved_by: MovedBy | None = None
@@ -218,7 +226,7 @@ class Fit:
             return as_it_is  # a memory that explains a whole output leaves nothing to the model
         return found
 
-    def _settled(self, group: Group, progress: Progress) -> Solution:
+    def _settled(self, group: Group, progress: Progress, unearned: Unearned | None) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
         found = self._solve(group, group.problem(), progress)
         if self.question.nuisances is not None:
@@ -229,10 +237,13 @@ class Fit:
         else:
             progress.doing("which nuisances the logs support")
             kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
+        harmful = unearned(found) if unearned is not None and group.engine != LOOP else ()
+        kept = tuple(name for name in kept if name not in harmful)
         lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
         if not lost:
             return found
         notes = tuple(f"{implausible(name, value)}: it is not fitted" for name, value in early.items())
+        notes += tuple(f"{name} {HARMS}: it is not fitted" for name in harmful if name not in early)
         if group.engine == LOOP:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
         return replace(self._solve(group, group.problem(kept), progress), notes=notes)
@@ -267,7 +278,7 @@ class Fit:
             nearer.state.point, watch=progress, blocked=nearer.blocked
         )
 
-    def _settled_alone(self, progress: Progress) -> tuple[str, ...] | None:
+    def _settled_alone(self, progress: Progress, unearned: Unearned | None) -> tuple[str, ...] | None:
         """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""
         if not self._settles:
             return None
@@ -276,7 +287,8 @@ class Fit:
         kept: tuple[str, ...] | None = None
         for group in self.groups:
             found = self._solve(group, group.problem(names), progress.alone(group.name))
-            mine = supported(found.solver, found, names)
+            harmful = unearned(found) if unearned is not None else ()
+            mine = tuple(name for name in supported(found.solver, found, names) if name not in harmful)
             kept = mine if kept is None else tuple(name for name in kept if name in mine)
         return kept
 

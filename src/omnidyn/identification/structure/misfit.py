@@ -87,6 +87,11 @@ def chance(linear: Linear, shown: Sequence[FloatArray]) -> float:
     return _Asked.of(linear, shown, np.zeros(0, dtype=int)).score(np.arange(shown[0].shape[2]))[1]
 
 
+def memory_of(rows: Rows) -> Sequence[AutoRegression]:
+    """The memory of the residuals of each column, as they are."""
+    return _memories(rows, rows.residual, None)
+
+
 def memory_beside(rows: Rows, cause: Sequence[FloatArray]) -> Sequence[AutoRegression]:
     """The memory of each column, of what is left beside what a cause shows (C, rows, K) of each piece."""
     return _whitened(rows, cause)[0].memory

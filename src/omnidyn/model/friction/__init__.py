@@ -38,7 +38,12 @@ class Friction(Value):
     @property
     def only_axes(self) -> bool:
         """Whether all friction is the paper's: on the body axes, the same both ways, with levels that never fall."""
-        return all(law == type(law)() for law in self.laws[1:]) and self.axes.is_plain
+        return not self.beyond_axes and self.axes.is_plain
+
+    @property
+    def beyond_axes(self) -> bool:
+        """Whether there is friction along the direction of travel or at the wheels."""
+        return self.laws[1:] != _OFF.laws[1:]
 
     @property
     def only_direction(self) -> bool:
@@ -63,9 +68,12 @@ class Friction(Value):
                 "friction about yaw stands in [friction.axes] and in [friction.direction], and one of them has another "
                 "law than coulomb: put all of it into one table"
             )
-        if axes.law == "karnopp" and any(law != type(law)() for law in self.laws[1:]):
+        if axes.law == "karnopp" and self.beyond_axes:
             raise ValueError(
                 'law = "karnopp" knows friction on the body axes only, where each axis gathers momentum for itself; '
                 "leave [friction.direction] and [friction.wheels] out, or the law"
             )
         return self
+
+
+_OFF = Friction()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +15,9 @@ from omnidyn.errors import InputError
 from omnidyn.model.fitted.correlation import KeyCorrelation, key_correlation
 from omnidyn.model.keys import BREAKAWAY, CENTRE, COULOMB, DEAD_BAND, LATENCY, VISCOUS, Key, expand, find_key
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
+from omnidyn.model.value import Value
 
+SAME = 1e-9  # relative: std that differ by no more are the same
 NEAR = 0.5  # std over value, from which on a friction may be 0
 SIGNED = ("wheels.azimuth_deg", "wheels.roller_angle_deg", CENTRE)  # numbers that may as well be below 0
 
@@ -90,8 +93,15 @@ def _has(robot: Robot, name: str) -> bool:
     if not key.level:
         return True
     law = getattr(robot.friction, key.table.rpartition(".")[2])
-    levels = [each for field, each in dict(law).items() if any(word in field for word in (VISCOUS, COULOMB, BREAKAWAY))]
-    return any(level is not None and np.any(level) for level in levels)
+    levels = (getattr(law, field) for field in _level_fields(type(law)))
+    return any(any(level) if isinstance(level, tuple) else level for level in levels)
+
+
+@cache
+def _level_fields(law: type[Value]) -> tuple[str, ...]:
+    """The fields of a law that hold levels."""
+    words = (VISCOUS, COULOMB, BREAKAWAY)
+    return tuple(field for field in law.model_fields if any(word in field for word in words))
 
 
 def is_log(name: str, value: float, std: float) -> bool:
@@ -148,7 +158,7 @@ def with_correlation(robot: Robot, keys: Sequence[str], matrix: ArrayLike, std: 
     beside = [float(own[key].std or 0.0) if key in own else 0.0 for key in every]
     earlier = dict(zip(before.keys, before.std, strict=True)) if before is not None and before.std is not None else {}
     joint = [*(earlier.get(key, beside[k]) for k, key in enumerate(old)), *(std or beside[len(old) :])]
-    apart = not np.allclose(joint, beside, rtol=1e-9, atol=0.0)
+    apart = any(abs(a - b) > SAME * abs(b) for a, b in zip(joint, beside, strict=True))
     found = key_correlation(every, whole, tuple(map(float, joint)) if apart else None)
     refuse_strange_keys(robot.model_copy(update={"correlation": found}))
     return robot.model_copy(update={"correlation": found if apart else _without_the_free(found)})
@@ -158,4 +168,6 @@ def _without_the_free(known: KeyCorrelation) -> KeyCorrelation | None:
     """The correlations without numbers that are off for themselves; None where all are."""
     matrix = known.of(known.keys)
     keys = tuple(key for key, row in zip(known.keys, matrix, strict=True) if np.count_nonzero(row) > 1)
+    if len(keys) == len(known.keys):
+        return known
     return key_correlation(keys, known.of(keys)) if keys else None

@@ -42,7 +42,7 @@ def why_not_exact(robot: Robot) -> list[str]:
         reasons.append("a centre of mass beside that of the wheels ([body] centre_m)")
     if robot.floor.tilt:
         reasons.append("a floor that is not level ([floor] tilt_deg)")
-    if any(law != type(law)() for law in robot.friction.laws[1:]):
+    if robot.friction.beyond_axes:
         reasons.append(
             "friction along the direction of travel or at the wheels ([friction.direction], [friction.wheels])"
         )

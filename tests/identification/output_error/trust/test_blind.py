@@ -11,7 +11,7 @@ from benchmarks.blind.setups import DEFICIENT, FRICTION, FULL, INERTIA, MASS, OH
 from benchmarks.blind.told import named, said
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.advice import advice
-from omnidyn.identification.output_error.trust.blind import _sparse
+from omnidyn.identification.output_error.trust.blind import _lost, _sparse
 from omnidyn.identification.whole_logs import fit_output_error
 
 BY_NAME = {setup.name: setup for setup in (*DEFICIENT, *FULL)}
@@ -69,3 +69,15 @@ def test_directions_are_told_apart_so_that_each_holds_few_numbers():
     for row, wanted in zip(found, plain, strict=True):
         assert row * np.sign(row[np.argmax(np.abs(row))]) == pytest.approx(wanted, abs=1e-12)
     assert len(_sparse(rng.normal(size=(3, 5)))) == 3
+
+
+def test_what_shows_at_some_size_shows_at_a_larger_one():
+    """So that the sizes of what motors push need not be found where the numbers themselves are large enough."""
+    rng, shown = np.random.default_rng(5), 0
+    for _ in range(300):
+        root, size = rng.standard_normal((6, 12)), 10.0 ** rng.uniform(0.0, 2.0, 6)
+        information = root @ root.T
+        if not _lost(information, size)[1].any():
+            shown += 1
+            assert not _lost(information, size * (1.0 + rng.exponential(size=6)))[1].any()
+    assert shown > 50

@@ -21,7 +21,7 @@ from omnidyn.model.frames import world_to_body
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
-from omnidyn.statistics import difference_noise
+from omnidyn.statistics import difference_noise, median
 
 WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
@@ -128,7 +128,7 @@ def _windows(
 
 def window_rows(t: FloatArray) -> int:
     """Rows of a window."""
-    return max(LEAST_ROWS, round(WINDOW / float(np.median(np.diff(t[: SAMPLE + 1])))))
+    return max(LEAST_ROWS, round(WINDOW / median(np.diff(t[: SAMPLE + 1]))))
 
 
 def measured_rows(v: FloatArray, rows: int) -> float:

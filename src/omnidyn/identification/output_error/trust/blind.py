@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem
@@ -44,12 +44,11 @@ class Way:
 
 def blind_ways(problem: Fitted, values: FloatArray, information: FloatArray) -> tuple[Way, ...]:
     """The blind directions of a fit. values (P,); information (P, P): of the rows alone, states eliminated."""
-    size = sizes(problem, values)
-    scaled = information * np.outer(size, size)
-    eigen, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    least = max(LOST**-2.0, SAME * float(eigen.max(initial=0.0)))
-    lost = eigen < least
-    found = []
+    # What shows where sizes are the numbers themselves shows no less where they are larger; to find these takes time.
+    if values.all() and not _lost(information, _own_sizes(problem, values))[1].any():
+        return ()
+    size, found = sizes(problem, values), []
+    scaled, lost, vectors = _lost(information, size)
     for way in _sparse(vectors[:, lost].T):
         seen = float(way @ scaled @ way)
         told = (np.abs(way) > SHARE) | (way**2 * np.diag(scaled) > VISIBLE**2)
@@ -58,12 +57,27 @@ def blind_ways(problem: Fitted, values: FloatArray, information: FloatArray) -> 
     return tuple(found)
 
 
+def _lost(information: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolArray, FloatArray]:
+    """(scaled information (P, P), which of its eigenvectors are blind (P,), these in columns)."""
+    scaled = information * np.outer(size, size)
+    eigen, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    return scaled, eigen < max(LOST**-2.0, SAME * float(eigen.max(initial=0.0))), vectors
+
+
 def sizes(problem: Fitted, values: FloatArray) -> FloatArray:
     """What a change of 1 is for each number, in the numbers that the solver sees. Shape (P,)."""
     # Of several groups there are as many robots: the one that their fit began from says how large things are.
     robot = problem.robot if isinstance(problem, Problem) else None
-    push, top = (np.zeros(3), np.ones(3)) if robot is None else (_pushes(problem, robot), top_speeds(robot))
-    return np.array([_size(p, float(v), push, top) for p, v in zip(problem.parameters, values.tolist(), strict=True)])
+    if robot is None:
+        return _own_sizes(problem, values)
+    push, top = _pushes(problem, robot), top_speeds(robot)
+    return np.array([_size(p, v, push, top) for p, v in zip(problem.parameters, values.tolist(), strict=True)])
+
+
+def _own_sizes(problem: Fitted, values: FloatArray) -> FloatArray:
+    """The same by the numbers alone, whatever the motors can push. Shape (P,)."""
+    push, top = np.zeros(3), np.ones(3)
+    return np.array([_size(p, v, push, top) for p, v in zip(problem.parameters, values.tolist(), strict=True)])
 
 
 def _size(p: Parameter, value: float, push: FloatArray, top: FloatArray) -> float:

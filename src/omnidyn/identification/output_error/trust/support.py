@@ -33,6 +33,7 @@ def supported(solver: Solver, solution: Solution, names: tuple[str, ...]) -> tup
 
 def too_early(solver: Solver, solution: Solution) -> dict[str, float]:
     """Latencies at or before the earliest that is plausible, by their names [s]."""
-    limit = earliest([piece.record for piece in solver.problem.pieces])
     pairs = zip(solver.problem.parameters, solution.state.point.values.tolist(), strict=True)
-    return {p.name: value for p, value in pairs if p.part == LATENCY and value <= limit}
+    late = {p.name: value for p, value in pairs if p.part == LATENCY}
+    limit = earliest([piece.record for piece in solver.problem.pieces]) if late else 0.0
+    return {name: value for name, value in late.items() if value <= limit}

@@ -16,6 +16,7 @@ beyond chance. No variance is below the plain one, of a number or of what severa
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,7 @@ class Trust:
         """What the data do not determine, whether a prior holds it or not."""
         return self.blind | self.guessed
 
-    @property
+    @cached_property
     def std(self) -> FloatArray:
         return np.sqrt(np.diag(self.covariance))
 

@@ -7,6 +7,7 @@ log where each leaves as much as the other and both together hardly less.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -60,6 +61,12 @@ class Blocks:
         self.block = self._blocks(linear, len(e))
         self.matrix = np.array([every[own].T @ every[own] for own in self.block])
         self.total = every.T @ every  # with what is known beforehand, which is held out of no block
+
+    def of(self, matrix: FloatArray, total: FloatArray) -> Blocks:
+        """Blocks with other scalar products, of the same rows."""
+        other = copy.copy(self)
+        other.matrix, other.total = matrix, total
+        return other
 
     def _blocks(self, linear: Linear, rows: int) -> list[IntArray]:
         """Rows by the time at which they stand, in blocks that are whole stretches of time; priors in all of them."""

@@ -1,0 +1,89 @@
+"""Whether a nuisance that is on by default earns its place: blocks of the log that were not fitted tell.
+
+A likelihood takes what is left over for noise. Where the model misses a stretch of the log (clocks apart for a while, a
+wheel that was held), a latency or a dead band soaks some of that up, the likelihood is sure of it, and the friction of
+all the rest goes with it. What is true of the log shows in blocks that were left out of the fit, too; what soaks up a
+stretch makes them worse. So each of which the likelihood is sure is asked for there, worst first: in rows made white,
+one linear step from the fit to all, as in ladder/held_out.py.
+
+In doubt a nuisance stays: one that is there and not fitted moves friction by 10 to 40 %, past every interval, and one
+that is fitted and not there costs what the intervals say. It must go where leaving it out lowers the error of those
+blocks by more than its standard error. A gain always stays: a supply that is only nominal is in the intervals by it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.output_error.problem.nuisances import LATENCY
+from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution
+from omnidyn.identification.structure.linear import Linear, Rows
+from omnidyn.identification.structure.misfit import memory_of
+from omnidyn.identification.structure.missing.remedies import Blocks
+from omnidyn.model.actuation import DEAD_BAND
+
+SURE = 10.8  # what a likelihood that is sure of a nuisance gains by it: 2 F, by chance once in a thousand logs
+MOST_ROWS = 30_000  # that are looked at
+
+
+def unearned(solution: Solution) -> tuple[str, ...]:
+    """The names of the latencies and the dead band that a fit is sure of, and blocks beside it are better without."""
+    steps = _steps(solution)
+    if not steps:
+        return ()
+    blocks, problem = _blocks(solution), solution.solver.problem
+    at = 1 + np.flatnonzero(~solution.held)
+    lost: list[int] = []
+    while steps:
+        found = {j: _harm(blocks, at, j, step) for j, step in steps.items()}
+        worst = max(found, key=lambda j: found[j])
+        if found[worst] <= 1.0:
+            break
+        blocks, at = _without(blocks, worst, steps.pop(worst)), at[at != 1 + worst]
+        lost.append(worst)
+    return tuple(problem.parameters[j].name for j in lost)
+
+
+def _steps(solution: Solution) -> dict[int, float]:
+    """Which nuisances the likelihood is sure of, by their place, and the step to where they are not fitted."""
+    normal, problem = Normal(solution.solver, solution.state), solution.solver.problem
+    variance = np.diag(np.linalg.pinv(normal.information, hermitian=True))
+    found = {}
+    for j, p in enumerate(problem.parameters):
+        step = p.inner(p.value) - float(normal.inner[j])
+        if p.part in (LATENCY, DEAD_BAND) and not solution.held[j] and step**2 > SURE * variance[j] > 0.0:
+            found[j] = step
+    return found
+
+
+def _blocks(solution: Solution) -> Blocks:
+    """The fit in blocks of white rows."""
+    whole = solution.solver.problem
+    assert isinstance(whole, Problem)
+    problem = whole.shortened(MOST_ROWS)
+    engine: RowEngine = solution.solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]
+    rows = Rows.of(problem, solution.state.point, engine.residuals(solution.state.point))
+    slopes = [np.where(solution.held, 0.0, own) for own in rows.slopes]  # what a bound holds, holds in every block
+    linear = Linear(replace(rows, slopes=slopes), memory_of(rows))
+    return Blocks(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
+
+
+def _harm(blocks: Blocks, at: IntArray, j: int, step: float) -> float:
+    """By how many standard errors the error of blocks that are left out is lower without number j."""
+    change = blocks.held_out(at) - _without(blocks, j, step).held_out(at[at != 1 + j])
+    return float(change.sum() / max(change.std(ddof=1) * np.sqrt(len(change)), 1e-300))
+
+
+def _without(blocks: Blocks, j: int, step: float) -> Blocks:
+    """The same blocks where number j has taken this step."""
+    turn = np.eye(len(blocks.size))
+    turn[1 + j, 0] = -step * blocks.size[1 + j]
+
+    def moved(matrix: FloatArray) -> FloatArray:
+        return turn.T @ matrix @ turn
+
+    return blocks.of(np.array([moved(own) for own in blocks.matrix]), moved(blocks.total))
