@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.friction_curve import friction_curve, sliding_force
-from omnidyn.identification.steady.band import confidence_band
+from omnidyn.identification.steady.line import confidence_band
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot

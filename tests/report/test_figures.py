@@ -12,7 +12,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-from omnidyn.identification.steady.band import confidence_band
+from omnidyn.identification.steady.line import confidence_band
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.model.robot_file import load_robot, preset_names
 from omnidyn.paper.friction import table_1_points

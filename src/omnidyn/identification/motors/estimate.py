@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from omnidyn.arrays import FloatArray
@@ -68,6 +68,22 @@ class MotorEstimate:
         known = BAND in self.value and BAND not in self.unidentifiable
         return known and self.ci95[BAND][0] > 0.0 and self.ci95[SLOPE][0] > 0.0
 
+    def bounded(self, turned: float, rested: float = math.nan) -> MotorEstimate:
+        """The same with a dead band that is not above an input under which the motor turned steadily, `turned`.
+
+        A value above that is none. Where there is none, it lies between that and `rested`, the largest input under
+        which the motor rested.
+        """
+        if BAND not in self.value or not math.isfinite(turned):
+            return self
+        low, high = self.ci95[BAND]
+        lost = BAND in self.unidentifiable or not self.value[BAND] <= turned
+        if not lost:
+            return replace(self, ci95={**self.ci95, BAND: (low, min(high, turned))})
+        blind = tuple(dict.fromkeys((*self.unidentifiable, BAND)))
+        ends = (rested if rested < turned else 0.0, turned)
+        return replace(self, std={**self.std, BAND: math.nan}, ci95={**self.ci95, BAND: ends}, unidentifiable=blind)
+
     @property
     def late(self) -> dict[str, float]:
         """The latencies that were fitted [s]."""
@@ -79,7 +95,9 @@ class MotorEstimate:
         """
         spread = f" +- {self.std[SLOPE]:.2g}" if math.isfinite(self.std[SLOPE]) else ""
         words = f"{self.name}: slope {self.value[SLOPE]:.5g}{spread} {self.unit} s/rad"
-        if self.ci95[LAG][0] > 0.0:
+        if LAG in self.unidentifiable:
+            words += ", lag not determined"
+        elif self.ci95[LAG][0] > 0.0:
             words += f", lag {1e3 * self.value[LAG]:.3g} ms"
         for name, value in self.late.items():
             sure = f"+- {1e3 * self.std[name]:.2g} ms"
@@ -99,7 +117,13 @@ class MotorEstimate:
             return "no dead band asked for"
         blind = "dead band not identifiable here"
         if BAND in self.unidentifiable:
-            return f"{blind}, and any is in the slope: with one speed or one input only they cannot be told apart"
+            low, high = self.ci95[BAND]
+            between = f"between {low:.3g} and {high:.3g}" if low > 0.0 else f"at most {high:.3g}"
+            known = f"; it is {between} {self.unit}, for it turned steadily under that" if high < math.inf else ""
+            if math.isfinite(self.value[BAND]):
+                return f"{blind}: {self.value[BAND]:.3g} {self.unit} is no estimate{known}"
+            told = "with one speed or one input only they cannot be told apart"
+            return f"{blind}, and any is in the slope: {told}{known}"
         low, high = self.ci95[BAND]
         band = f"{self.value[BAND]:.3g} +- {self.std[BAND]:.2g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
         if self.dead_band_seen:
@@ -120,12 +144,17 @@ class MotorEstimate:
             self.name.removeprefix("motor "), f"{self.count} windows" if self.way == WINDOWS else self.way,
             "yes" if band else "no", f"{self.value[SLOPE]:.5g}", f"{self.std[SLOPE]:.2g}",
             *((f"{self.value[BAND]:.3g}", f"{self.std[BAND]:.2g}", "[{:.3g}, {:.3g}]".format(*self.ci95[BAND]))
-              if band and math.isfinite(self.value[BAND]) else ("-", "-", "-")),
-            *(f"{1e3 * each:{form}}" if math.isfinite(each) else "-"
+              if band and math.isfinite(self.std[BAND]) else ("-", "-", self._interval_alone())),
+            *(f"{1e3 * each:{form}}" if math.isfinite(each) and LAG not in self.unidentifiable else "-"
               for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))),
             f"{self.unit}, s/rad", f"{self.rmse:.4g}",
             f"{self.held_out:.4g}" if math.isfinite(self.held_out) else "-",
         )  # fmt: skip
+
+    def _interval_alone(self) -> str:
+        """Of a dead band without a value."""
+        low, high = self.ci95.get(BAND, (math.nan, math.nan))
+        return f"[{low:.3g}, {high:.3g}]" if math.isfinite(high) else "-"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

@@ -23,17 +23,18 @@ from omnidyn.identification.motors.estimate import (
     FREE_RUN,
     INERTIA,
     LAG,
-    LATENCY,
     SLOPE,
     MotorEstimate,
     named,
 )
-from omnidyn.identification.motors.log import MotorLog, motor_logs
+from omnidyn.identification.motors.log import MotorLog, motor_logs, orientation_of
 from omnidyn.identification.motors.problem import begin, motor_problem, motor_record
+from omnidyn.identification.motors.rest import rested_under, turned_under
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.fit import degrees
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
+from omnidyn.identification.output_error.trust.ends import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
@@ -81,7 +82,10 @@ def fit_motor(
     for way in cost:
         if way != chosen and 2.0 * (cost[way] - cost[chosen]) <= rise:
             fit = _with_rival(fit, answers[way])
-    return _with_bend(fit, bend(found[chosen][0], found[chosen][1].state)) if fit.dead_band_seen else fit
+    if fit.dead_band_seen:
+        fit = _with_bend(fit, bend(found[chosen][0], found[chosen][1].state))
+    way = orientation_of(logs, motor)
+    return fit.bounded(turned_under(logs, motor, way=way), rested_under(logs, motor))
 
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
@@ -150,12 +154,14 @@ def _answer(
         if value[BAND] >= 0.99 * high or std[BAND] > high:
             blind |= {BAND}
             std[BAND], ci95[BAND] = float("nan"), (problem.parameters[at].low, high)
-    for parameter, held in zip(problem.parameters, known.held, strict=True):
-        if held and parameter.name.startswith(LATENCY):  # the end of what was searched is no estimate
-            blind |= {parameter.name}
-            std[parameter.name], ci95[parameter.name] = float("nan"), (parameter.low, parameter.high)
+    ended = {p.name: p for p in at_the_end(problem, values) if p.name != BAND}  # which is no estimate
+    blind |= ended.keys()
+    for name, p in ended.items():
+        std[name], ci95[name] = float("nan"), (p.low, p.high)
     value[INERTIA] = value[SLOPE] * value[LAG]
     std[INERTIA], ci95[INERTIA] = _of_product(problem, known, value[INERTIA])
+    if ended.keys() & {SLOPE, LAG}:
+        std[INERTIA], ci95[INERTIA] = float("nan"), (0.0, float("inf"))
     names = [name for name in (SLOPE, BAND, LAG, INERTIA, *problem.names) if name in value]
     rows, rmse = _speed_errors(MotorEngine(problem), solution.state.point)
     return MotorEstimate(

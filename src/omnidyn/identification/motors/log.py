@@ -100,6 +100,16 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces)
 
 
+def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
+    """+1.0 where a positive input turns a motor forward, -1.0 where it turns it backward. pairs: (input, speed)."""
+    return -1.0 if sum(float(np.nansum(put_in * speed)) for put_in, speed in pairs) < 0.0 else 1.0
+
+
+def orientation_of(logs: Sequence[MotorLog], motor: int) -> float:
+    """The same of a motor of some logs."""
+    return orientation([(log.put_in[:, motor], log.motion[:, motor]) for log in logs])
+
+
 def rows_with(known: BoolArray, pieces: Sequence[slice]) -> list[tuple[int, int]]:
     """(first, last) rows between gaps throughout which `known` (rows,) holds."""
     return [(p.start + a, p.start + b - 1) for p in pieces for a, b in stretches(known[p]).tolist()]

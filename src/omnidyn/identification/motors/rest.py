@@ -2,6 +2,10 @@
 
 Rows move where the speed, averaged until its noise is no motion, is beyond that noise; a few rows of either do not
 count. Rest is told from a speed that passes zero, which goes from one side to the other.
+
+Where it turns steadily its input is above its dead band, whatever a line through its speeds says of that:
+
+    u = slope w + c sgn w + inertia w',   w steady:   c < |u|
 """
 
 from __future__ import annotations
@@ -16,8 +20,9 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.motors.edge import edge_interval
 from omnidyn.identification.motors.log import MotorLog
+from omnidyn.logs.plateaus import find_plateaus
 from omnidyn.logs.resolved import unresolved_rows
-from omnidyn.statistics import MAD_TO_STD, sensor_step, stretches
+from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step, stretches
 
 RISK = 0.05
 AROUND = 40  # rows on either side of a start or stop that tell of it
@@ -29,6 +34,9 @@ LOST = 0.25  # of the largest speed: where only faster motion can be told from n
 BLOCK = 0.25  # [s]
 LAGS_AT_REST = 1.0
 CURRENT = "current"
+SURE = 5.0  # standard errors of a steady speed, from which the motor turns
+FALLING = 3.0  # standard errors of the mean of a half: a motor that slows down more may be running out
+NOISE = 2.0  # standard errors of the input
 
 
 class Span(NamedTuple):
@@ -233,3 +241,55 @@ def _rested(column: _Column) -> Iterator[float]:
         under = speed[own >= held]
         if held > 0.0 and float(under.mean()) <= 3.0 * noise_of_rows(speed) / math.sqrt(len(under)):
             yield held
+
+
+# ---- steady turning, and steady rest ------------------------------------------------------------------------
+
+
+def turned_under(logs: Sequence[MotorLog], motor: int, side: float = 0.0, way: float = 1.0) -> float:
+    """The least input, as a size, under which a motor is seen to turn steadily; infinite where it never is.
+
+    side: +1.0 or -1.0: of its speed, 0.0: either. way: +1.0 where a positive input turns it forward, else -1.0.
+    """
+    turned = (
+        way * float(np.sign(each.speed)) * each.put_in + each.error
+        for each in _steady(logs, motor) if each.turns and side * each.speed >= 0.0
+    )  # fmt: skip
+    return min((each for each in turned if each > 0.0), default=math.inf)
+
+
+def rested_under(logs: Sequence[MotorLog], motor: int) -> float:
+    """The largest input, as a size, under which a motor rested; 0 where none shows."""
+    return max((abs(each.put_in) - each.error for each in _steady(logs, motor) if each.rests), default=0.0)
+
+
+class _Window(NamedTuple):
+    """One in which a motor turns and does not slow down, or rests. error: by how much the input may be another."""
+
+    put_in: float
+    speed: float
+    error: float
+    turns: bool
+    rests: bool
+
+
+def _steady(logs: Sequence[MotorLog], motor: int) -> list[_Window]:
+    found = [each for log in logs for each in _windows_of(log, motor)]
+    slow = SLOW * max((abs(each.speed) for each in found), default=0.0)
+    return [
+        each._replace(turns=each.turns and abs(each.speed) > slow, rests=each.rests and abs(each.speed) <= slow)
+        for each in found
+    ]  # fmt: skip
+
+
+def _windows_of(log: MotorLog, motor: int) -> Iterator[_Window]:
+    for each in find_plateaus(log.run):
+        put_in, speed = log.put_in[each.rows, motor], log.motion[each.rows, motor]
+        if not np.isfinite(put_in).all() or np.isfinite(speed).sum() < 2:
+            continue
+        half = len(speed) // 2
+        (early, early_std), (late, late_std) = (robust_mean(part) for part in (speed[:half], speed[half:]))
+        mean, std = (float(part) for part in robust_mean(speed))
+        slower = np.sign(mean) * (early - late) > FALLING * np.hypot(early_std, late_std)
+        middle, error = (float(part) for part in robust_mean(put_in))
+        yield _Window(middle, mean, NOISE * error, abs(mean) > SURE * std and not slower, abs(mean) <= SURE * std)

@@ -24,8 +24,8 @@ from omnidyn.document import interval_cell, plain
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, LAG, SLOPE, MotorEstimate
 from omnidyn.identification.motors.line import fit_line
-from omnidyn.identification.motors.log import MotorLog
-from omnidyn.identification.motors.rest import LEAST_REST, Span, noise_of_rows, starts_and_stops
+from omnidyn.identification.motors.log import MotorLog, orientation_of
+from omnidyn.identification.motors.rest import LEAST_REST, Span, noise_of_rows, starts_and_stops, turned_under
 from omnidyn.identification.motors.windows import EDGE_SHARE, LENGTHS, MotorWindows, motor_windows
 from omnidyn.statistics import sensor_step
 
@@ -123,29 +123,30 @@ def motor_starts(
     """Both directions of each motor, as far as the logs show it to turn or to rest there."""
     found, row = [], max(float(np.median(np.diff(log.t))) for log in logs if len(log.t) > 1)
     for motor in motors:
-        way = orientation([(log.put_in[:, motor], log.motion[:, motor]) for log in logs])
+        way = orientation_of(logs, motor)
         own = windows_for_a_lag(logs, windows, motor)
         lines = {side: line_one_way(own, motor, side) for side in (1.0, -1.0)}
         for side, line in lines.items():
             lag = line.value[LAG] if line is not None else math.nan
             up, down = starts_and_stops(logs, motor, side, way, lag)
             if up or down or line is not None:
-                found.append(direction_of(motor, side, logs[0].unit, up, down, _numbers(line, way, row)))
+                turned = turned_under(logs, motor, side, way)
+                found.append(direction_of(motor, side, logs[0].unit, up, down, _numbers(line, way, row), turned))
     return tuple(found)
-
-
-def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
-    """+1.0 where a positive input turns a motor forward, -1.0 where it turns it backward. pairs: (input, speed)."""
-    return -1.0 if sum(float(np.nansum(put_in * speed)) for put_in, speed in pairs) < 0.0 else 1.0
 
 
 def direction_of(
     motor: int, side: float, unit: str, up: Sequence[Span], down: Sequence[Span],
-    numbers: Mapping[str, tuple[float, tuple[float, float]]],
+    numbers: Mapping[str, tuple[float, tuple[float, float]]], turned: float = math.inf,
 ) -> MotorStart:  # fmt: skip
-    """One direction from its starts, its stops and its line. numbers: name -> (value, interval)."""
+    """One direction from its starts, its stops and its line. numbers: name -> (value, interval). turned: the least
+    input under which it turned steadily, which bounds a start that was not seen: it set off somewhere.
+    """
     warnings = []
     known = {START: common(up), STOP: common(down)}
+    rest = known[START][0]
+    if up and rest.high == math.inf and turned > rest.low:
+        known[START] = rest._replace(high=turned), True
     for name, (_, agree) in known.items():
         if not agree:
             warnings.append(f"its {name}s scatter by more than their intervals: the interval spans them")

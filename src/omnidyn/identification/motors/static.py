@@ -17,9 +17,9 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.estimate import SLOPE
-from omnidyn.identification.motors.log import MotorLog
+from omnidyn.identification.motors.log import MotorLog, orientation
 from omnidyn.identification.motors.rest import Span
-from omnidyn.identification.motors.start import OFFSET, MotorStart, direction_of, orientation, unknown_line
+from omnidyn.identification.motors.start import OFFSET, MotorStart, direction_of, unknown_line
 from omnidyn.identification.motors.windows import MotorWindows
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.statistics import t_quantile
@@ -133,7 +133,8 @@ def starts_of_points(points: MotorTable) -> tuple[MotorStart, ...]:
                 if forward.sum() >= LEAST_POINTS:
                     slope, offset = line_of_speed(level[forward], side * speed[forward])
                     numbers |= {SLOPE: (way * slope[0], _turned(slope[1], way)), OFFSET: offset}
-                found.append(direction_of(motor, side, points.unit, up, down, numbers))
+                turned = float(level[forward].min(initial=math.inf))
+                found.append(direction_of(motor, side, points.unit, up, down, numbers, turned))
     return tuple(found)
 
 

@@ -21,7 +21,8 @@ from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, na
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.free_run import fit_rmse
 from omnidyn.identification.motors.line import fit_line
-from omnidyn.identification.motors.log import GROUND, MotorLog, motor_logs
+from omnidyn.identification.motors.log import GROUND, MotorLog, motor_logs, orientation_of
+from omnidyn.identification.motors.rest import turned_under
 from omnidyn.identification.motors.start import STARTS_HEAD, MotorStart, motor_starts
 from omnidyn.identification.motors.static import is_slow, points_of_logs, starts_of_points, windows_of_points
 from omnidyn.identification.motors.verdict import motors_verdict, none_answers
@@ -190,6 +191,10 @@ def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
     windows = motor_windows(logs, steady=asked.steady, share=asked.window)
     source = named([log.run.source for log in logs])
     motors, lines = _of_each(windows, source)
+    lines = tuple(
+        line if line.motor is None else
+        line.bounded(turned_under(logs, line.motor, way=orientation_of(logs, line.motor)), line.rest) for line in lines
+    )  # fmt: skip
     return MotorStudy(
         STEADY_STATE, windows.kind, windows.unit, windows.speed_from, lines, (), windows,
         motor_starts(logs, windows, motors), _supply(logs), tuple(_of_windows(windows, lines)),
@@ -206,6 +211,9 @@ def _of_points(points: MotorTable, origin: str, words: Sequence[str]) -> MotorSt
     """The study of points of steady speed."""
     windows = windows_of_points(points, origin)
     _, lines = _of_each(windows, points.source)
+    lines = tuple(
+        line if line.motor is None else line.bounded(windows.turned_under(line.motor), line.rest) for line in lines
+    )
     return MotorStudy(
         STEADY_STATE, points.kind, points.unit, origin, lines, (), windows, starts_of_points(points),
         log_warnings=(*points.notes, *words, *_of_windows(windows, lines)),

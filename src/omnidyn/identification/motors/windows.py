@@ -30,6 +30,7 @@ SETTLED_SHARE = (1.0 / 3.0, 1.0)  # of each command's rows, where speeds are too
 EDGE_SHARE = 0.2  # of a window, around each end: where the speed at the end is taken from
 SIGN_NOISE = 0.2  # of the usual speed: noise that a sign can bear
 SLOW = 0.02  # of the usual speed: slower is at rest
+TURNS = 5.0  # standard errors of a mean speed, from which it is one
 REST_SHARE = 0.1  # of the rows of a window at rest from which it says nothing about sliding friction
 
 
@@ -68,6 +69,12 @@ class MotorWindows:
         """(put_in, speed, speed_std, side, change, block) of one motor, or of all."""
         keep = slice(None) if motor is None else self.motor == motor
         return tuple(getattr(self, name)[keep] for name in ("put_in", "speed", "speed_std", "side", "change", "block"))
+
+    def turned_under(self, motor: int) -> float:
+        """The least input, as a size, under which a motor turns steadily; infinite where no window is steady."""
+        put_in, speed, speed_std, *_ = self.of(motor)
+        turns = (np.abs(speed) > TURNS * speed_std) & (put_in != 0.0)
+        return float(np.abs(put_in[turns]).min(initial=np.inf)) if self.settled else np.inf
 
 
 def motor_windows(

@@ -15,6 +15,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
+from omnidyn.identification.estimate import Estimate
 from omnidyn.statistics import FittedLine, errors_in_variables, t_quantile
 
 PARAMETERS = 2
@@ -153,3 +154,18 @@ def _bounded(
     corners = [_minimise(*problem, choice)[1] for choice in ((True, False), (False, True))]
     allowed = [corner for corner in (*corners, np.zeros(PARAMETERS)) if (corner >= 0.0).all()]
     return min(allowed, key=lambda parameters: _cost(parameters, *problem))
+
+
+def confidence_band(estimate: Estimate, axis: int, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How sure a line is along its length: force B v + C and half of its pointwise 95 % interval.
+
+    q sqrt(s_B^2 v^2 + 2 rho s_B s_C v + s_C^2), q of Student's t.
+
+    `speed` [m/s or rad/s], shape (n,). Returns (force, half) [N or N m], shape (n,) each.
+    """
+    slope, level = f"friction.axes.viscous[{axis}]", f"friction.axes.coulomb[{axis}]"
+    of_slope, of_level = estimate.std[slope] * speed, estimate.std[level]
+    joint = 2.0 * estimate.correlation.between(slope, level) * of_slope * of_level
+    spread = np.sqrt(of_slope**2 + joint + of_level**2)
+    middle = estimate.value[slope] * speed + estimate.value[level]
+    return middle, t_quantile(estimate.degrees_of_freedom[slope]) * spread

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.steady.band import confidence_band
+from omnidyn.identification.steady.line import confidence_band
 from omnidyn.model.frames import AXES
 from omnidyn.paper.tables import FORCE_UNIT, SPEED_UNIT, TABLE_1, TABLE_2_COULOMB, TABLE_2_VISCOUS
 from omnidyn.report.style import (
