@@ -13,7 +13,7 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES
-from omnidyn.model.stick_slip.band import aim_band, gather, hold_in_band, keep_band
+from omnidyn.model.stick_slip.band import FIRM, aim_band, gather, hold_in_band, keep_band
 from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import solve
@@ -60,10 +60,7 @@ def _stage(plant, stage, start, end):
     """Solve one stage in place, x from the guess `end`; `start`: x before the step. Returns the iterations."""
     body, task = plant.body, stage.task
     if task.ellipse != 1.0:
-        count = solve(plant, stage, end)
-        if body.gathers > 0.0:
-            gather(plant, stage, task.tau)
-        return count
+        return solve(plant, stage, end)
     # A body that slides meets the Coulomb level; only when it would go through rest can breakaway hold it. What falls
     # with the speed has no such gap.
     falls = body.fall > 0.0
@@ -118,7 +115,7 @@ def _begin(plant, stage, start, x, tau):
     stage.task.tau = tau
     _aim(plant, stage, start, x, 0.0)
     if plant.body.gathers > 0.0:
-        hold_in_band(plant, stage)
+        hold_in_band(plant, stage, FIRM)
 
 
 @part
@@ -153,8 +150,6 @@ def last_stage(plant, stage, start, end, h):
         end.each[e].current = stage.each[e].current
     if plant.body.bristles > 0.0:
         keep_bristles(plant, stage, end)
-    if plant.body.gathers > 0.0:
-        keep_band(stage, end)
     return count, back
 
 
@@ -163,3 +158,18 @@ def step(plant, stage, start, end, middle, h):
     """One SDIRK2 step of length h from `start` to `end`; `middle` receives x at t + gamma h. Returns the iterations."""
     first = first_stage(plant, stage, start, end.x, middle, h)
     return max(first, last_stage(plant, stage, start, end, h)[0])
+
+
+@part
+def step_or_gather(plant, stage, spare, start, end, middle, h):
+    """`step`, where momentum may gather in Karnopp's bands too. spare: the room of a march."""
+    if plant.body.gathers == 0.0:
+        return step(plant, stage, start, end, middle, h)
+    bare, rate = spare.bare, spare.settled.x
+    first = first_stage(plant, stage, start, end.x, middle, h)
+    first = max(first, gather(plant, stage, bare, rate))
+    last = last_stage(plant, stage, start, end, h)[0]
+    last = max(last, gather(plant, stage, bare, rate))
+    keep_band(stage, end)
+    hold_in_band(plant, stage, 0.0)
+    return max(first, last)
