@@ -155,6 +155,27 @@ def with_bristles(robot: Robot, seed: int, kinds: tuple[str, ...] = USUAL) -> Ro
     return robot.replace(friction=Friction(**changed), motor=plain)
 
 
+def with_band(robot: Robot, seed: int) -> Robot:
+    """The robot with Karnopp's law wherever it has friction, bands of 0.5 to 5 mm/s, and plain motors."""
+    random, changed = Random(f"band {seed}"), {}
+
+    def speed(scale: float = 1.0) -> float:
+        return float(f"{scale * 10 ** random.uniform(-3.3, -2.3):.4g}")
+
+    for name in [n for n in ("axes", "direction", "wheels") if n in robot.friction.model_fields_set]:
+        new = {"law": "karnopp"}
+        if name == "axes":
+            new["karnopp_speed"] = (speed(), speed(), speed(10.0))
+        elif name == "direction":
+            new |= {"karnopp_speed": speed(), "yaw_karnopp_speed": speed(10.0)}
+            new |= {"yaw_coulomb": 0.0, "yaw_breakaway": None} if "axes" in changed else {}
+        else:
+            new["karnopp_speed"] = tuple(speed() for _ in range(robot.wheels.count))
+        changed[name] = getattr(robot.friction, name).replace(**new)
+    plain = robot.motor.replace(voltage_drop=0.0, current_limit=None, gear_efficiency=1.0)
+    return robot.replace(friction=Friction(**changed), motor=plain)
+
+
 def _wheels(random, around, some) -> Wheels:
     """3 to 6 wheels at random azimuths, or four mecanum wheels."""
     radius = some(0.035, 0.2, 4)
