@@ -1,4 +1,4 @@
-"""Robots with bristles (Dahl, LuGre, elasto-plastic) as an ordinary differential equation, for scipy's DOP853: no solver of ours.
+"""Robots with bristles (Dahl, LuGre, elasto-plastic) as an ordinary differential equation, for scipy's DOP853.
 
     M nu' = sum g_i K i + m omega (v_y, -v_x, 0) - B nu - sum_e d_e (s0 z + s1(s) z' )_e - (plane: s0 z + s1 z')
     z_e' = s - s0 |s| z / g(s)      LuGre;      z_e' = s |w|^a sgn w, w = 1 - s0 z sgn(s)/C      Dahl
@@ -20,7 +20,6 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from tests.reference.modes_plant import left_at, plant_of, to_centre
-
 
 BENDS = ("dahl", "lugre", "elastoplastic")
 

@@ -68,7 +68,7 @@ class Friction(Value):
         bends = [table for table, law in laws.items() if KINDS[law].bends]
         if KARNOPP in laws.values() and bends:
             raise ValueError(
-                f'law = "{KARNOPP}" rests in its band, and the bristles of [friction.{bends[0]}] never rest: it stands in '
-                f'for a law that sticks. Take law = "{COULOMB}" beside bristles'
+                f'law = "{KARNOPP}" rests in its band, and the bristles of [friction.{bends[0]}] never rest: it stands '
+                f'in for a law that sticks. Take law = "{COULOMB}" beside bristles'
             )
         return self
