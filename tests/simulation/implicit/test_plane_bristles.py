@@ -70,7 +70,7 @@ def test_along_an_axis_it_is_the_law_of_one_axis(law, axis):
     pattern = ([0.0, 1.0, -1.0], [-1.0, 0.5, 0.5])[axis]
     voltage = np.outer(pushes(60)[:, 0], pattern)
     runs = [simulate(robot, voltage, 4e-3, tol=None) for robot in (one, AXEBOT.replace(friction=Friction(axes=box)))]
-    assert np.abs(runs[0].twist[:, axis]).max() > 0.05
+    assert np.abs(runs[0].twist[:, axis]).max() > 0.03
     assert np.abs(runs[0].twist - runs[1].twist).max() <= 1e-12
 
 

@@ -21,6 +21,7 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.friction import lugre
 from omnidyn.model.friction.law import Kind, Number
 
+LEAST = 1e-30  # of the way to slipping: below it there is nothing left
 ROUNDS = 60  # of Newton's steps for a general exponent; bisection needs no more
 
 
@@ -103,11 +104,10 @@ def _plane_by_newton(own, aimed, speed, tau, levels):
         return 0.0, 0.0, 1.0, 0.0, 0.0, 1.0
     n, stiff = (cx * x / work, cy * y / work), tau * own.stiffness * work
     start = (own.stiffness * aimed[0] / cx - n[0], own.stiffness * aimed[1] / cy - n[1])
-    q = max(_left_of_way(start, stiff / (cx * cx), stiff / (cy * cy), a), 1e-150)
-    power = q ** (a - 1.0)
+    power = max(_left_of_way(start, stiff / (cx * cx), stiff / (cy * cy), a), LEAST) ** (a - 1.0)
     u, v = start[0] / (1.0 + stiff * power / (cx * cx)), start[1] / (1.0 + stiff * power / (cy * cy))
-    more = (a - 1.0) * power / (q * q)
-    xx, xy, yy = power + more * u * u, more * u * v, power + more * v * v  # of |Y|^(a-1) Y by Y
+    q, more = max(math.hypot(u, v), 1e-300), (a - 1.0) * power
+    xx, xy, yy = power + more * (u / q) ** 2, more * (u / q) * (v / q), power + more * (v / q) ** 2  # |Y|^(a-1) Y by Y
     turn_x, turn_y = xx * n[0] + xy * n[1] + power * u, xy * n[0] + yy * n[1] + power * v
     by = lugre.within(
         (1.0 + stiff * xx / (cx * cx), stiff * xy / (cx * cy), stiff * xy / (cx * cy), 1.0 + stiff * yy / (cy * cy)),

@@ -5,8 +5,8 @@
 w is the momentum over the masses [m/s]. v is what is seen of it: P projects onto the velocities that what rests allows
 (g_e . v = 0), orthogonally in M; w - v has gathered. With f_e set-valued, w' is the acceleration of what gives way at
 once (release.py): the least of 1/2 w' M w' - F . w' + sum S_e |g_e . w'|. It is one however many wheels there are,
-though their forces need not be. What holds all that drives it gathers nothing and rests for ever, to the last bit; an axis by
-itself has F = clip(drive, +-S), M w' = drive - F.
+though their forces need not be. What holds all that drives it gathers nothing and rests for ever, to the last bit; an
+axis by itself has F = clip(drive, +-S), M w' = drive - F.
 
 An element enters its band where |g_e . v| < Dv: it then allows no speed. It leaves where |g_e . w| >= Dv, if it moves
 at Dv or more once it is let go, alone or with others that want to: a wheel stays as long as enough others hold it. w is
