@@ -140,7 +140,7 @@ def test_what_knows_it_and_what_does_not(friction):
     assert "Karnopp" in friction_study(robot).axes[0].law
     with pytest.raises(UnsupportedError, match=r"no derivatives of a run.*take law = \"coulomb\""):
         derivatives(robot, np.ones((3, 3)), 0.01, ["body.mass_kg"])
-    with pytest.raises(InputError, match="never rest.*beside bristles"):
+    with pytest.raises(InputError, match=r"never rest.*beside bristles"):
         robot.friction.replace(
             axes=AxesFriction(viscous=(0.0,) * 3, coulomb=(1.0, 1.0, 0.0), law="dahl", stiffness=(1e4,) * 3)
         )
