@@ -69,9 +69,9 @@ def test_along_an_axis_the_direction_of_travel_is_the_law_of_the_axis(axis):
     np.testing.assert_array_equal(runs[0].twist[:, axis] == 0.0, runs[1].twist[:, axis] == 0.0)
 
 
-@pytest.mark.parametrize("robot", [AXEBOT.replace(friction=along()), AXEBOT.replace(friction=at_wheels()),
-                                   FOUR.replace(friction=at_wheels())], ids=["direction", "wheels", "four wheels"])  # fmt: skip
-def test_it_rests_to_the_last_bit_below_breakaway_and_leaves_at_its_speed(robot):
+@pytest.mark.parametrize("base, friction", [(AXEBOT, along), (AXEBOT, at_wheels), (FOUR, at_wheels)])
+def test_it_rests_to_the_last_bit_below_breakaway_and_leaves_at_its_speed(base, friction):
+    robot = base.replace(friction=friction())
     patterns = axis_patterns(robot)
     for pattern, edge, way in zip(patterns, breakaway_voltage(robot, patterns), np.eye(3), strict=True):
         for start in (0.0, 0.4 * DV):
