@@ -163,13 +163,13 @@ def step(plant, stage, start, end, middle, h):
 @part
 def step_or_gather(plant, stage, spare, start, end, middle, h):
     """`step`, where momentum may gather in Karnopp's bands too. spare: the room of a march."""
-    if plant.body.gathers == 0.0:
-        return step(plant, stage, start, end, middle, h)
-    bare, rate = spare.bare, spare.settled.x
-    first = first_stage(plant, stage, start, end.x, middle, h)
-    first = max(first, gather(plant, stage, bare, rate))
-    last = last_stage(plant, stage, start, end, h)[0]
-    last = max(last, gather(plant, stage, bare, rate))
-    keep_band(stage, end)
-    hold_in_band(plant, stage, 0.0)
-    return max(first, last)
+    gathers = plant.body.gathers > 0.0
+    count = first_stage(plant, stage, start, end.x, middle, h)
+    if gathers:
+        count = max(count, gather(plant, stage, spare.bare, spare.settled.x))
+    count = max(count, last_stage(plant, stage, start, end, h)[0])
+    if gathers:
+        count = max(count, gather(plant, stage, spare.bare, spare.settled.x))
+        keep_band(stage, end)
+        hold_in_band(plant, stage, 0.0)
+    return count
