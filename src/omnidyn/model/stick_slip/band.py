@@ -53,23 +53,31 @@ def hold_in_band(plant, stage, firm):
 
 
 @part
-def aim_band(stage, start, back):
-    """Set what has gathered before a stage, along the body axes, as currents have their i*."""
+def keep_drive(stage):
+    """After the first stage of a step: what drives what rests stands in its residual."""
     for a in range(N_AXES):
-        u = start.each[a].bend
-        stage.each[a].aimed_bend = u + back * (stage.each[a].bend - u) if back != 0.0 else u
+        stage.work.first[a] = stage.work.residual[a]
 
 
 @part
-def gather(plant, stage, bare, rate):
-    """What has gathered at the end of a stage that has been solved: what drives what rests stands in the residual.
+def gather(plant, stage, bare, rate, start, end, h, last):
+    """What has gathered at the end of a step that has been solved, along the body axes, into `end`.
 
-    bare: `with_given_currents`; rate (3,): room. Returns the iterations.
+    last: the weight of its last stage, that of the first is 1 - last; bare: `with_given_currents`; rate (3,): room.
+    Returns the iterations.
     """
-    rests = _rests_in_band(plant, stage)
-    count = _rate(plant, stage, bare, rate) if rests else 0
+    count = 0
     for a in range(N_AXES):
-        stage.each[a].bend = stage.each[a].aimed_bend + (stage.task.tau * rate[a] if rests else 0.0)
+        end.each[a].bend = start.each[a].bend
+    if _rests_in_band(plant, stage):
+        count = _rate(plant, stage, bare, stage.work.residual, rate)
+        for a in range(N_AXES):
+            end.each[a].bend += h * last * rate[a]
+        if last != 1.0:
+            count = max(count, _rate(plant, stage, bare, stage.work.first, rate))
+            for a in range(N_AXES):
+                end.each[a].bend += h * (1.0 - last) * rate[a]
+    hold_in_band(plant, stage, 0.0)
     return count
 
 
@@ -82,14 +90,14 @@ def _rests_in_band(plant, stage):
 
 
 @part
-def _rate(plant, stage, bare, rate):
-    """w' - v' of what rests, by its breakaway levels alone."""
+def _rate(plant, stage, bare, residual, rate):
+    """w' - v' of what rests, by its breakaway levels alone, where a residual has what drives it."""
     own, stages = bare.plant, bare.stage
     given, there = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
     task, m = there.task, len(plant.element)
     for a in range(3):
         rate[a] = task.goal[a] = 0.0
-        task.push[a] = -stage.work.residual[a]
+        task.push[a] = -residual[a]
     for e in range(m):
         one, now, at = plant.element[e], stage.each[e], there.each[e]
         at.sign = 0.0 if now.sign == 0.0 else 2.0
@@ -112,13 +120,6 @@ def _rate(plant, stage, bare, rate):
         for a in range(2):
             given.body.coulomb[a] = plant.body.coulomb[a]
     return count
-
-
-@part
-def keep_band(stage, end):
-    """Into a state: what has gathered."""
-    for a in range(N_AXES):
-        end.each[a].bend = stage.each[a].bend
 
 
 @part

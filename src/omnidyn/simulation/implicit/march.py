@@ -16,7 +16,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
-from omnidyn.model.stick_slip.band import band_error, cross_band, crosses
+from omnidyn.model.stick_slip.band import band_error, cross_band, crosses, gather
 from omnidyn.model.stick_slip.copies import copy_row, copy_state, row_of_state, signs_differ, state_of_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
@@ -29,7 +29,7 @@ from omnidyn.model.stick_slip.step_bound import (
     has_one_start,
     longest_step,
 )
-from omnidyn.simulation.implicit.step import GAMMA, step_or_gather
+from omnidyn.simulation.implicit.step import GAMMA, step
 from omnidyn.simulation.speed_loop import Loop, close_loop, passed
 
 FORGETS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its MEMORY, within these bounds
@@ -241,6 +241,13 @@ def in_one_row(plant, dt):
 
 
 @part
+def _gather(plant, stage, spare, start, end, h):
+    """What gathers in Karnopp's bands during a step that has just been solved, into `end`. Returns the iterations."""
+    last = GAMMA if stage.task.tau < h else 1.0  # an implicit Euler stage takes the place of both
+    return gather(plant, stage, spare.bare, spare.settled.x, start, end, h, last)
+
+
+@part
 def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
     """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
 
@@ -259,11 +266,17 @@ def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
         if left - h < 1e-9 * dt:
             h = left
         pull(plant, stage, _turned(plant, state, 0.5 * h))  # as in the middle of the step: second order, as the step is
-        first = step_or_gather(plant, stage, spare, state, one, inner, h)
+        first = step(plant, stage, state, one, inner, h)
+        if body.gathers > 0.0:
+            first = max(first, _gather(plant, stage, spare, state, one, h))
         pull(plant, stage, _turned(plant, state, 0.25 * h))
-        second = step_or_gather(plant, stage, spare, state, middle, inner, 0.5 * h)
+        second = step(plant, stage, state, middle, inner, 0.5 * h)
+        if body.gathers > 0.0:
+            second = max(second, _gather(plant, stage, spare, state, middle, 0.5 * h))
         pull(plant, stage, _turned(plant, state, 0.25 * h) + _turned(plant, middle, 0.5 * h))
-        third = step_or_gather(plant, stage, spare, middle, two, inner, 0.5 * h)
+        third = step(plant, stage, middle, two, inner, 0.5 * h)
+        if body.gathers > 0.0:
+            third = max(third, _gather(plant, stage, spare, middle, two, 0.5 * h))
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
         ratio = _error(plant, one, two) / max(rate * max(h, SHORT), ROUNDING)
         if body.laws != 0.0:
@@ -344,7 +357,9 @@ def _march(room, voltage, bound, dt, loop, tol, most, out):
             for _ in range(pieces):
                 stage.task.facing = pose[2]
                 pull(plant, stage, _turned(plant, state, 0.5 * dt[k] / pieces))
-                count = step_or_gather(plant, stage, spare, state, two, inner, dt[k] / pieces)
+                count = step(plant, stage, state, two, inner, dt[k] / pieces)
+                if plant.body.gathers > 0.0:
+                    count = max(count, _gather(plant, stage, spare, state, two, dt[k] / pieces))
                 counts[0], counts[1] = max(counts[0], count), pieces
                 advance_pose(pose, state.x, inner, two.x, plant.body.length, dt[k] / pieces, STAGES)
                 copy_state(state, two)

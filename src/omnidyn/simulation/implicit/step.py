@@ -13,7 +13,7 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES
-from omnidyn.model.stick_slip.band import FIRM, aim_band, gather, hold_in_band, keep_band
+from omnidyn.model.stick_slip.band import FIRM, hold_in_band, keep_drive
 from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import solve
@@ -36,8 +36,6 @@ def _aim(plant, stage, start, x, back):
         stage.each[e].aimed_current = i + back * (stage.each[e].current - i) if back != 0.0 else i
     if plant.body.bristles > 0.0:
         aim_bristles(plant, stage, start, back)
-    if plant.body.gathers > 0.0:
-        aim_band(stage, start, back)
 
 
 @part
@@ -124,6 +122,8 @@ def first_stage(plant, stage, start, end, middle, h):
     _begin(plant, stage, start, end, GAMMA * h)
     count = _stage(plant, stage, start.x, end)
     copy_row(middle, end)
+    if plant.body.gathers > 0.0:
+        keep_drive(stage)
     return count
 
 
@@ -158,18 +158,3 @@ def step(plant, stage, start, end, middle, h):
     """One SDIRK2 step of length h from `start` to `end`; `middle` receives x at t + gamma h. Returns the iterations."""
     first = first_stage(plant, stage, start, end.x, middle, h)
     return max(first, last_stage(plant, stage, start, end, h)[0])
-
-
-@part
-def step_or_gather(plant, stage, spare, start, end, middle, h):
-    """`step`, where momentum may gather in Karnopp's bands too. spare: the room of a march."""
-    gathers = plant.body.gathers > 0.0
-    count = first_stage(plant, stage, start, end.x, middle, h)
-    if gathers:
-        count = max(count, gather(plant, stage, spare.bare, spare.settled.x))
-    count = max(count, last_stage(plant, stage, start, end, h)[0])
-    if gathers:
-        count = max(count, gather(plant, stage, spare.bare, spare.settled.x))
-        keep_band(stage, end)
-        hold_in_band(plant, stage, 0.0)
-    return count
