@@ -63,7 +63,7 @@ BODY = record(
     bristles=(),  # the sum of the levels of all bristles [N]; 0 where there are none
     off=(),  # 1 where the centre of mass stands off
     band=(),  # Karnopp's speed of the ellipse [m/s], 0 for none
-    gathers=(),  # 1 where anything gathers momentum in Karnopp's band
+    gathers=(),  # 1 where all that rests gathers momentum in Karnopp's band, 2 where something else can stick too
 )
 ELEMENT = record(
     g=(3,),  # local speed = g . x

@@ -31,9 +31,11 @@ def plant(robot: Robot) -> Plant:
     _fill_motors(robot, element[N_AXES:])
     for law in robot.friction.laws:
         law.add_to(own, length)
-    body.gathers = float(body.band > 0.0 or bool(np.any(element["band"] > 0.0)))
     lossy = element["efficiency"] < np.repeat([0.0, 1.0], [N_AXES, own.wheels])  # a lossy gear holds too
     body.active, element["active"] = body.breakaway[0] > 0.0, lossy | (element["breakaway"] > 0.0).any(axis=1)
+    if body.band > 0.0 or np.any(element["band"] > 0.0):
+        others = np.any((element["active"] > 0.0) & (element["band"] == 0.0)) or (body.active and body.band == 0.0)
+        body.gathers = 2.0 if others else 1.0
     heaviest = float(body.mass + np.linalg.eigvalsh(body.spin)[-1])
     _bound_laws(own)
     body.memory[:] = _memory(heaviest, element, True), _memory(heaviest, element, False)

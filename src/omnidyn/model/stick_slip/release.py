@@ -131,6 +131,8 @@ def settle(plant, stage, bare, state, acceleration):
     """
     m = len(plant.element)
     settle_currents(plant, stage, state)
+    if plant.body.gathers == 1.0:  # who leaves his band is told by what has gathered there
+        return 0
     own, stages = bare.plant, bare.stage
     bare_plant, bare_stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
     _smooth_force(plant, stage, bare_plant, bare_stage, state)
@@ -144,7 +146,7 @@ def settle(plant, stage, bare, state, acceleration):
     bare_stage.task.ellipse = 0.0 if state.each[m].sign == 0.0 else 2.0
     for a in range(3):
         acceleration[a] = bare_stage.task.goal[a] = 0.0
-    if plant.body.gathers > 0.0:  # who leaves his band is told by what has gathered there
+    if plant.body.gathers > 0.0:
         hold_in_band(bare_plant, bare_stage, FIRM)
     count = solve(bare_plant, bare_stage, acceleration)
     for e in range(m):
