@@ -92,7 +92,7 @@ def room(plant: Plant) -> Room:
     own = many([plant])
     count, bare = len(Spare._fields) - 1, with_given_currents(plant)
     states = new_states(plant, count)
-    return Room(Problem(own, new_stage(own)), bare, Spare(*(states.at(k) for k in range(count)), bare))
+    return Room(Problem(own, new_stage(own)), bare, Spare(*(states.at(k) for k in range(count)), bare=bare))
 
 
 def run_implicit(
