@@ -1,8 +1,12 @@
-"""Robots with bristles (Dahl, LuGre) as an ordinary differential equation, for scipy's DOP853: no solver of ours.
+"""Robots with bristles (Dahl, LuGre, elasto-plastic) as an ordinary differential equation, for scipy's DOP853.
 
     M nu' = sum g_i K i + m omega (v_y, -v_x, 0) - B nu - sum_e d_e (s0 z + s1(s) z' )_e - (plane: s0 z + s1 z')
     z_e' = s - s0 |s| z / g(s)      LuGre;      z_e' = s |w|^a sgn w, w = 1 - s0 z sgn(s)/C      Dahl
-    plane: z_a' = v_a - s0 D(v) z_a / C_a(v)^2,  D^2 = Cx^2 vx^2 + Cy^2 vy^2
+    z_e' = s (1 - alpha(w) w), w = s0 z sgn(s)/g(s)                                          elasto-plastic
+    plane, Z_a = s0 z_a / C_a(v), V_a = C_a v_a:
+        C_a z_a' = V_a - |V| Z_a                                LuGre
+        C_a z_a' = |V| |V/|V| - Z|^(a-1) (V/|V| - Z)_a          Dahl
+        z_a' = v_a - l Z_a / C_a, l = alpha(|Z|) |Z| l*         elasto-plastic; l* >= 0 is what keeps |Z| as it is
 
 Written from the papers, with the wrench matrix and the numbers of a Robot only. Settled currents without drop, limit or
 gear loss; or dynamic ones. State: twist, pose, currents, bends of axes, of wheels, of the plane.
@@ -17,6 +21,31 @@ from scipy.integrate import DOP853
 
 from tests.reference.modes_plant import left_at, plant_of, to_centre
 
+BENDS = ("dahl", "lugre", "elastoplastic")
+
+
+def alpha(w, b):
+    """Of the paper of 2002: what share of a motion slips."""
+    if w <= b:
+        return 0.0
+    return 1.0 if w >= 1.0 else 0.5 * math.sin(math.pi * (w - 0.5 * (1.0 + b)) / (1.0 - b)) + 0.5
+
+
+def plane_rate(law, v, z, c):
+    """z' of a bristle along the direction of travel, the levels c (2,) being those of now."""
+    Z, V = law.stiffness * z / c, c * v
+    size = math.hypot(*V)
+    if size == 0.0:
+        return np.zeros(2)
+    if law.law == "elastoplastic":
+        normal = Z / c
+        keeps = max(normal @ v, 0.0) / max(normal @ normal, 1e-300)
+        far = math.hypot(*Z)
+        return v - alpha(far, law.elastic_share) * far * keeps * normal
+    left = V / size - Z
+    power = law.dahl_exponent - 1.0 if law.law == "dahl" else 0.0
+    return size * math.hypot(*left) ** power * left / c if power else size * left / c
+
 
 class Bristles:
     """The right-hand side of one robot."""
@@ -27,10 +56,10 @@ class Bristles:
         self.kind, self.rows = [], []
         axes, way, rim = robot.friction.axes, robot.friction.direction, robot.friction.wheels
         m, along = self.p.mass, np.linalg.inv(to_centre(robot))  # axes of the wheels, seen from the centre of mass
-        if axes.law in ("dahl", "lugre"):
+        if axes.law in BENDS:
             for k in range(3):
                 self._add(axes, along[k], k, m[k], axes.viscous[k], lambda v, k=k: None if v is None else v[k])
-        if way.law in ("dahl", "lugre") and way.yaw_coulomb > 0.0:
+        if way.law in BENDS and way.yaw_coulomb > 0.0:
             turning = way.model_copy(
                 update={
                     name: getattr(way, f"yaw_{name}")
@@ -38,7 +67,7 @@ class Bristles:
                 }
             )
             self._add(turning, np.eye(3)[2], 2, m[2], way.yaw_viscous, lambda v: v)
-        if rim.law in ("dahl", "lugre"):
+        if rim.law in BENDS:
             for k in range(n):
                 g = robot.wheels.wrench_matrix[:, k]
                 mass = m[0] / (g[0] ** 2 + g[1] ** 2 + g[2] ** 2 * m[0] / m[2])
@@ -47,7 +76,7 @@ class Bristles:
                     return v[k] if isinstance(v, tuple) else v
 
                 self._add(rim, self.p.G[:, k], k, mass, pick(rim.viscous), pick)
-        self.way = way if way.law in ("dahl", "lugre") and any(way.coulomb) else None
+        self.way = way if way.law in BENDS and any(way.coulomb) else None
         self.first = 6 + (n if self.p.dynamic else 0)
         self.inverse = np.linalg.inv(self.p.M)
 
@@ -61,11 +90,12 @@ class Bristles:
         stiff = pick(law.stiffness)
         damping = pick(law.damping)
         if damping is None:
-            damping = max(2 * math.sqrt(stiff * mass) - viscous, 0.0) if law.law == "lugre" else 0.0
+            damping = max(2 * math.sqrt(stiff * mass) - viscous, 0.0) if law.law != "dahl" else 0.0
         fades, falls = pick(law.damping_speed) or math.inf, pick(law.stribeck_speed) or math.inf
-        power = law.dahl_exponent if law.law == "dahl" and hasattr(law, "dahl_exponent") else 1.0
+        power = law.dahl_exponent if law.law == "dahl" else 1.0
+        elastic = law.elastic_share if law.law == "elastoplastic" else None
         fall = (falls, law.stribeck_exponent, law.stribeck_shape == "lorentzian")
-        self.rows.append((d, slide, hold, back, hold_back, stiff, damping, fades, fall, power))
+        self.rows.append((d, slide, hold, back, hold_back, stiff, damping, fades, fall, power, elastic))
 
     def rates(self, z, u):
         p, n = self.p, self.p.wheels
@@ -84,11 +114,10 @@ class Bristles:
             slow = math.hypot(v[0], v[1]) / (w.stribeck_speed or math.inf)
             fallen = left_at(slow, w.stribeck_exponent, w.stribeck_shape == "lorentzian")
             c = np.array(w.coulomb) + (np.array(w.breakaway or w.coulomb) - w.coulomb) * fallen
-            work = math.hypot(c[0] * v[0], c[1] * v[1])
-            rate = v[:2] - w.stiffness * work * z[at : at + 2] / c**2
+            rate = plane_rate(w, v[:2], z[at : at + 2], c)
             damping = w.damping
             if damping is None:
-                damping = max(2 * math.sqrt(w.stiffness * p.mass[0]) - w.viscous, 0.0) if w.law == "lugre" else 0.0
+                damping = max(2 * math.sqrt(w.stiffness * p.mass[0]) - w.viscous, 0.0) if w.law != "dahl" else 0.0
             damping *= math.exp(-(((v[0] ** 2 + v[1] ** 2) ** 0.5 / (w.damping_speed or math.inf)) ** 2))
             force = force - np.append(w.stiffness * z[at : at + 2] + damping * rate, 0.0)
             out[at : at + 2] = rate
@@ -100,11 +129,14 @@ class Bristles:
         return out
 
     def _one(self, row, v, z, force):
-        d, slide, hold, back, hold_back, stiff, damping, fades, fall, power = row
+        d, slide, hold, back, hold_back, stiff, damping, fades, fall, power, elastic = row
         s = float(d @ v)
         low, high = (slide, hold) if s >= 0 else (back, hold_back)
         g = low + (high - low) * left_at(abs(s) / fall[0], *fall[1:])
-        if power == 1.0:
+        if elastic is not None:
+            w = stiff * z * math.copysign(1.0, s) / g
+            rate = s * (1.0 - alpha(w, elastic) * w)
+        elif power == 1.0:
             rate = s - stiff * abs(s) * z / g
         else:
             w = 1 - stiff * z * math.copysign(1.0, s) / g

@@ -25,6 +25,7 @@ PLACES = (
     ("axes", "direction"),
     ("axes", "direction", "wheels"),
 )
+USUAL = ("lugre", "lugre", "dahl")
 REDRAWN: dict[int, int] = {}
 """Seed -> number of draws thrown away because the reference met a tie; filled by hand from modes_make.py."""
 
@@ -119,7 +120,7 @@ def with_stribeck(robot: Robot, seed: int) -> Robot:
     return robot.replace(friction=Friction(**changed))
 
 
-def with_bristles(robot: Robot, seed: int) -> Robot:
+def with_bristles(robot: Robot, seed: int, kinds: tuple[str, ...] = USUAL) -> Robot:
     """The robot with bristles of its own wherever it has friction, and plain motors: what bristles.py integrates."""
     random, changed, about_yaw = Random(f"bristles {seed}"), {}, False
 
@@ -127,9 +128,9 @@ def with_bristles(robot: Robot, seed: int) -> Robot:
         return float(f"{10 ** random.uniform(low, high):.4g}")
 
     for name in [n for n in ("axes", "direction", "wheels") if n in robot.friction.model_fields_set]:
-        law, kind = getattr(robot.friction, name), random.choice(("lugre", "lugre", "dahl"))
+        law, kind = getattr(robot.friction, name), random.choice(kinds)
         new = {"law": kind, "stiffness": stiff()}
-        falls = kind == "lugre" and law.breakaway is not None
+        falls = kind != "dahl" and law.breakaway is not None
         if kind == "dahl":
             new |= {k: None for k in ("breakaway", "breakaway_backward", "yaw_breakaway") if hasattr(law, k)}
         elif random.random() < 0.4:
@@ -138,14 +139,39 @@ def with_bristles(robot: Robot, seed: int) -> Robot:
             about_yaw, new["stiffness"] = True, (stiff(), stiff(), 0.02 * stiff())
             new |= {"stribeck_speed": (0.02, 0.05, 0.3)} if falls else {}
             new |= {"dahl_exponent": random.choice((1.0, 1.5, 2.0))} if kind == "dahl" else {}
+            new |= {"elastic_share": random.choice((0.3, 0.7, 0.9))} if kind == "elastoplastic" else {}
         elif name == "direction":
             turning = {"yaw_stiffness": 0.02 * stiff()} | ({"yaw_stribeck_speed": 0.3} if falls else {})
             none = {"yaw_coulomb": 0.0, "yaw_breakaway": None}
             new |= ({"stribeck_speed": 0.03} if falls else {}) | (none if about_yaw else turning)
+            if kinds != USUAL and kind == "dahl":
+                new["dahl_exponent"] = random.choice((0.6, 1.5, 2.0))
+            new |= {"elastic_share": random.choice((0.3, 0.7, 0.9))} if kind == "elastoplastic" else {}
         else:
             new["stiffness"] = tuple(stiff() for _ in range(robot.wheels.count))
             new |= {"stribeck_speed": 0.04} if falls else {}
         changed[name] = law.replace(**new)
+    plain = robot.motor.replace(voltage_drop=0.0, current_limit=None, gear_efficiency=1.0)
+    return robot.replace(friction=Friction(**changed), motor=plain)
+
+
+def with_band(robot: Robot, seed: int) -> Robot:
+    """The robot with Karnopp's law wherever it has friction, bands of 0.5 to 5 mm/s, and plain motors."""
+    random, changed = Random(f"band {seed}"), {}
+
+    def speed(scale: float = 1.0) -> float:
+        return float(f"{scale * 10 ** random.uniform(-3.3, -2.3):.4g}")
+
+    for name in [n for n in ("axes", "direction", "wheels") if n in robot.friction.model_fields_set]:
+        new = {"law": "karnopp"}
+        if name == "axes":
+            new["karnopp_speed"] = (speed(), speed(), speed(10.0))
+        elif name == "direction":
+            new |= {"karnopp_speed": speed(), "yaw_karnopp_speed": speed(10.0)}
+            new |= {"yaw_coulomb": 0.0, "yaw_breakaway": None} if "axes" in changed else {}
+        else:
+            new["karnopp_speed"] = tuple(speed() for _ in range(robot.wheels.count))
+        changed[name] = getattr(robot.friction, name).replace(**new)
     plain = robot.motor.replace(voltage_drop=0.0, current_limit=None, gear_efficiency=1.0)
     return robot.replace(friction=Friction(**changed), motor=plain)
 

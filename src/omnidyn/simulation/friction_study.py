@@ -13,7 +13,6 @@ from omnidyn.document import Document, Points, Table
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.dynamics import drive_wrench, frame_wrench
 from omnidyn.model.frames import AXES
-from omnidyn.model.friction import lugre
 from omnidyn.model.friction.bristle import LAWS
 from omnidyn.model.friction.kinds import COULOMB, KINDS
 from omnidyn.model.layout import N_AXES, Plant
@@ -116,7 +115,7 @@ def _parts(numbers: Plant, k: int) -> list[tuple[float, FloatArray, Any, Any]]:
     if k < 2:
         body = numbers.body
         level = _slowest(body, body.stiffness > 0.0)[k]
-        found.append((1.0, np.array([level, level]), body, lugre))
+        found.append((1.0, np.array([level, level]), body, LAWS[int(body.law)]))
     return [each for each in found if each[1].any()]
 
 

@@ -6,7 +6,8 @@ import pytest
 import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.prepare import guesses
-from omnidyn.model.friction import AxesFriction, Friction
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -44,6 +45,38 @@ def test_its_levels_are_found_and_the_answer_keeps_the_law():
     axes = fit.robot.friction.axes
     assert (axes.law, axes.karnopp_speed) == ("karnopp", guess.friction.axes.karnopp_speed)
     assert any("karnopp_speed is numerical" in words for words in fit.warnings)
+
+
+@pytest.mark.parametrize("place", ["direction", "wheels"])
+def test_so_it_is_elsewhere(place):
+    """Levels are found; the law and its bands, none of them the usual ones, come back."""
+    table = f"friction.{place}"
+    if place == "wheels":
+        law = WheelFriction(coulomb=0.7, breakaway=0.9, viscous=0.3, law="karnopp", karnopp_speed=1e-3)
+        keys = (f"{table}.coulomb", f"{table}.viscous")
+    else:
+        law = DirectionFriction(
+            coulomb=(2.2, 1.5), breakaway=(2.8, 1.9), viscous=0.95, yaw_coulomb=0.099, yaw_breakaway=0.13,
+            yaw_viscous=0.01, law="karnopp", karnopp_speed=1e-3, yaw_karnopp_speed=1e-2,
+        )  # fmt: skip
+        keys = (f"{table}.coulomb[0]", f"{table}.viscous")
+    robot = AXEBOT.replace(friction=Friction(**{place: law}))
+    pushes = np.repeat([1.5, -2.5, 3.5, 0.0, -4.0, 3.0], 10)
+    voltage = np.outer(pushes, [0.0, 1.0, -1.0])
+    twist = reference(robot.rigid, voltage, 0.03).twist
+    noise = np.random.default_rng(0).normal(size=twist.shape) * [0.005, 0.005, 0.02]
+    seen = Run(t=0.03 * np.arange(len(twist)), voltage=np.append(voltage, voltage[-1:], axis=0), twist=twist + noise)
+    guess = robot
+    for key in map(Key.parse, keys):
+        guess = key.set(guess, 0.9 * key.get(guess))
+    fit = omnidyn.identify([seen], guess, free=keys)
+    for key in keys:
+        assert abs(fit.value[key] - Key.parse(key).get(robot)) <= 3.0 * fit.std[key]
+    found = getattr(fit.robot.friction, place)
+    assert (found.law, found.karnopp_speed) == ("karnopp", 1e-3)
+    assert any("karnopp_speed is numerical" in words for words in fit.warnings)
+    with pytest.raises(InputError, match="cannot be free"):
+        omnidyn.identify([seen], robot, free=(*keys, f"{table}.karnopp_speed"))
 
 
 def test_the_band_is_never_free():

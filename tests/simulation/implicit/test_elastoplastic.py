@@ -116,11 +116,10 @@ def test_a_slow_loop_is_stiff_first_and_comes_to_its_level():
     assert own.loop[: len(own.loop) // 3][-1] == pytest.approx(2.2, rel=0.01)
 
 
-def test_a_file_keeps_it_at_the_axes_and_at_the_wheels_and_no_ellipse_knows_it():
+def test_a_file_keeps_it_everywhere():
     rim = AXEBOT.replace(friction=Friction(wheels=WheelFriction(coulomb=0.7, law="elastoplastic", stiffness=1e4)))
-    for robot in (axes(elastic_share=0.4), rim):
+    along = DirectionFriction(coulomb=(1.0, 1.0), law="elastoplastic", stiffness=1e4, elastic_share=0.4)
+    for robot in (axes(elastic_share=0.4), rim, AXEBOT.replace(friction=Friction(direction=along))):
         assert parse_robot(robot_to_toml(robot)) == robot
-    with pytest.raises(InputError, match="cannot use this value"):
-        DirectionFriction(coulomb=(1.0, 1.0), law="elastoplastic", stiffness=1e4)
     with pytest.raises(InputError, match=r'elastic_share is of law = "elastoplastic"'):
         AxesFriction(**LEVELS, elastic_share=0.4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import UnsupportedError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
@@ -354,13 +354,3 @@ def test_karnopp_with_a_narrow_band_is_the_law_that_sticks():
         errors.append(of_error(simulate(robot, voltage, 4e-3, tol=1e-7), exact.twist))
     assert errors[1] <= 0.3 * errors[0]
     assert errors[2] <= 0.3 * errors[1]
-
-
-def test_karnopp_is_refused_where_no_axis_rests_for_itself():
-    law = {"viscous": VISCOUS, "coulomb": COULOMB, "law": "karnopp"}
-    with pytest.raises(InputError, match=r"knows friction on the body axes only.*leave"):
-        Friction(axes=AxesFriction(**law), wheels=WheelFriction(coulomb=0.5))
-    robot = axes(law="karnopp")
-    lossy = robot.replace(motor=robot.motor.replace(gear_efficiency=0.8))
-    with pytest.raises(UnsupportedError, match="axes that rest each for itself"):
-        simulate(lossy, np.ones((3, 3)), 0.01)

@@ -69,21 +69,13 @@ def conclude(
     data, names = _data(records), [p.name for p in problem.parameters]
     own_levels, joint = _levels(levels, ci95), combinations(problem, values, known, moved)
     endless = [name for name, (_, (_, high)) in own_levels.items() if high == math.inf]
-<<<<<<< HEAD
     fitted, correlation = problem.parameters[:own], _correlation(names, known)
-=======
->>>>>>> edge
     robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)
     robot = with_nuisances(robot, problem, values, std, open_, records, data)
     warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
-<<<<<<< HEAD
         robot=_together(robot, problem.parameters, std, known, correlation.matrix),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
-=======
-        robot=_together(robot, problem.parameters, std, known),
-        value={p.name: float(v) for p, v in zip(problem.parameters[:own], values, strict=False)}
->>>>>>> edge
         | {k: v for k, (v, _) in own_levels.items()},
         std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
         ci95={name: ci95[name] for name in names[:own]} | {k: i for k, (_, i) in own_levels.items()},

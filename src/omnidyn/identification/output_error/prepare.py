@@ -14,7 +14,7 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.slipping import implicit_engine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
-from omnidyn.identification.output_error.problem.band import BAND
+from omnidyn.identification.output_error.problem.band import BANDS
 from omnidyn.identification.output_error.problem.differences import differences
 from omnidyn.identification.output_error.problem.falling import falls, kept_in_order
 from omnidyn.identification.output_error.problem.motion import Motion, motion
@@ -71,7 +71,7 @@ NEVER_FREE = (
     "drive.supply_V",
     DEAD_BAND,
     DRIVE_LATENCY,
-    BAND,
+    *BANDS,
 )
 LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
 

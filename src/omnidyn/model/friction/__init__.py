@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from omnidyn.model.friction.axes import AxesFriction
 from omnidyn.model.friction.direction import DirectionFriction
+from omnidyn.model.friction.kinds import COULOMB, KARNOPP, KINDS
 from omnidyn.model.friction.law import FrictionLaw
 from omnidyn.model.friction.wheels import WheelFriction
 from omnidyn.model.value import Value
@@ -68,10 +69,12 @@ class Friction(Value):
                 "friction about yaw stands in [friction.axes] and in [friction.direction], and one of them has another "
                 "law than coulomb: put all of it into one table"
             )
-        if axes.law == "karnopp" and self.beyond_axes:
+        laws = {table: getattr(self, table).law for table in type(self).model_fields}
+        bends = [table for table, law in laws.items() if KINDS[law].bends]
+        if KARNOPP in laws.values() and bends:
             raise ValueError(
-                'law = "karnopp" knows friction on the body axes only, where each axis gathers momentum for itself; '
-                "leave [friction.direction] and [friction.wheels] out, or the law"
+                f'law = "{KARNOPP}" rests in its band, and the bristles of [friction.{bends[0]}] never rest: it stands '
+                f'in for a law that sticks. Take law = "{COULOMB}" beside bristles'
             )
         return self
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.model.friction.kinds import AXES, KARNOPP, refuse_mixtures, spread_on, words_of
+from omnidyn.model.friction.kinds import AXES, refuse_mixtures, spread_on, words_of
 from omnidyn.model.friction.stribeck import LEAST, MOST, SHAPES, USUAL
 from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.value import Levels, Value, number, per_axis_number, word_of
@@ -91,8 +91,6 @@ class AxesFriction(Value):
         slide, hold = np.stack([coulomb, self.backward], 1), np.stack([breakaway, self.hold_backward], 1)
         slide, hold = slide / units[:, None], hold / units[:, None]
         spread_on(self, rows, slide, hold, float(plant.body.mass), rows["viscous"], units)
-        if self.law == KARNOPP:
-            rows["band"] = np.array(self.karnopp_speed) * units
 
     def sliding_wrench(self, twist: ArrayLike) -> FloatArray:
         """-(B v + C sgn v) of the axes that move; 0 for an axis at rest. Shape (*batch, 3)."""

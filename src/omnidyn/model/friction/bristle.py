@@ -10,9 +10,11 @@ The rate is that of one of LAWS, each a file:
     rate(own, aimed, speed, tau, level, slope)   (z', dz'/ds) at the end of a stage of length tau from z* = aimed,
         solved for z' beforehand, so that a stiff bristle is no matter; tau = 0: at z* itself. own: the record ELEMENT
         with the numbers of the law (layout.py). level, slope: g(s) > 0 and dg/ds; slipping, sigma0 |z| = g
+    plane(own, aimed, speed, tau, levels)   the same of the ellipse, whose own is the record BODY: aimed, speed pairs
+        along x and y, levels (Cx, Cy, their slopes by |v|, |v|); (zx', zy', zx' by v_x, by v_y, zy' by v_x, by v_y)
     slow(own, left, far)   of left = 1 - sigma0 z sgn(s)/C, what a slow way leaves, far times C/sigma0: for pictures
     KIND   its word, and the keys that it takes
-All else, force, steps, errors and derivatives, follows here and in stick_slip/. That of the ellipse has LuGre's rate.
+All else, force, steps, errors and derivatives, follows here and in stick_slip/.
 """
 
 from __future__ import annotations
@@ -31,6 +33,8 @@ FADES = 0.75  # times the damping: the steepest way in which one that fades lets
 
 NUMBER_OF = {each.KIND.word: number for number, each in enumerate(LAWS)}
 _rate = one_of([each.rate for each in LAWS])
+plane_rate = one_of([each.plane for each in LAWS])
+"""What the ellipse bends by, its first argument the number of the law."""
 
 
 @part

@@ -3,6 +3,13 @@
     z' = s |w|^a sgn w,  w = 1 - sigma0 z sgn(s)/C,   F = sigma0 z
 
 a = 1 usual, below 1 brittle, above 1 ductile. It never gives energy back. Source: Dahl 1976. a = 1 is LuGre's rate.
+
+Along the direction of travel, in units of the ellipse: Z_a = sigma0 z_a/C_a, D n_a = C_a v_a, |n| = 1,
+
+    C_a z_a' = D |n - Z|^(a-1) (n_a - Z_a)
+
+For a motion along an axis it is the law of one axis; of a disc it is the same along any direction. With the storage
+W = sigma0 |z|^2/2 it takes energy for every a > 0 and every Z: F . v - W' = D (Z . n - |n - Z|^(a-1) Z . (n - Z)) >= 0.
 """
 
 from __future__ import annotations
@@ -14,6 +21,7 @@ from omnidyn.compiled.kernel import part
 from omnidyn.model.friction import lugre
 from omnidyn.model.friction.law import Kind, Number
 
+LEAST = 1e-30  # of the way to slipping: below it there is nothing left
 ROUNDS = 60  # of Newton's steps for a general exponent; bisection needs no more
 
 
@@ -59,7 +67,57 @@ def _psi(own, w):
     return math.copysign(size, left), a * size / max(abs(left), 1e-300)
 
 
+@part
+def _left_of_way(aimed, bend_x, bend_y, a):
+    """q = |Y| with Y_a (1 + bend_a q^(a-1)) = aimed_a: what is left of the way to slipping. 0 where nothing was left.
+
+    q/|Y(q)| - 1 rises with q: Newton within a bracket.
+    """
+    low, high = 0.0, math.hypot(aimed[0], aimed[1])
+    found = high
+    for _ in range(ROUNDS if high > 0.0 else 0):
+        power = found ** (a - 1.0)
+        below_x, below_y = 1.0 + bend_x * power, 1.0 + bend_y * power
+        x, y = aimed[0] / below_x, aimed[1] / below_y
+        size = max(math.hypot(x, y), 1e-300)
+        off = found - size
+        if off > 0.0:
+            high = found
+        else:
+            low = found
+        rises = (a - 1.0) * power * (bend_x * x * x / below_x + bend_y * y * y / below_y) / (size * size)
+        new = found - off / (1.0 + rises)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - found) <= 1e-16 * found:
+            break
+        found = new
+    return found
+
+
+@part
+def _plane_by_newton(own, aimed, speed, tau, levels):
+    """As `plane`, for a general exponent."""
+    (x, y), cx, cy, a = speed, levels[0], levels[1], own.dahl_exponent
+    work = math.hypot(cx * x, cy * y)
+    if work == 0.0:
+        return 0.0, 0.0, 1.0, 0.0, 0.0, 1.0
+    n, stiff = (cx * x / work, cy * y / work), tau * own.stiffness * work
+    start = (own.stiffness * aimed[0] / cx - n[0], own.stiffness * aimed[1] / cy - n[1])
+    power = max(_left_of_way(start, stiff / (cx * cx), stiff / (cy * cy), a), LEAST) ** (a - 1.0)
+    u, v = start[0] / (1.0 + stiff * power / (cx * cx)), start[1] / (1.0 + stiff * power / (cy * cy))
+    q, more = max(math.hypot(u, v), 1e-300), (a - 1.0) * power
+    xx, xy, yy = power + more * (u / q) ** 2, more * (u / q) * (v / q), power + more * (v / q) ** 2  # |Y|^(a-1) Y by Y
+    turn_x, turn_y = xx * n[0] + xy * n[1] + power * u, xy * n[0] + yy * n[1] + power * v
+    by = lugre.within(
+        (1.0 + stiff * xx / (cx * cx), stiff * xy / (cx * cy), stiff * xy / (cx * cy), 1.0 + stiff * yy / (cy * cy)),
+        (xx - turn_x * n[0], (xy - turn_x * n[1]) * cy / cx, (xy - turn_y * n[0]) * cx / cy, yy - turn_y * n[1]),
+    )
+    return -work / cx * power * u, -work / cy * power * v, by[0], by[1], by[2], by[3]
+
+
 _linear, _by_newton = lugre.rate, rate_of(_psi)
+_linear_plane = lugre.plane
 
 
 @part
@@ -68,6 +126,14 @@ def rate(own, aimed, speed, tau, level, slope):
     if own.dahl_exponent == 1.0:
         return _linear(own, aimed, speed, tau, level, slope)
     return _by_newton(own, aimed, speed, tau, level, slope)
+
+
+@part
+def plane(own, aimed, speed, tau, levels):
+    """(zx', zy', their slopes by v_x and v_y); see LAWS of bristle.py."""
+    if own.dahl_exponent == 1.0:
+        return _linear_plane(own, aimed, speed, tau, levels)
+    return _plane_by_newton(own, aimed, speed, tau, levels)
 
 
 def slow(own: Any, left: float, far: float) -> float:
@@ -81,10 +147,5 @@ def slow(own: Any, left: float, far: float) -> float:
     return below ** (1.0 / (1.0 - a)) if below > 0.0 else 0.0
 
 
-def linear(stiffness: Any, mass: Any, viscous: Any) -> float:
-    """a where a table has no key for it."""
-    return 1.0
-
-
 TAKES = {"stiffness": lugre.STIFFNESS, "dahl_exponent": Number("dahl_exponent")}
-KIND = Kind("dahl", "Dahl", TAKES, falls=False, bends=True, usual={"dahl_exponent": linear})
+KIND = Kind("dahl", "Dahl", TAKES, falls=False, bends=True)

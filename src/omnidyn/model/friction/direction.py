@@ -4,7 +4,7 @@
     sliding    F = -(Cx^2 vx, Cy^2 vy)/D - B v
     at rest    F anywhere in the ellipse (Fx/Sx)^2 + (Fy/Sy)^2 <= 1
     Stribeck   Cx and Cy fall with |v| from Sx and Sy
-    bristle    z_a' = v_a - sigma0 D z_a/C_a^2, F = -(sigma0 z + sigma1 z') - B v: a vector that turns with the body
+    bristle    F = -(sigma0 z + sigma1 z') - B v, z a vector that turns with the body, its rate in the file of each law
 
 On real floors the force is collinear with the velocity and of constant size (252 runs of a Robotino): the shape the
 box of eqs (4)-(6) misses.
@@ -48,12 +48,16 @@ class DirectionFriction(Value):
     yaw_stribeck_speed: Annotated[Speed | None, Field(description="v_s [rad/s]")] = None
     stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
     stribeck_shape: Annotated[Annotated[str, word_of(*SHAPES)], Field(description="f of the fall")] = "exponential"
+    karnopp_speed: Annotated[Speed, Field(description="Dv [m/s]")] = 1e-4
+    yaw_karnopp_speed: Annotated[Speed, Field(description="Dv [rad/s]")] = 1e-4
     stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m]")] = None
     yaw_stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N m/rad]")] = None
     damping: Annotated[Level | None, Field(description="sigma1 [N s/m]")] = None
     yaw_damping: Annotated[Level | None, Field(description="sigma1 [N m s]")] = None
     damping_speed: Annotated[Speed | None, Field(description="v_d [m/s]")] = None
     yaw_damping_speed: Annotated[Speed | None, Field(description="v_d [rad/s]")] = None
+    dahl_exponent: Annotated[Annotated[float, number(0.5, 4.0)], Field(description="a")] = 1.0
+    elastic_share: Annotated[Annotated[float, number(0.0, 0.99)], Field(description="b")] = 0.7
 
     @property
     def holds_all(self) -> bool:

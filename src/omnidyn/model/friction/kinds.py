@@ -3,7 +3,7 @@
     coulomb   C in motion, S >= C at rest; with stribeck_speed the level falls from S to C (stribeck.py)
     karnopp   the same, at rest below a speed Dv (karnopp_speed, 1e-4 m/s): a device of solvers that cannot stick. It
               has no meaning of its own: momentum gathers while the drive exceeds S, and motion begins at Dv. Here for
-              comparison with such solvers; on the body axes only. Source: Karnopp 1985
+              comparison with such solvers; stick_slip/band.py has the law. Source: Karnopp 1985
     dahl, lugre, ...  bristles, which bend before they slip: LAWS of bristle.py
 
 Which law a table has is one word; what it takes, and what goes with what, is checked here for all tables.
@@ -24,7 +24,7 @@ AXES, DIRECTION, WHEELS = "axes", "direction", "wheels"
 COULOMB, KARNOPP, LUGRE = "coulomb", "karnopp", "lugre"
 _STICKING = (
     Kind(COULOMB, "Coulomb"),
-    Kind(KARNOPP, "Karnopp", takes={"karnopp_speed": Number("band", -1, units=SPEED)}, falls=False, places=(AXES,)),
+    Kind(KARNOPP, "Karnopp", takes={"karnopp_speed": Number("band", -1, units=SPEED)}, falls=False),
 )
 KINDS = {each.word: each for each in (*_STICKING, *(law.KIND for law in bristle.LAWS))}
 
@@ -53,24 +53,23 @@ def spread_on(
     kind = KINDS[table.law]
     rows["bristle_coulomb" if kind.bends else "coulomb"] += slide
     rows["bristle_breakaway" if kind.bends else "breakaway"] += hold
-    if kind.bends:
-        _bend(kind, table, rows, np.any(slide > 0.0, axis=-1), mass, viscous, units, yaw)
+    _take(kind, table, rows, np.any((slide if kind.bends else hold) > 0.0, axis=-1), mass, viscous, units, yaw)
     if getattr(table, f"{yaw}stribeck_speed") is not None:
         falls = np.any(hold > slide, axis=-1)
         for key, number in FALL.items():
             _put(rows, falls, number.field, _number(table, yaw, key, number, units))
 
 
-def _bend(
+def _take(
     kind: Kind, table: Any, rows: Any, used: Any, mass: Any, viscous: Any, units: FloatArray | float, yaw: str
 ) -> None:
-    """The numbers of a law that bends; the ellipse has fields for those of LuGre alone."""
+    """The numbers of a law."""
     for key, number in kind.takes.items():
         value = _number(table, yaw, key, number, units)
         if value is None and key in kind.usual:
             value = kind.usual[key](_number(table, yaw, "stiffness", kind.takes["stiffness"], units), mass, viscous)
         _put(rows, used, number.field, value)
-    _put(rows, used, "law", bristle.NUMBER_OF[kind.word])
+    _put(rows, used, "law", bristle.NUMBER_OF.get(kind.word))
 
 
 def _number(table: Any, yaw: str, key: str, number: Number, units: FloatArray | float) -> Any:
@@ -86,8 +85,8 @@ def _number(table: Any, yaw: str, key: str, number: Number, units: FloatArray | 
 
 
 def _put(rows: Any, where: Any, field: str, value: Any) -> None:
-    """One number, or one per row, into a field of some rows, where they have such a field."""
-    if value is not None and field in rows.dtype.fields:
+    """One number, or one per row, into a field of some rows."""
+    if value is not None:
         rows[field] = np.where(where, value, rows[field])
 
 

@@ -10,7 +10,8 @@ A law acts between body and floor. It must:
    (`damping_speed`), and may not where sigma1 is constant and large: the one exception, known (Olsson 1996) and said;
 2. say how it rests. Set-valued (coulomb, Stribeck): at rest it exerts whatever balances the drive, up to a breakaway
    level, and rest is exact. With bristles it is a function of its state and never quite rests. With Karnopp's band it
-   is at rest below a speed. sgn(0) = 0, as printed in the paper, would let a robot creep inside its dead zone;
+   is at rest below a speed, and remembers the momentum that gathers (stick_slip/band.py). sgn(0) = 0, as printed in
+   the paper, would let a robot creep inside its dead zone;
 3. hold at least as much as it slides with: breakaway >= coulomb >= 0, element by element, forward and backward apart;
 4. never smooth sgn: no tanh, no small speed below which it changes, but where the law itself is that (Karnopp);
 5. derive at rest and at constant level from a convex potential of the velocity (maximum dissipation), so that the

@@ -1,4 +1,4 @@
-"""Friction at the wheels: each resists along its own rolling direction, at the rim. Any law of kinds.py but Karnopp's.
+"""Friction at the wheels: each resists along its own rolling direction, at the rim. Laws: kinds.py.
 
 sliding    f_i = -(b_i s_i + c_i sgn s_i),  s_i = g_i . twist the rim speed;  c_i may differ forward and backward
 at rest    -S_forward <= f_i <= S_backward
@@ -38,6 +38,7 @@ class WheelFriction(Value):
     stribeck_speed: Annotated[Speed | None, Field(description="v_s [m/s] of the rim")] = None
     stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
     stribeck_shape: Annotated[Annotated[str, word_of(*SHAPES)], Field(description="f of the fall")] = "exponential"
+    karnopp_speed: Annotated[Speed, Field(description="Dv [m/s] of the rim")] = 1e-4
     stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m] at the rim")] = None
     damping: Annotated[Level | None, Field(description="sigma1 [N s/m] at the rim")] = None
     damping_speed: Annotated[Speed | None, Field(description="v_d [m/s] of the rim")] = None

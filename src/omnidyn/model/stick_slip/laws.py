@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.friction.bristle import bristle_force, damping_at
+from omnidyn.model.friction.bristle import bristle_force, damping_at, plane_rate
 from omnidyn.model.friction.stribeck import excess, fall
 
 
@@ -68,23 +68,11 @@ def _add_ellipse(plant, stage, x):
 
 
 @part
-def plane_rate(plant, stage, x, y, tau, a):
-    """(z', its slopes by x and y) of one axis a of the bristle of the ellipse: z' = v_a - sigma0 D(v) z/C_a^2.
-
-    D, C_a as above: sliding, sigma0 z is the force of maximum dissipation.
-    """
-    body = plant.body
-    cx, cy, dx, dy, size = _levels_xy(body, x, y, body.bristle_coulomb, body.bristle_breakaway)
-    work = max(math.hypot(cx * x, cy * y), 1e-150)
-    along = (cx * dx * x * x + cy * dy * y * y) / (work * max(size, 1e-150))  # dD/d|v| over |v|
-    by_x, by_y = cx * cx * x / work + along * x, cy * cy * y / work + along * y
-    level, falls = (cx, dx) if a == 0 else (cy, dy)
-    k, own = body.stiffness * work / level**2, 2.0 * falls / (level * max(size, 1e-150))
-    k_x, k_y = body.stiffness * by_x / level**2 - k * own * x, body.stiffness * by_y / level**2 - k * own * y
-    aimed, speed = stage.task.aimed_bend[a], x if a == 0 else y
-    rate, below = (speed - k * aimed) / (1.0 + tau * k), 1.0 + tau * k
-    bent = aimed + tau * rate
-    return rate, ((1.0 if a == 0 else 0.0) - k_x * bent) / below, ((1.0 if a == 1 else 0.0) - k_y * bent) / below
+def _plane_rate(plant, stage, x, y, tau):
+    """(zx', zy', their slopes by x and y) of the bristle of the ellipse."""
+    body, aimed = plant.body, (stage.task.aimed_bend[0], stage.task.aimed_bend[1])
+    levels = _levels_xy(body, x, y, body.bristle_coulomb, body.bristle_breakaway)
+    return plane_rate(body.law, body, aimed, (x, y), tau, levels)
 
 
 @part
@@ -93,13 +81,15 @@ def _add_plane_bristle(plant, stage, x):
     body, task, work = plant.body, stage.task, stage.work
     tau, size = task.tau, math.hypot(x[0], x[1])
     damping, fades = damping_at(size, body.damping, body.fade)
-    for a in range(2):
-        rate, by_x, by_y = plane_rate(plant, stage, x[0], x[1], tau, a)
-        task.bend[a] = task.aimed_bend[a] + tau * rate
-        work.residual[a] += body.stiffness * task.bend[a] + damping * rate
-        gain = body.stiffness * tau + damping
-        work.jacobian[a, 0] += gain * by_x + fades * rate * x[0] / max(size, 1e-150)
-        work.jacobian[a, 1] += gain * by_y + fades * rate * x[1] / max(size, 1e-150)
+    gain, nx, ny = body.stiffness * tau + damping, x[0] / max(size, 1e-150), x[1] / max(size, 1e-150)
+    x_rate, y_rate, x_x, x_y, y_x, y_y = _plane_rate(plant, stage, x[0], x[1], tau)
+    task.bend[0], task.bend[1] = task.aimed_bend[0] + tau * x_rate, task.aimed_bend[1] + tau * y_rate
+    work.residual[0] += body.stiffness * task.bend[0] + damping * x_rate
+    work.residual[1] += body.stiffness * task.bend[1] + damping * y_rate
+    work.jacobian[0, 0] += gain * x_x + fades * x_rate * nx
+    work.jacobian[0, 1] += gain * x_y + fades * x_rate * ny
+    work.jacobian[1, 0] += gain * y_x + fades * y_rate * nx
+    work.jacobian[1, 1] += gain * y_y + fades * y_rate * ny
 
 
 @part
@@ -141,9 +131,9 @@ def push_of_laws(plant, stage, x, push):
         push[2] += force * own.g[2]
     if body.stiffness > 0.0:
         damping = damping_at(math.hypot(x[0], x[1]), body.damping, body.fade)[0]
-        for a in range(2):
-            rate = plane_rate(plant, stage, x[0], x[1], 0.0, a)[0]
-            push[a] -= body.stiffness * task.aimed_bend[a] + damping * rate
+        x_rate, y_rate = _plane_rate(plant, stage, x[0], x[1], 0.0)[:2]
+        push[0] -= body.stiffness * task.aimed_bend[0] + damping * x_rate
+        push[1] -= body.stiffness * task.aimed_bend[1] + damping * y_rate
     elif body.fall > 0.0 and task.ellipse == 1.0:
         cx, cy = _levels_xy(plant.body, x[0], x[1], plant.body.coulomb, stage.task.hold)[:2]
         now, rest = math.hypot(cx * x[0], cy * x[1]), math.hypot(task.hold[0] * x[0], task.hold[1] * x[1])

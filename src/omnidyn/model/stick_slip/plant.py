@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.errors import UnsupportedError
 from omnidyn.model.friction.bristle import fade_of
 from omnidyn.model.friction.stribeck import BENDS, steepest, steepest_of
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
@@ -32,11 +31,11 @@ def plant(robot: Robot) -> Plant:
     _fill_motors(robot, element[N_AXES:])
     for law in robot.friction.laws:
         law.add_to(own, length)
-    if np.any(element["band"] > 0.0):
-        _check_band(robot, own)
-        body.gathers = 1.0
     lossy = element["efficiency"] < np.repeat([0.0, 1.0], [N_AXES, own.wheels])  # a lossy gear holds too
     body.active, element["active"] = body.breakaway[0] > 0.0, lossy | (element["breakaway"] > 0.0).any(axis=1)
+    if body.band > 0.0 or np.any(element["band"] > 0.0):
+        others = np.any((element["active"] > 0.0) & (element["band"] == 0.0)) or (body.active and body.band == 0.0)
+        body.gathers = 2.0 if others else 1.0
     heaviest = float(body.mass + np.linalg.eigvalsh(body.spin)[-1])
     _bound_laws(own)
     body.memory[:] = _memory(heaviest, element, True), _memory(heaviest, element, False)
@@ -46,17 +45,6 @@ def plant(robot: Robot) -> Plant:
 def _least(mass: float, off: float) -> float:
     """The least eigenvalue of mass x [[1, off], [off, 1 + off^2]]; what spins only adds to it."""
     return mass / (1.0 + 0.5 * off**2 + off * float(np.sqrt(1.0 + 0.25 * off**2)))
-
-
-def _check_band(robot: Robot, plant: Plant) -> None:
-    """Raises UnsupportedError where body axes do not gather momentum in Karnopp's band each for itself."""
-    couples = np.any(plant.body.spin[np.triu_indices(N_AXES, 1)] != 0.0)
-    if couples or np.any(np.asarray(robot.motor.gear_efficiency) != 1.0):
-        raise UnsupportedError(
-            'law = "karnopp" knows axes that rest each for itself',
-            got="unequal inertias of rotors or wheels, a centre_m, or gears that lose", expected="neither",
-            remedy='take law = "coulomb": it sticks exactly, which the band stands in for', where="friction.axes.law",
-        )  # fmt: skip
 
 
 def _bound_laws(plant: Plant) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
+from omnidyn.model.stick_slip.band import FIRM, hold_in_band
 from omnidyn.model.stick_slip.forces import residual, winding
 from omnidyn.model.stick_slip.inclusion import solve
 from omnidyn.model.stick_slip.laws import aim_bristles, push_of_laws
@@ -130,7 +131,7 @@ def settle(plant, stage, bare, state, acceleration):
     """
     m = len(plant.element)
     settle_currents(plant, stage, state)
-    if plant.body.gathers > 0.0:  # who leaves his band is told by what has gathered there
+    if plant.body.gathers == 1.0:  # who leaves his band is told by what has gathered there
         return 0
     own, stages = bare.plant, bare.stage
     bare_plant, bare_stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
@@ -145,6 +146,8 @@ def settle(plant, stage, bare, state, acceleration):
     bare_stage.task.ellipse = 0.0 if state.each[m].sign == 0.0 else 2.0
     for a in range(3):
         acceleration[a] = bare_stage.task.goal[a] = 0.0
+    if plant.body.gathers > 0.0:
+        hold_in_band(bare_plant, bare_stage, FIRM)
     count = solve(bare_plant, bare_stage, acceleration)
     for e in range(m):
         if state.each[e].sign == 0.0:

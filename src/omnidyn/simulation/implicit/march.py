@@ -16,7 +16,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
-from omnidyn.model.stick_slip.band import band_error, cross_band, crosses
+from omnidyn.model.stick_slip.band import band_error, cross_band, crosses, gather
 from omnidyn.model.stick_slip.copies import copy_row, copy_state, row_of_state, signs_differ, state_of_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
@@ -65,7 +65,10 @@ def begun(rows: int, state: State, pose: FloatArray) -> Outcome:
 
 
 class Spare(NamedTuple):
-    """States on the way: after a whole step, one and two half steps, within a step, as it settles; and that of now."""
+    """States on the way: after a whole step, one and two half steps, within a step, as it settles; and that of now.
+
+    bare: the plant and a stage with their currents given.
+    """
 
     whole: State
     middle: State
@@ -73,6 +76,7 @@ class Spare(NamedTuple):
     inner: State
     settled: State
     now: State
+    bare: Problem
 
 
 class Room(NamedTuple):
@@ -80,15 +84,15 @@ class Room(NamedTuple):
 
     own: Problem  # an array of one plant, and of a stage of it
     bare: Problem  # the same, its currents given
-    spare: Spare
+    spare: Spare  # which has `bare`, too
 
 
 def room(plant: Plant) -> Room:
     """Room for runs of a plant."""
     own = many([plant])
-    states = new_states(plant, len(Spare._fields))
-    spare = Spare(*(states.at(k) for k in range(len(Spare._fields))))
-    return Room(Problem(own, new_stage(own)), with_given_currents(plant), spare)
+    count, bare = len(Spare._fields) - 1, with_given_currents(plant)
+    states = new_states(plant, count)
+    return Room(Problem(own, new_stage(own)), bare, Spare(*(states.at(k) for k in range(count)), bare=bare))
 
 
 def run_implicit(
@@ -178,7 +182,7 @@ def _error(plant, one, two):
     if body.bristles > 0.0:
         worst = max(worst, bristle_error(plant, one, two))
     if body.gathers > 0.0:
-        worst = max(worst, band_error(one, two))
+        worst = max(worst, band_error(plant, one, two))
     return worst / 3.0
 
 
@@ -241,6 +245,13 @@ def in_one_row(plant, dt):
 
 
 @part
+def _gather(plant, stage, spare, start, end, h):
+    """What gathers in Karnopp's bands during a step that has just been solved, into `end`. Returns the iterations."""
+    last = GAMMA if stage.task.tau < h else 1.0  # an implicit Euler stage takes the place of both
+    return gather(plant, stage, spare.bare, spare.settled.x, start, end, h, last)
+
+
+@part
 def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
     """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
 
@@ -260,10 +271,16 @@ def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
             h = left
         pull(plant, stage, _turned(plant, state, 0.5 * h))  # as in the middle of the step: second order, as the step is
         first = step(plant, stage, state, one, inner, h)
+        if body.gathers > 0.0:
+            first = max(first, _gather(plant, stage, spare, state, one, h))
         pull(plant, stage, _turned(plant, state, 0.25 * h))
         second = step(plant, stage, state, middle, inner, 0.5 * h)
+        if body.gathers > 0.0:
+            second = max(second, _gather(plant, stage, spare, state, middle, 0.5 * h))
         pull(plant, stage, _turned(plant, state, 0.25 * h) + _turned(plant, middle, 0.5 * h))
         third = step(plant, stage, middle, two, inner, 0.5 * h)
+        if body.gathers > 0.0:
+            third = max(third, _gather(plant, stage, spare, middle, two, 0.5 * h))
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
         ratio = _error(plant, one, two) / max(rate * max(h, SHORT), ROUNDING)
         if body.laws != 0.0:
@@ -273,7 +290,7 @@ def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
             astray = max(astray, _unresolved(plant, stage, state, h))
             if body.steep_sum > 0.0 and not has_one_start(plant, stage, state.x, h):
                 astray = max(astray, 2.0 * tol)
-        if body.gathers > 0.0 and (crosses(plant, middle) or crosses(plant, two)):
+        if body.gathers > 0.0 and (crosses(plant, stage, middle) or crosses(plant, stage, two)):
             astray = max(astray, _unresolved(plant, stage, state, h))
         counts[2] += 1
         if astray > 0.0:
@@ -299,7 +316,7 @@ def _row(plant, stage, bare, spare, state, dt, tol, most, h, pose, counts):
     stage.task.facing = pose[2]
     pull(plant, stage, 0.0)
     if body.gathers > 0.0:
-        cross_band(plant, state)
+        cross_band(plant, stage, state)
     counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
     while left > 0.0 and counts[1] <= most:
         taken, h = find_step(plant, stage, spare, state, h, left, dt, tol, counts)
@@ -307,7 +324,7 @@ def _row(plant, stage, bare, spare, state, dt, tol, most, h, pose, counts):
         copy_state(state, two)
         stage.task.facing = pose[2]
         if body.gathers > 0.0:
-            cross_band(plant, state)
+            cross_band(plant, stage, state)
         if sticks(state):  # a step so short sees no release within its rounding
             pull(plant, stage, 0.0)
             counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
@@ -339,15 +356,19 @@ def _march(room, voltage, bound, dt, loop, tol, most, out):
                 return k
         else:
             pieces = in_one_row(plant, dt[k])
+            if plant.body.gathers > 0.0:
+                cross_band(plant, stage, state)
             for _ in range(pieces):
                 stage.task.facing = pose[2]
                 pull(plant, stage, _turned(plant, state, 0.5 * dt[k] / pieces))
                 count = step(plant, stage, state, two, inner, dt[k] / pieces)
+                if plant.body.gathers > 0.0:
+                    count = max(count, _gather(plant, stage, spare, state, two, dt[k] / pieces))
                 counts[0], counts[1] = max(counts[0], count), pieces
                 advance_pose(pose, state.x, inner, two.x, plant.body.length, dt[k] / pieces, STAGES)
                 copy_state(state, two)
                 if plant.body.gathers > 0.0:
-                    cross_band(plant, state)
+                    cross_band(plant, stage, state)
         out.iterations[k], out.steps[k] = counts[0], counts[1]
         row_of_state(out.state, k + 1, state)
         copy_row(out.pose[k + 1], pose)

@@ -13,7 +13,7 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES
-from omnidyn.model.stick_slip.band import aim_band, gather, hold_in_band, keep_band
+from omnidyn.model.stick_slip.band import FIRM, hold_in_band, keep_drive
 from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import solve
@@ -36,8 +36,6 @@ def _aim(plant, stage, start, x, back):
         stage.each[e].aimed_current = i + back * (stage.each[e].current - i) if back != 0.0 else i
     if plant.body.bristles > 0.0:
         aim_bristles(plant, stage, start, back)
-    if plant.body.gathers > 0.0:
-        aim_band(stage, start, back)
 
 
 @part
@@ -60,10 +58,7 @@ def _stage(plant, stage, start, end):
     """Solve one stage in place, x from the guess `end`; `start`: x before the step. Returns the iterations."""
     body, task = plant.body, stage.task
     if task.ellipse != 1.0:
-        count = solve(plant, stage, end)
-        if body.gathers > 0.0:
-            gather(plant, stage, task.tau)
-        return count
+        return solve(plant, stage, end)
     # A body that slides meets the Coulomb level; only when it would go through rest can breakaway hold it. What falls
     # with the speed has no such gap.
     falls = body.fall > 0.0
@@ -118,7 +113,7 @@ def _begin(plant, stage, start, x, tau):
     stage.task.tau = tau
     _aim(plant, stage, start, x, 0.0)
     if plant.body.gathers > 0.0:
-        hold_in_band(plant, stage)
+        hold_in_band(plant, stage, FIRM)
 
 
 @part
@@ -127,6 +122,8 @@ def first_stage(plant, stage, start, end, middle, h):
     _begin(plant, stage, start, end, GAMMA * h)
     count = _stage(plant, stage, start.x, end)
     copy_row(middle, end)
+    if plant.body.gathers > 0.0:
+        keep_drive(stage)
     return count
 
 
@@ -153,8 +150,6 @@ def last_stage(plant, stage, start, end, h):
         end.each[e].current = stage.each[e].current
     if plant.body.bristles > 0.0:
         keep_bristles(plant, stage, end)
-    if plant.body.gathers > 0.0:
-        keep_band(stage, end)
     return count, back
 
 

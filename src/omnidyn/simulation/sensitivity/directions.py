@@ -112,11 +112,13 @@ def current_derivatives(
 
 def refuse_band(robot: Robot) -> None:
     """Raises UnsupportedError for Karnopp's law, whose band is no motion that a number could move."""
-    if robot.friction.axes.law == KARNOPP:
+    for table in type(robot.friction).model_fields:
+        if getattr(robot.friction, table).law != KARNOPP:
+            continue
         raise UnsupportedError(
             f'no derivatives of a run with law = "{KARNOPP}"', got=KARNOPP, expected='law = "coulomb"',
             remedy='take law = "coulomb" with the same levels: it sticks exactly, which the band stands in for',
-            where="friction.axes.law",
+            where=f"friction.{table}.law",
         )  # fmt: skip
 
 

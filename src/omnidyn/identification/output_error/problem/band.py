@@ -5,36 +5,51 @@ What is fitted are its levels, by the engines that stick exactly; the law and it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from omnidyn.errors import InputError
-from omnidyn.model.friction.kinds import KARNOPP
+from omnidyn.model.friction import Friction
+from omnidyn.model.friction.kinds import COULOMB, KARNOPP
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 
-BAND = "friction.axes.karnopp_speed"
+SPEEDS = ("karnopp_speed", "yaw_karnopp_speed")
+BANDS = tuple(
+    f"friction.{table}.{name}"
+    for table, field in Friction.model_fields.items()
+    for name in SPEEDS
+    if name in type(field.default).model_fields
+)
+"""The keys of the bands, in all tables."""
 
 
 def without_band(robot: Robot, free: Sequence[str]) -> Robot:
     """The robot with the levels of Karnopp's law as Coulomb's. Raises InputError where its band is free."""
-    asked = [key for key in free if Key.parse(key).name == BAND]
+    asked = [key for key in free if Key.parse(key).name in BANDS]
     if asked:
         raise InputError(
             "cannot be free", got=asked[0], expected="coulomb, breakaway or viscous",
             remedy="leave it out: the speed below which Karnopp's law rests is chosen for a solver, not measured",
             where="free",
         )  # fmt: skip
-    return _with_law(robot, "coulomb") if robot.friction.axes.law == KARNOPP else robot
+    usual = {name: type(getattr(robot.friction, name)) for name in tables_with_band(robot)}
+    return _changed(
+        robot, {n: {s: f.model_fields[s].default for s in SPEEDS if s in f.model_fields} for n, f in usual.items()},
+        COULOMB,
+    )  # fmt: skip
 
 
 def with_band(robot: Robot, of: Robot) -> Robot:
     """A fitted robot with the law of the robot that it began from."""
-    return _with_law(robot, KARNOPP) if of.friction.axes.law == KARNOPP else robot
+    own = {name: getattr(of.friction, name) for name in tables_with_band(of)}
+    speeds = {n: {s: getattr(law, s) for s in SPEEDS if hasattr(law, s)} for n, law in own.items()}
+    return _changed(robot, speeds, KARNOPP)
 
 
 def band_words(of: Robot) -> tuple[str, ...]:
     """What is to be said of it."""
-    if of.friction.axes.law != KARNOPP:
+    if not tables_with_band(of):
         return ()
     return (
         f'law = "{KARNOPP}" is fitted as Coulomb friction with breakaway, which its band stands in for; '
@@ -42,6 +57,12 @@ def band_words(of: Robot) -> tuple[str, ...]:
     )
 
 
-def _with_law(robot: Robot, law: str) -> Robot:
-    axes = robot.friction.axes.model_copy(update={"law": law})
-    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"axes": axes})})
+def tables_with_band(robot: Robot) -> list[str]:
+    """The tables of friction that have Karnopp's law."""
+    return [name for name in type(robot.friction).model_fields if getattr(robot.friction, name).law == KARNOPP]
+
+
+def _changed(robot: Robot, speeds: Mapping[str, Mapping[str, Any]], law: str) -> Robot:
+    """The robot with another law, and other bands, in some tables."""
+    own = {n: getattr(robot.friction, n).model_copy(update={"law": law, **each}) for n, each in speeds.items()}
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update=own)}) if own else robot

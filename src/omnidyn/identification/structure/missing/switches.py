@@ -35,10 +35,10 @@ from omnidyn.identification.structure.missing.laws import (
     slippery,
     table_of,
 )
-from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
-from omnidyn.model.friction.kinds import COULOMB, KINDS, LUGRE
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.friction.kinds import KINDS, LUGRE
 from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
-from omnidyn.model.layout import N_AXES, YAW
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Prior, Robot
 
@@ -279,9 +279,9 @@ def _beside(robot: Robot, asked: Question, words: str, level: float | tuple[floa
             "on the axes",
         )
     else:
-        half = direction.replace(
-            coulomb=tuple((0.5 * coulomb[:YAW]).tolist()), yaw_coulomb=0.5 * direction.yaw_coulomb, law=COULOMB,
-            **dict.fromkeys(("breakaway", "yaw_breakaway", FALL, f"yaw_{FALL}")),
+        half = DirectionFriction(
+            coulomb=(0.5 * float(coulomb[0]), 0.5 * float(coulomb[1])), yaw_coulomb=0.5 * direction.yaw_coulomb,
+            viscous=direction.viscous, yaw_viscous=direction.yaw_viscous,
         )  # fmt: skip
         body, where = Friction(direction=half), "along the direction of travel"
     both = body.replace(wheels=WheelFriction(coulomb=level))
