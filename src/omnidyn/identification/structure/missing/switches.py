@@ -31,13 +31,13 @@ from omnidyn.identification.structure.missing.laws import (
     TRACTION,
     along_axes,
     along_travel,
-    arm,
     bristled,
+    falling,
     slippery,
     table_of,
 )
 from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
-from omnidyn.model.friction.kinds import COULOMB, KINDS, LUGRE
+from omnidyn.model.friction.kinds import COULOMB
 from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.motor import per_wheel
@@ -48,6 +48,7 @@ EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one o
 FALLS, BRISTLES = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS)), f"{BODY_AXES}.{BRISTLE}"
 LOSS = 0.01  # of a gear, from which its fit begins at least
 UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
+BREAK = "breakaway"
 ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {
@@ -199,29 +200,17 @@ def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
     levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
     changed = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=levels)))
-    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
+    told = {Key.parse(key).axis for key in asked.free or () if key.startswith(f"{BODY_AXES}.coulomb")}
+    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, max(len(told), 1))
 
 
 def _falling(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
-    """Levels and speeds from which a fit finds how friction falls: those of the first step; with bristles it is LuGre's
-    law."""
-    table, own = remedy.key.rpartition(".")[0], table_of(robot.friction, remedy.key.rpartition(".")[0])
-    above, about = np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at / arm(robot)
-    changes: dict[str, Any]
-    if table == BODY_AXES:
-        levels, speeds = above * own.coulomb, (remedy.at, remedy.at, about)
-        changes = {"breakaway": tuple(levels.tolist()), FALL: speeds}
-    elif table == DIRECTION:
-        changes = {"breakaway": tuple((above[0] * np.array(own.coulomb)).tolist()), FALL: remedy.at}
-        if own.yaw_coulomb > 0.0:
-            changes |= {"yaw_breakaway": float(above[1] * own.yaw_coulomb), f"yaw_{FALL}": about}
-    else:
-        levels = above[0] * per_wheel(own.coulomb, robot.wheels.count)
-        changes = {"breakaway": tuple(levels.tolist()) if np.ndim(own.coulomb) else float(levels[0]), FALL: remedy.at}
-    one_level = KINDS[own.law].bends and not KINDS[own.law].falls
-    law = own.replace(**changes, law=LUGRE if one_level else own.law)
-    changed = robot.replace(friction=robot.friction.replace(**{table.rpartition(".")[2]: law}))
-    return _rough(changed, asked, [f"{table}.{name}" for name in changes], remedy.words)
+    """Levels and speeds from which a fit finds how friction falls: those of the first step."""
+    table = remedy.key.rpartition(".")[0]
+    friction = falling(robot, table, np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at)
+    own, yaw = table_of(friction, table), (f"yaw_{BREAK}", f"yaw_{FALL}")
+    names = (BREAK, FALL, *(yaw if getattr(own, yaw[0], None) is not None else ()))
+    return _rough(robot.replace(friction=friction), asked, [f"{table}.{name}" for name in names], remedy.words)
 
 
 def _bending(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
