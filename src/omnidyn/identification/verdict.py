@@ -104,7 +104,7 @@ def steady_verdict(study: SteadyStudy) -> str:
     alike = f"; as good, as far as these data tell: {all_of(ties[:NAMED])}" if ties else ""
     lacks = [each for each in study.lack_of_fit.values() if each.found]
     if lacks:
-        best = next((remedy.words for each in lacks for remedy in each.remedies), "")
+        best = next((remedy.words for each in lacks for remedy in each.causes), "")
         alike = f"; but no offered shape fits: {f'it takes {best} beside it' if best else 'the errors repeat'}"
     known = _of_groups({group: each.numbers_known() for group, each in study.estimates.items()})
     return (

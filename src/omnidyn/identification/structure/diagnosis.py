@@ -27,7 +27,7 @@ from omnidyn.identification.structure.missing.unoffered import unoffered
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.rests_on import rests_on
 from omnidyn.identification.structure.shifts import stability
-from omnidyn.identification.structure.tails import wild_samples
+from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
 from omnidyn.identification.structure.workbench import Workbench
 
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
@@ -62,7 +62,7 @@ def examine(solution: Solution, level: float = FALSE) -> Examined:
     problem = with_levels(solver.problem, levels_of(solution)).shortened(MOST_ROWS)
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     parts = engine.residuals(point)
-    rows, moved = Rows.of(problem, point, parts), motions(problem, point)
+    rows, moved = Rows.of(problem, point, as_counted(solution, problem, parts)), motions(problem, point)
     seen = misfit(rows, moved)
     stable = stability(seen.linear)
     bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
@@ -79,10 +79,12 @@ def examine(solution: Solution, level: float = FALSE) -> Examined:
     memory = memory_beside(rows, cause) if cause and not seen.found else seen.linear.memory
     seen = with_cause(seen, cause) if cause else seen
     names = [f"{name}[{i}]" for name, i in problem.columns]
+    wild = {} if solver.nu else wild_samples(seen)
+    told = (*told, *calmer(seen, wild))
     pictures = binned(rows, moved, int(np.argmax(seen.shares))) if found else ()
     lack = LackOfFit(
         found, dict(zip(names, seen.shares.tolist(), strict=True)), _sizes(seen, names), seen.found, told, seen.tested,
-        pictures, {} if solver.nu else wild_samples(seen),
+        pictures, wild,
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
     return Examined(diagnosis, memory, len(tried), count, sure)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
-from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.lack_of_fit import LOSS, Remedy
 from omnidyn.identification.output_error.prepare import expand_keys, guesses, stays_exact
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
@@ -24,7 +23,7 @@ from omnidyn.identification.output_error.problem.parameters import AT, EFFICIENC
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
-from omnidyn.identification.question import Question
+from omnidyn.identification.question import STUDENT, Question
 from omnidyn.identification.structure.missing.laws import (
     BRISTLE,
     FALL,
@@ -46,7 +45,7 @@ from omnidyn.model.robot import Prior, Robot
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
 EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one of all
 FALLS, BRISTLES = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS)), f"{BODY_AXES}.{BRISTLE}"
-LOSS = 0.01  # of a gear, from which its fit begins at least
+OF_GEAR = 0.01  # lost by a gear, from which its fit begins at least
 UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
 BREAK = "breakaway"
 ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
@@ -111,6 +110,8 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
     friction = robot.friction
     if key.partition(".")[0] in NUISANCES:
         yield Switch(robot, replace(asked, nuisances=(*(asked.nuisances or ()), key)), words)
+    elif key == LOSS:
+        yield Switch(robot, replace(asked, loss=STUDENT), words)
     elif key == FRAME:
         body = robot.body.replace(rotating_frame=not robot.body.rotating_frame)
         yield Switch(robot.replace(body=body), asked, words)
@@ -141,7 +142,7 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         on = robot.replace(motor=robot.motor.replace(**{OFF[key]: remedy.size[0]}))
         yield Switch(on, _free(asked, key), words)
     elif key == EFFICIENCY:
-        lossy = robot.replace(motor=robot.motor.replace(gear_efficiency=1.0 - max(remedy.size[0], LOSS)))
+        lossy = robot.replace(motor=robot.motor.replace(gear_efficiency=1.0 - max(remedy.size[0], OF_GEAR)))
         yield Switch(lossy, _free(asked, key), words)
     elif find_key(key):
         yield Switch(_as_one(robot, key), _free(asked, key), words)
