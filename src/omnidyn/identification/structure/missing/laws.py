@@ -40,7 +40,8 @@ USUAL_FALL, USUAL_SPEED = 1.3, 0.05  # breakaway over Coulomb friction, and [m/s
 FALL_WORDS = "friction that falls with the speed from breakaway, above Coulomb friction (Stribeck)"
 LIGHT, AMPLE = 0.02, 1e6  # wheels, as a share of the robot's mass at their rims; a grip that no motor overcomes
 TRACTION = "wheels.traction_mu"
-FALL, BRISTLE = "stribeck_speed", "stiffness"  # numbers that laws begin with, in the table of the friction
+FALL, BEND, DAMPING = "stribeck_speed", "stiffness", "damping"  # numbers by which laws are named: Stribeck, Dahl, LuGre
+DAHL = "dahl"
 
 
 def candidates(bench: Workbench) -> Iterator[Candidate]:
@@ -166,14 +167,20 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
         yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
     for table in may_fall(friction):
         yield Candidate(f"{table}.{FALL}", _falling(table), as_it_is(FALL_WORDS), 0.0)
-    if boxed and axes.law == COULOMB and axes.coulomb_backward is None:
-        yield Candidate(f"{BODY_AXES}.{BRISTLE}", _bending, as_it_is("friction that bends before it slips (LuGre)"))
+    if not boxed or axes.coulomb_backward is not None:
+        return
+    if axes.law == COULOMB and axes.breakaway is None:
+        yield Candidate(f"{BODY_AXES}.{BEND}", _bending(bent), as_it_is("friction that bends before it slips (Dahl)"))
+    if axes.law in (COULOMB, DAHL):
+        words = "friction that bends before it slips, falls and is damped (LuGre)"
+        yield Candidate(f"{BODY_AXES}.{DAMPING}", _bending(bristled), as_it_is(words))
 
 
 def may_fall(friction: Friction) -> list[str]:
-    """The tables of friction whose level is the same at every speed."""
+    """The tables of friction whose level is the same at every speed; of Dahl's bristles on the axes LuGre's fall."""
     laws = ((table, table_of(friction, table)) for table in (BODY_AXES, DIRECTION, WHEELS))
-    return [table for table, law in laws if law.stribeck_speed is None and np.any(law.coulomb)]
+    level = [table for table, law in laws if law.stribeck_speed is None and np.any(law.coulomb)]
+    return [table for table in level if table != BODY_AXES or friction.axes.law != DAHL]
 
 
 def table_of(friction: Friction, table: str) -> Any:
@@ -232,28 +239,39 @@ def arm(robot: Robot) -> float:
     return float(np.mean(robot.wheels.robot_radius))
 
 
-def _bending(bench: Workbench) -> list[Trial]:
-    """LuGre's bristles in the place of friction that holds exactly, at several lengths by which they bend.
+def _bending(law: Callable[[Robot, float], Friction]) -> Callable[[Workbench], list[Trial]]:
+    """Bristles in the place of friction that holds exactly, at several lengths by which they bend.
 
     Levels that a fit drove far beyond what the motors give would make bristles as stiff, and steps as short.
     """
-    axes = bench.robot.friction.axes
-    drive = np.max([np.abs(drive_wrench(m.robot, 0.0 * m.twist, m.voltage)).max(axis=0) for m in bench.motions], axis=0)
-    least = axes.model_copy(update={"coulomb": tuple(np.minimum(axes.coulomb, 2.0 * drive).tolist())})
-    robot = bench.robot.model_copy(update={"friction": bench.robot.friction.model_copy(update={"axes": least})})
-    return [Trial(bench.change(robot.model_copy(update={"friction": bristled(robot, z)})), z) for z in BENDS]
+
+    def trials(bench: Workbench) -> list[Trial]:
+        axes, moved = bench.robot.friction.axes, bench.motions
+        drive = np.max([np.abs(drive_wrench(m.robot, 0.0 * m.twist, m.voltage)).max(axis=0) for m in moved], axis=0)
+        least = axes.model_copy(update={"coulomb": tuple(np.minimum(axes.coulomb, 2.0 * drive).tolist())})
+        robot = bench.robot.model_copy(update={"friction": bench.robot.friction.model_copy(update={"axes": least})})
+        return [Trial(bench.change(robot.model_copy(update={"friction": law(robot, z)})), z) for z in BENDS]
+
+    return trials
+
+
+def bent(robot: Robot, bend: float) -> Friction:
+    """The friction of the axes with Dahl's bristles, that bend by a length [m at the rims] before they slip."""
+    axes, units = robot.friction.axes, np.array([1.0, 1.0, arm(robot)])
+    stiffness = np.maximum(np.array(axes.coulomb) * units / bend, 1e-3)
+    other = axes.replace(law=DAHL, stiffness=tuple(stiffness.tolist()))
+    return robot.friction.model_copy(update={"axes": other})
 
 
 def bristled(robot: Robot, bend: float) -> Friction:
-    """The friction of the axes with LuGre's bristles, that bend by a length [m at the rims] before they slip; where the
-    level does not fall yet, it falls as much and as fast as is usual."""
+    """The friction of the axes with LuGre's bristles, that bend by a length [m at the rims] before they slip, or are as
+    stiff as they are; where the level does not fall yet, it falls as much and as fast as is usual."""
     axes, units = robot.friction.axes, np.array([1.0, 1.0, arm(robot)])
-    coulomb = np.array(axes.coulomb)
     falls = {} if axes.stribeck_speed is not None else {
-        "breakaway": tuple((USUAL_FALL * coulomb).tolist()), FALL: tuple((USUAL_SPEED / units).tolist())
+        "breakaway": tuple((USUAL_FALL * np.array(axes.coulomb)).tolist()), FALL: tuple((USUAL_SPEED / units).tolist())
     }  # fmt: skip
-    stiffness = np.maximum(coulomb * units / bend, 1e-3)
-    other = axes.replace(law=LUGRE, stiffness=tuple(stiffness.tolist()), **falls)
+    stiffness = np.maximum(np.array(axes.coulomb) * units / bend, 1e-3)
+    other = axes.replace(law=LUGRE, stiffness=axes.stiffness or tuple(stiffness.tolist()), **falls)
     return robot.friction.model_copy(update={"axes": other})
 
 

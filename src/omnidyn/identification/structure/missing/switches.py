@@ -25,11 +25,13 @@ from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_prof
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
 from omnidyn.identification.question import STUDENT, Question
 from omnidyn.identification.structure.missing.laws import (
-    BRISTLE,
+    BEND,
+    DAMPING,
     FALL,
     TRACTION,
     along_axes,
     along_travel,
+    bent,
     bristled,
     falling,
     slippery,
@@ -44,7 +46,8 @@ from omnidyn.model.robot import Prior, Robot
 
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
 EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one of all
-FALLS, BRISTLES = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS)), f"{BODY_AXES}.{BRISTLE}"
+FALLS = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS))
+BRISTLES = BENDS, DAMPS = f"{BODY_AXES}.{BEND}", f"{BODY_AXES}.{DAMPING}"  # Dahl's, LuGre's
 OF_GEAR = 0.01  # lost by a gear, from which its fit begins at least
 UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
 BREAK = "breakaway"
@@ -86,11 +89,11 @@ def as_it_ended(robot: Robot, question: Question, found: Solution) -> Switch:
 
 
 def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
-    """Without bristles behind a fall that explains more: they have that fall too, and their turn after it; a fit of
-    bristles to a log without any takes long."""
+    """Without bristles behind a fall that explains more, and LuGre's behind Dahl's: they have their turn after it; a
+    fit of bristles to a log without any takes long."""
     found = [remedy.key for remedy in remedies]
-    falls = [found.index(key) for key in FALLS if key in found]
-    return [r for k, r in enumerate(remedies) if r.key != BRISTLES or k < min(falls, default=len(found))]
+    first = {BENDS: FALLS, DAMPS: (*FALLS, BENDS)}
+    return [r for k, r in enumerate(remedies) if not any(key in found[:k] for key in first.get(r.key, ()))]
 
 
 def told(words: str, before: Mapping[str, float], after: Mapping[str, float]) -> str:
@@ -129,7 +132,7 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         yield _at_each_wheel(robot, asked)
     elif key in FALLS:
         yield _falling(remedy, robot, asked)
-    elif key == BRISTLES:
+    elif key in BRISTLES:
         yield _bending(remedy, robot, asked)
     elif key == LIMIT:
         limited = robot.replace(motor=robot.motor.replace(current_limit=remedy.at))
@@ -215,10 +218,11 @@ def _falling(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
 
 
 def _bending(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
-    """LuGre's law, with the critical damping to begin from."""
-    bent = robot.replace(friction=bristled(robot, remedy.at))
-    keys = [f"{BODY_AXES}.{name}" for name in ("breakaway", FALL, BRISTLE, "damping")]
-    return _rough(with_damping(bent, keys), asked, keys, remedy.words)
+    """Dahl's law, or LuGre's with the critical damping to begin from."""
+    if remedy.key == BENDS:
+        return _rough(robot.replace(friction=bent(robot, remedy.at)), asked, [BENDS], remedy.words)
+    keys = [f"{BODY_AXES}.{name}" for name in (BREAK, FALL, BEND, DAMPING)]
+    return _rough(with_damping(robot.replace(friction=bristled(robot, remedy.at)), keys), asked, keys, remedy.words)
 
 
 def _rough(robot: Robot, asked: Question, names: Sequence[str], words: str) -> Switch:
