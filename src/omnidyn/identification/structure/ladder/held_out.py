@@ -58,7 +58,7 @@ class Errors:
         counts as a number: the largest of chi2_1 along one has a tail like that of chi2_2 (R. B. Davies, Biometrika 74,
         33 (1987), his bound at about one crossing). At 3 % of 40 models k = 2 takes 14.4, so a law whose log holds 5
         standard errors of it in its other numbers (lambda = 25) is seen in 91 %, P(chi2_2(lambda) > 14.4), and one of
-        30 in 95 %; BIC of 700 rows takes 20.5, for 75 and 85 %. For a model without more numbers, 0 where BIC prefers
+        30 in 96 %; BIC of 700 rows takes 20.5, for 72 and 85 %. For a model without more numbers, 0 where BIC prefers
         it, else 1.
         """
         more = self.numbers - before.numbers
