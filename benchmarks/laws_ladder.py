@@ -1,8 +1,9 @@
 """A law that the robot file lacks: is it found, named and taken, and do the intervals hold with it?
 
-Stribeck and LuGre along x by the integrators of laws_identified, which share no code with simulation/, under the file
-of plain Coulomb friction; the fall as large as so many of its standard errors, by differences of the same
-integrators; right logs of the same programs; Stribeck and wheels that slip from the simulator of wrong_worlds.
+Stribeck, Dahl and LuGre along x by the integrators of laws_identified, which share no code with simulation/, under the
+file of plain Coulomb friction; the fall, or the way that Dahl's bristles bend, as large as so many of its standard
+errors, by differences of the same integrators; right logs of the same programs; Stribeck and wheels that slip from the
+simulator of wrong_worlds.
 OMNIDYN_BENCH_SHARE=0.2 does that share of the logs.
 """
 
@@ -18,7 +19,19 @@ import numpy as np
 
 from benchmarks.identify_log import SHARE
 from benchmarks.ladder import Climbed, climbed
-from benchmarks.laws_identified import DT, LAWS, PROGRAMS, ROWS, TRUE, Law, program, robot_of, std_of_fall, true_twist
+from benchmarks.laws_identified import (
+    DT,
+    LAWS,
+    PROGRAMS,
+    ROWS,
+    TRUE,
+    Law,
+    bound,
+    program,
+    robot_of,
+    std_of_fall,
+    true_twist,
+)
 from benchmarks.table import Table, machine
 from benchmarks.wrong_worlds.remedies import FALL, FRICTION
 from omnidyn.arrays import FloatArray
@@ -33,8 +46,7 @@ LOGS, WORLDS, RIGHT_LOGS = max(round(20 * SHARE), 2), max(round(10 * SHARE), 2),
 FIRST_SEED = 7000  # of no log of laws_identified
 CLEAR = (5.0, 10.0, 30.0)  # standard errors (of their difference) by which breakaway exceeds Coulomb friction
 HELD, TAKEN, RICHER = 0.9, 0.95, 0.05
-BRISTLE = "friction.axes.stiffness"
-LAW_OF = {"Stribeck": (FALL,), "LuGre": (BRISTLE,)}
+LAW_OF = {"Stribeck": (FALL,), "Dahl": ("friction.axes.stiffness",), "LuGre": ("friction.axes.damping",)}
 
 NAMES = {"friction.axes.viscous[0]": TRUE["viscous"], "friction.axes.coulomb[0]": TRUE["coulomb"]}
 COLUMNS = ["world", "logs", "found", "1st or 2nd", "step", "law taken", "held before", "held after", "s a log"]
@@ -46,7 +58,7 @@ def measure() -> Table:
     table.notes += [
         machine(), "held: 95 % intervals of viscous and Coulomb friction that hold the truth, with the file's law, and "
         "with what the ladder took; law taken: of all logs, a step is the law, or says it is the same: "
-        "of LuGre its bristles, not the fall of the level alone",
+        "of LuGre its damped bristles, not the fall of the level alone",
     ]  # fmt: skip
     for name, law in LAW_OF.items():
         for clear in CLEAR if name == "Stribeck" else CLEAR[-1:]:
@@ -74,8 +86,15 @@ def _show(*told: Any) -> None:
 def of_law(name: str, clear: float, seed: int) -> tuple[Climbed, bool]:
     """A log of a law, so noisy that its fall is `clear`: (what came of it, whether the law is first or second)."""
     number = seed % PROGRAMS
-    noise = LAWS[name].noise * (TRUE["breakaway"] - TRUE["coulomb"]) / std_of_fall(name, number) / clear
+    noise = LAWS[name].noise * std_away(name, number) / clear
     return _on(true_twist(name, number), noise, seed, LAW_OF[name])
+
+
+def std_away(name: str, number: int) -> float:
+    """How many of its standard errors the number is from none of the law: the fall; of Dahl, the way they bend."""
+    if "breakaway" in LAWS[name].names:
+        return (TRUE["breakaway"] - TRUE["coulomb"]) / std_of_fall(name, number)
+    return TRUE["stiffness"] / float(bound(name, number)[LAWS[name].names.index("stiffness")])
 
 
 def right(seed: int) -> tuple[Climbed, bool]:

@@ -70,13 +70,13 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
     lack = fit.lack_of_fit
     if lack is None or not lack.found or fit.not_followed:
         return
-    near = (each for each in lack.remedies if each.confident and each.chi2 >= NEARLY * lack.remedies[0].chi2)
+    near = (each for each in lack.causes if each.confident and each.chi2 >= NEARLY * lack.causes[0].chi2)
     remedy = next(near, None)
     if remedy is not None:
         alike = f"; these logs cannot tell it from {lack.alike(remedy)}" if remedy.same_as else ""
         change = f" ({words})" if (words := remedy.would_change()) else ""
         yield f"{remedy.words} would explain what the model leaves out{change}{alike}: {how_to(remedy)}"
-    best = next(iter(lack.remedies), None)
+    best = next(iter(lack.causes), None)
     if fit.ladder is None and (best is None or (best.offered and best.key != CHANGE)):
         yield "let `ladder` fit the logs with each of the best causes, step by step: it keeps what predicts better"
 

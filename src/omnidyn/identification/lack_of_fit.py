@@ -12,6 +12,7 @@ from omnidyn.document import Part, Table, all_of, plain
 from omnidyn.identification.stability import Stability
 from omnidyn.model.keys import find_key, in_words, unit
 
+LOSS = "loss"  # the key of a remedy for wild samples, which is no cause of a misfit
 MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
 # What robots do that no law holds yet: key -> words.
 UNOFFERED = {
@@ -155,7 +156,8 @@ class LackOfFit:
     -> what that is, root mean square, in the unit of the output. follows: what residuals follow, first what explains
     most. remedies: best first; those that the log cannot tell from each other name each other in `same_as`. tested:
     what they were tested for -> chance of as much by noise alone. pictures: of the output that is worst. wild: outputs
-    with wild samples, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's.
+    with wild samples, which is no lack of fit, but widens intervals and pulls at numbers, unless the loss is Student's;
+    then the last remedy, key "loss", is that, whether or not there is a misfit.
     noise: of outputs whose noise the log shows without the model, by the best source; None where that was not asked.
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
     """
@@ -172,6 +174,11 @@ class LackOfFit:
     beyond: tuple[str, ...] = ()
     at_rest: Mapping[str, Noise] = field(default_factory=dict)
 
+    @property
+    def causes(self) -> tuple[Remedy, ...]:
+        """The remedies of a misfit."""
+        return tuple(each for each in self.remedies if each.key != LOSS)
+
     def words(self) -> str:
         """In a sentence, "" for a model that fits."""
         if not self.found:
@@ -179,12 +186,12 @@ class LackOfFit:
         worst = max(self.channels, key=lambda name: self.channels[name], default="")
         share = f" ({100.0 * self.channels[worst]:.0f} % of the residual of {worst} is no noise)" if worst else ""
         what = all_of([each.theme for each in self.follows[:2]])
-        beyond = "" if what or self.remedies else self._beyond_noise()
+        beyond = "" if what or self.causes else self._beyond_noise()
         words = "the model leaves something out" + (f": what it misses follows {what}{share}" if what else beyond)
-        if not self.remedies:
+        if not self.causes:
             return f"{words}; no cause that is known here explains it"
-        if not self.remedies[0].confident:
-            near = self.remedies[0]
+        if not self.causes[0].confident:
+            near = self.causes[0]
             if not near.offered:
                 return f"{words}; it looks like {near.words}, which no law that is known here holds"
             if near.rivals:
@@ -193,7 +200,7 @@ class LackOfFit:
                 f"{words}; no cause that is known here explains it: the nearest, {near.words}, explains "
                 f"{100.0 * near.share:.0f} % of it"
             )
-        best = self.remedies[0]
+        best = self.causes[0]
         same = f", or what this log cannot tell from it ({self.alike(best)})" if best.same_as else ""
         return f"{words}; most likely {best.words}{same}"
 
@@ -273,7 +280,7 @@ class LackOfFit:
 
     def parts(self) -> list[Part]:
         """As lines and a table."""
-        return [*self.statements(), *([self.table()] if self.remedies and self.found else [])]
+        return [*self.statements(), *([self.table()] if self.remedies else [])]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""

@@ -128,7 +128,7 @@ def _misfit(group: str, fit: OutputErrorEstimate) -> str:
     if lack is None or fit.not_followed:
         return paragraph("Not looked for: the fit was cut short, or the model does not follow the logs at all.")
     drawn = [draw_misfit(lack.pictures, _anchor(f"misfit-in-bins{group}"))] if lack.pictures else []
-    return content(Points(lack.statements()), *drawn, *([lack.table()] if lack.found and lack.remedies else []))
+    return content(Points(lack.statements()), *drawn, *([lack.table()] if lack.remedies else []))
 
 
 def _ladder(fit: OutputErrorEstimate) -> str:

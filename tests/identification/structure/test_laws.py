@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 from benchmarks.laws_ladder import of_law, right
-from omnidyn.identification.structure.missing.laws import arm, bristled, may_fall
+from omnidyn.identification.structure.missing.laws import arm, bent, bristled, may_fall
 from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import LUGRE
 from omnidyn.model.robot_file import load_robot
 
 
-@pytest.mark.parametrize("name", ["Stribeck", "LuGre"])
+@pytest.mark.parametrize("name", ["Stribeck", "Dahl", "LuGre"])
 def test_a_law_that_the_file_lacks_is_named_and_taken(name):
-    """Its fall is 10 standard errors of breakaway: found, first or second, the first step, and only noise is left."""
+    """Its fall, or the way that bristles bend, is 10 standard errors: found, first or second, the first step, and
+    only noise is left. Of Dahl and LuGre each has a key of its own."""
     log, early = of_law(name, 10.0, 0)
     assert log.found
     assert early
@@ -30,6 +31,8 @@ def test_a_law_that_the_file_lacks_is_named_and_taken(name):
         pytest.param(2, id="two of three axes never moved"),
         pytest.param(7, id="without the law viscous friction stands at its bound"),
         pytest.param(9, id="only the law tells that something is left, and what it leaves has less memory"),
+        pytest.param(17, id="a block that alone tells of the speed, where a linear step leads far astray"),
+        pytest.param(35, id="seen in one block only, whose error over blocks is as large as its gain"),
     ],
 )
 def test_a_law_of_five_standard_errors_is_taken(seed):
@@ -48,6 +51,15 @@ def test_what_may_fall_is_level_at_every_speed():
     assert may_fall(Friction(axes=falling, wheels=WheelFriction(coulomb=0.4))) == ["friction.wheels"]
 
 
+def test_dahls_bristles_on_the_axes_fall_with_lugres_law_only():
+    axes = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))
+    robot = load_robot("axebot").replace(friction=Friction(axes=axes))
+    dahl = bent(robot, 1e-3)
+    assert (dahl.axes.law, dahl.axes.breakaway) == ("dahl", None)
+    assert may_fall(dahl) == []
+    assert bristled(robot.replace(friction=dahl), 5e-3).axes.stiffness == dahl.axes.stiffness
+
+
 def test_the_law_that_is_right_is_kept():
     log, _ = right(1)
     assert log.steps == 0
@@ -58,9 +70,9 @@ def test_bristles_begin_as_long_as_they_are_said_to_bend():
     """On every axis, at the rims; a fall that is there stays."""
     axes = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))
     robot = load_robot("axebot").replace(friction=Friction(axes=axes))
-    bent = bristled(robot, 1e-3).axes
-    assert bent.law == LUGRE
-    lengths = np.array(axes.coulomb) / np.array(bent.stiffness) * [1.0, 1.0, arm(robot)]
+    lugre = bristled(robot, 1e-3).axes
+    assert lugre.law == LUGRE
+    lengths = np.array(axes.coulomb) / np.array(lugre.stiffness) * [1.0, 1.0, arm(robot)]
     assert lengths == pytest.approx([1e-3] * 3)
     falling = axes.replace(breakaway=(2.8, 1.9, 0.13), stribeck_speed=(0.02, 0.02, 0.2))
     again = bristled(robot.replace(friction=Friction(axes=falling)), 1e-3).axes

@@ -3,6 +3,11 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.prepare import EXACT, make_engine
+from omnidyn.identification.question import Question
+from omnidyn.identification.structure.linear import Rows
+from omnidyn.identification.structure.tails import as_counted
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -34,6 +39,47 @@ def test_wild_samples_are_named_with_the_way_out(times):
         assert one.held > 0.7  # 0.02 times^2 of 0.98 + 0.02 times^2
     assert any("heavy tails" in words and "`loss` student-t" in words for words in lack.statements())
     assert lack.to_dict()["wild"]["twist[0]"]["share"] == lack.wild["twist[0]"].share
+
+
+@pytest.mark.parametrize("times", [15.0, 100.0])
+def test_the_ladder_takes_the_loss_that_bears_them(times):
+    """It is the last remedy, for it is no cause, and the first step; what it says is what Student's t says."""
+    run = spoiled(3, times)
+    estimate = fit_output_error(run, AXEBOT, nuisances=(), ladder=True)
+    plain = fit_output_error(run, AXEBOT, nuisances=())
+    assert not plain.lack_of_fit.found
+    (remedy,) = plain.lack_of_fit.remedies
+    assert remedy.key == "loss"
+    assert remedy.offered
+    assert remedy.gain > remedy.gain_std > 0.0
+    assert plain.lack_of_fit.causes == ()
+    assert [rung.key for rung in estimate.ladder.taken] == ["loss"]
+    asked = fit_output_error(run, AXEBOT, nuisances=(), loss="student-t")
+    assert estimate.value == pytest.approx(asked.value, rel=1e-3)
+    assert "Student's t" in estimate.method
+
+
+def test_a_cause_that_wild_samples_hide_is_found_behind_them():
+    """A mass 5 % below the true one: unseen among samples 100 times off, and found by the loss that bears them."""
+    light = AXEBOT.replace(body=AXEBOT.body.replace(mass=AXEBOT.body.mass * 0.95))
+    run = spoiled(4, 100.0)
+    assert not fit_output_error(run, light, nuisances=()).lack_of_fit.found
+    assert fit_output_error(run, light, nuisances=(), loss="student-t").lack_of_fit.found
+
+
+def test_pulled_in_residuals_leave_a_robust_fit_where_it_is():
+    """Least squares of them go nowhere from its best point, in standard errors; of the residuals as they are, far."""
+    solution = Fit.of(spoiled(5, 30.0), AXEBOT, Question(nuisances=(), loss="student-t")).solve()
+    problem, point, variance = solution.solver.problem, solution.state.point, solution.state.variance
+    parts = make_engine(EXACT, problem).residuals(point)
+    far = []
+    for own in (as_counted(solution, problem, parts), parts):
+        rows = Rows.of(problem, point, own)
+        weighed = rows.slopes[0] / variance[:, None, None]
+        size = np.sqrt(np.einsum("ckp,ckp->p", weighed, rows.slopes[0]))
+        far.append(np.abs(np.einsum("ck,ckp->p", rows.residual[0], weighed) / size).max())
+    assert far[0] < 0.05
+    assert far[1] > 1.0
 
 
 def test_student_t_counts_them_little():

@@ -1,15 +1,29 @@
-"""Heavy tails: a few wild samples that hold much of the squares of residuals, which normal noise does not."""
+"""Heavy tails: a few wild samples that hold much of the squares of residuals, which normal noise does not.
+
+They are no misfit of the model. What makes up for them is a loss that counts them little, Student's t: a remedy by what
+held-out blocks gain, which Huber's loss measures, as the square of a wild sample would drown every gain.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
-from omnidyn.identification.lack_of_fit import Wild
+from omnidyn.arrays import FloatArray
+from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
+from omnidyn.identification.output_error.fit import NU
+from omnidyn.identification.output_error.kernel.of_rows import row_terms
+from omnidyn.identification.output_error.problem.problem import Parts, Problem
+from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.structure.linear import solved
 from omnidyn.identification.structure.misfit import Misfit
-from omnidyn.statistics import robust_std
+from omnidyn.identification.structure.missing.remedies import Blocks
+from omnidyn.statistics import HUBER_CLIP, huber_loss, robust_std
 
 BEYOND = 5.0  # robust standard deviations: of normal noise one sample in two million is so far out
 LEAST, HELD = 3, 0.1  # samples, and their share of the squares, from which they are worth a word
+ROUNDS = 20  # of weights and fit in turn
 
 
 def wild_samples(seen: Misfit) -> dict[str, Wild]:
@@ -32,4 +46,62 @@ def wild_samples(seen: Misfit) -> dict[str, Wild]:
         if scale > 0.0 and out.sum() >= LEAST and held > HELD:
             name, i = rows.problem.columns[c]
             found[f"{name}[{i}]"] = Wild(float(out.mean()), held)
+    return found
+
+
+def calmer(seen: Misfit, wild: Mapping[str, Wild]) -> tuple[Remedy, ...]:
+    """Student's t as a remedy where samples are wild: none, or one. Its gain is the share of the held-out error that it
+    takes away beside all that residuals follow, of Huber's loss for both, so that it compares with other remedies."""
+    if not wild:
+        return ()
+    linear = seen.linear
+    e, j = linear.whole()
+    columns = np.column_stack([j, linear.white(seen.shown)])
+    plain, robust = list[float](), list[float]()
+    scale = float(robust_std(e[e != 0.0], 0.0))
+    for own in Blocks(linear, [shown[:, :, :0] for shown in seen.shown]).block:
+        others, bound = np.delete(np.arange(len(e)), own), HUBER_CLIP * scale
+        first = solved(columns[others], e[others])
+        ways = first, _students(columns[others], e[others], first, scale)
+        one, other = (float(huber_loss((e[own] - columns[own] @ by) ** 2, bound).sum()) for by in ways)
+        plain.append(one)
+        robust.append(other)
+    change = (np.array(plain) - robust) / max(sum(plain), 1e-300)
+    share = 100.0 * max(each.share for each in wild.values())
+    words = f"noise with wild samples, {share:.2g} % of them, that count little (`loss` student-t)"
+    return (Remedy(LOSS, words, float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change))), share=0.0),)
+
+
+def _students(columns: FloatArray, e: FloatArray, begin: FloatArray, scale: float) -> FloatArray:
+    """What Student's t fits columns (N, K) to e (N,) by, at a known scale: least squares with its weights, again."""
+    by = begin
+    for _ in range(ROUNDS):
+        root = np.sqrt((NU + 1.0) / (NU + ((e - columns @ by) / scale) ** 2))
+        by = solved(columns * root[:, None], e * root)
+    return by
+
+
+def as_counted(solution: Solution, problem: Problem, parts: Sequence[Parts]) -> list[Parts]:
+    """What an engine shows, its residuals as the loss of a fit counts them: those of Student's t pulled in.
+
+    Pseudo-residuals w r/mean(d(w r)/dr): least squares of them is what the robust fit is at its best point, and tests
+    for normal noise hold. P. J. Huber, Robust Statistics (1981), section 7.8.
+    """
+    nu = solution.solver.nu
+    if not nu:
+        return list(parts)
+    every, variance = solution.solver.problem.columns, solution.state.variance
+    slope, number, pulled = np.zeros(len(every)), np.zeros(len(every)), list[FloatArray]()
+    for piece, (residual, _, _) in zip(problem.pieces, parts, strict=True):
+        own = np.array([every.index(column) for column in piece.record.columns])
+        pull, _, curvature, _ = row_terms(residual, variance[own], nu, None, np.ones(len(own)), True)
+        there = np.isfinite(residual)
+        slope[own] += np.where(there, curvature, 0.0).sum(axis=1)
+        number[own] += there.sum(axis=1)
+        pulled.append(np.where(there, pull, np.nan))
+    mean = np.where(slope > 0.0, slope / np.maximum(number, 1.0), 1.0)
+    found = []
+    for piece, own, (_, slopes, at) in zip(problem.pieces, pulled, parts, strict=True):
+        places = [every.index(column) for column in piece.record.columns]
+        found.append((own / mean[places][:, None], slopes, at))
     return found

@@ -3,10 +3,10 @@
 A step fits the logs anew with each of the best remedies of the diagnosis, and with what is the same as the first of
 them. Where none of these leaves only noise, it tries what a diagnosis near the best point tells little of: other shapes
 of friction, a usual fall, a limit; and, once it has found the best, the same without the step before. Of those that
-predict blocks of the logs which they were not fitted to better than what stands, by more than a standard error, and
-that BIC prefers though they are the best of many, the simplest within a standard error of the best is taken, unless BIC
-prefers the best by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor is what explains
-less than such a cause would.
+predict blocks of the logs which they were not fitted to better than what stands (`Errors.lowers`), and that explain
+more than the best of so many would of noise (`Errors.chance`), the simplest within a standard error of the best is
+taken, unless BIC prefers the best by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor
+is what explains less than such a cause would. Before all this, where samples are wild, is a loss that bears them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.document import all_of
-from omnidyn.identification.lack_of_fit import UNOFFERED, LackOfFit, Remedy
+from omnidyn.identification.lack_of_fit import LOSS, UNOFFERED, LackOfFit, Remedy
 from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import WHOLE
 from omnidyn.identification.output_error.conclusion import unexplained
@@ -25,7 +25,8 @@ from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine
-from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
+from omnidyn.identification.structure.ladder.calm import calmed
+from omnidyn.identification.structure.ladder.held_out import CLEAR, Errors, errors, margins_of
 from omnidyn.identification.structure.ladder.models import Model, Untried, can, moves, moves_apart, tried
 from omnidyn.identification.structure.missing.candidates import CHANGE
 from omnidyn.identification.structure.missing.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
@@ -36,11 +37,12 @@ from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
 from omnidyn.run import Run
 
+NOISE = "the residuals hold nothing but noise"  # why it went no further
 STEPS = 4  # at most
 TRIED = 3  # remedies that are fitted in a step
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of BIC, from which one of two models is the better one; of a first step's chi squared
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
-CLEAR = 1.0  # standard errors of its gain by which a step must pay
+LOOK, RICHER = 0.1, 0.03  # of right models: in which a cause is looked for; for which a richer one is taken, at most
 BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
 
 
@@ -49,9 +51,11 @@ def climb(
 ) -> tuple[Fit, Solution, Ladder]:
     """The best fit of some runs, its solution, and the way to it. fit, solution: of the robot as it was given. names:
     of the group of each run, where there are groups."""
-    stands, rungs = Model.first(fit, solution), list[Rung]()
-    seen: dict[str, Examined] | None = None
-    for step in range(1, STEPS + 1):
+    given = Model.first(fit, solution)
+    seen: dict[str, Examined] | None = _examined(given)
+    stands, rungs = calmed(given, seen, runs, names, progress)
+    seen, begin = (seen, 1) if stands is given else (None, 2)
+    for step in range(begin, begin + STEPS):
         if unexplained(stands.solution.solver, stands.solution):
             return _ended(
                 stands, rungs, "the model does not follow the logs: first mend signs, units, the order of wheels"
@@ -60,7 +64,7 @@ def climb(
         seen = seen or _examined(stands)
         lacks = _lacks(seen)
         if not lacks:
-            return _ended(stands, rungs, "the residuals hold nothing but noise")
+            return _ended(stands, rungs, NOISE)
         every, found, best, after = list[Model | Untried](), list[Rung](), None, None
         first = {group: offered(lack) for group, lack in lacks.items()}
         far = {group: unseen(lack, stands, group) for group, lack in lacks.items()}
@@ -77,20 +81,21 @@ def climb(
             every += tried(best.move, stands.before, runs, names, progress, stands.words)
             found, best = judged(step, stands, every, seen)
             after = _examined(best) if best is not None and best.instead else after
-        rungs += found
+        rungs += [rung for rung in found if rung.step or not rungs]
         if best is None:
-            return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}")
+            sure = any(each.sure for each in seen.values())
+            return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}" if sure else NOISE)
         stands, seen = best, after
     return _ended(stands, rungs, f"{STEPS} steps are the most that it takes")
 
 
 def _examined(model: Model) -> dict[str, Examined]:
-    """What a model leaves out, of each group."""
-    return {group: examine(alone) for group, alone in model.alone.items()}
+    """What a model may leave out, of each group."""
+    return {group: examine(alone, LOOK) for group, alone in model.alone.items()}
 
 
 def _lacks(seen: Mapping[str, Examined]) -> dict[str, LackOfFit]:
-    """The groups in which something is left out, and what."""
+    """The groups in which something may be left out, and what."""
     every = {group: each.diagnosis.lack_of_fit for group, each in seen.items()}
     return {group: lack for group, lack in every.items() if lack.found}
 
@@ -98,7 +103,7 @@ def _lacks(seen: Mapping[str, Examined]) -> dict[str, LackOfFit]:
 def offered(lack: LackOfFit) -> list[Remedy]:
     """The remedies that are worth a fit, best first: those that a robot file or a fit can hold, and nothing else is the
     same as; and what the first of them cannot be told from."""
-    able = simpler_first([r for r in lack.remedies if r.offered and r.key != CHANGE and not r.rivals])
+    able = simpler_first([r for r in lack.remedies if r.offered and r.key not in (CHANGE, LOSS) and not r.rivals])
     same = [r for r in able[TRIED:] if r.key in able[0].same_as]
     return [*able[:TRIED], *same[: TRIED - 1]]
 
@@ -165,11 +170,10 @@ def judged(
 
 def _why_not(model: Model, own: Errors, before: Errors, count: int, beyond: tuple[float, str]) -> str:
     """Why a model is no step up, "" where it is one."""
-    gain, std = own.gain(before)
-    if not gain > CLEAR * std:
+    if not own.lowers(before):
         return "predicts what it was not fitted to no better"
-    if own.bic(count) >= before.bic():
-        return "explains less than its numbers cost"
+    if own.chance(before, count) >= RICHER:
+        return "explains no more than the best of so many would of noise"
     at_least, words = beyond
     noise = own.left / max(own.rows, 1)
     if (before.left - own.left) / noise - np.log(max(own.rows, 2)) * (own.numbers - before.numbers) < at_least:
@@ -250,7 +254,7 @@ def _said(lacks: Mapping[str, LackOfFit]) -> str:
 
 
 def _looks_like(lack: LackOfFit) -> str:
-    first = next(iter(lack.remedies), None)
+    first = next(iter(lack.causes), None)
     if first is None:
         return ""
     if first.key == CHANGE:

@@ -221,7 +221,7 @@ def _fit(
     asked, first = stands.fit.question, next(iter(begins.values()))[1]
     profiles = [set(question.profile) for _, question in begins.values()]
     question = replace(
-        asked, per_free=_own(stands, begins), nuisances=first.nuisances,
+        asked, per_free=_own(stands, begins), nuisances=first.nuisances, loss=first.loss,
         profile=tuple(name for name in asked.profile if all(name in own for own in profiles)),
     )  # fmt: skip
     return Fit.of(runs, stands.fit.began, question, names, progress, begins)

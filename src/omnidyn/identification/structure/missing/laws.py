@@ -22,9 +22,7 @@ from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.dynamics import drive_wrench, frame_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.friction.kinds import COULOMB, LUGRE
-from omnidyn.model.friction.stribeck import USUAL as EXPONENT
-from omnidyn.model.friction.stribeck import fallen
+from omnidyn.model.friction.kinds import COULOMB, KINDS, LUGRE
 from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
@@ -42,7 +40,8 @@ USUAL_FALL, USUAL_SPEED = 1.3, 0.05  # breakaway over Coulomb friction, and [m/s
 FALL_WORDS = "friction that falls with the speed from breakaway, above Coulomb friction (Stribeck)"
 LIGHT, AMPLE = 0.02, 1e6  # wheels, as a share of the robot's mass at their rims; a grip that no motor overcomes
 TRACTION = "wheels.traction_mu"
-FALL, BRISTLE = "stribeck_speed", "stiffness"  # numbers that laws begin with, in the table of the friction
+FALL, BEND, DAMPING = "stribeck_speed", "stiffness", "damping"  # numbers by which laws are named: Stribeck, Dahl, LuGre
+DAHL = "dahl"
 
 
 def candidates(bench: Workbench) -> Iterator[Candidate]:
@@ -167,15 +166,21 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
     if friction.wheels == WheelFriction():
         yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
     for table in may_fall(friction):
-        yield Candidate(f"{table}.{FALL}", _falling(FORCES[table]), as_it_is(FALL_WORDS), 0.0)
-    if boxed and axes.law == COULOMB and axes.coulomb_backward is None:
-        yield Candidate(f"{BODY_AXES}.{BRISTLE}", _bending, as_it_is("friction that bends before it slips (LuGre)"))
+        yield Candidate(f"{table}.{FALL}", _falling(table), as_it_is(FALL_WORDS), 0.0)
+    if not boxed or axes.coulomb_backward is not None:
+        return
+    if axes.law == COULOMB and axes.breakaway is None:
+        yield Candidate(f"{BODY_AXES}.{BEND}", _bending(bent), as_it_is("friction that bends before it slips (Dahl)"))
+    if axes.law in (COULOMB, DAHL):
+        words = "friction that bends before it slips, falls and is damped (LuGre)"
+        yield Candidate(f"{BODY_AXES}.{DAMPING}", _bending(bristled), as_it_is(words))
 
 
 def may_fall(friction: Friction) -> list[str]:
-    """The tables of friction whose level is the same at every speed."""
+    """The tables of friction whose level is the same at every speed; of Dahl's bristles on the axes LuGre's fall."""
     laws = ((table, table_of(friction, table)) for table in (BODY_AXES, DIRECTION, WHEELS))
-    return [table for table, law in laws if law.stribeck_speed is None and np.any(law.coulomb)]
+    level = [table for table, law in laws if law.stribeck_speed is None and np.any(law.coulomb)]
+    return [table for table in level if table != BODY_AXES or friction.axes.law != DAHL]
 
 
 def table_of(friction: Friction, table: str) -> Any:
@@ -183,17 +188,50 @@ def table_of(friction: Friction, table: str) -> Any:
     return getattr(friction, table.rpartition(".")[2])
 
 
-def _falling(force: Callable[[Motion, float], FloatArray]) -> Callable[[Workbench], list[Trial]]:
-    """A level that is larger at rest by a share of Coulomb friction, a number for each part of `force`: to first order,
-    where the robot moves. Tried with several speeds over which it falls [m/s at the rims]."""
+def _falling(table: str) -> Callable[[Workbench], list[Trial]]:
+    """A level that is larger at rest by a share of Coulomb friction, a number for each part of the table. Tried with
+    several speeds over which it falls [m/s at the rims].
+
+    By as much as is usual, not by a little: what a log tells of a fall is mostly how long the robot sticks, and of that
+    a small step from the fit, where it sticks less, shows hardly anything.
+    """
 
     def trials(bench: Workbench) -> list[Trial]:
         top = max(float(np.abs(m.twist @ bench.robot.wheels.wrench_matrix).max()) for m in bench.motions)
-        speeds = [share * top for share in SPEEDS if top > 0.0]
-        shown = bench.by_forces([lambda m, v=v: force(m, v) for v in speeds])
-        return [Trial(own, v) for own, v in zip(shown, speeds, strict=True)]
+        return [Trial(_fallen(bench, table, share * top), share * top) for share in SPEEDS if top > 0.0]
 
     return trials
+
+
+def _fallen(bench: Workbench, table: str, over: float) -> list[FloatArray]:
+    """What a fall of each part over a speed shows, by a share of 1; nothing of an axis that never moved."""
+    nothing = [np.zeros((*m.shown(m.twist[:, None, :]).shape[:2], 1)) for m in bench.motions]
+    moved = np.any([np.any(m.twist, axis=0) for m in bench.motions], axis=0)
+    parts = {BODY_AXES: moved, DIRECTION: np.array([moved[:YAW].any(), moved[YAW]]), WHEELS: np.ones(1, bool)}[table]
+    columns = []
+    for k, moves in enumerate(parts):
+        above = np.where(np.arange(len(parts)) == k, USUAL_FALL, 1.0)
+        other = bench.robot.model_copy(update={"friction": falling(bench.robot, table, above, over)})
+        columns.append([own / (USUAL_FALL - 1.0) for own in bench.change(other)] if moves else nothing)
+    return [np.concatenate(each, axis=2) for each in zip(*columns, strict=True)]
+
+
+def falling(robot: Robot, table: str, above: FloatArray, over: float) -> Friction:
+    """The friction with a level that is `above` times Coulomb friction at rest, and falls to it over a speed [m/s at
+    the rims]; with bristles of one level it is LuGre's law. above: of each axis; of the direction of travel and about
+    yaw; of all wheels."""
+    own, about = table_of(robot.friction, table), over / arm(robot)
+    changes = {"breakaway": tuple((above[0] * np.array(own.coulomb)).tolist()), FALL: over}
+    if table == BODY_AXES:
+        changes = {"breakaway": tuple((above * own.coulomb).tolist()), FALL: (over, over, about)}
+    elif table == DIRECTION and own.yaw_coulomb > 0.0:
+        changes |= {"yaw_breakaway": float(above[1] * own.yaw_coulomb), f"yaw_{FALL}": about}
+    elif table == WHEELS:
+        levels = above[0] * per_wheel(own.coulomb, robot.wheels.count)
+        changes["breakaway"] = tuple(levels.tolist()) if np.ndim(own.coulomb) else float(levels[0])
+    one_level = KINDS[own.law].bends and not KINDS[own.law].falls
+    law = own.replace(**changes, law=LUGRE if one_level else own.law)
+    return robot.friction.model_copy(update={table.rpartition(".")[2]: law})
 
 
 def arm(robot: Robot) -> float:
@@ -201,53 +239,39 @@ def arm(robot: Robot) -> float:
     return float(np.mean(robot.wheels.robot_radius))
 
 
-def _of_axes(motion: Motion, over: float) -> FloatArray:
-    speed, level = motion.twist * [1.0, 1.0, arm(motion.robot)], motion.robot.friction.axes.coulomb
-    return np.eye(N_AXES) * (-np.sign(speed) * fallen(speed, 1.0 / over, EXPONENT) * level)[:, None, :]
-
-
-def _of_travel(motion: Motion, over: float) -> FloatArray:
-    """Along the direction of travel, and about yaw."""
-    law, yaw = motion.robot.friction.direction, motion.twist[:, YAW]
-    weighed = motion.twist[:, :YAW] * law.coulomb
-    fall = fallen(np.linalg.norm(motion.twist[:, :YAW], axis=1, keepdims=True), 1.0 / over, EXPONENT)
-    along = fall * weighed * law.coulomb / np.maximum(np.linalg.norm(weighed, axis=1, keepdims=True), 1e-12)
-    about = np.sign(yaw) * fallen(arm(motion.robot) * yaw, 1.0 / over, EXPONENT) * law.yaw_coulomb
-    zero = np.zeros_like(yaw)
-    return -np.stack([np.column_stack([along, zero]), np.column_stack([zero, zero, about])], axis=1)
-
-
-def _of_rims(motion: Motion, over: float) -> FloatArray:
-    g, rim = motion.robot.wheels.wrench_matrix, motion.twist @ motion.robot.wheels.wrench_matrix
-    level = per_wheel(motion.robot.friction.wheels.coulomb, g.shape[1])
-    return -((np.sign(rim) * fallen(rim, 1.0 / over, EXPONENT) * level) @ g.T)[:, None, :]
-
-
-FORCES = {BODY_AXES: _of_axes, DIRECTION: _of_travel, WHEELS: _of_rims}  # of a fall, of each table
-
-
-def _bending(bench: Workbench) -> list[Trial]:
-    """LuGre's bristles in the place of friction that holds exactly, at several lengths by which they bend.
+def _bending(law: Callable[[Robot, float], Friction]) -> Callable[[Workbench], list[Trial]]:
+    """Bristles in the place of friction that holds exactly, at several lengths by which they bend.
 
     Levels that a fit drove far beyond what the motors give would make bristles as stiff, and steps as short.
     """
-    axes = bench.robot.friction.axes
-    drive = np.max([np.abs(drive_wrench(m.robot, 0.0 * m.twist, m.voltage)).max(axis=0) for m in bench.motions], axis=0)
-    least = axes.model_copy(update={"coulomb": tuple(np.minimum(axes.coulomb, 2.0 * drive).tolist())})
-    robot = bench.robot.model_copy(update={"friction": bench.robot.friction.model_copy(update={"axes": least})})
-    return [Trial(bench.change(robot.model_copy(update={"friction": bristled(robot, z)})), z) for z in BENDS]
+
+    def trials(bench: Workbench) -> list[Trial]:
+        axes, moved = bench.robot.friction.axes, bench.motions
+        drive = np.max([np.abs(drive_wrench(m.robot, 0.0 * m.twist, m.voltage)).max(axis=0) for m in moved], axis=0)
+        least = axes.model_copy(update={"coulomb": tuple(np.minimum(axes.coulomb, 2.0 * drive).tolist())})
+        robot = bench.robot.model_copy(update={"friction": bench.robot.friction.model_copy(update={"axes": least})})
+        return [Trial(bench.change(robot.model_copy(update={"friction": law(robot, z)})), z) for z in BENDS]
+
+    return trials
+
+
+def bent(robot: Robot, bend: float) -> Friction:
+    """The friction of the axes with Dahl's bristles, that bend by a length [m at the rims] before they slip."""
+    axes, units = robot.friction.axes, np.array([1.0, 1.0, arm(robot)])
+    stiffness = np.maximum(np.array(axes.coulomb) * units / bend, 1e-3)
+    other = axes.replace(law=DAHL, stiffness=tuple(stiffness.tolist()))
+    return robot.friction.model_copy(update={"axes": other})
 
 
 def bristled(robot: Robot, bend: float) -> Friction:
-    """The friction of the axes with LuGre's bristles, that bend by a length [m at the rims] before they slip; where the
-    level does not fall yet, it falls as much and as fast as is usual."""
+    """The friction of the axes with LuGre's bristles, that bend by a length [m at the rims] before they slip, or are as
+    stiff as they are; where the level does not fall yet, it falls as much and as fast as is usual."""
     axes, units = robot.friction.axes, np.array([1.0, 1.0, arm(robot)])
-    coulomb = np.array(axes.coulomb)
     falls = {} if axes.stribeck_speed is not None else {
-        "breakaway": tuple((USUAL_FALL * coulomb).tolist()), FALL: tuple((USUAL_SPEED / units).tolist())
+        "breakaway": tuple((USUAL_FALL * np.array(axes.coulomb)).tolist()), FALL: tuple((USUAL_SPEED / units).tolist())
     }  # fmt: skip
-    stiffness = np.maximum(coulomb * units / bend, 1e-3)
-    other = axes.replace(law=LUGRE, stiffness=tuple(stiffness.tolist()), **falls)
+    stiffness = np.maximum(np.array(axes.coulomb) * units / bend, 1e-3)
+    other = axes.replace(law=LUGRE, stiffness=axes.stiffness or tuple(stiffness.tolist()), **falls)
     return robot.friction.model_copy(update={"axes": other})
 
 

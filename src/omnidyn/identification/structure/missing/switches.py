@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
-from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.lack_of_fit import LOSS, Remedy
 from omnidyn.identification.output_error.prepare import LOOP, engine_kind, expand_keys, guesses
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
@@ -23,20 +22,21 @@ from omnidyn.identification.output_error.problem.parameters import AT, EFFICIENC
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
-from omnidyn.identification.question import Question
+from omnidyn.identification.question import STUDENT, Question
 from omnidyn.identification.structure.missing.laws import (
-    BRISTLE,
+    BEND,
+    DAMPING,
     FALL,
     TRACTION,
     along_axes,
     along_travel,
-    arm,
+    bent,
     bristled,
+    falling,
     slippery,
     table_of,
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.friction.kinds import KINDS, LUGRE
 from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
@@ -44,9 +44,11 @@ from omnidyn.model.robot import Prior, Robot
 
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
 EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one of all
-FALLS, BRISTLES = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS)), f"{BODY_AXES}.{BRISTLE}"
-LOSS = 0.01  # of a gear, from which its fit begins at least
+FALLS = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS))
+BRISTLES = BENDS, DAMPS = f"{BODY_AXES}.{BEND}", f"{BODY_AXES}.{DAMPING}"  # Dahl's, LuGre's
+OF_GEAR = 0.01  # lost by a gear, from which its fit begins at least
 UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
+BREAK = "breakaway"
 ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {
@@ -85,11 +87,11 @@ def as_it_ended(robot: Robot, question: Question, found: Solution) -> Switch:
 
 
 def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
-    """Without bristles behind a fall that explains more: they have that fall too, and their turn after it; a fit of
-    bristles to a log without any takes long."""
+    """Without bristles behind a fall that explains more, and LuGre's behind Dahl's: they have their turn after it; a
+    fit of bristles to a log without any takes long."""
     found = [remedy.key for remedy in remedies]
-    falls = [found.index(key) for key in FALLS if key in found]
-    return [r for k, r in enumerate(remedies) if r.key != BRISTLES or k < min(falls, default=len(found))]
+    first = {BENDS: FALLS, DAMPS: (*FALLS, BENDS)}
+    return [r for k, r in enumerate(remedies) if not any(key in found[:k] for key in first.get(r.key, ()))]
 
 
 def told(words: str, before: Mapping[str, float], after: Mapping[str, float]) -> str:
@@ -109,6 +111,8 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
     friction = robot.friction
     if key.partition(".")[0] in NUISANCES:
         yield Switch(robot, replace(asked, nuisances=(*(asked.nuisances or ()), key)), words)
+    elif key == LOSS:
+        yield Switch(robot, replace(asked, loss=STUDENT), words)
     elif key == FRAME:
         body = robot.body.replace(rotating_frame=not robot.body.rotating_frame)
         yield Switch(robot.replace(body=body), asked, words)
@@ -126,7 +130,7 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         yield _at_each_wheel(robot, asked)
     elif key in FALLS:
         yield _falling(remedy, robot, asked)
-    elif key == BRISTLES:
+    elif key in BRISTLES:
         yield _bending(remedy, robot, asked)
     elif key == LIMIT:
         limited = robot.replace(motor=robot.motor.replace(current_limit=remedy.at))
@@ -139,7 +143,7 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         on = robot.replace(motor=robot.motor.replace(**{OFF[key]: remedy.size[0]}))
         yield Switch(on, _free(asked, key), words)
     elif key == EFFICIENCY:
-        lossy = robot.replace(motor=robot.motor.replace(gear_efficiency=1.0 - max(remedy.size[0], LOSS)))
+        lossy = robot.replace(motor=robot.motor.replace(gear_efficiency=1.0 - max(remedy.size[0], OF_GEAR)))
         yield Switch(lossy, _free(asked, key), words)
     elif find_key(key):
         yield Switch(_as_one(robot, key), _free(asked, key), words)
@@ -203,36 +207,25 @@ def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
     levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
     changed = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=levels)))
-    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
+    told = {Key.parse(key).axis for key in asked.free or () if key.startswith(f"{BODY_AXES}.coulomb")}
+    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, max(len(told), 1))
 
 
 def _falling(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
-    """Levels and speeds from which a fit finds how friction falls: those of the first step; with bristles it is LuGre's
-    law."""
-    table, own = remedy.key.rpartition(".")[0], table_of(robot.friction, remedy.key.rpartition(".")[0])
-    above, about = np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at / arm(robot)
-    changes: dict[str, Any]
-    if table == BODY_AXES:
-        levels, speeds = above * own.coulomb, (remedy.at, remedy.at, about)
-        changes = {"breakaway": tuple(levels.tolist()), FALL: speeds}
-    elif table == DIRECTION:
-        changes = {"breakaway": tuple((above[0] * np.array(own.coulomb)).tolist()), FALL: remedy.at}
-        if own.yaw_coulomb > 0.0:
-            changes |= {"yaw_breakaway": float(above[1] * own.yaw_coulomb), f"yaw_{FALL}": about}
-    else:
-        levels = above[0] * per_wheel(own.coulomb, robot.wheels.count)
-        changes = {"breakaway": tuple(levels.tolist()) if np.ndim(own.coulomb) else float(levels[0]), FALL: remedy.at}
-    one_level = KINDS[own.law].bends and not KINDS[own.law].falls
-    law = own.replace(**changes, law=LUGRE if one_level else own.law)
-    changed = robot.replace(friction=robot.friction.replace(**{table.rpartition(".")[2]: law}))
-    return _rough(changed, asked, [f"{table}.{name}" for name in changes], remedy.words)
+    """Levels and speeds from which a fit finds how friction falls: those of the first step."""
+    table = remedy.key.rpartition(".")[0]
+    friction = falling(robot, table, np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at)
+    own, yaw = table_of(friction, table), (f"yaw_{BREAK}", f"yaw_{FALL}")
+    names = (BREAK, FALL, *(yaw if getattr(own, yaw[0], None) is not None else ()))
+    return _rough(robot.replace(friction=friction), asked, [f"{table}.{name}" for name in names], remedy.words)
 
 
 def _bending(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
-    """LuGre's law, with the critical damping to begin from."""
-    bent = robot.replace(friction=bristled(robot, remedy.at))
-    keys = [f"{BODY_AXES}.{name}" for name in ("breakaway", FALL, BRISTLE, "damping")]
-    return _rough(with_damping(bent, keys), asked, keys, remedy.words)
+    """Dahl's law, or LuGre's with the critical damping to begin from."""
+    if remedy.key == BENDS:
+        return _rough(robot.replace(friction=bent(robot, remedy.at)), asked, [BENDS], remedy.words)
+    keys = [f"{BODY_AXES}.{name}" for name in (BREAK, FALL, BEND, DAMPING)]
+    return _rough(with_damping(robot.replace(friction=bristled(robot, remedy.at)), keys), asked, keys, remedy.words)
 
 
 def _rough(robot: Robot, asked: Question, names: Sequence[str], words: str) -> Switch:

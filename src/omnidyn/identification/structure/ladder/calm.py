@@ -1,0 +1,42 @@
+"""The first step where samples are wild: a fit that counts them little, before any other, for they hide causes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from omnidyn.identification.lack_of_fit import LOSS
+from omnidyn.identification.ladder import STANDS, Rung
+from omnidyn.identification.output_error.conclusion import unexplained
+from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.structure.diagnosis import Examined
+from omnidyn.identification.structure.ladder.models import Model, Move, tried
+from omnidyn.run import Run
+
+
+def calmed(
+    stands: Model, seen: Mapping[str, Examined], runs: Sequence[Run], names: Sequence[str] | None, progress: Progress
+) -> tuple[Model, list[Rung]]:
+    """(the model to go on from, the rungs): of Student's t where that predicts better, by more than a standard error,
+    what is not wild; as it stands, and no rungs, where no sample is wild. It counts as no number of the fit."""
+    own = {
+        group: remedy for group, each in seen.items() for remedy in each.diagnosis.lack_of_fit.remedies
+        if remedy.key == LOSS
+    }  # fmt: skip
+    if not own:
+        return stands, []
+    best = max(own.values(), key=lambda remedy: remedy.gain - remedy.gain_std)
+    made = tried(Move(dict.fromkeys(stands.begins, best)), stands, runs, names, progress)[0]
+    count, nothing = len(stands.value), np.nan
+    rung = Rung(1, LOSS, best.words, count, nothing, best.gain, best.gain_std, nothing)
+    first = Rung(0, "", STANDS, count, nothing, taken=True, value=stands.value)
+    if isinstance(made, Model) and unexplained(made.solution.solver, made.solution):
+        return stands, []
+    if not isinstance(made, Model):
+        return stands, [first, replace(rung, why=f"cannot be fitted: {made.why}")]
+    if not best.gain > best.gain_std:
+        return stands, [first, replace(rung, why="predicts what it was not fitted to no better", value=made.value)]
+    taken = replace(rung, why="pays", value=made.value, taken=True)
+    return replace(made, before=None), [first, taken]
