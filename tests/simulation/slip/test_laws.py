@@ -60,7 +60,8 @@ def with_law(robot, law, rng):
         axes = axes.replace(law="lugre", breakaway=tuple(coulomb * more), stribeck_speed=(speed, speed, speed / arm),
                             stiffness=(stiff[0], stiff[1], stiff[2] * arm), damping=(10.0, 10.0, 10.0 * arm**2),
                             coulomb=tuple(coulomb))  # fmt: skip
-        wheels = wheels.replace(law="dahl", coulomb=rim, stiffness=rim / 2e-3)
+        spring, spin = rim / 2e-3, robot.wheels.wheel_inertia / robot.wheels.radii[0] ** 2
+        wheels = wheels.replace(law="lugre", coulomb=rim, stiffness=spring, damping=2.0 * float(np.sqrt(spring * spin)))
     return robot.replace(friction=friction.replace(axes=axes, wheels=wheels), motor=motor)
 
 
