@@ -112,6 +112,14 @@ def reverses(plant, a, b, h):
 
 
 @part
+def _speed_of_bend(plant, e):
+    """The speed that a bend of 1 m, or rad, gives to what it moves, as an error of that speed counts [1/s]."""
+    heavy = plant.mass[e] if e < 3 else plant.spin[e - 3]
+    speed = math.sqrt(plant.element[e].stiffness / heavy)
+    return speed if e < 2 else SHARE * speed
+
+
+@part
 def memory_error(plant, one, two):
     """Difference of currents and of what bends between two states, as a speed [m/s]."""
     worst = 0.0
@@ -120,8 +128,7 @@ def memory_error(plant, one, two):
         if own.inductance > 0.0:
             worst = max(worst, CURRENT_SHARE * abs(a.current - b.current))
         if own.stiffness > 0.0:
-            heavy = plant.mass[e] if e < 3 else plant.spin[e - 3]
-            worst = max(worst, math.sqrt(own.stiffness / heavy) * abs(a.bend - b.bend))
+            worst = max(worst, _speed_of_bend(plant, e) * abs(a.bend - b.bend))
     return worst
 
 
@@ -133,7 +140,6 @@ def bristle_turns(plant, a, b, h):
         own = plant.element[e]
         if own.stiffness > 0.0 and a.x[e] * b.x[e] < 0.0:
             side = 0 if a.x[e] > 0.0 else 1
-            heavy = plant.mass[e] if e < 3 else plant.spin[e - 3]
             bent = min(abs(a.each[e].bend) * own.stiffness / own.bristle_coulomb[side], 1.0)
-            worst = max(worst, math.sqrt(own.stiffness / heavy) * bent * h * abs(b.x[e] - a.x[e]))
+            worst = max(worst, _speed_of_bend(plant, e) * bent * h * abs(b.x[e] - a.x[e]))
     return 0.25 * worst
