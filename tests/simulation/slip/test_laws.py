@@ -62,7 +62,8 @@ def with_law(robot, law, rng):
                             coulomb=tuple(coulomb))  # fmt: skip
         spring, spin = rim / 2e-3, robot.wheels.wheel_inertia / robot.wheels.radii[0] ** 2
         wheels = wheels.replace(law="lugre", coulomb=rim, stiffness=spring, damping=2.0 * float(np.sqrt(spring * spin)))
-    return robot.replace(friction=friction.replace(axes=axes, wheels=wheels), motor=motor)
+    grip = robot.wheels.replace(traction_mu=0.6 * robot.wheels.traction_mu)  # friction of its own holds a wheel back
+    return robot.replace(friction=friction.replace(axes=axes, wheels=wheels), motor=motor, wheels=grip)
 
 
 @cache
