@@ -8,7 +8,7 @@ import pytest
 import omnidyn
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.sensitivity.directions import EPS
-from omnidyn.simulation.sensitivity.late_sample import Direction
+from omnidyn.simulation.sensitivity.late_sample import Direction, Program
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
 from omnidyn.simulation.slip.loads import load_shift, wheel_loads
 from tests.simulation.slip.test_random_robots import DT, drawn
@@ -223,7 +223,7 @@ def test_derivatives_follow(name, key):
 
     t = np.arange(len(u) + 1) * dt
     one = Direction(key, moved(EPS), moved(-EPS))
-    found = slipping_samples(robot, t, u, [one], np.zeros(3), [0.0], 4, 1e-6)[0].dtwist[:, 0, 0]
+    found = slipping_samples(robot, Program(t, u, np.zeros(3)), [one], [0.0], 4, 1e-6)[0].dtwist[:, 0, 0]
     far, near = (omnidyn.simulate(moved(side), u, dt, tol=1e-9).twist[:, 0] for side in (step, -step))
     expected = (far - near) / (2.0 * step)
     assert np.abs(expected).max() > 1e-3

@@ -99,8 +99,12 @@ def give_way(plant, stage, start, x, each):
 
 @part
 def stops(plant, start, end):
-    """Whether anything that holds more than it slides with has stopped or reversed, without a fall between."""
+    """Whether anything that holds more than it slides with has stopped or reversed, without a fall between, or a wheel
+    has come to grip or lost it: the second of two stages, which overshoots there, might tear loose what rests."""
     m = len(plant.element)
+    for e in range(3, m):
+        if start.each[e].contact != end.each[e].contact:
+            return True
     for e in range(m):
         own, before = plant.element[e], start.each[e].sign
         gap = own.fall == 0.0 and (own.breakaway[0] > own.coulomb[0] or own.breakaway[1] > own.coulomb[1])
