@@ -13,7 +13,7 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
-from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.fit import Fit, MovedBy
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, State
@@ -78,12 +78,12 @@ def solved(fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[s
 def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
     """What a solution says, each estimate with its diagnosis, which is made when it is first asked for."""
     try:
-        answer = fit.answer(solution, progress, _moved_by_the_file)
+        answer = fit.answer(solution, progress, _MOVED_BY)
     except InsufficientDataError:
         plainer = fit.with_latencies_only(solution, progress)
         if plainer is None:
             raise
-        answer = fit.answer(plainer, progress, _moved_by_the_file)
+        answer = fit.answer(plainer, progress, _MOVED_BY)
     found = {
         group: replace(estimate, study=_study(seen))
         for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)
@@ -96,6 +96,16 @@ def _moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     from omnidyn.identification.structure.rests_on import moved_by_the_file  # here, for it takes time to load
 
     return moved_by_the_file(sure, held)
+
+
+def _moved_by_rounding(sure: Weighed) -> FloatArray:
+    """See structure/rounded_inputs.py."""
+    from omnidyn.identification.structure.rounded_inputs import moved_by_rounding  # here, for it takes time to load
+
+    return moved_by_rounding(sure)
+
+
+_MOVED_BY = MovedBy(_moved_by_the_file, _moved_by_rounding)
 
 
 def _unearned(found: Solution) -> tuple[str, ...]:

@@ -81,20 +81,15 @@ def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     To first order, as in `rests_on`; 0 for what shows in no row, or cannot be simulated. The covariance of what is
     fitted beside numbers that are taken as they stand: S. F. Schmidt, Adv. Control Syst. 3, 293 (1966).
     """
-    solver, point = sure.plain.solver, sure.plain.state.point
-    assert isinstance(solver.problem, Problem)
-    problem, variance = solver.problem.shortened(MOST_ROWS), sure.plain.state.variance
-    engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
-    rows = Rows.of(problem, point, engine.residuals(point))
-    memory = [
-        sure.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
-        for c, column in enumerate(problem.columns)
+    linear, engine, point = as_weighed(sure)
+    benches = [
+        (Workbench(own, at, engine_kind(by), ()), places)
+        for own, at, by, places in members_of(engine, linear.rows.problem, point)
     ]
-    linear = Linear(rows, memory)
-    benches, (_, j) = _benches(engine, problem, point), linear.whole()
+    _, j = linear.whole()
     found = np.zeros((j.shape[1], len(held)))
     for k, (key, std) in enumerate(held.items()):
-        shown = [np.zeros((*own.shape, 1)) for own in rows.residual]
+        shown = [np.zeros((*own.shape, 1)) for own in linear.rows.residual]
         try:
             for bench, places in benches:
                 number = robot_parameter(bench.robot, key, None, tuple(held))
@@ -109,10 +104,24 @@ def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     return found
 
 
-def _benches(engine: RowEngine, problem: Problem, point: Point) -> list[tuple[Workbench, IntArray]]:
-    """(what simulates, which pieces of all are its own) of each group; of one where there are none."""
-    if not isinstance(engine, JointEngine):
-        return [(Workbench(problem, point, engine_kind(engine), ()), np.arange(len(problem.pieces)))]
-    return [
-        (Workbench(own.problem, own.point(point), engine_kind(own.engine), ()), own.places) for own in engine.members
+def as_weighed(sure: Weighed) -> tuple[Linear, RowEngine, Point]:
+    """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point)."""
+    solver, point = sure.plain.solver, sure.plain.state.point
+    assert isinstance(solver.problem, Problem)
+    problem, variance = solver.problem.shortened(MOST_ROWS), sure.plain.state.variance
+    engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
+    rows = Rows.of(problem, point, engine.residuals(point))
+    memory = [
+        sure.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
+        for c, column in enumerate(problem.columns)
     ]
+    return Linear(rows, memory), engine, point
+
+
+def members_of(
+    engine: RowEngine, problem: Problem, point: Point
+) -> list[tuple[Problem, Point, RowEngine, IntArray]]:  # fmt: skip
+    """(problem, point, engine, which pieces of all are its own) of each group; of one where there are none."""
+    if not isinstance(engine, JointEngine):
+        return [(problem, point, engine, np.arange(len(problem.pieces)))]
+    return [(own.problem, own.point(point), own.engine, own.places) for own in engine.members]

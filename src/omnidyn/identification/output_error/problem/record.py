@@ -20,10 +20,9 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings.floor import refuse_slope
 from omnidyn.model.wheels import refuse_slip, wheel_speed
 from omnidyn.run import Run
-from omnidyn.statistics import sensor_step, stretches
+from omnidyn.statistics import stretches
 
 SHORTEST = 3  # rows of a piece that is used
-COARSE = 0.01  # half a step of the duty, of the largest one, from which on it is worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +162,7 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
     if voltage is not None:
         supplied = run.voltage is None and run.supply is None
         told = [f"the supply is not logged: its nominal {nominal:g} V is taken"] if supplied else []
-        return voltage, supplied, [*told, *_rounded(run, voltage)]
+        return voltage, supplied, told
     if run.duty is not None:
         raise InputError(
             "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
@@ -175,21 +174,6 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
             expected="voltage or duty, or the speed loop of the firmware", where=run.source, remedy=LOOP_REMEDY,
         )  # fmt: skip
     raise InputError("the log has no input", got=", ".join(run.channels), expected="voltage or duty", where=run.source)
-
-
-def _rounded(run: Run, voltage: FloatArray) -> list[str]:
-    """What the steps of a logged duty may have lost, where that is worth a word."""
-    if run.voltage is not None or run.duty is None:
-        return []
-    step = max(sensor_step(column[np.isfinite(column)]) for column in run.duty.T)
-    largest = float(np.nanmax(np.abs(run.duty), initial=0.0))
-    if not largest or 0.5 * step < COARSE * largest:
-        return []
-    volts = 0.5 * step * float(np.nanmax(np.abs(voltage), initial=0.0)) / largest
-    return [
-        f"duties are logged in steps of {100.0 * step:.2g} %: up to {volts:.2g} V may have been rounded off, which the "
-        "intervals do not hold"
-    ]
 
 
 def _set_point(run: Run, robot: Robot, loop: bool) -> FloatArray | None:

@@ -1,0 +1,85 @@
+"""Inputs that are logged in steps: what they may have been rounded by is in the intervals, unless the log tells that
+the motors took just these steps. Logs by the simulator of wrong_worlds, which shares no code with ours."""
+
+import numpy as np
+import pytest
+
+from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
+from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.problem.input_steps import input_steps
+from omnidyn.identification.output_error.problem.record import record
+from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.robot_file import load_robot
+from omnidyn.run import Run
+from omnidyn.simulation.simulate import simulate
+from tests.support.axebot_logs import NOISE, voltages
+
+AXEBOT = load_robot("axebot")
+
+
+def rounded(values, step):
+    return np.round(np.asarray(values) / step) * step
+
+
+def errors(seed, step):
+    """(errors of the friction numbers in standard errors, warnings) of a log whose voltages are rounded."""
+    case = right_case(3 * seed).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0)
+    run = logged(case, 7000 + seed)
+    fit = fit_output_error(run.replace(voltage=rounded(run.voltage, step)), robot_of(case.told), nuisances=())
+    truth = truths(case.told, case.told.shape)
+    return [(fit.value[key] - true) / fit.std[key] for key, true in truth.items()], fit.warnings
+
+
+def test_voltages_that_were_rounded_are_in_the_intervals():
+    """Steps of .3 V: without them intervals of these logs hold the truth in two of three."""
+    found = [errors(seed, 0.3) for seed in range(6)]
+    z = np.array([each for each, _ in found])
+    assert (np.abs(z) < 1.96).mean() >= 0.92
+    assert np.sqrt((z**2).mean()) > 0.5
+    assert all(any("in steps of 0.3 V" in words for words in told) for _, told in found)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("step", [0.05, 0.1, 0.3])
+def test_intervals_over_many_logs(step):
+    z = np.array([errors(seed, step)[0] for seed in range(60)])
+    print(step, (np.abs(z) < 1.96).mean().round(3), np.sqrt((z**2).mean(axis=0)).round(2))
+    assert (np.abs(z) < 1.96).mean() >= 0.92
+    assert np.sqrt((z**2).mean()) > 1.0 / 1.3  # no more than 1.3 times as wide as they scatter
+
+
+def a_log(voltage, told, seed):
+    run = simulate(AXEBOT, voltage[:-1], 0.01)
+    twist = run.twist + np.random.default_rng(seed).normal(size=run.twist.shape) * NOISE
+    return Run(t=run.t, voltage=told, twist=twist)
+
+
+def test_motors_that_take_just_these_steps_cost_little(monkeypatch):
+    """A log in which the loss of half a volt would show by itself: none does."""
+    exact = rounded(voltages(np.random.default_rng(5), 30.0), 0.5)
+    with monkeypatch.context() as without:
+        without.setattr(f"{Fit.__module__}.input_steps", lambda one: np.zeros(3))
+        fine = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=())
+    steps = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=())
+    wider = [steps.std[key] / fine.std[key] for key in steps.value]
+    print(np.round(wider, 2))
+    assert max(wider) < 2.0
+    lost = voltages(np.random.default_rng(5), 30.0)
+    off = fit_output_error(a_log(lost, rounded(lost, 0.5), 6), AXEBOT, nuisances=())
+    assert min(off.std[key] / steps.std[key] for key in off.value) > 1.5
+
+
+def steps_of(**inputs):
+    rows = len(next(iter(inputs.values())))
+    run = Run(t=np.arange(rows) * 0.01, twist=np.zeros((rows, 3)) + np.linspace(0, 1, rows)[:, None], **inputs)
+    return input_steps(record(run, AXEBOT))
+
+
+def test_steps_are_told_by_many_levels_that_are_whole():
+    volts = np.repeat(np.random.default_rng(1).uniform(-5.0, 5.0, (40, 3)), 10, axis=0)
+    assert steps_of(voltage=volts).tolist() == [0.0, 0.0, 0.0]
+    assert steps_of(voltage=rounded(volts, 0.1)) == pytest.approx([0.1] * 3)
+    assert steps_of(voltage=rounded(volts, 1e-4)).tolist() == [0.0] * 3  # the text of a log
+    assert steps_of(voltage=rounded(volts, 2.5)).tolist() == [0.0] * 3  # levels that a person chose
+    duty, supply = rounded(volts / 6.0, 1.0 / 255.0), np.full(len(volts), 12.0)
+    assert steps_of(duty=duty, supply=supply) == pytest.approx([12.0 / 255.0] * 3)
