@@ -79,6 +79,7 @@ def test_steps_are_told_by_many_levels_that_are_whole():
     volts = np.repeat(np.random.default_rng(1).uniform(-5.0, 5.0, (40, 3)), 10, axis=0)
     assert steps_of(voltage=volts).tolist() == [0.0, 0.0, 0.0]
     assert steps_of(voltage=rounded(volts, 0.1)) == pytest.approx([0.1] * 3)
+    assert steps_of(voltage=rounded(1.5 * volts, 0.07)) == pytest.approx([0.07] * 3)  # some beyond the limit of 6 V
     assert steps_of(voltage=rounded(volts, 1e-4)).tolist() == [0.0] * 3  # the text of a log
     assert steps_of(voltage=rounded(volts, 2.5)).tolist() == [0.0] * 3  # levels that a person chose
     duty, supply = rounded(volts / 6.0, 1.0 / 255.0), np.full(len(volts), 12.0)

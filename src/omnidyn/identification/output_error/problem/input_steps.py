@@ -18,8 +18,8 @@ def input_steps(record: Record) -> FloatArray:
     run = record.run
     if run is None or record.set_point is not None:
         return np.zeros(record.voltage.shape[1])
-    if run.voltage is not None or run.duty is None:
-        return np.array([_step(column) for column in record.voltage.T])
+    if run.voltage is not None or run.duty is None:  # as logged: clipping to the limit would make a level of its own
+        return np.array([_step(column) for column in (record.voltage if run.voltage is None else run.voltage).T])
     steps = np.array([_step(column) for column in run.duty.T])
     if not steps.any():
         return steps
