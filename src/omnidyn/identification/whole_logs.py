@@ -13,8 +13,9 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
-from omnidyn.identification.output_error.fit import Fit, MovedBy
+from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.whitening import Weighed
+from omnidyn.identification.output_error.moved_by import MovedBy
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, State
 from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question

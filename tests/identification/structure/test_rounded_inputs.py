@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
-from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.moved_by import beside_rounding
 from omnidyn.identification.output_error.problem.input_steps import input_steps
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.whole_logs import fit_output_error
@@ -58,7 +58,7 @@ def test_motors_that_take_just_these_steps_cost_little(monkeypatch):
     """A log in which the loss of half a volt would show by itself: none does."""
     exact = rounded(voltages(np.random.default_rng(5), 30.0), 0.5)
     with monkeypatch.context() as without:
-        without.setattr(f"{Fit.__module__}.input_steps", lambda one: np.zeros(3))
+        without.setattr(f"{beside_rounding.__module__}.input_steps", lambda one: np.zeros(3))
         fine = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=())
     steps = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=())
     wider = [steps.std[key] / fine.std[key] for key in steps.value]

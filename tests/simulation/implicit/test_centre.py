@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from omnidyn.errors import UnsupportedError
 from omnidyn.model.deadzone import breakaway_voltage
 from omnidyn.model.dynamics import acceleration, drive_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
@@ -109,10 +108,16 @@ def test_friction_that_bends_against_its_differential_equation(seed):
     assert not run.warnings
 
 
-def test_karnopp_s_law_refuses_it_by_name():
-    axes = AXEBOT.friction.axes.replace(law="karnopp", karnopp_speed=(1e-3, 1e-3, 1e-2))
-    with pytest.raises(UnsupportedError, match=r"knows axes that rest each for itself; got .*a centre_m"):
-        simulate(beside(AXEBOT).replace(friction=Friction(axes=axes)), np.ones((3, 3)), 0.01)
+def test_karnopp_s_law_with_a_narrow_band_is_the_law_that_sticks():
+    """Masses that couple gather momentum together; the band stands in for Coulomb friction, which sticks exactly."""
+    axes = AXEBOT.friction.axes.replace(law="karnopp", karnopp_speed=(1e-7, 1e-7, 1e-6))
+    volts = np.repeat(np.random.default_rng(4).uniform(-6.0, 6.0, (12, 3)), 10, axis=0)
+    sticks, gathers = (
+        simulate(beside(AXEBOT).replace(friction=Friction(axes=own)), volts, 0.01, tol=1e-7).twist
+        for own in (AXEBOT.friction.axes, axes)
+    )
+    assert np.abs(sticks).max() > 0.3
+    assert (np.abs(sticks - gathers) / [1.0, 1.0, 10.0]).max() < 1e-5
 
 
 def test_what_holds_a_robot_is_not_its_mass():

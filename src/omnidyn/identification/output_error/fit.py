@@ -10,17 +10,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
 from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
 from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
+from omnidyn.identification.output_error.moved_by import MovedBy, beside_rounding
 from omnidyn.identification.output_error.prepare import (
     EXACT,
     FINE,
@@ -31,7 +30,6 @@ from omnidyn.identification.output_error.prepare import (
     make_engine,
 )
 from omnidyn.identification.output_error.problem.band import band_words, with_band
-from omnidyn.identification.output_error.problem.input_steps import input_steps
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
@@ -52,18 +50,8 @@ from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 
-
-class MovedBy(NamedTuple):
-    """What moves the numbers of a fit beside its noise, (P, K): numbers that its file knows only so far, name -> std,
-    and what the inputs were rounded by."""
-
-    file: Callable[[Weighed, Mapping[str, float]], FloatArray]
-    rounding: Callable[[Weighed], FloatArray]
-
-
 Unearned = Callable[[Solution], Sequence[str]]
 
-WIDER = 1.1  # times an interval, from which on what widens it is said
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
@@ -165,7 +153,8 @@ class Fit:
         solution, levels = self.with_levels(solution, progress) if done else (solution, [])
         progress.doing("finding how sure the numbers are")
         sure = self.weighed(solution, progress, anew=done)
-        known, rounded = self._beside_rounding(sure, moved_by if done else None)
+        records = [record for group in self.groups for record in group.records]
+        known, rounded = beside_rounding(sure, records, moved_by if done else None)
         by, warnings = sure.solution, [*warnings, *sure.warnings, *rounded]
         strata = {id(record): group.name for group in self.groups for record in group.records}
         profile, draws = (self.question.profile, self.question.bootstrap) if done else ((), 0)
@@ -209,17 +198,6 @@ class Fit:
         """The same trust, with what the file knows only so far; the same number moves all groups at once."""
         so_far = self.known_so_far(sure.plain.solver.problem)
         return known.beside(moved_by.file(sure, so_far)) if so_far and moved_by else known
-
-    def _beside_rounding(self, sure: Weighed, moved_by: MovedBy | None) -> tuple[Trust, list[str]]:
-        """(the trust, with what inputs in steps may have been rounded by; what is to be said of that)."""
-        steps = max(float(input_steps(record).max()) for group in self.groups for record in group.records)
-        if not steps or moved_by is None:
-            return sure.known, []
-        known = sure.known.beside(moved_by.rounding(sure))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            wider = float(np.nanmax(known.std / sure.known.std, initial=1.0))
-        words = f"voltages are logged in steps of {steps:.2g} V: what they may have been rounded by is in the intervals"
-        return known, [f"{words}, which are up to {wider:.2g} times as wide for it"] if wider > WIDER else []
 
     def known_so_far(self, problem: Problem) -> dict[str, float]:
         """Key -> std of what the robot file knows only so far, and the fit took as it stands."""

@@ -38,14 +38,12 @@ MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginni
 @dataclass(frozen=True, eq=False)
 class Examined:
     """A diagnosis, and what it was made with. memory: of each column, of what is left beside all that residuals follow;
-    tried: how many causes were looked at; rows: how many numbers of the logs. sure: whether something is left out to
-    the level of a diagnosis, whatever it was looked for at."""
+    tried: how many causes were looked at; rows: how many numbers of the logs."""
 
     diagnosis: Diagnosis
     memory: Sequence[AutoRegression]
     tried: int
     rows: int
-    sure: bool
 
 
 def diagnose(solution: Solution) -> Diagnosis:
@@ -53,12 +51,12 @@ def diagnose(solution: Solution) -> Diagnosis:
     return examine(solution).diagnosis
 
 
-def examine(solution: Solution, level: float = FALSE) -> Examined:
+def examine(solution: Solution) -> Examined:
     """The diagnosis of a fit at its best point, and what it was made with.
 
-    level: of right models for which one of all causes seems to be missing; each is tested at `level` over their number
-    (Bonferroni). Sizes and causes that are alike make that no stricter: of 39 causes at 86 sizes noise passes the best
-    as often as of 35 to 60 that have nothing in common, by draws from their scalar products.
+    A cause that is clear by itself is found where its chance, times their number, is below FALSE (Bonferroni). Sizes,
+    and causes that are alike, make that no stricter: of 39 causes at 86 sizes noise passes the best as often as of 35
+    to 60 that have nothing in common, by draws from their scalar products.
     """
     solver, point = solution.solver, solution.state.point
     problem = with_levels(solver.problem, levels_of(solution)).shortened(MOST_ROWS)
@@ -70,18 +68,17 @@ def examine(solution: Solution, level: float = FALSE) -> Examined:
     bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
     every = [*candidates(bench), *unoffered(bench)]
     tried = _tried(bench, [one for one in every if not one.late])
-    ranked = remedies(seen.linear, tried, seen.shown, level)
+    ranked = remedies(seen.linear, tried, seen.shown)
     count = int(sum(there.sum() for there in rows.there))
-    by_chance = min((_chance(seen.linear, tried, r) for r in ranked), default=1.0) * len(tried)
-    found, sure = (bool(seen.found) or by_chance < each for each in (level, FALSE))
+    found = bool(seen.found) or any(_chance(seen.linear, tried, r) * len(tried) < FALSE for r in ranked)
     if found:
         tried += _tried(bench, [one for one in every if one.late])
-        ranked = remedies(seen.linear, tried, seen.shown, level)
+        ranked = remedies(seen.linear, tried, seen.shown)
     told, cause = _fitted(solution, problem, parts, seen, tried, ranked) if found else ((), None)
     memory = memory_beside(rows, cause) if cause and not seen.found else seen.linear.memory
     seen = with_cause(seen, cause) if cause else seen
     names, levels = [f"{name}[{i}]" for name, i in problem.columns], noise_levels(seen.linear, moved)
-    found, sure = found or bool(levels.beyond), sure or bool(levels.beyond)
+    found = found or bool(levels.beyond)
     channels = levels.channels(dict(zip(names, seen.shares.tolist(), strict=True)))
     wild = {} if solver.nu else wild_samples(seen)
     pictures = binned(rows, moved, int(np.argmax([*channels.values()]))) if found else ()
@@ -90,7 +87,7 @@ def examine(solution: Solution, level: float = FALSE) -> Examined:
         pictures, wild, levels.noise, levels.beyond, levels.at_rest,
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
-    return Examined(diagnosis, memory, len(tried), count, sure)
+    return Examined(diagnosis, memory, len(tried), count)
 
 
 def _tried(bench: Workbench, every: Sequence[Candidate]) -> list[tuple[Candidate, list[Trial]]]:

@@ -158,7 +158,7 @@ def with_correlation(robot: Robot, keys: Sequence[str], matrix: ArrayLike, std: 
     beside = [float(own[key].std or 0.0) if key in own else 0.0 for key in every]
     earlier = dict(zip(before.keys, before.std, strict=True)) if before is not None and before.std is not None else {}
     joint = [*(earlier.get(key, beside[k]) for k, key in enumerate(old)), *(std or beside[len(old) :])]
-    apart = any(abs(a - b) > SAME * abs(b) for a, b in zip(joint, beside, strict=True))
+    apart = not all(a == b or abs(a - b) <= SAME * abs(b) for a, b in zip(joint, beside, strict=True))
     found = key_correlation(every, whole, tuple(map(float, joint)) if apart else None)
     refuse_strange_keys(robot.model_copy(update={"correlation": found}))
     return robot.model_copy(update={"correlation": found if apart else _without_the_free(found)})
@@ -168,6 +168,6 @@ def _without_the_free(known: KeyCorrelation) -> KeyCorrelation | None:
     """The correlations without numbers that are off for themselves; None where all are."""
     matrix = known.of(known.keys)
     keys = tuple(key for key, row in zip(known.keys, matrix, strict=True) if np.count_nonzero(row) > 1)
-    if len(keys) == len(known.keys):
-        return known
+    if keys == tuple(known.keys):
+        return known if keys else None
     return key_correlation(keys, known.of(keys)) if keys else None

@@ -3,10 +3,10 @@
 A step fits the logs anew with each of the best remedies of the diagnosis, and with what is the same as the first of
 them. Where none of these leaves only noise, it tries what a diagnosis near the best point tells little of: other shapes
 of friction, a usual fall, a limit; and, once it has found the best, the same without the step before. Of those that
-predict blocks of the logs which they were not fitted to better than what stands (`Errors.lowers`), and that explain
-more than the best of so many would of noise (`Errors.chance`), the simplest within a standard error of the best is
-taken, unless BIC prefers the best by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor
-is what explains less than such a cause would. Before all this, where samples are wild, is a loss that bears them.
+predict blocks of the logs which they were not fitted to better than what stands, by more than a standard error, and
+that BIC prefers though they are the best of many, the simplest within a standard error of the best is taken, unless BIC
+prefers the best by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor is what explains
+less than such a cause would. Before all this, where samples are wild, is a loss that bears them.
 """
 
 from __future__ import annotations
@@ -37,12 +37,10 @@ from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
 from omnidyn.run import Run
 
-NOISE = "the residuals hold nothing but noise"  # why it went no further
 STEPS = 4  # at most
 TRIED = 3  # remedies that are fitted in a step
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of BIC, from which one of two models is the better one; of a first step's chi squared
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
-LOOK, RICHER = 0.1, 0.03  # of right models: in which a cause is looked for; for which a richer one is taken, at most
 BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
 
 
@@ -64,7 +62,7 @@ def climb(
         seen = seen or _examined(stands)
         lacks = _lacks(seen)
         if not lacks:
-            return _ended(stands, rungs, NOISE)
+            return _ended(stands, rungs, "the residuals hold nothing but noise")
         every, found, best, after = list[Model | Untried](), list[Rung](), None, None
         first = {group: offered(lack) for group, lack in lacks.items()}
         far = {group: unseen(lack, stands, group) for group, lack in lacks.items()}
@@ -83,19 +81,18 @@ def climb(
             after = _examined(best) if best is not None and best.instead else after
         rungs += [rung for rung in found if rung.step or not rungs]
         if best is None:
-            sure = any(each.sure for each in seen.values())
-            return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}" if sure else NOISE)
+            return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}")
         stands, seen = best, after
     return _ended(stands, rungs, f"{STEPS} steps are the most that it takes")
 
 
 def _examined(model: Model) -> dict[str, Examined]:
-    """What a model may leave out, of each group."""
-    return {group: examine(alone, LOOK) for group, alone in model.alone.items()}
+    """What a model leaves out, of each group."""
+    return {group: examine(alone) for group, alone in model.alone.items()}
 
 
 def _lacks(seen: Mapping[str, Examined]) -> dict[str, LackOfFit]:
-    """The groups in which something may be left out, and what."""
+    """The groups in which something is left out, and what."""
     every = {group: each.diagnosis.lack_of_fit for group, each in seen.items()}
     return {group: lack for group, lack in every.items() if lack.found}
 
@@ -170,10 +167,11 @@ def judged(
 
 def _why_not(model: Model, own: Errors, before: Errors, count: int, beyond: tuple[float, str]) -> str:
     """Why a model is no step up, "" where it is one."""
-    if not own.lowers(before):
+    gain, std = own.gain(before)
+    if not gain > CLEAR * std:
         return "predicts what it was not fitted to no better"
-    if own.chance(before, count) >= RICHER:
-        return "explains no more than the best of so many would of noise"
+    if own.bic(count) >= before.bic():
+        return "explains less than its numbers cost"
     at_least, words = beyond
     noise = own.left / max(own.rows, 1)
     if (before.left - own.left) / noise - np.log(max(own.rows, 2)) * (own.numbers - before.numbers) < at_least:

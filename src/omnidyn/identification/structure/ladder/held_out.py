@@ -10,7 +10,6 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.joint import JointEngine
@@ -48,35 +47,6 @@ class Errors:
         """n log(S/n) + k log n, and 2 log of the number of models that it is the best of."""
         n = max(self.rows, 2)
         return float(n * np.log(max(self.left, 1e-300) / n) + self.numbers * np.log(n) + 2.0 * np.log(max(tried, 1)))
-
-    def chance(self, before: Errors, tried: int) -> float:
-        """The chance that noise alone lets the best of so many models explain more than a simpler one by as much.
-
-            p = tried P(chi2_k > n log(S0/S))        k: more numbers than before
-
-        Wilks' likelihood ratio and Bonferroni's bound. A speed or a stiffness, of which there is none without its law,
-        counts as a number: the largest of chi2_1 along one has a tail like that of chi2_2 (R. B. Davies, Biometrika 74,
-        33 (1987), his bound at about one crossing). At 3 % of 40 models k = 2 takes 14.4, so a law whose log holds 5
-        standard errors of it in its other numbers (lambda = 25) is seen in 91 %, P(chi2_2(lambda) > 14.4), and one of
-        30 in 96 %; BIC of 700 rows takes 20.5, for 72 and 85 %. For a model without more numbers, 0 where BIC prefers
-        it, else 1.
-        """
-        more = self.numbers - before.numbers
-        if more <= 0:
-            return float(self.bic(tried) >= before.bic())
-        ratio = self.rows * np.log(max(before.left, 1e-300) / max(self.left, 1e-300))
-        return min(float(tried * chdtrc(more, max(ratio, 0.0))), 1.0)
-
-    def lowers(self, before: Errors) -> bool:
-        """Whether it predicts what it was not fitted to better than another model, by more than chance.
-
-        By more than the standard error over blocks; or by more than noise gives such a difference. Of predictions that
-        are d apart, noise of variance s^2 moves the difference of the squared errors, d'd, by 2 s |d|: d'd > 4 s^2.
-        What is seen in one block only, as a fall where a robot hardly moves, has an error over blocks as large as it.
-        """
-        gain, std = self.gain(before)
-        noise = self.left / max(self.rows, 1)
-        return gain > min(CLEAR * std, 4.0 * noise / max(float(before.held_out.sum()), 1e-300))
 
     def gain(self, before: Errors) -> tuple[float, float]:
         """(share of the squared held-out error of another model that this one takes away, its standard error)."""

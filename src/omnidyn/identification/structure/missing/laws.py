@@ -23,6 +23,8 @@ from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.dynamics import drive_wrench, frame_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import COULOMB, KINDS, LUGRE
+from omnidyn.model.friction.stribeck import USUAL as EXPONENT
+from omnidyn.model.friction.stribeck import fallen
 from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
@@ -166,7 +168,7 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
     if friction.wheels == WheelFriction():
         yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
     for table in may_fall(friction):
-        yield Candidate(f"{table}.{FALL}", _falling(table), as_it_is(FALL_WORDS), 0.0)
+        yield Candidate(f"{table}.{FALL}", _falling(FORCES[table]), as_it_is(FALL_WORDS), 0.0)
     if not boxed or axes.coulomb_backward is not None:
         return
     if axes.law == COULOMB and axes.breakaway is None:
@@ -188,32 +190,17 @@ def table_of(friction: Friction, table: str) -> Any:
     return getattr(friction, table.rpartition(".")[2])
 
 
-def _falling(table: str) -> Callable[[Workbench], list[Trial]]:
-    """A level that is larger at rest by a share of Coulomb friction, a number for each part of the table. Tried with
-    several speeds over which it falls [m/s at the rims].
-
-    By as much as is usual, not by a little: what a log tells of a fall is mostly how long the robot sticks, and of that
-    a small step from the fit, where it sticks less, shows hardly anything.
-    """
+def _falling(force: Callable[[Motion, float], FloatArray]) -> Callable[[Workbench], list[Trial]]:
+    """A level that is larger at rest by a share of Coulomb friction, a number for each part of `force`: to first order,
+    where the robot moves. Tried with several speeds over which it falls [m/s at the rims]."""
 
     def trials(bench: Workbench) -> list[Trial]:
         top = max(float(np.abs(m.twist @ bench.robot.wheels.wrench_matrix).max()) for m in bench.motions)
-        return [Trial(_fallen(bench, table, share * top), share * top) for share in SPEEDS if top > 0.0]
+        speeds = [share * top for share in SPEEDS if top > 0.0]
+        shown = bench.by_forces([lambda m, v=v: force(m, v) for v in speeds])
+        return [Trial(own, v) for own, v in zip(shown, speeds, strict=True)]
 
     return trials
-
-
-def _fallen(bench: Workbench, table: str, over: float) -> list[FloatArray]:
-    """What a fall of each part over a speed shows, by a share of 1; nothing of an axis that never moved."""
-    nothing = [np.zeros((*m.shown(m.twist[:, None, :]).shape[:2], 1)) for m in bench.motions]
-    moved = np.any([np.any(m.twist, axis=0) for m in bench.motions], axis=0)
-    parts = {BODY_AXES: moved, DIRECTION: np.array([moved[:YAW].any(), moved[YAW]]), WHEELS: np.ones(1, bool)}[table]
-    columns = []
-    for k, moves in enumerate(parts):
-        above = np.where(np.arange(len(parts)) == k, USUAL_FALL, 1.0)
-        other = bench.robot.model_copy(update={"friction": falling(bench.robot, table, above, over)})
-        columns.append([own / (USUAL_FALL - 1.0) for own in bench.change(other)] if moves else nothing)
-    return [np.concatenate(each, axis=2) for each in zip(*columns, strict=True)]
 
 
 def falling(robot: Robot, table: str, above: FloatArray, over: float) -> Friction:
@@ -237,6 +224,31 @@ def falling(robot: Robot, table: str, above: FloatArray, over: float) -> Frictio
 def arm(robot: Robot) -> float:
     """What a speed about yaw [rad/s] is times, to be one of the rims [m]."""
     return float(np.mean(robot.wheels.robot_radius))
+
+
+def _of_axes(motion: Motion, over: float) -> FloatArray:
+    speed, level = motion.twist * [1.0, 1.0, arm(motion.robot)], motion.robot.friction.axes.coulomb
+    return np.eye(N_AXES) * (-np.sign(speed) * fallen(speed, 1.0 / over, EXPONENT) * level)[:, None, :]
+
+
+def _of_travel(motion: Motion, over: float) -> FloatArray:
+    """Along the direction of travel, and about yaw."""
+    law, yaw = motion.robot.friction.direction, motion.twist[:, YAW]
+    weighed = motion.twist[:, :YAW] * law.coulomb
+    fall = fallen(np.linalg.norm(motion.twist[:, :YAW], axis=1, keepdims=True), 1.0 / over, EXPONENT)
+    along = fall * weighed * law.coulomb / np.maximum(np.linalg.norm(weighed, axis=1, keepdims=True), 1e-12)
+    about = np.sign(yaw) * fallen(arm(motion.robot) * yaw, 1.0 / over, EXPONENT) * law.yaw_coulomb
+    zero = np.zeros_like(yaw)
+    return -np.stack([np.column_stack([along, zero]), np.column_stack([zero, zero, about])], axis=1)
+
+
+def _of_rims(motion: Motion, over: float) -> FloatArray:
+    g, rim = motion.robot.wheels.wrench_matrix, motion.twist @ motion.robot.wheels.wrench_matrix
+    level = per_wheel(motion.robot.friction.wheels.coulomb, g.shape[1])
+    return -((np.sign(rim) * fallen(rim, 1.0 / over, EXPONENT) * level) @ g.T)[:, None, :]
+
+
+FORCES = {BODY_AXES: _of_axes, DIRECTION: _of_travel, WHEELS: _of_rims}  # of a fall, of each table
 
 
 def _bending(law: Callable[[Robot, float], Friction]) -> Callable[[Workbench], list[Trial]]:

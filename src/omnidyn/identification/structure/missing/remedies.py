@@ -12,12 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.structure.linear import SAME, Linear, Rows
-from omnidyn.identification.structure.misfit import FALSE
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial
 from omnidyn.model.keys import BODY_AXES, DIRECTION
 
@@ -111,13 +109,9 @@ class Blocks:
 
 
 def remedies(
-    linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], found: Sequence[FloatArray],
-    level: float = FALSE, most: int = 8,
-) -> tuple[Remedy, ...]:  # fmt: skip
-    """The candidates that explain something, best first. found: of each piece (C, rows, K), what residuals follow.
-
-    level: of logs in which noise alone lets one of them explain as much.
-    """
+    linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], found: Sequence[FloatArray], most: int = 8
+) -> tuple[Remedy, ...]:
+    """The candidates that explain something, best first. found: of each piece (C, rows, K), what residuals follow."""
     flat = [(one, trial) for one, trials in tried for trial in trials]
     if not flat:
         return ()
@@ -143,7 +137,7 @@ def remedies(
         if one.key not in best or chi2 - penalty * own.numbers > best[one.key].chi2 - penalty * best[one.key].numbers:
             best[one.key] = own
     ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * t.numbers, reverse=True)
-    worth = [t for t in ranked if chdtrc(t.numbers, max(t.chi2, 0.0)) * len(best) < level][: 2 * most]
+    worth = [t for t in ranked if t.chi2 > penalty * t.numbers + 2.0 * np.log(max(len(best), 1))][: 2 * most]
     ranking = []
     for t in worth:
         after = blocks.held_out(np.concatenate([known, t.at]))

@@ -207,8 +207,7 @@ def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
     levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
     changed = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=levels)))
-    told = {Key.parse(key).axis for key in asked.free or () if key.startswith(f"{BODY_AXES}.coulomb")}
-    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, max(len(told), 1))
+    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
 
 
 def _falling(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
