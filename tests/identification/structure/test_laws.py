@@ -32,7 +32,6 @@ def test_a_law_that_the_file_lacks_is_named_and_taken(name):
         pytest.param(7, id="without the law viscous friction stands at its bound"),
         pytest.param(9, id="only the law tells that something is left, and what it leaves has less memory"),
         pytest.param(17, id="a block that alone tells of the speed, where a linear step leads far astray"),
-        pytest.param(35, id="seen in one block only, whose error over blocks is as large as its gain"),
     ],
 )
 def test_a_law_of_five_standard_errors_is_taken(seed):

@@ -72,7 +72,6 @@ def conclude(
     fitted, correlation = problem.parameters[:own], _correlation(names, known)
     robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)
     robot = with_nuisances(robot, problem, values, std, open_, records, data)
-    warnings = [*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more]
     return OutputErrorEstimate(
         robot=_together(robot, problem.parameters, std, known, correlation.matrix),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
@@ -82,7 +81,7 @@ def conclude(
         correlation=correlation,
         degrees_of_freedom={name: known.degrees for name in (*names[:own], *own_levels)},
         at_bound=tuple(name for name, held in zip(names[:own], known.held, strict=False) if held),
-        warnings=tuple(warnings),
+        warnings=(*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more),
         method=f"output error, maximum likelihood, {loss}, {known.kind} covariance",
         lower_bound={**lower_bound, **{name: own_levels[name][1][0] for name in endless}},
         data=data,
