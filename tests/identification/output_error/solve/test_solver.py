@@ -31,19 +31,20 @@ def test_a_fit_marches_through_no_point_twice(axebot, monkeypatch):
     assert len(asked) == len(set(asked))
 
 
-def test_a_fit_derives_the_motors_twice_at_most(axebot, monkeypatch):
-    """Whether the robot is exact, and what the kernels take; the friction is put beside these."""
-    derived, wrench = [], dynamics.drive_wrench
+def test_a_fit_derives_the_motors_once(axebot, monkeypatch):
+    """For whether the robot is exact, and for what the kernels take; the friction is put beside these."""
+    derived, wrench = [], dynamics.wrench_of_motors
 
-    def drive_wrench(*given):
+    def wrench_of_motors(*given):
         derived.append(given)
         return wrench(*given)
 
-    monkeypatch.setattr(statespace, "drive_wrench", drive_wrench)
+    monkeypatch.setattr(statespace, "wrench_of_motors", wrench_of_motors)
     log = noisy_draw(simulate(axebot, excitation(20.0), 0.01), 0)
+    statespace._motor_wrench.cache_clear()
     derived.clear()
     fit_output_error(log, axebot, start="rest", nuisances=())
-    assert len(derived) == 2 * 2  # braking and driving
+    assert len(derived) == 2  # braking and driving
 
 
 def test_what_an_axis_held_is_asked_only_where_one_stood_still(axebot):
