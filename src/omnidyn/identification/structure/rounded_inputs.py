@@ -70,11 +70,11 @@ def _shown(motion: Motion, volts: FloatArray) -> FloatArray:
 
 
 def _share(left: FloatArray, z: FloatArray) -> float:
-    """How much of the variance of what may have been rounded off there is, a standard error beyond what is seen."""
+    """How much of the variance of what may have been rounded off there is, two standard errors beyond what is seen."""
     both = (z.T @ z) ** 2
     apart = float(both.sum() - np.trace(both)) / (DRAWS * (DRAWS - 1))
     if apart <= 0.0:
         return 0.0
     seen = float(np.mean((left @ z) ** 2) - np.mean((z**2).sum(axis=0)))
     error = np.sqrt(2.0 * float(both.mean()))
-    return float(np.clip((seen + error) / apart, 0.0, 1.0))
+    return float(np.clip((seen + 2.0 * error) / apart, 0.0, 1.0))
