@@ -21,7 +21,7 @@ from benchmarks.table import Table, machine
 from benchmarks.wrong_worlds import SHARE
 from benchmarks.wrong_worlds.log import SPEEDS, Case, logged, right_case, robot_of, truths
 from benchmarks.wrong_worlds.remedies import FRICTION
-from benchmarks.wrong_worlds.worker import Worker
+from benchmarks.wrong_worlds.worker import Workers
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, World
 from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.friction import Friction
@@ -67,17 +67,17 @@ def measure() -> Table:
     """Each kind a row, then all in which the file has what there is."""
     table = Table("group_shapes: the ladder with a shape per group, and a level per wheel", COLUMNS)
     table.notes += [machine(), *_legend()]
-    with Worker() as worker:
-        _rows(worker, table, [(kind.name, FILES[kind.told], kind.right, partial(climbed, kind)) for kind in KINDS])
-        _rows(worker, table, [(kind.name, "", kind.right, partial(steady, kind)) for kind in steady_shapes.KINDS])
+    with Workers() as workers:
+        _rows(workers, table, [(kind.name, FILES[kind.told], kind.right, partial(climbed, kind)) for kind in KINDS])
+        _rows(workers, table, [(kind.name, "", kind.right, partial(steady, kind)) for kind in steady_shapes.KINDS])
     return table
 
 
-def _rows(worker: Worker, table: Table, asked: Sequence[tuple[str, str, bool, Callable[[int], Seen]]]) -> None:
+def _rows(workers: Workers, table: Table, asked: Sequence[tuple[str, str, bool, Callable[[int], Seen]]]) -> None:
     """A row of each kind: its name, what the file says, whether that is right, and what is seen of a seed."""
     calm: list[Seen] = []
     for number, (name, file, right, how) in enumerate(asked):
-        seen = [worker.ask(how, FIRST_SEED + SEEDS_EACH * number + k) for k in range(LOGS)]
+        seen = workers.ask_each(how, ((FIRST_SEED + SEEDS_EACH * number + k,) for k in range(LOGS)))
         logs = [log for log in seen if log is not None]
         table.notes += [f"{name}: {len(seen) - len(logs)} logs took too long"] * (len(logs) < len(seen))
         calm += logs if right else []

@@ -21,7 +21,7 @@ from benchmarks.wrong_worlds.remedies import FRICTION, SHAPES, refitted
 from benchmarks.wrong_worlds.right import NOISES
 from benchmarks.wrong_worlds.score import SPREAD, is_same, worst
 from benchmarks.wrong_worlds.sizes import SIZES
-from benchmarks.wrong_worlds.worker import Worker
+from benchmarks.wrong_worlds.worker import Workers
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.identify import identify
 from omnidyn.model.robot import Robot
@@ -54,15 +54,15 @@ def measure() -> Table:
     table = Table("ladder: `identify` with `ladder`, where the model is wrong and where it is right", COLUMNS)
     table.notes += [machine(), *_legend()]
     every: list[tuple[Kind, Climbed]] = []
-    with Worker() as worker:
+    with Workers() as workers:
         for kind in KINDS:
-            asked = [worker.ask(climbed, kind.name, number) for number in range(LOGS)]
+            asked = workers.ask_each(climbed, ((kind.name, number) for number in range(LOGS)))
             logs = [log for log in asked if log is not None]
             table.notes += [f"{kind.name}: {len(asked) - len(logs)} logs took too long"] * (len(logs) < len(asked))
             print(kind.name, _cells(logs), [log.words for log in logs], file=sys.stderr, flush=True)
             every += [(kind, log) for log in logs]
             table.add(world=kind.name, cause=kind.key or "none", **_cells(logs))
-        calm = [log for noise in NOISES for log in _right(worker, table, noise)]
+        calm = [log for noise in NOISES for log in _right(workers, table, noise)]
     able = [log for kind, log in every if is_able(kind)]
     stepped = [log for log in able if log.steps]
     held = _share(each for log in stepped for each in log.after)
@@ -143,8 +143,8 @@ def _held(case: Case, estimates: Sequence[Any]) -> list[bool]:
     return out
 
 
-def _right(worker: Worker, table: Table, noise: str) -> list[Climbed]:
-    asked = [worker.ask(calmly, noise, number) for number in range(RIGHT_LOGS)]
+def _right(workers: Workers, table: Table, noise: str) -> list[Climbed]:
+    asked = workers.ask_each(calmly, ((noise, number) for number in range(RIGHT_LOGS)))
     logs = [log for log in asked if log is not None]
     print(noise, _cells(logs), [log.words for log in logs if log.steps], file=sys.stderr, flush=True)
     table.add(world=f"right: {noise}", cause="", **_cells(logs))

@@ -35,26 +35,30 @@ def measure() -> Table:
     from benchmarks.wrong_worlds.kinds import KINDS
     from benchmarks.wrong_worlds.right import NOISES, score_right
     from benchmarks.wrong_worlds.score import score
-    from benchmarks.wrong_worlds.worker import Worker
+    from benchmarks.wrong_worlds.worker import Workers
 
     table = Table("wrong_worlds: `identify` where the model is wrong, and where it is right", COLUMNS)
     table.notes += [machine(), *_legend()]
     every: list[tuple[Kind, Seen]] = []
     endless: list[str] = []
-    with Worker() as worker:
+    with Workers() as workers:
         for kind in KINDS:
-            asked = [worker.ask(score, kind.name, number) for number in range(LOGS)]
+            asked = workers.ask_each(score, ((kind.name, number) for number in range(LOGS)))
             logs = [log for log in asked if log is not None]
             endless += [f"{kind.name}: log {number} took too long" for number, log in enumerate(asked) if log is None]
             print(kind.name, _cells(kind.key, logs), file=sys.stderr, flush=True)
             every += [(kind, log) for log in logs]
             table.add(world=kind.name, cause=kind.key or "none", **_cells(kind.key, logs))
             table.notes += list(dict.fromkeys(f"{kind.name}: {log.words}" for log in logs if log.words))[:2]
-    table.notes += endless
-    _add_totals(table, every)
-    calm = {noise: score_right(noise, range(RIGHT_LOGS)) for noise in NOISES}
-    for noise, seen in calm.items():
-        table.add(world=f"right: {noise}", cause="", **_calm_cells(seen))
+        table.notes += endless
+        _add_totals(table, every)
+        calm: dict[str, list[Calm]] = {}
+        for noise in NOISES:
+            asked = workers.ask_each(score_right, ((noise, number) for number in range(RIGHT_LOGS)))
+            calm[noise] = [log for log in asked if log is not None]
+            table.notes += [f"right, {noise}: {len(asked) - len(calm[noise])} logs took too long"] * (None in asked)
+            print(noise, _calm_cells(calm[noise]), file=sys.stderr, flush=True)
+            table.add(world=f"right: {noise}", cause="", **_calm_cells(calm[noise]))
     _add_calm(table, calm)
     return table
 
@@ -92,18 +96,20 @@ def _add_totals(table: Table, every: Sequence[tuple[Kind, Seen]]) -> None:
     table.add(f"held >= {HELD}", _at_least(held, HELD), world="after the true remedy", logs=len(told), held=held)
 
 
-def _calm_cells(seen: Calm) -> dict[str, Any]:
-    return {"logs": len(seen.found), "found": _share(seen.found), "sure": _share(seen.sure), "held": _share(seen.held)}
+def _calm_cells(seen: Sequence[Calm]) -> dict[str, Any]:
+    told = [log for log in seen if not log.words]
+    return {
+        "logs": len(told), "found": _share(log.found for log in told), "sure": _share(log.sure for log in told),
+        "held": _share(each for log in told for each in log.held),
+    }  # fmt: skip
 
 
-def _add_calm(table: Table, calm: dict[str, Calm]) -> None:
-    found = [each for seen in calm.values() for each in seen.found]
-    sure = [each for seen in calm.values() for each in seen.sure]
-    held = _share(each for seen in calm.values() for each in seen.held)
-    shares = _share(found), _share(sure)
-    table.add(f"found <= {FALSE}, sure <= {RICHER}", _at_most(shares[0], FALSE) and _at_most(shares[1], RICHER),
-              world="all right worlds", logs=len(found), found=shares[0], sure=shares[1], held=held)  # fmt: skip
-    table.notes += [f"{noise}: {words}" for noise, seen in calm.items() for words in seen.words[:2]]
+def _add_calm(table: Table, calm: dict[str, list[Calm]]) -> None:
+    cells = _calm_cells([log for seen in calm.values() for log in seen])
+    good = _at_most(cells["found"], FALSE) and _at_most(cells["sure"], RICHER)
+    table.add(f"found <= {FALSE}, sure <= {RICHER}", good, world="all right worlds", **cells)
+    for noise, seen in calm.items():
+        table.notes += [f"{noise}: {log.words}" for log in seen if log.words][:2]
 
 
 def _share(values: Iterable[Any]) -> float | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,32 +23,28 @@ NOISES = {
 
 @dataclass
 class Calm:
-    """Of logs of one noise. held: intervals with the truth. sure: a confident remedy where nothing is wrong."""
+    """Of one log. held: intervals with the truth. sure: a confident remedy where nothing is wrong; words: why not."""
 
-    found: list[bool] = field(default_factory=list)
-    sure: list[bool] = field(default_factory=list)
+    found: bool = False
+    sure: bool = False
     held: list[bool] = field(default_factory=list)
-    words: list[str] = field(default_factory=list)
+    words: str = ""
 
 
-def score_right(noise: str, numbers: Iterable[int]) -> Calm:
-    """Logs of right worlds with one noise."""
+def score_right(noise: str, number: int) -> Calm:
+    """A log of a right world with one noise."""
     sensor, memory = NOISES[noise]
-    out = Calm()
-    for number in numbers:
-        seed = FIRST_SEED + SEEDS_EACH * list(NOISES).index(noise) + number
-        case = right_case(seed).setup_but(sensor=sensor, memory=memory)
-        try:
-            estimate = identify(logged(case, seed), robot_of(case.told), free=FRICTION)
-        except OmnidynError as error:
-            out.words.append(str(error))
-            continue
-        lack = getattr(estimate, "lack_of_fit", None)
-        remedies = list(getattr(lack, "remedies", ()) or ())
-        out.found.append(bool(getattr(lack, "found", False)))
-        out.sure.append(bool(remedies) and is_sure(remedies[0]))
-        for name, true in truths(case.told, case.told.shape).items():
-            low, high = estimate.ci95[name]
-            if name not in estimate.unidentifiable and np.isfinite(low + high):
-                out.held.append(bool(low <= true <= high))
+    seed = FIRST_SEED + SEEDS_EACH * list(NOISES).index(noise) + number
+    case = right_case(seed).setup_but(sensor=sensor, memory=memory)
+    try:
+        estimate = identify(logged(case, seed), robot_of(case.told), free=FRICTION)
+    except OmnidynError as error:
+        return Calm(words=str(error))
+    lack = getattr(estimate, "lack_of_fit", None)
+    remedies = list(getattr(lack, "remedies", ()) or ())
+    out = Calm(bool(getattr(lack, "found", False)), bool(remedies) and is_sure(remedies[0]))
+    for name, true in truths(case.told, case.told.shape).items():
+        low, high = estimate.ci95[name]
+        if name not in estimate.unidentifiable and np.isfinite(low + high):
+            out.held.append(bool(low <= true <= high))
     return out

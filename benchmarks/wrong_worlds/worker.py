@@ -1,18 +1,52 @@
-"""A process beside this one that does one thing at a time, and is given up where it takes too long: a fit that does not
-end must not keep a thousand others from being scored. One that dies is a defect, and never passes for a slow one."""
+"""Processes beside this one, one on each core, that do one thing at a time, and are given up where it takes too long: a
+fit that does not end must not keep a thousand others from being scored. One that dies is a defect, and never passes for
+a slow one."""
 
 from __future__ import annotations
 
 import multiprocessing as mp
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
+from queue import SimpleQueue
 from typing import Any
 
-LONGEST = 120.0  # [s] of the wall clock
+LONGEST = 240.0  # [s] of the wall clock, on a machine that may do other work too
+
+
+class Workers:
+    """A context that holds a process for each core; `ask_each` calls a function there."""
+
+    def __init__(self) -> None:
+        self._all = [Worker() for _ in range(os.cpu_count() or 1)]
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for worker in self._all:
+            worker.__exit__()
+
+    def ask_each(self, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]) -> list[Any]:
+        """What the function makes of each of the arguments, in their order, as `Worker.ask` tells it."""
+        free: SimpleQueue[Worker] = SimpleQueue()
+        for worker in self._all:
+            free.put(worker)
+
+        def one(given: tuple[Any, ...]) -> Any:
+            worker = free.get()
+            try:
+                return worker.ask(function, *given)
+            finally:
+                free.put(worker)
+
+        with ThreadPoolExecutor(len(self._all)) as threads:
+            return list(threads.map(one, arguments))
 
 
 class Worker:
-    """A context that holds the process; `ask` calls a function there."""
+    """A context that holds one process; `ask` calls a function there."""
 
     def __init__(self) -> None:
         self._process: Any = None

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from benchmarks.wrong_worlds import worker as module
-from benchmarks.wrong_worlds.worker import Worker
+from benchmarks.wrong_worlds.worker import Worker, Workers
 
 
 def test_what_comes_back_and_what_does_not(monkeypatch):
@@ -20,3 +20,14 @@ def test_what_comes_back_and_what_does_not(monkeypatch):
         assert worker.ask(time.sleep, 60.0) is None
         monkeypatch.setattr(module, "LONGEST", 60.0)
         assert worker.ask(max, 3, 5) == 5
+
+
+def test_each_comes_back_in_its_place(monkeypatch):
+    with Workers() as workers:
+        monkeypatch.setattr(module, "LONGEST", 2.0)
+        assert workers.ask_each(_slow_or_own, ((k,) for k in range(5))) == [0, 1, None, 3, 4]
+
+
+def _slow_or_own(number: int) -> int:
+    time.sleep(60.0 if number == 2 else 0.05 * (5 - number))
+    return number
