@@ -17,7 +17,8 @@ def test_what_comes_back_and_what_does_not(monkeypatch):
         with pytest.raises(RuntimeError, match="died, exit code 7"):
             worker.ask(os._exit, 7)
         monkeypatch.setattr(module, "LONGEST", 0.2)
-        assert worker.ask(time.sleep, 60.0) is None
+        assert worker.ask(_busy, 60.0) is None
+        assert worker.ask(_asleep, 0.5) == "rested"  # while it waits it takes no time of the processor
         monkeypatch.setattr(module, "LONGEST", 60.0)
         assert worker.ask(max, 3, 5) == 5
 
@@ -29,5 +30,19 @@ def test_each_comes_back_in_its_place(monkeypatch):
 
 
 def _slow_or_own(number: int) -> int:
-    time.sleep(60.0 if number == 2 else 0.05 * (5 - number))
+    if number == 2:
+        _busy(60.0)
+    time.sleep(0.05 * (5 - number))
     return number
+
+
+def _asleep(seconds: float) -> str:
+    time.sleep(seconds)
+    return "rested"
+
+
+def _busy(seconds: float) -> str:
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+    return "done"

@@ -11,6 +11,8 @@ LEVELS = 12  # of different size, from which on it is no chance that all are who
 PARTS = 4  # of the least difference of two levels, of which the step may be one
 WHOLE = 0.02  # of a step, by which a level may be beside it: the text of a log is rounded, too
 LEAST = 1e-3  # of the largest input, below which a step does not matter
+SAME = 1e-6  # of the largest input: what is nearer is the same, written otherwise
+FEW = 200  # inputs, which tell soon of most logs that theirs are in no steps
 
 
 def input_steps(record: Record) -> FloatArray:
@@ -37,9 +39,9 @@ def _step(column: FloatArray) -> float:
     held = np.abs(column[changed])
     held = held[np.isfinite(held)]
     largest = float(held.max(initial=0.0))
-    levels = np.unique(np.concatenate([[0.0], held]))
-    apart = np.diff(levels)
-    apart = apart[apart > 1e-6 * largest]  # what is nearer is the same, written otherwise
+    if _apart(held[:FEW], largest).min(initial=largest) < LEAST * largest:  # nor are those of all of them further apart
+        return 0.0
+    levels, apart = np.unique(np.concatenate([[0.0], held])), _apart(held, largest)
     if len(apart) < LEVELS:
         return 0.0
     for parts in range(1, PARTS + 1):
@@ -50,3 +52,9 @@ def _step(column: FloatArray) -> float:
         if beside.max() <= WHOLE:
             return step
     return 0.0
+
+
+def _apart(held: FloatArray, largest: float) -> FloatArray:
+    """The differences of levels, 0 among them."""
+    apart = np.diff(np.sort(np.concatenate([[0.0], held])))
+    return apart[apart > SAME * largest]
