@@ -65,15 +65,16 @@ class Levels:
         return dict(sizes) | {name: max(sizes[name], size) for name, size in own.items()}
 
 
-def noise_levels(linear: Linear, motions: Sequence[Motion]) -> Levels:
+def noise_levels(linear: Linear, motions: Sequence[Motion], pulled_in: bool = False) -> Levels:
     """What the log shows of the noise of each output, and whether the fit leaves more.
 
     Of residuals without what the parameters make of them in white rows: errors with a memory may have pulled them off.
+    pulled_in: whether they are as Student's t counts them (tails.py), and so no longer those of the rows of the log.
     """
     none = [np.zeros((*each.shape, 0)) for each in linear.rows.residual]
     rows = replace(linear.rows, residual=left_beside(linear.rows, linear, none)[0])
     every = {
-        f"{column[0]}[{column[1]}]": _of_column(rows, c, own, linear.memory[c])
+        f"{column[0]}[{column[1]}]": _of_column(rows, c, own, linear.memory[c], pulled_in)
         for c, (own, column) in enumerate(zip(shown(rows, motions), rows.problem.columns, strict=True))
     }
     likely = FALSE / max(sum(each.decides for own in every.values() for each in own), 1)
@@ -88,13 +89,13 @@ def noise_levels(linear: Linear, motions: Sequence[Motion]) -> Levels:
     return Levels(noise, at_rest, tuple(beyond))
 
 
-def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression) -> list[Noise]:
+def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression, pulled_in: bool) -> list[Noise]:
     """By every source that tells, best first."""
     name, i = rows.problem.columns[c]
     more, moves, unit = _taken(rows), _moves(rows, c), unit_of(name, i)
     tests = [(REPEATS, _repeated(own, memory, name in TRAVEL)), (HOLDS, _held(own, memory)), (REST, _rested(own))]
     told = [(source, test) for source, test in tests if test is not None and test.level > COARSE * _step(rows, c)]
-    if not any(source != REST for source, _ in told):
+    if not pulled_in and not any(source != REST for source, _ in told):
         other = [(ROUNDING, _rounded(rows, c)), (NEIGHBOURS, _neighbours(rows, c, memory))]
         told = [*[(source, test) for source, test in other if test is not None][:1], *told]
     return [test.noise(source, more, moves, own.step, unit) for source, test in told]
