@@ -169,6 +169,7 @@ def _held(own: Shown, memory: AutoRegression) -> _Test | None:
     way = _Way.of(own.held.values.shape[1], PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
+        """What is left in motion beside the scatter of holds, both seen this way."""
         held, busy = way.power(own.held), way.power(own.busy)
         both = (held.squares.sum() + busy.squares.sum()) / ((held.counts.sum() + busy.counts.sum()) * held.numbers)
         return _test(held, busy, float(both), way.rows, way.removed)
@@ -198,6 +199,7 @@ def _repeated(own: Shown, memory: AutoRegression, counts_on: bool) -> _Test | No
         way = _Way.of(way.rows, PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
+        """What repeats have in common beside what they differ by, both seen this way."""
         seen, groups = way.seen(own.again.values), own.again.groups
         many = _summed(groups, np.ones(len(groups)))
         mean = np.stack([_summed(groups, column) for column in seen.T], axis=1) / many[:, None]
