@@ -80,7 +80,7 @@ def noise_levels(linear: Linear, motions: Sequence[Motion], pulled_in: bool = Fa
     likely = FALSE / max(sum(each.decides for own in every.values() for each in own), 1)
     noise, beyond = dict[str, Noise](), list[str]()
     for name, own in every.items():
-        clear = [each for each in own if each.decides and each.p < likely and each.share >= MARGIN]
+        clear = [each for each in own if each.decides and each.p < likely and each.most >= MARGIN]
         if own:
             noise[name] = min(clear, key=lambda each: each.p) if clear else own[0]
         if clear:
@@ -127,7 +127,7 @@ class _Power:
 @dataclass(frozen=True)
 class _Test:
     """level, residual: in their unit; p; degrees: of the level; share: of the residual that is no noise; rows, removed:
-    of a window."""
+    of a window. new: the share in rows made white."""
 
     level: float
     residual: float
@@ -136,6 +136,7 @@ class _Test:
     share: float
     rows: int
     removed: int
+    new: float = 0.0
 
     def noise(self, source: str, more: float, moves: float, step: float, unit: str) -> Noise:
         """As people read it. more: what a fit leaves is smaller by, for it has taken some; moves: of the output."""
@@ -143,7 +144,7 @@ class _Test:
         slowest = self.removed / (2.0 * self.rows * step)
         return Noise(
             source, self.level, float(residual), float((residual / max(self.level, TINY)) ** 2), self.p, self.degrees,
-            self.share, self.level / max(moves, TINY), slowest, unit,
+            self.share, self.level / max(moves, TINY), slowest, unit, self.new,
         )  # fmt: skip
 
 
@@ -160,7 +161,7 @@ def _both_ways(plain: _Test | None, white: _Test | None) -> _Test | None:
     """Rows as they are, in their units, with the better chance of the two."""
     if plain is None or white is None:
         return plain
-    return replace(plain, p=min(1.0, 2.0 * min(plain.p, white.p)), share=max(plain.share, white.share))
+    return replace(plain, p=min(1.0, 2.0 * min(plain.p, white.p)), new=white.share)
 
 
 def _held(own: Shown, memory: AutoRegression) -> _Test | None:
