@@ -11,9 +11,9 @@ from omnidyn.errors import InputError
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.keys import Key
-from omnidyn.model.mass import added_mass, axis_masses, mass_matrix, masses_couple, per_mass
+from omnidyn.model.mass import added_mass, axis_masses, mass_matrix, masses_couple, of_body_alone, per_mass
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
-from omnidyn.model.statespace import state_space
+from omnidyn.model.statespace import motor_wrench, state_space
 from omnidyn.model.wheels import wheel_speed
 from tests.support.strategies import SMALL, any_wheels
 
@@ -93,6 +93,25 @@ def test_the_state_space_has_the_new_mass():
     np.testing.assert_allclose(heavy.A, light.A * share[:, None], rtol=1e-13, atol=0.0)
     np.testing.assert_allclose(heavy.B, light.B * share[:, None], rtol=1e-13, atol=0.0)
     np.testing.assert_allclose(heavy.K, light.K * share[:, None], rtol=1e-13, atol=0.0)
+
+
+@pytest.mark.parametrize("part, change", [
+    ("motor", {"rotor_inertia": (1e-6, 2e-6, 3e-6)}), ("wheels", {"wheel_inertia": 1e-4}),
+    ("body", {"centre": (0.01, 0.0)}),
+])  # fmt: skip
+def test_the_body_alone_is_without_what_spins_and_in_the_middle(part, change):
+    robot = AXEBOT.replace(**{part: getattr(AXEBOT, part).replace(**change)})
+    assert not np.array_equal(mass_matrix(robot), mass_matrix(AXEBOT))
+    assert np.array_equal(mass_matrix(of_body_alone(robot)), mass_matrix(AXEBOT))
+
+
+def test_the_motors_of_a_linear_robot_are_without_their_drop_and_limit():
+    """And the same arrays at each call are nobody's to change."""
+    robot = AXEBOT.replace(motor=AXEBOT.motor.replace(voltage_drop=0.3, current_limit=0.1))
+    for found, plain in zip(motor_wrench(robot), motor_wrench(AXEBOT), strict=True):
+        np.testing.assert_array_equal(found, plain)
+        with pytest.raises(ValueError, match="read-only"):
+            found[0] = 0.0
 
 
 def test_turning_gives_the_added_mass_no_force_of_its_own():

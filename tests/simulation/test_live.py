@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.model.fitted.log_effects import LogEffects
+from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.live import LiveRobot
 from omnidyn.simulation.programs import prbs
@@ -62,6 +64,42 @@ def test_a_push_moves_it_as_far_as_its_motors_would():
         live.step(np.zeros(3))
     system = omnidyn.state_space(AXEBOT)
     assert live.twist[0] == pytest.approx((4.0 - 2.2) / 1.5 / -system.A[0, 0], rel=1e-9)
+
+
+def test_a_push_adds_to_what_motors_at_their_limit_give():
+    """Closed form: at |i| = i_max and without viscous friction M v = (F_max + push - C) t. Volts could not push so."""
+    none, some = (0.0,) * 3, (1.0,) * 3
+    robot = AXEBOT.replace(
+        motor=AXEBOT.motor.replace(current_limit=1.0), friction=Friction(axes=AxesFriction(viscous=none, coulomb=some))
+    )
+    live, rim = LiveRobot(robot, 0.02, push=(0.7, 0.0, 0.0)), robot.motor.torque_constant * robot.motor.gear_ratio
+    for _ in range(10):
+        live.step(np.array([0.0, 6.0, -6.0]))
+    force = 2.0 * np.cos(np.radians(30.0)) * rim / robot.wheels.wheel_radius + 0.7 - 1.0
+    assert live.twist[0] == pytest.approx(force / robot.body.mass * 0.2, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name != "late"])
+def test_a_push_is_what_simulate_makes_of_it(name):
+    """Through a speed loop too, which pushes back."""
+    robot, kind, _ = CASES[name]
+    rows, push = np.tile(SIZE[kind] * np.array([0.0, 3.0, -3.0]), (40, 1)), (6.0, -4.0, 0.2)
+    run = omnidyn.simulate(robot, dt=0.02, **{kind: rows}, log=LogEffects(push=push))
+    live = LiveRobot(robot, 0.02, push=push)
+    for k, row in enumerate(rows):
+        live.step(row)
+        np.testing.assert_allclose(live.twist, run.twist[k + 1], atol=5e-5)
+    unpushed = omnidyn.simulate(robot, dt=0.02, **{kind: rows})
+    assert np.abs(run.twist - unpushed.twist).max() > 0.05
+
+
+def test_a_push_that_volts_cannot_stand_for_is_refused():
+    wheels = AXEBOT.wheels.replace(traction_mu=0.5, wheel_inertia=2e-5)
+    robot = driven(**SPEED, rate=100.0).replace(wheels=wheels)
+    with pytest.raises(UnsupportedError, match=r"wheels may slip .*; got drive = \"speed\".*leave the push out"):
+        LiveRobot(robot, 0.02, push=(4.0, 0.0, 0.0))
+    with pytest.raises(UnsupportedError, match=r"wheels may slip .*; got drive = \"speed\".*leave the push out"):
+        omnidyn.simulate(robot, wheel_speed_command=np.ones((3, 3)), dt=0.02, log=LogEffects(push=(4.0, 0.0, 0.0)))
 
 
 def test_a_start_that_is_none_is_refused():

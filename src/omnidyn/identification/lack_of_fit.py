@@ -75,6 +75,12 @@ class Noise:
     of_moves: float
     from_hz: float
     unit: str
+    new: float = 0.0
+
+    @property
+    def most(self) -> float:
+        """The larger share: beside slow noise what is new tells of a misfit that is hardly seen in rows as they are."""
+        return max(self.share, self.new)
 
     @property
     def decides(self) -> bool:
@@ -84,10 +90,11 @@ class Noise:
     def words(self, output: str) -> str:
         """ "the residual of twist[0] is 0.31 m/s where the log repeats within 0.12 m/s (3 % of what moves): ..."."""
         where, more = WHERE[self.source]
+        new = f", {100.0 * self.new:.0f} % of what is new from row to row," if self.new > self.share else ""
         return (
             f"the residual of {output} is {self.residual:.2g} {self.unit} where the log {where} {self.level:.2g} "
-            f"{self.unit} ({100.0 * self.of_moves:.2g} % of what moves): {100.0 * self.share:.0f} % of its variance is "
-            f"{more}"
+            f"{self.unit} ({100.0 * self.of_moves:.2g} % of what moves): {100.0 * self.share:.0f} % of its "
+            f"variance{new} is {more}"
         )
 
 

@@ -28,7 +28,7 @@ from omnidyn.simulation.slip.grip import Grip
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
-from omnidyn.simulation.view import pushing
+from omnidyn.simulation.view import pushing, refuse_push
 
 EDGE = 1e-9  # of a step or a tick: so near, two times are one
 
@@ -53,7 +53,7 @@ class LiveRobot:
         self.robot, self.dt, self.supply = robot, dt, supply
         self.pose, self.twist = as_start("pose", pose, 3), as_start("twist", twist, 3)
         self._kind, n = robot.drive.kind, robot.wheels.count
-        self._push = pushing(robot, push) if any(push) else None
+        self._push = push if any(push) else None
         late = delay + robot.drive.latency / dt
         self._whole = int(np.floor(late + EDGE))
         self._part = late - self._whole if late - self._whole > EDGE else 0.0
@@ -90,17 +90,17 @@ class LiveRobot:
     def _engine(self, tol: float) -> Callable[[float, FloatArray], None]:
         """Which engine moves it."""
         robot = self.robot
-        if self._kind == SPEED or robot.drive.coasts or why_not_exact(robot):
+        dynamic = robot.motor.electrical == DYNAMIC
+        if self._kind == SPEED or robot.drive.coasts or why_not_exact(robot) or (dynamic and self._push):
             return self._implicit(tol)
-        if robot.motor.electrical == DYNAMIC:
+        if dynamic:
             self._current = np.zeros(robot.wheels.count)
             return self._with_windings
-        march = ExactMarch(robot)
+        march, pushed = ExactMarch(robot), pushing(robot, self._push) if self._push else 0.0
 
         def advance(length: float, command: FloatArray) -> None:
             """Go on by a length of time [s] with a command held, from the state that the last call left."""
-            """Go on for so long [s] under a command, shape (wheels,)."""
-            volts = self._at_motors(self._volts(command))
+            volts = self._at_motors(command) + pushed
             self.twist, self.pose = march.step(volts, length, self.twist, self.pose)
 
         return advance
@@ -113,12 +113,11 @@ class LiveRobot:
         assert battery is not None
         return clip_voltage(self.robot.motor, np.clip(command, -1.0, 1.0) * battery)
 
-    def _at_motors(self, volts: FloatArray) -> FloatArray:
-        reached = reaching(self.robot, volts)
-        return reached if self._push is None else reached + self._push
+    def _at_motors(self, command: FloatArray) -> FloatArray:
+        return reaching(self.robot, self._volts(command))
 
     def _with_windings(self, length: float, command: FloatArray) -> None:
-        rows = self._at_motors(self._volts(command))[None], np.array([length]), self.twist, self.pose, self._current
+        rows = self._at_motors(command)[None], np.array([length]), self.twist, self.pose, self._current
         twists, poses, currents = simulate_exact_inductance(self.robot, *rows)
         self.twist, self.pose, self._current = twists[1], poses[1], currents[1]
 
@@ -126,8 +125,13 @@ class LiveRobot:
         """The implicit engine, the speed loop of the firmware included."""
         robot, n = self.robot, self.robot.wheels.count
         slips = robot.wheels.traction_mu is not None
-        numbers = plant(robot)
+        numbers, pushed = plant(robot), np.zeros(n)
         units = np.array([1.0, 1.0, numbers.body.length])
+        if self._push and slips:
+            refuse_push(robot, self._kind == SPEED)
+            pushed = pushing(robot, self._push)
+        elif self._push:
+            numbers.body.push += np.array(self._push) / units
         limit = robot.motor.current_limit
         most = per_wheel(np.inf if limit is None else limit, n)
         state, work = start_state(numbers, self.twist, np.zeros(n)), room(numbers)
@@ -147,7 +151,7 @@ class LiveRobot:
                 volts[-1] = asked  # a row before the first tick takes the voltage of the row before it: the last one
                 given = loop._replace(command=np.tile(command, (len(dts), 1)), tick=ticks)
             else:
-                volts[:], given = self._at_motors(self._volts(command)), loop
+                volts[:], given = self._at_motors(command) + pushed, loop
             bound = np.tile(np.where(command == 0.0, 0.0, most) if robot.drive.coasts else most, (len(dts), 1))
             if wheels is not None:
                 slid = run_slipping(wheels, volts, bound, dts, slid_to, self.pose, given, tol)

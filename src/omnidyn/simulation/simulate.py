@@ -29,7 +29,7 @@ from omnidyn.simulation.slip.grip import Grip
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
-from omnidyn.simulation.view import PLAIN, View, pushing, seen_at_once, seen_through
+from omnidyn.simulation.view import PLAIN, View, pushing, refuse_push, seen_at_once, seen_through
 
 TOLERANCE = 1e-6
 # Beyond these a step has no meaning and the implicit engine no end: [m/s, rad/s], [m, rad], [A].
@@ -171,7 +171,8 @@ def _slipping(
     """Run the engine of wheels that slip from (twist, pose, current), and say which did."""
     numbers = slip_plant(robot)
     numbers.room[:] += (0.0, 0.0) if view.room is None else view.room
-    if acting.set_point is None:
+    if view.push is not None:
+        refuse_push(robot, acting.set_point is not None)
         acting = replace(acting, voltage=_pushed(robot, acting, view))
     dt, voltage, loop, keep = _on_grid(robot, acting)
     begin = rolling(numbers, start[0], start[2])
@@ -181,7 +182,7 @@ def _slipping(
     asked = voltage[keep[:-1]]
     motors = asked if acting.set_point is None else reaching(robot, asked)
     turning = out.rims[keep] / robot.wheels.radii
-    push = 0.0 if view.push is None or acting.voltage is None else pushing(robot, view.push)  # not of the motors
+    push = 0.0 if view.push is None else pushing(robot, view.push)  # not of the motors
     current = out.current[keep]
     if robot.motor.electrical != DYNAMIC:
         current = settled_current(robot.motor, _with_last(motors - push), turning)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.errors import UnsupportedError
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.fitted.log_effects import LogEffects
@@ -113,3 +114,13 @@ def pushing(robot: Robot, push: tuple[float, float, float]) -> FloatArray:
     """The least volts that push the body at rest as hard as a wrench (3,) [N, N, N m]. Shape (wheels,)."""
     per_volt = drive_wrench(linear_part(robot), np.zeros(3), np.eye(robot.wheels.count)).T
     return np.asarray(np.linalg.lstsq(per_volt, np.array(push), rcond=None)[0], dtype=float)
+
+
+def refuse_push(robot: Robot, looped: bool) -> None:
+    """Raises UnsupportedError for a push on wheels that may slip behind a speed loop: volts cannot stand for it."""
+    if looped:
+        raise UnsupportedError(
+            "a push on a robot whose wheels may slip is simulated as volts, and a speed loop makes its own",
+            got=f'drive = "{robot.drive.kind}"', expected="voltages or duties", where=robot.name,
+            remedy="leave the push out, or [wheels] traction_mu",
+        )  # fmt: skip

@@ -44,13 +44,24 @@ def test_a_line_that_is_too_short_says_no_more_than_that_it_turned():
 
 def test_a_motor_that_runs_out_does_not_turn_steadily():
     """Its lag is 2 s: under 0.3 V, below the dead band, it still turns for seconds."""
-    (log,) = motor_logs([motor(steps(2.0, 2.0, 2.0, 0.3), lag=2.0, noise=0.01)])
-    assert turned_under([log], 0) == pytest.approx(2.0)
+    for noise in (0.01, 0.3):  # where little hides it no window is steady; where much does, its halves differ
+        (log,) = motor_logs([motor(steps(2.0, 2.0, 2.0, 0.3), lag=2.0, noise=noise)])
+        assert turned_under([log], 0) == pytest.approx(2.0)
     (slowly,) = motor_logs([motor(steps(-2.0, -1.0, 0.0, 1.5), noise=0.05)])
     assert turned_under([slowly], 0) == pytest.approx(1.0)
     assert turned_under([slowly], 0, side=1.0) == pytest.approx(1.5)
     (rests,) = motor_logs([motor(steps(0.2, 0.4), noise=0.05)])
     assert turned_under([rests], 0) == np.inf
+
+
+def test_a_motor_that_a_positive_input_turns_backward():
+    forward = motor(steps(0.35, 2.0, 2.0, -1.5))
+    backward = forward.replace(voltage=-forward.voltage)
+    (log,) = motor_logs([backward])
+    assert turned_under([log], 0, way=-1.0) == pytest.approx(1.5)
+    assert turned_under([log], 0, side=1.0, way=-1.0) == pytest.approx(2.0)
+    forward, backward = (identify_motors([each]).starts for each in (forward, backward))
+    assert [each.ci95["start"] for each in forward] == [each.ci95["start"] for each in backward]
 
 
 def test_a_free_run_at_one_speed_says_between_what():

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.model.keys import Key
+from omnidyn.identification.output_error.prepare import guesses
+from omnidyn.model.keys import BOX, Key
+from omnidyn.model.robot import Prior
 
 AXEBOT = omnidyn.load_robot("axebot")
 TURNING = AXEBOT.replace(body=AXEBOT.body.replace(rotating_frame=True))
@@ -42,6 +44,27 @@ def test_a_robot_that_knows_it_is_fitted_by_the_implicit_engine(log):
     check(fit, ["friction.axes.coulomb[0]", "friction.axes.coulomb[1]", "friction.axes.viscous[0]"], BESIDE)
     assert not fit.lack_of_fit.found
     assert set(CENTRE) <= set(fit.rests_on["friction.axes.coulomb[1]"])
+
+
+def test_its_std_counts_on_either_side_and_in_the_middle():
+    """A robot and its log in a mirror, the centre on the other side, have the same intervals; it is free by default."""
+    volts = np.repeat(np.random.default_rng(3).uniform(-6.0, 6.0, (40, 3)), 15, axis=0)
+    noise = np.random.default_rng(4).normal(size=(601, 3)) * [0.005, 0.005, 0.02]
+    found = []
+    for side in (1.0, -1.0, 0.0):
+        robot = AXEBOT.replace(
+            body=AXEBOT.body.replace(centre=(0.0, 0.02 * side)), priors={CENTRE[1]: Prior(std=0.01, origin="measured")}
+        )
+        mirrored = -volts[:, [0, 2, 1]] if side < 0.0 else volts
+        run = omnidyn.simulate(robot, mirrored, 0.01)
+        twist = run.twist + noise * ([1.0, -1.0, -1.0] if side < 0.0 else 1.0)
+        log = run.replace(twist=twist, wheel_speed=None, pose=None, current=None)
+        assert CENTRE[1] in guesses(robot)
+        fit = omnidyn.identify([log], robot, free="friction", nuisances=())
+        found.append(np.array([fit.std[name] for name in BOX]))
+        alone = np.array([np.ptp(fit.log_alone[name]) for name in BOX]) / (2.0 * 1.96)
+        assert found[-1][2] > 1.3 * alone[2]
+    np.testing.assert_allclose(found[1], found[0], rtol=0.05)  # a step away is not one in the mirror
 
 
 def test_a_paper_robot_whose_centre_is_free_leaves_the_exact_engine(log):

@@ -122,6 +122,24 @@ def test_a_number_that_is_not_fitted_counts_with_its_std(asked):
     assert not alone.log_alone
 
 
+@pytest.mark.parametrize("more", [{"profile": ("friction.axes.viscous[0]",)}, {"bootstrap": 20}])
+def test_it_counts_in_a_profile_and_a_bootstrap_too(more):
+    """No likelihood and no draw of the logs sees it: in squares it is what the std of the fit has for it."""
+    plain, key = robot_of(World()), "friction.axes.viscous[0]"
+    gear = Prior(std=0.005 * float(plain.motor.gear_ratio), origin="measured")
+    runs = [logged(Case(World(), World()), 960 + k) for k in range(1 if "profile" in more else 5)]
+    fits = []
+    for asked in ({}, more):
+        for robot in (plain, plain.replace(priors={"motor.gear_ratio": gear})):
+            fits.append(fit_output_error(runs, robot, free="friction", nuisances=(), **asked))
+    bare, told, alone, both = fits
+    moved = np.sqrt(told.std[key] ** 2 - bare.std[key] ** 2)
+    assert moved > bare.std[key]
+    reach, wider = ([abs(end - each.value[key]) for end in each.ci95[key]] for each in (alone, both))
+    assert wider == pytest.approx(np.hypot(reach, 1.96 * moved), rel=0.03)
+    assert both.std[key] == pytest.approx(np.hypot(alone.std[key], moved), rel=0.03)
+
+
 def test_a_number_that_is_not_fitted_and_is_off_is_in_the_interval():
     """Worlds whose gear ratio is off the file's by what the file says of it: coverage of
     viscous friction, which that moves by several of its other standard errors, far from its bound at 0."""

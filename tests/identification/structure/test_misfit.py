@@ -158,3 +158,12 @@ def test_a_gyro_alone_leaves_the_other_axes_unasked():
     assert fit.lack_of_fit is not None
     assert not fit.lack_of_fit.found
     assert fit.lack_of_fit.channels["twist[0]"] == fit.lack_of_fit.channels["twist[1]"] == 0.0
+
+
+def test_gaps_leave_pieces_that_tell_their_starts_unequally():
+    """One begins at rest, others in motion, one where an axis stands still: what each has taken out has a width."""
+    log = remembered(0.0, 1)
+    kept = np.ones(len(log.t), dtype=bool)
+    kept[510:760] = kept[1300:1400] = False
+    cut = Run(t=log.t[kept], voltage=log.voltage[kept], twist=log.twist[kept], source="log")
+    assert not fit_output_error(cut, AXEBOT, nuisances=()).lack_of_fit.found

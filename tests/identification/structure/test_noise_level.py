@@ -117,6 +117,19 @@ def test_misfit_that_comes_again_with_the_commands_is_found_by_repeats_and_chi2_
         assert one.share == pytest.approx(1.5**2 / (1.0 + 1.5**2), abs=0.08)
 
 
+def test_a_misfit_beside_slow_noise_is_as_large_as_it_is_said_to_be():
+    """A white one of .4 of the noise, which remembers: seen in what is new from row to row, 14 % of the variance."""
+    again = 0.4 * NOISE * np.random.default_rng(5).normal(size=(1000, 3))
+    lack = lack_of(np.tile(commands(1, 10.0), (3, 1)), lambda clean, rng: np.resize(again, clean.twist.shape), rho=0.95)
+    assert {"twist[0]", "twist[1]", "twist[2]"} == set(lack.beyond)
+    for (name, one), std in zip(lack.noise.items(), NOISE, strict=True):
+        assert one.new > 0.5
+        assert one.share == pytest.approx(0.4**2 / (1.0 + 0.4**2), abs=0.15)
+        assert lack.channels[name] == one.share
+        assert lack.sizes[name] < 0.6 * std
+    assert "of what is new from row to row, is no noise" in lack.words()
+
+
 def test_noise_that_comes_of_motion_is_said_and_is_no_misfit():
     """Three times as much noise while it moves: at rest the log says nothing of that."""
 
@@ -155,8 +168,9 @@ def test_neighbours_tell_white_noise_where_nothing_else_does():
             assert one.level == pytest.approx(std, rel=4.0 / np.sqrt(2.0 * one.degrees))
 
 
-def test_a_sensor_that_rounds_says_nothing_at_rest():
-    step = 4.0 * NOISE
+@pytest.mark.parametrize("times", [1.5, 4.0])
+def test_a_sensor_that_rounds_says_nothing_at_rest(times):
+    step = times * NOISE
     lack = lack_of(commands(4), twist=lambda values: np.round(values / step) * step)
     assert REST not in {one.source for one in (*lack.noise.values(), *lack.at_rest.values())}
 

@@ -82,6 +82,12 @@ def test_pulled_in_residuals_leave_a_robust_fit_where_it_is():
     assert far[1] > 1.0
 
 
+def test_a_fit_that_counts_them_little_is_not_held_against_rows_that_hold_them():
+    """Neighbours in the log scatter by wild samples too: of that the residuals, pulled in, would be next to none."""
+    lack = fit_output_error(spoiled(3, 100.0), AXEBOT, nuisances=(), loss="student-t").lack_of_fit
+    assert all(one.chi2 > 0.8 for one in lack.noise.values())
+
+
 def test_student_t_counts_them_little():
     """Its intervals are those of a log without wild samples, within a fifth; Gauss's are not."""
     bare, wild = spoiled(2, 1.0), spoiled(2, 30.0)

@@ -41,7 +41,7 @@ from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Sol
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_axes, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
-from omnidyn.identification.output_error.trust.resampling import refuse_bootstrap, resampled
+from omnidyn.identification.output_error.trust.resampling import beside, refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
@@ -159,7 +159,7 @@ class Fit:
         strata = {id(record): group.name for group in self.groups for record in group.records}
         profile, draws = (self.question.profile, self.question.bootstrap) if done else ((), 0)
         names = _in_each_group(profile, by.solver.problem)
-        again = resampled(by.solver, by, known, names, draws, strata, progress)
+        again = resampled(by.solver, by, sure.known, names, draws, strata, progress)
         solution, solver = sure.plain, sure.plain.solver
         loss = loss_words(self.question.loss)
         if len(self.groups) == 1:
@@ -168,18 +168,18 @@ class Fit:
             known = known.beside(np.concatenate(moves, axis=1)) if moves else known
             exact, held, told = without_a_fall(solution, known) if done else (known, {}, [])
             known = self._beside_what_is_held(exact, sure, moved_by if done else None)
-            words = [*warnings, *told, *group.warnings, *hints]
+            words, better = [*warnings, *told, *group.warnings, *hints], beside(again, by, sure.known, known).intervals
             estimate = conclude(
                 solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels,
-                held | dict(again.intervals), exact
+                held | dict(better), exact
             )  # fmt: skip
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
         exact, known = known, self._beside_what_is_held(known, sure, moved_by if done else None)
-        engine, estimates, alones = solver.engine, {}, []
+        engine, estimates, alones, wider = solver.engine, {}, [], beside(again, by, sure.known, known).intervals
         assert isinstance(engine, JointEngine)
         for member in engine.members:
             words = [*warnings, *member.group.warnings]
-            better = engine.named_alone(member, again.intervals)
+            better = engine.named_alone(member, wider)
             seen, alone = engine.seen_alone(member, solution, known)
             as_exact = alone if exact is known else engine.seen_alone(member, solution, exact)[1]
             estimate = conclude(

@@ -34,5 +34,5 @@ def beside_rounding(
     known = sure.known.beside(moved_by.rounding(sure))
     with np.errstate(divide="ignore", invalid="ignore"):
         wider = float(np.nanmax(known.std / sure.known.std, initial=1.0))
-    words = f"voltages are logged in steps of {steps:.2g} V: what they may have been rounded by is in the intervals"
+    words = f"inputs are logged in steps of {steps:.2g} V: what they may have been rounded by is in the intervals"
     return known, [f"{words}, which are up to {wider:.2g} times as wide for it"] if wider > WIDER else []

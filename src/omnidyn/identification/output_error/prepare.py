@@ -37,6 +37,7 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.keys import (
     BOX,
     BREAKAWAY,
+    CENTRE,
     COULOMB,
     DEAD_BAND,
     EMF,
@@ -283,7 +284,7 @@ def guesses(robot: Robot, looped: bool = False) -> tuple[str, ...]:
     for name, key in found.items():
         tied = (magnet and key.name == EMF) or (key.level == BREAKAWAY and not falls(name, robot))
         held = key.name in NEVER_FREE or (key.name == LIMIT and not looped)
-        if not tied and not held and (key.level or key.get(robot) > 0.0):
+        if not tied and not held and (key.level or key.name == CENTRE or key.get(robot) > 0.0):
             kept.append(name)
     return tuple(kept)
 

@@ -77,7 +77,8 @@ def examine(solution: Solution) -> Examined:
     told, cause = _fitted(solution, problem, parts, seen, tried, ranked) if found else ((), None)
     memory = memory_beside(rows, cause) if cause and not seen.found else seen.linear.memory
     seen = with_cause(seen, cause) if cause else seen
-    names, levels = [f"{name}[{i}]" for name, i in problem.columns], noise_levels(seen.linear, moved)
+    names = [f"{name}[{i}]" for name, i in problem.columns]
+    levels = noise_levels(seen.linear, moved, solver.nu > 0.0)
     found = found or bool(levels.beyond)
     channels = levels.channels(dict(zip(names, seen.shares.tolist(), strict=True)))
     wild = {} if solver.nu else wild_samples(seen)

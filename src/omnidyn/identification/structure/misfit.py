@@ -189,7 +189,8 @@ def left_beside(rows: Rows, linear: Linear, kept: Sequence[FloatArray]) -> tuple
     for k, own in enumerate(rows.own):
         if own.shape[2]:
             taken[k] = np.concatenate([taken[k], own @ root_of_covariance(linear.of_piece(k, own))], axis=2)
-    return found, taken
+    most = max((each.shape[2] for each in taken), default=0)  # of some pieces less is told of their start
+    return found, [np.pad(each, ((0, 0), (0, 0), (0, most - each.shape[2]))) for each in taken]
 
 
 def _shares(rows: Rows, left: Sequence[FloatArray], found: bool) -> tuple[FloatArray, list[FloatArray]]:

@@ -65,21 +65,22 @@ class Levels:
         return dict(sizes) | {name: max(sizes[name], size) for name, size in own.items()}
 
 
-def noise_levels(linear: Linear, motions: Sequence[Motion]) -> Levels:
+def noise_levels(linear: Linear, motions: Sequence[Motion], pulled_in: bool = False) -> Levels:
     """What the log shows of the noise of each output, and whether the fit leaves more.
 
     Of residuals without what the parameters make of them in white rows: errors with a memory may have pulled them off.
+    pulled_in: whether they are as Student's t counts them (tails.py), and so no longer those of the rows of the log.
     """
     none = [np.zeros((*each.shape, 0)) for each in linear.rows.residual]
     rows = replace(linear.rows, residual=left_beside(linear.rows, linear, none)[0])
     every = {
-        f"{column[0]}[{column[1]}]": _of_column(rows, c, own, linear.memory[c])
+        f"{column[0]}[{column[1]}]": _of_column(rows, c, own, linear.memory[c], pulled_in)
         for c, (own, column) in enumerate(zip(shown(rows, motions), rows.problem.columns, strict=True))
     }
     likely = FALSE / max(sum(each.decides for own in every.values() for each in own), 1)
     noise, beyond = dict[str, Noise](), list[str]()
     for name, own in every.items():
-        clear = [each for each in own if each.decides and each.p < likely and each.share >= MARGIN]
+        clear = [each for each in own if each.decides and each.p < likely and each.most >= MARGIN]
         if own:
             noise[name] = min(clear, key=lambda each: each.p) if clear else own[0]
         if clear:
@@ -88,13 +89,13 @@ def noise_levels(linear: Linear, motions: Sequence[Motion]) -> Levels:
     return Levels(noise, at_rest, tuple(beyond))
 
 
-def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression) -> list[Noise]:
+def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression, pulled_in: bool) -> list[Noise]:
     """By every source that tells, best first."""
     name, i = rows.problem.columns[c]
     more, moves, unit = _taken(rows), _moves(rows, c), unit_of(name, i)
     tests = [(REPEATS, _repeated(own, memory, name in TRAVEL)), (HOLDS, _held(own, memory)), (REST, _rested(own))]
     told = [(source, test) for source, test in tests if test is not None and test.level > COARSE * _step(rows, c)]
-    if not any(source != REST for source, _ in told):
+    if not pulled_in and not any(source != REST for source, _ in told):
         other = [(ROUNDING, _rounded(rows, c)), (NEIGHBOURS, _neighbours(rows, c, memory))]
         told = [*[(source, test) for source, test in other if test is not None][:1], *told]
     return [test.noise(source, more, moves, own.step, unit) for source, test in told]
@@ -126,7 +127,7 @@ class _Power:
 @dataclass(frozen=True)
 class _Test:
     """level, residual: in their unit; p; degrees: of the level; share: of the residual that is no noise; rows, removed:
-    of a window."""
+    of a window. new: the share in rows made white."""
 
     level: float
     residual: float
@@ -135,6 +136,7 @@ class _Test:
     share: float
     rows: int
     removed: int
+    new: float = 0.0
 
     def noise(self, source: str, more: float, moves: float, step: float, unit: str) -> Noise:
         """As people read it. more: what a fit leaves is smaller by, for it has taken some; moves: of the output."""
@@ -142,7 +144,7 @@ class _Test:
         slowest = self.removed / (2.0 * self.rows * step)
         return Noise(
             source, self.level, float(residual), float((residual / max(self.level, TINY)) ** 2), self.p, self.degrees,
-            self.share, self.level / max(moves, TINY), slowest, unit,
+            self.share, self.level / max(moves, TINY), slowest, unit, self.new,
         )  # fmt: skip
 
 
@@ -159,7 +161,7 @@ def _both_ways(plain: _Test | None, white: _Test | None) -> _Test | None:
     """Rows as they are, in their units, with the better chance of the two."""
     if plain is None or white is None:
         return plain
-    return replace(plain, p=min(1.0, 2.0 * min(plain.p, white.p)), share=max(plain.share, white.share))
+    return replace(plain, p=min(1.0, 2.0 * min(plain.p, white.p)), new=white.share)
 
 
 def _held(own: Shown, memory: AutoRegression) -> _Test | None:
@@ -168,6 +170,7 @@ def _held(own: Shown, memory: AutoRegression) -> _Test | None:
     way = _Way.of(own.held.values.shape[1], PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
+        """What is left in motion beside the scatter of holds, both seen this way."""
         held, busy = way.power(own.held), way.power(own.busy)
         both = (held.squares.sum() + busy.squares.sum()) / ((held.counts.sum() + busy.counts.sum()) * held.numbers)
         return _test(held, busy, float(both), way.rows, way.removed)
@@ -197,6 +200,7 @@ def _repeated(own: Shown, memory: AutoRegression, counts_on: bool) -> _Test | No
         way = _Way.of(way.rows, PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
+        """What repeats have in common beside what they differ by, both seen this way."""
         seen, groups = way.seen(own.again.values), own.again.groups
         many = _summed(groups, np.ones(len(groups)))
         mean = np.stack([_summed(groups, column) for column in seen.T], axis=1) / many[:, None]

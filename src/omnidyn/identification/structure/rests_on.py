@@ -93,11 +93,10 @@ def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
         try:
             for bench, places in benches:
                 number = robot_parameter(bench.robot, key, None, tuple(held))
-                if number.value == 0.0:
-                    continue
-                change = bench.change(number.on(bench.robot, (1.0 + TRIED) * number.value))
+                by = TRIED * (abs(number.value) or std)
+                change = bench.change(number.on(bench.robot, number.value + by))
                 for place, own in zip(places, change, strict=True):
-                    shown[place] = own / (TRIED * abs(number.value))
+                    shown[place] = own / by
         except OmnidynError:
             continue
         found[:, k] = solved(j, -linear.white(shown)[:, 0]) * std

@@ -19,7 +19,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.memory.whitening import Weighed
-from omnidyn.identification.output_error.problem.input_steps import input_steps
+from omnidyn.identification.output_error.problem.input_steps import as_logged, input_steps
 from omnidyn.identification.structure.linear import solved
 from omnidyn.identification.structure.motion import Motion, motions
 from omnidyn.identification.structure.rests_on import as_weighed, members_of
@@ -49,7 +49,7 @@ def moved_by_rounding(sure: Weighed) -> FloatArray:
 def _drawn(motion: Motion, random: np.random.Generator) -> FloatArray:
     """Draws of what was rounded off [V], another one at each change of an input. Shape (rows, DRAWS, W)."""
     record, rows = motion.piece.record, slice(motion.piece.first, motion.piece.last + 1)
-    inputs, steps = record.voltage[rows], input_steps(record)
+    inputs, steps = as_logged(record)[rows], input_steps(record)
     off = np.zeros((len(inputs), DRAWS, len(steps)))
     for w in np.flatnonzero(steps):
         stretch = np.cumsum(np.diff(inputs[:, w], prepend=inputs[:1, w]) != 0.0)

@@ -15,19 +15,29 @@ SAME = 1e-6  # of the largest input: what is nearer is the same, written otherwi
 FEW = 200  # inputs, which tell soon of most logs that theirs are in no steps
 
 
+def as_logged(record: Record) -> FloatArray:
+    """The inputs as they were written: voltages [V], or else duties. Shape (rows, W).
+
+    A limit would make a level of its own of them, and a supply that is logged a change of every row.
+    """
+    run = record.run
+    if run is None or record.set_point is not None:
+        return record.voltage
+    return next((each for each in (run.voltage, run.duty) if each is not None), record.voltage)
+
+
 def input_steps(record: Record) -> FloatArray:
     """The step of the voltage of each wheel [V], that of a duty times the supply; 0 where there is none. (W,)."""
     run = record.run
     if run is None or record.set_point is not None:
         return np.zeros(record.voltage.shape[1])
-    if run.voltage is not None or run.duty is None:  # as logged: clipping to the limit would make a level of its own
-        return np.array([_step(column) for column in (record.voltage if run.voltage is None else run.voltage).T])
-    steps = np.array([_step(column) for column in run.duty.T])
-    if not steps.any():
+    inputs = as_logged(record)
+    steps = np.array([_step(column) for column in inputs.T])
+    if run.voltage is not None or run.duty is None or not steps.any():
         return steps
-    driven = np.abs(run.duty) > 0.0
+    driven = np.abs(inputs) > 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        supply = np.median(np.abs(record.voltage / run.duty)[driven & np.isfinite(record.voltage)])
+        supply = np.median(np.abs(record.voltage / inputs)[driven & np.isfinite(record.voltage)])
     return steps * float(supply)
 
 

@@ -68,6 +68,28 @@ def resampled(
     return Resampled(found, drawn, widening)
 
 
+def beside(again: Resampled, solution: Solution, alone: Trust, known: Trust) -> Resampled:
+    """The same intervals beside what moves the numbers and no likelihood, and no draw of the logs, sees: what the robot
+    file knows only so far, what inputs were rounded by. Each end is as much farther away as adds up in squares.
+
+    alone, known: the trust without that, and with it.
+    """
+    problem, found = solution.solver.problem, dict(again.intervals)
+    for name, (spread, ends) in again.intervals.items():
+        j = problem.names.index(name)
+        p, value = problem.parameters[j], float(solution.state.point.values[j])
+        more = max(float(known.covariance[j, j] - alone.covariance[j, j]), 0.0)
+        if not 0.0 < more < np.inf:
+            continue
+        middle = p.inner(value)
+        low, high = (p.inner(end) if end > 0.0 or not p.log else -np.inf for end in ends)
+        low = middle - float(np.hypot(middle - low, known.quantile * more**0.5))
+        high = middle + float(np.hypot(high - middle, known.quantile * more**0.5))
+        wider = None if spread is None else float(np.hypot(spread, more**0.5 * p.slope(value)))
+        found[name] = wider, (p.outer(low if p.log else max(low, p.low)), p.outer(high))
+    return replace(again, intervals=found)
+
+
 def draw_interval(value: float, draws: FloatArray, widening: float) -> tuple[float, float]:
     """95 % interval of draws (N,) around a value: their quantiles, as much farther away as few runs ask for."""
     low, high = central_interval(draws)
