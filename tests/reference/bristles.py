@@ -31,6 +31,14 @@ def alpha(w, b):
     return 1.0 if w >= 1.0 else 0.5 * math.sin(math.pi * (w - 0.5 * (1.0 + b)) / (1.0 - b)) + 0.5
 
 
+def rate_of(s, bent, power=1.0, elastic=None):
+    """z' of a bristle at a speed; bent: s0 z/g. power: Dahl's exponent; elastic: b of elasto-plastic ones, or None."""
+    w = bent * math.copysign(1.0, s)
+    if elastic is not None:
+        return s * (1.0 - alpha(w, elastic) * w)
+    return s - abs(s) * bent if power == 1.0 else s * math.copysign(abs(1.0 - w) ** power, 1.0 - w)
+
+
 def plane_rate(law, v, z, c):
     """z' of a bristle along the direction of travel, the levels c (2,) being those of now."""
     Z, V = law.stiffness * z / c, c * v
@@ -133,14 +141,7 @@ class Bristles:
         s = float(d @ v)
         low, high = (slide, hold) if s >= 0 else (back, hold_back)
         g = low + (high - low) * left_at(abs(s) / fall[0], *fall[1:])
-        if elastic is not None:
-            w = stiff * z * math.copysign(1.0, s) / g
-            rate = s * (1.0 - alpha(w, elastic) * w)
-        elif power == 1.0:
-            rate = s - stiff * abs(s) * z / g
-        else:
-            w = 1 - stiff * z * math.copysign(1.0, s) / g
-            rate = s * math.copysign(abs(w) ** power, w)
+        rate = rate_of(s, stiff * z / g, power, elastic)
         damped = damping * math.exp(-((s / fades) ** 2)) * rate
         return force - d * (stiff * z + damped), rate
 

@@ -14,11 +14,11 @@ ROBOTS, ROWS, DT = 20, 8, 0.25
 REJECTED = 4  # draws of 24 at which a decision is within rounding of its edge
 
 
-def drawn(seed):
-    """A robot of any geometry, mass, motor and friction whose wheels may slip, and levels for its motors."""
+def drawn(seed, place="axes"):
+    """A robot of any geometry, mass and motor whose wheels may slip, and levels for its motors. place: of friction."""
     rng = np.random.default_rng([seed, 9])
     robot = random_robot(rng)
-    while not any(robot.friction.axes.coulomb):  # the reference knows friction on the axes
+    while not any(getattr(robot.friction, place).coulomb):
         robot = random_robot(rng)
     r, b = float(np.mean(robot.wheels.radii)), float(np.mean(robot.wheels.robot_radius))
     spin = robot.body.mass * r**2 * rng.uniform(0.005, 0.05) / robot.wheels.count

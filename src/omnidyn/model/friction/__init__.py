@@ -1,7 +1,8 @@
 """Friction between robot and floor: a contract (law.py) and one file per place where it acts. The parts add up.
 
 Where it acts: axes, direction, wheels. How it falls with the speed: stribeck, and a file per shape (exponential,
-lorentzian). What bends: bristle, and a file per law (dahl, lugre). kinds: what a table may choose.
+lorentzian). What bends: bristle, and a file per law (dahl, lugre, elastoplastic); newton solves for it. kinds: what a
+table may choose.
 """
 
 from __future__ import annotations

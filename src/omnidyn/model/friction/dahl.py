@@ -20,6 +20,7 @@ from typing import Any
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction import lugre
 from omnidyn.model.friction.law import Kind, Number
+from omnidyn.model.friction.newton import SETTLED, newton
 
 LEAST = 1e-30  # of the way to slipping: below it there is nothing left
 ROUNDS = 60  # of Newton's steps for a general exponent; bisection needs no more
@@ -42,17 +43,10 @@ def rate_of(psi: Any) -> Any:
         bend = tau * abs(speed) * stiffness / level
         for _ in range(ROUNDS):
             value, steep = psi(own, stiffness * (aimed + tau * found) * side / level)
-            off = found - speed * value
-            if off > 0.0:
-                high = found
-            else:
-                low = found
-            new = found - off / (1.0 + bend * steep)
-            if not low <= new <= high:
-                new = 0.5 * (low + high)
-            if abs(new - found) <= 1e-16 * abs(start):
+            before = found
+            found, low, high = newton(found, found - speed * value, 1.0 + bend * steep, low, high)
+            if abs(found - before) <= SETTLED * abs(start):
                 break
-            found = new
         w = stiffness * (aimed + tau * found) * side / level
         value, steep = psi(own, w)
         return found, (value + speed * steep * w * slope / level) / (1.0 + bend * steep)
@@ -80,18 +74,11 @@ def _left_of_way(aimed, bend_x, bend_y, a):
         below_x, below_y = 1.0 + bend_x * power, 1.0 + bend_y * power
         x, y = aimed[0] / below_x, aimed[1] / below_y
         size = max(math.hypot(x, y), 1e-300)
-        off = found - size
-        if off > 0.0:
-            high = found
-        else:
-            low = found
         rises = (a - 1.0) * power * (bend_x * x * x / below_x + bend_y * y * y / below_y) / (size * size)
-        new = found - off / (1.0 + rises)
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        if abs(new - found) <= 1e-16 * found:
+        before = found
+        found, low, high = newton(found, found - size, 1.0 + rises, low, high)
+        if abs(found - before) <= SETTLED * found:
             break
-        found = new
     return found
 
 

@@ -24,6 +24,7 @@ from omnidyn.compiled.kernel import part, plain
 from omnidyn.model.friction import lugre
 from omnidyn.model.friction.dahl import ROUNDS, rate_of
 from omnidyn.model.friction.law import Kind, Number
+from omnidyn.model.friction.newton import SETTLED, newton
 
 STEPS = 20  # of a slow way of one bend
 
@@ -76,16 +77,11 @@ def _slip_within(own, trial, speed, tau, levels):
         slip, by_x, by_y = _slip(own, zx, zy, speed, levels)[:3]
         off = found - slip
         fits |= off >= 0.0
-        if off > 0.0:
-            high = found
-        else:
-            low, high = found, (high if fits else 2.0 * found)
-        new = found - off / (1.0 + by_x * zx * ex / (1.0 + ex * found) + by_y * zy * ey / (1.0 + ey * found))
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        if abs(new - found) <= 1e-16 * found:
+        high = high if fits else 2.0 * found
+        before, slope = found, 1.0 + by_x * zx * ex / (1.0 + ex * found) + by_y * zy * ey / (1.0 + ey * found)
+        found, low, high = newton(found, off, slope, low, high)
+        if abs(found - before) <= SETTLED * found:
             break
-        found = new
     return found
 
 

@@ -15,6 +15,7 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.bristle import bristle_force
+from omnidyn.model.friction.newton import SETTLED, newton
 from omnidyn.model.layout import Plant
 from omnidyn.model.stick_slip.copies import copy_row
 from omnidyn.model.stick_slip.laws import aim_bristles
@@ -35,38 +36,24 @@ def _travel_speed(b, m, c):
     q = 0.5 * high
     for _ in range(200):
         x, y = c[0] * b[0] / (m[0] * q + c[0] ** 2), c[1] * b[1] / (m[1] * q + c[1] ** 2)
-        off = x * x + y * y - 1.0
-        if off > 0.0:
-            low = q
-        else:
-            high = q
-        slope = -2.0 * (x * x * m[0] / (m[0] * q + c[0] ** 2) + y * y * m[1] / (m[1] * q + c[1] ** 2))
-        following = q - off / slope
-        if not low < following < high:
-            following = 0.5 * (low + high)
-        if abs(following - q) <= 1e-16 * q:
+        rises = 2.0 * (x * x * m[0] / (m[0] * q + c[0] ** 2) + y * y * m[1] / (m[1] * q + c[1] ** 2))
+        before = q
+        q, low, high = newton(q, 1.0 - x * x - y * y, rises, low, high)
+        if abs(q - before) <= SETTLED * q:
             break
-        q = following
     return b[0] * q / (m[0] * q + c[0] ** 2), b[1] * q / (m[1] * q + c[1] ** 2)
 
 
 @part
 def _axis_speed(own, at, tau, heavy, alone, level):
     """v with heavy v = alone + bristle(v) - level: an axis that slides to the side of its level."""
-    v, inner, outer = 0.0, 0.0, math.inf  # of |v|
-    side = math.copysign(1.0, alone + bristle_force(own, 0.0, at.aimed_bend, tau)[0] - level)
+    forward = alone + bristle_force(own, 0.0, at.aimed_bend, tau)[0] - level > 0.0
+    v, low, high = 0.0, (0.0 if forward else -math.inf), (math.inf if forward else 0.0)
     for _ in range(STEPS):
         bent, steep, _ = bristle_force(own, v, at.aimed_bend, tau)
-        off, slope = heavy * v - alone - bent + level, heavy - steep
-        if side * off <= 0.0:
-            inner = side * v
-        else:
-            outer = side * v
-        following = v - off / slope
-        if not inner <= side * following <= outer:
-            following = side * 0.5 * (inner + outer)
-        before, v = v, following
-        if abs(v - before) <= 1e-16 * abs(v) or off == 0.0:
+        before, off = v, heavy * v - alone - bent + level
+        v, low, high = newton(v, off, heavy - steep, low, high)
+        if abs(v - before) <= SETTLED * abs(v) or off == 0.0:
             break
     return v
 

@@ -15,6 +15,7 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.bristle import bristle_force
+from omnidyn.model.friction.newton import SETTLED, newton
 from omnidyn.model.layout import record
 from omnidyn.model.stick_slip.forces import gear, winding_answer
 
@@ -87,19 +88,13 @@ def rim_speed(own, at, line, tau, rate, goal):
         if force + level <= 0.0:
             return 0.0, (0.0 if own.active != 0.0 else FREE)
     force, slope = force + level, rate - slope
-    s, inner, outer = 0.0, 0.0, math.inf  # of |s|: between them lies the answer
+    s, low, high = 0.0, (0.0 if side > 0.0 else -math.inf), (math.inf if side > 0.0 else 0.0)
     for _ in range(STEPS):
-        if side * force <= 0.0:
-            inner = side * s
-        else:
-            outer = side * s
-        following = s - force / slope
-        if not inner <= side * following <= outer:
-            following = side * 0.5 * (inner + outer)
-        before, s = s, following
+        before = s
+        s, low, high = newton(s, force, slope, low, high)
         drive, slope = _drive(own, at, line, tau, side, s)
         force, slope = rate * s - goal - drive + level, rate - slope
-        if abs(s - before) <= 1e-16 * abs(s) or force == 0.0:
+        if abs(s - before) <= SETTLED * abs(s) or force == 0.0:
             break
     return s, side if own.active != 0.0 else FREE
 
