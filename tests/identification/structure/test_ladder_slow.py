@@ -62,6 +62,7 @@ def test_a_wrong_mass_under_wild_samples_needs_no_fit_of_wheels_that_slip(monkey
     assert abs(estimate.value[MASS] / AXEBOT.body.mass - 1.0) < 3e-3
     assert 3 <= len(made) <= 8
     assert not any(robot.wheels.traction_mu for robot in made)
+    assert estimate.ladder is not None
     assert [rung.why for rung in estimate.ladder.rungs if rung.key == GRIP] == [NOT_NEEDED]
 
 
