@@ -58,11 +58,11 @@ def test_a_wrong_mass_under_wild_samples_needs_no_fit_of_wheels_that_slip(monkey
     monkeypatch.setattr(Fit, "solve", lambda self, *a: made.append(self.groups[0].robot) or raw(self, *a))
     light = AXEBOT.replace(body=AXEBOT.body.replace(mass=0.7 * AXEBOT.body.mass))
     estimate = fit_output_error(spoiled(4, 100.0), light, nuisances=(), ladder=True)
+    assert estimate.ladder is not None
     assert [rung.key for rung in estimate.ladder.taken] == ["loss", MASS]
     assert abs(estimate.value[MASS] / AXEBOT.body.mass - 1.0) < 3e-3
     assert 3 <= len(made) <= 8
     assert not any(robot.wheels.traction_mu for robot in made)
-    assert estimate.ladder is not None
     assert [rung.why for rung in estimate.ladder.rungs if rung.key == GRIP] == [NOT_NEEDED]
 
 
@@ -73,6 +73,8 @@ def test_a_fit_by_students_t_goes_on_from_the_scales_that_it_has(monkeypatch):
     seen = lambda self, point, by: asked.append((self.tol, by.nu)) or raw(self, point, by)  # noqa: E731
     monkeypatch.setattr(SlipEngine, "sums", seen)
     run = spoiled(4, 100.0)
+    assert run.voltage is not None
+    assert run.twist is not None
     short = run.replace(t=run.t[:300], voltage=run.voltage[:300], twist=run.twist[:300])
     fit_output_error(short, grippy, nuisances=(), loss="student-t", free=("friction",))
     assert {nu for tol, nu in asked if tol is None} == {0.0, 4.0}
