@@ -75,7 +75,7 @@ def test_a_fit_by_students_t_goes_on_from_the_scales_that_it_has(monkeypatch):
     run = spoiled(4, 100.0)
     assert run.voltage is not None
     assert run.twist is not None
-    short = run.replace(t=run.t[:300], voltage=run.voltage[:300], twist=run.twist[:300])
+    short = run.replace(t=run.t[:120], voltage=run.voltage[:120], twist=run.twist[:120])
     fit_output_error(short, grippy, nuisances=(), loss="student-t", free=("friction",))
     assert {nu for tol, nu in asked if tol is None} == {0.0, 4.0}
     assert {nu for tol, nu in asked if tol is not None} == {4.0}

@@ -79,7 +79,7 @@ def _with_latencies(solver: Solver, begun: State) -> State:
 
 
 def coarse_point(problem: Problem, nu: float, watch: Progress) -> State:
-    """Near the best point, by one step a row; a long log is first fitted in part, of which `watch` hears only."""
+    """A state near the best point, by a step a row; a long log is first fitted in part, of which `watch` hears only."""
     watch.doing("looking for a start")
     rows = sum(piece.last - piece.first for piece in problem.pieces)
     solver, short, own = (
