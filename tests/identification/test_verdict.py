@@ -120,7 +120,7 @@ def study(loo, ties=(), std=0.02) -> Any:
     return SimpleNamespace(
         choice=choice, travel={"all": SimpleNamespace(mean=10.0)},
         points=SimpleNamespace(wrench=np.array([[10.0, 0.0, 0.0], [0.0, -10.0, 0.0]])),
-        estimates={"all": estimate([std] * 6, Estimate)}, lack_of_fit={},
+        estimates={"all": estimate([std] * 6, Estimate)}, lack_of_fit={}, moments=(),
     )  # fmt: skip
 
 

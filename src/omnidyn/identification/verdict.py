@@ -107,7 +107,9 @@ def steady_verdict(study: SteadyStudy) -> str:
         best = next((remedy.words for each in lacks for remedy in each.remedies), "")
         alike = f"; but no offered shape fits: {f'it takes {best} beside it' if best else 'the errors repeat'}"
     known = _of_groups({group: each.numbers_known() for group, each in study.estimates.items()})
-    return (
+    shift = all_of([each.short() for each in study.moments])
+    lead = sentence(f"the force of friction changes within a run ({shift}): the levels lie between both") + " "
+    return (lead if shift else "") + (
         f"Friction along travel is {levels}; its shape, {_shapes(study)}, predicts "
         f"the force in a direction that was left out within {max(1.0, round(100.0 * share)):.0f} %{alike}; {known}."
     )

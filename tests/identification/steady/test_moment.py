@@ -112,6 +112,41 @@ def test_a_wrong_shape_that_is_driven_round_is_no_change():
     assert not identify_steady([once(7, world, 24, swept=True)], robot_of(told)).moments
 
 
+@pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
+def test_a_change_is_told_first_and_the_shape_fits_on_both_sides_of_it(shape):
+    """One round: left is driven before it, right after, which looks like another level to the left."""
+    world, changed = World(shape=shape, **ROUND), 0.55 * 20 * HOLD
+    found = Identification.of(
+        [once(102, world, 20, swept=True, change=changed, factor=1.25)], robot_of(world), method="steady-state"
+    )
+    study = found.study
+    assert study is not None
+    assert [moment.shape for moment in study.moments] == [study.choice.chosen]
+    assert not study.lack_of_fit["all"].found
+    assert study.lack_of_fit["all"].tested
+    assert any("no lack of fit is seen on both sides of the change" in words for words in study.statements)
+    assert found.verdict.startswith("The force of friction changes within a run (+2")
+    assert "no offered shape fits" not in found.verdict
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.2])
+def test_a_shape_that_fits_on_neither_side_of_a_change_is_said_behind_it(factor):
+    """A box turned by 25 degrees against the body; every direction comes again, so that the change needs no shape."""
+    world = World(shape=BOX, **ROUND)
+    told = replace(world, azimuth=tuple(angle - 25.0 for angle in world.azimuth))
+    rng, angle = np.random.default_rng(8), np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False) + 0.1
+    order = np.concatenate([rng.permutation(24) for _ in range(2)])
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)[order] @ np.linalg.pinv(world.G)[:, :2].T
+    rim *= 7.0 / np.abs(rim).max(axis=1, keepdims=True)
+    run = logged(replace(world, change=36.0, after_friction=factor), rim, rng, "round")
+    study = identify_steady([run], robot_of(told))
+    assert len(study.moments) == (factor != 1.0)
+    assert study.lack_of_fit["all"].found
+    heads = [words.partition(":")[0] for words in study.warnings if "no offered shape" in words or "changes" in words]
+    beside = "no offered shape fits on both sides of the change within the run"
+    assert heads == (["no offered shape fits"] if factor == 1.0 else ["round", beside])
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
 def test_changes_by_the_shape_many_times(shape):

@@ -20,7 +20,7 @@ from omnidyn.identification.output_error.combinations import combinations
 from omnidyn.identification.output_error.problem.falling import breaking_at, falls
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.problem.problem import Fitted, Problem, per_column
+from omnidyn.identification.output_error.problem.problem import Column, Fitted, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.solve.ordered import Order
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
@@ -131,32 +131,41 @@ def _scale(problem: Problem) -> str:
 def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
     """Output -> share of its spread that the model leaves, where the model misses it (`is_missed`).
 
-    It has a wrong sign or unit. Left out: what is counted, and what never changes.
+    It has a wrong sign or unit. Left out: what is counted. What never changes, as of a dead sensor, has the largest
+    spread of its channel; the share is then infinite.
     """
-    found = {}
-    noise = noise_of(solver, solution)
-    for c, column in enumerate(solver.problem.columns):
-        pieces = [
-            (piece, piece.record.columns.index(column)) for piece in solver.problem.pieces
-            if column in piece.record.columns
-        ]  # fmt: skip
-        parts = [piece.record.outputs[piece.first : piece.last + 1, k] for piece, k in pieces]
-        parts = [part[np.isfinite(part)] for part in parts]
-        parts = [part - part.mean() if column[0] in TRAVELS else part for part in parts if part.size]
-        left = noise.get(_column(column), 0.0)
-        spread = float(np.std(np.concatenate(parts))) if parts else 0.0
-        if solver.tick[c] or not spread:
+    found, problem, noise = {}, solver.problem, noise_of(solver, solution)
+    measured = [_measured(problem, column) for column in problem.columns]
+    own = [float(np.std(np.concatenate(parts))) * bool(np.ptp(np.concatenate(parts))) if parts else 0.0
+           for parts in measured]  # fmt: skip
+    largest = {name: max(s for s, other in zip(own, problem.columns, strict=True) if other[0] == name)
+               for name, _ in problem.columns}  # fmt: skip
+    for c, (column, parts) in enumerate(zip(problem.columns, measured, strict=True)):
+        left, spread = noise.get(_column(column), 0.0), own[c] or largest[column[0]]
+        if solver.tick[c] or not spread or not parts:
             continue
         share = left / spread
         if is_missed(share, left) and is_missed(share, left, difference_noise(*parts)):  # the noise takes time to find
-            found[_column(column)] = share
+            found[_column(column)] = share if own[c] else math.inf
     return found
+
+
+def _measured(problem: Fitted, column: Column) -> list[FloatArray]:
+    """What was measured of a column, piece by piece; of what adds up, from its mean."""
+    pieces = [piece for piece in problem.pieces if column in piece.record.columns]
+    parts = [piece.record.outputs[piece.first : piece.last + 1, piece.record.columns.index(column)] for piece in pieces]
+    parts = [part[np.isfinite(part)] for part in parts]
+    return [part - part.mean() if column[0] in TRAVELS else part for part in parts if part.size]
 
 
 def _not_followed(missed: Mapping[str, float]) -> list[str]:
     if not missed:
         return []
-    names = ", ".join(f"{name} (errors {100.0 * share:.0f} % of its spread)" for name, share in missed.items())
+    still = "it never changes, and the model moves it: a sensor that is dead"
+    names = ", ".join(
+        f"{name} ({f'errors {100.0 * share:.0f} % of its spread' if math.isfinite(share) else still})"
+        for name, share in missed.items()
+    )
     return [
         f"the model does not follow {names}: a sign, a unit, the order of the wheels or the robot file is wrong; the "
         "numbers and intervals of this fit mean nothing until it does"

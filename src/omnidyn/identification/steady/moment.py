@@ -8,14 +8,14 @@ explains most; Student's t of d counts all cuts of all runs (C. E. Bonferroni, 1
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtr
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.steady.operating_points import HeldForces, held_forces
+from omnidyn.identification.steady.operating_points import ForcePoints, HeldForces, held_forces
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.statistics import t_quantile
@@ -59,6 +59,21 @@ class Moment:
             f"[{self.after_ci95[0]:.3g}, {self.after_ci95[1]:.3g}], {100.0 * self.change:+.2g} % "
             f"[{low:.2g}, {high:.2g}]; the levels of the fit lie between both{rests}"
         )
+
+    def short(self) -> str:
+        """In a few words."""
+        return f"{100.0 * self.change:+.2g} % in {self.source or 'the run'} at {self.at:.4g} s"
+
+
+def levelled(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> ForcePoints:
+    """The points as they would be had nothing changed: forces after each change over 1 + change, what it falls into
+    left out. sources: of the runs, by number."""
+    wrench, kept = points.wrench.copy(), np.ones(len(points), bool)
+    for each in found:
+        own = np.array([sources[number] == each.source for number in points.run.tolist()])
+        wrench[own & (points.span[:, 0] >= each.at)] /= 1.0 + each.change
+        kept &= ~(own & (points.span[:, 0] < each.at) & (points.span[:, 1] > each.at))
+    return replace(points, wrench=wrench).chosen(kept)
 
 
 def moments(

@@ -27,7 +27,7 @@ from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
-from omnidyn.identification.steady.moment import moments
+from omnidyn.identification.steady.moment import Moment, levelled, moments
 from omnidyn.identification.steady.moment_by_shape import moments_by_shape
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
 from omnidyn.identification.steady.rests_on import moved_by_the_file, rests_on
@@ -88,7 +88,8 @@ def identify_steady(
     changed = moments(runs, robot, points.speed_from, points.force_from, asked.window)
     sources = {number: run.source for number, run, _ in windows.found}
     changed += moments_by_shape(robot, points, choice.fit, sources, changed)
-    lack = {group: lack_of_fit(robot, own, choice.fit(group)) for group, own in parts.items()}
+    lack = {group: _lack(robot, own, choice, group, changed, sources, robust) for group, own in parts.items()}
+    within = {group for group, own in parts.items() if _changed(own, changed, sources)}
     turning = any(is_turning(robot, own) for own in parts.values())
     for group, each in estimates.items():
         estimates[group] = replace(each, study=partial(_examined, robot, lack[group], each.value, anew[group]))
@@ -97,16 +98,35 @@ def identify_steady(
         differences=differences, internal=internal,
         lack_of_fit=lack,
         statements=(
-            *words.statements(choice, viscous, differences, internal, lack, MATTERS),
+            *words.statements(choice, viscous, differences, internal, lack, within, MATTERS),
             scale_of_traction(robot, points.force_from == CURRENT),
         ),
         warnings=(
-            *points.notes, *words.about_points(points, choice, turning), *words.about_lack_of_fit(lack, choice),
-            *(each.words() for each in changed),
+            *points.notes, *words.about_points(points, choice, turning), *(each.words() for each in changed),
+            *words.about_lack_of_fit(lack, choice, within),
         ),
         moments=changed,
         advice=words.lack_advice(lack) + words.advice(choice, viscous, turning, points.force_from),
     )  # fmt: skip
+
+
+def _changed(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> list[Moment]:
+    """The changes inside the runs of these points; without those of runs that have one name."""
+    own, names = {sources[number] for number in points.run.tolist()}, [*sources.values()]
+    return [each for each in found if each.source in own and names.count(each.source) == 1]
+
+
+def _lack(
+    robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, found: Sequence[Moment],
+    sources: Mapping[int, str], robust: bool,
+) -> LackOfFit:  # fmt: skip
+    """Whether the shape of a group fits: on both sides of a change inside a run, which would look like another shape
+    wherever directions were driven on one side of it only."""
+    fit, own = choice.fit(group), _changed(points, found, sources)
+    if own:
+        points = levelled(points, own, sources)
+        fit = fit_shape(fit.shape, robot, points, turning=is_turning(robot, points), robust=robust) or fit
+    return lack_of_fit(robot, points, fit)
 
 
 def _levels(windows: SteadyWindows, shape: str, group: str, robust: bool, robot: Robot) -> dict[str, float]:

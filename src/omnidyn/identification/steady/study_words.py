@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 
@@ -20,6 +20,7 @@ LOW_WEIGHT = 0.5
 WRONG_WAY = 0.05  # share of points whose force points against the motion from which a sign is doubted
 
 
+BESIDE = " on both sides of the change within the run"
 LOST = {
     "current": "the sign of the currents is lost (`current_unsigned`)",
     "voltage": "the sign of the voltages or speeds is wrong, or K_t, K_v, the gear or a radius of the robot file is",
@@ -45,11 +46,11 @@ def data(points: ForcePoints, group: str) -> str:
 
 def statements(
     choice: ShapeChoice, viscous: Mapping[str, Sequence[ViscousLevel]], differences: Sequence[Difference],
-    internal: Mapping[str, float], lack: Mapping[str, LackOfFit], matters: float,
+    internal: Mapping[str, float], lack: Mapping[str, LackOfFit], within: Container[str], matters: float,
 ) -> tuple[str, ...]:  # fmt: skip
     """What the data say, one sentence each."""
     found = [_about_choice(choice), *_about_own(choice), *_about_ties(choice), *_about_comparison(choice)]
-    found += [words for group, each in lack.items() for words in _about_fit_or_not(group, each)]
+    found += [words for group, each in lack.items() for words in _about_fit_or_not(group, each, group in within)]
     for group, levels in viscous.items():
         found += [_about_viscous(group, level, choice.of(group), matters) for level in levels]
     found += [_about_difference(each) for each in differences]
@@ -110,22 +111,26 @@ def _about_comparison(choice: ShapeChoice) -> list[str]:
     ]
 
 
-def _about_fit_or_not(group: str, lack: LackOfFit) -> list[str]:
-    """What was tested, where no lack was found: that is a result too. A lack is a warning."""
+def _about_fit_or_not(group: str, lack: LackOfFit, changes: bool) -> list[str]:
+    """What was tested, where no lack was found: that is a result too. A lack is a warning. changes: whether the force
+    changes within a run."""
     if lack.found:
         return []
     if not lack.tested:
         return [f"{_of(group)}whether the shape fits was not tested: too few directions in which all of it moves"]
-    return [f"{_of(group)}no lack of fit is seen: nothing that was tried beside the shape does better"]
+    beside = BESIDE if changes else ""
+    return [f"{_of(group)}no lack of fit is seen{beside}: nothing that was tried beside the shape does better"]
 
 
-def about_lack_of_fit(lack: Mapping[str, LackOfFit], choice: ShapeChoice) -> tuple[str, ...]:
-    """That no offered shape fits, and what would."""
+def about_lack_of_fit(
+    lack: Mapping[str, LackOfFit], choice: ShapeChoice, within: Container[str] = ()
+) -> tuple[str, ...]:
+    """That no offered shape fits, and what would. within: groups in which the force changes within a run."""
     found = []
     for group, each in lack.items():
         if not each.found:
             continue
-        head = f"{_of(group)}no offered shape fits: "
+        head = f"{_of(group)}no offered shape fits{BESIDE if group in within else ''}: "
         if each.remedies:
             best = each.remedies[0]
             as_well = f"; as well do: {', '.join(best.same_as)}" if best.same_as else ""

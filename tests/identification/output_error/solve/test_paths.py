@@ -65,7 +65,7 @@ def test_a_fit_of_counts_from_bad_guesses_finds_what_one_from_the_truth_does(see
     """It ended where an axis creeps that should rest, thousands above."""
     problem, true = problem_of(seed)
     solver = Solver(problem, ImplicitEngine(problem), counted=False)
-    found = solver.state(coarse_point(problem, 0.0, Progress()))
+    found = solver.state(coarse_point(problem, 0.0, Progress()).point)
     assert found.objective < solver.minimise(true).state.objective + 50.0
 
 

@@ -78,8 +78,8 @@ def _with_latencies(solver: Solver, begun: State) -> State:
     return solver.state(Point(values, point.states))
 
 
-def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
-    """Near the best point, by one step a row; a long log is first fitted in part, of which `watch` hears only."""
+def coarse_point(problem: Problem, nu: float, watch: Progress) -> State:
+    """A state near the best point, by a step a row; a long log is first fitted in part, of which `watch` hears only."""
     watch.doing("looking for a start")
     rows = sum(piece.last - piece.first for piece in problem.pieces)
     solver, short, own = (
@@ -88,14 +88,14 @@ def coarse_point(problem: Problem, nu: float, watch: Progress) -> Point:
         moving_start(problem, nu, watch),
     )
     if short is problem:
-        return solver.minimise(own, watch=watch).state.point
+        return solver.minimise(own, watch=watch).state
     found = (
         Solver(short, implicit_engine(short), nu, NEAR)
         .minimise(own, watch=watch.aside("a part of the log first"))
         .state.point
     )
     states = [solver.state(point) for point in (own, found)]
-    return solver.minimise(min(states, key=lambda state: state.objective).point, watch=watch).state.point
+    return solver.minimise(min(states, key=lambda state: state.objective).point, watch=watch).state
 
 
 def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:

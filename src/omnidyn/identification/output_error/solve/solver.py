@@ -127,16 +127,19 @@ class Solver(Generic[P]):
 
     def minimise(
         self, start: Point | State, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None,
-        blocked: BoolArray | None = None,
+        blocked: BoolArray | None = None, scales: FloatArray | None = None,
     ) -> Solution:  # fmt: skip
         """The best point from `start`; `watch` sees every better one on the way.
 
         Where the start is a state that this engine found, the logs are not marched through for it again. blocked (P,):
-        latencies that a solution near by has found to stand at an edge.
+        latencies that a solution near by has found to stand at an edge. scales (columns,): variances that it has found,
+        of Student's t; without them least squares come first, which wild samples lead far away.
         """
         if not self.scaled.any():
             return self._descend(self._begun(start), limit, watch, blocked)
         start = start.point if isinstance(start, State) else start
+        if scales is not None:
+            return self._descend(self._rescaled(self.state(self._inside(start), scales))[0], limit, watch, blocked)
         plain = Solver(self.problem, self.engine, close=self.close, counted=False).minimise(start, limit)
         now = self.state(plain.state.point, np.maximum(plain.state.variance - self.tick**2 / 12.0, self.floor))
         return self._descend(self._rescaled(now)[0], limit, watch, blocked)

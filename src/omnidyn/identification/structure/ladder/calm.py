@@ -35,7 +35,7 @@ def calmed(
     if isinstance(made, Model) and unexplained(made.solution.solver, made.solution):
         return stands, []
     if not isinstance(made, Model):
-        return stands, [first, replace(rung, why=f"cannot be fitted: {made.why}")]
+        return stands, [first, replace(rung, why=made.why)]
     if not best.gain > best.gain_std:
         return stands, [first, replace(rung, why="predicts what it was not fitted to no better", value=made.value)]
     taken = replace(rung, why="pays", value=made.value, taken=True)

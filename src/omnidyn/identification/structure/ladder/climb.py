@@ -11,7 +11,7 @@ less than such a cause would. Before all this, where samples are wild, is a loss
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +27,8 @@ from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine
 from omnidyn.identification.structure.ladder.calm import calmed
 from omnidyn.identification.structure.ladder.held_out import CLEAR, Errors, errors, margins_of
-from omnidyn.identification.structure.ladder.models import Model, Untried, can, moves, moves_apart, tried
+from omnidyn.identification.structure.ladder.models import Model, Move, Untried, can, moves, moves_apart, tried
+from omnidyn.identification.structure.ladder.slow import Purse, quick_first
 from omnidyn.identification.structure.missing.candidates import CHANGE
 from omnidyn.identification.structure.missing.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
 from omnidyn.identification.structure.missing.odometry import hidden_by
@@ -40,8 +41,10 @@ from omnidyn.run import Run
 STEPS = 4  # at most
 TRIED = 3  # remedies that are fitted in a step
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of BIC, from which one of two models is the better one; of a first step's chi squared
+MEND = "the model does not follow the logs: first mend signs, units, the order of wheels, sensors that are dead"
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
 BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
+Fits = Callable[[Move, Model, str], list[Model | Untried]]  # of a move from a model, and in the place of which step
 
 
 def climb(
@@ -53,37 +56,52 @@ def climb(
     seen: dict[str, Examined] | None = _examined(given)
     stands, rungs = calmed(given, seen, runs, names, progress)
     seen, begin = (seen, 1) if stands is given else (None, 2)
+    fits: Fits = lambda move, before, instead: tried(move, before, runs, names, progress, instead)  # noqa: E731
+    purse = Purse()
     for step in range(begin, begin + STEPS):
         if unexplained(stands.solution.solver, stands.solution):
             return _ended(
-                stands, rungs, "the model does not follow the logs: first mend signs, units, the order of wheels"
+                stands,
+                rungs,
+                "the model does not follow the logs: first mend signs, units, the order of wheels, dead sensors",
             )
         progress.doing(f"step {step} of the ladder: looking for what the model leaves out")
         seen = seen or _examined(stands)
         lacks = _lacks(seen)
         if not lacks:
             return _ended(stands, rungs, "the residuals hold nothing but noise")
-        every, found, best, after = list[Model | Untried](), list[Rung](), None, None
-        first = {group: offered(lack) for group, lack in lacks.items()}
-        far = {group: unseen(lack, stands, group) for group, lack in lacks.items()}
-        for asked in (moves(first, stands), moves_apart(first, stands), moves(far, stands)):
-            more = [each for move in asked for each in tried(move, stands, runs, names, progress)]
-            if not more:
-                continue
-            every += more
-            found, best = judged(step, stands, every, seen)
-            after = _examined(best) if best is not None else None
-            if after is not None and not _lacks(after):
-                break
-        if best is not None and best.move is not None and stands.before is not None:  # may the step before go?
-            every += tried(best.move, stands.before, runs, names, progress, stands.words)
-            found, best = judged(step, stands, every, seen)
-            after = _examined(best) if best is not None and best.instead else after
+        found, best, after = _climbed(step, stands, seen, lacks, fits, purse)
         rungs += [rung for rung in found if rung.step or not rungs]
+        rungs += [_untried(step, each) for each in purse.told()]
         if best is None:
             return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}")
         stands, seen = best, after
     return _ended(stands, rungs, f"{STEPS} steps are the most that it takes")
+
+
+def _climbed(
+    step: int, stands: Model, seen: Mapping[str, Examined], lacks: Mapping[str, LackOfFit], fits: Fits, purse: Purse
+) -> tuple[list[Rung], Model | None, dict[str, Examined] | None]:
+    """(the rungs of a step, the model to go on from, None where nothing pays, and its diagnosis, where it is made)."""
+    every, found, best, after = list[Model | Untried](), list[Rung](), None, None
+    first = {group: offered(lack) for group, lack in lacks.items()}
+    far = {group: unseen(lack, stands, group) for group, lack in lacks.items()}
+    quick, slow = quick_first(moves(first, stands), stands)
+    for asked in (quick, slow, moves_apart(first, stands), moves(far, stands)):
+        if best is not None and after is not None and not _lacks(after):  # what rivals it, and no more
+            asked = purse.rivals(asked, best) if asked is slow else []
+        more = [each for move in purse.pays(asked, stands) for each in fits(move, stands, "")]
+        if not more:
+            continue
+        every += more
+        found, best = judged(step, stands, every, seen)
+        after = _examined(best) if best is not None else None
+    if best is not None and best.move is not None and stands.before is not None:  # may the step before go?
+        again = purse.pays([best.move], stands.before)
+        every += [each for move in again for each in fits(move, stands.before, stands.words)]
+        found, best = judged(step, stands, every, seen)
+        after = _examined(best) if best is not None and best.instead else after
+    return found, best, after
 
 
 def _examined(model: Model) -> dict[str, Examined]:
@@ -156,13 +174,14 @@ def judged(
         rungs.append(_rung(step, each, own, before, count, k == taken, words, others, stands))
     rungs.sort(key=lambda rung: (not rung.taken, -rung.gain))
     rungs = [*{(rung.key, rung.words): rung for rung in reversed(rungs)}.values()][::-1]  # a limit found twice is one
-    rungs += [
-        Rung(step, each.move.key, each.words, 0, np.nan, np.nan, np.nan, np.nan, why=f"cannot be fitted: {each.why}",
-             groups=each.move.groups)
-        for each in every if isinstance(each, Untried)
-    ]  # fmt: skip
+    rungs += [_untried(step, each) for each in every if isinstance(each, Untried)]
     first = [Rung(0, "", STANDS, before.numbers, before.size, taken=True, value=stands.value)] if step == 1 else []
     return [*first, *rungs], None if taken is None else models[taken]
+
+
+def _untried(step: int, each: Untried) -> Rung:
+    nothing, move = np.nan, each.move
+    return Rung(step, move.key, each.words, 0, nothing, nothing, nothing, nothing, why=each.why, groups=move.groups)
 
 
 def _why_not(model: Model, own: Errors, before: Errors, count: int, beyond: tuple[float, str]) -> str:

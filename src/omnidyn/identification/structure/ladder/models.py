@@ -52,6 +52,16 @@ class Move:
         return next(iter(self.remedies.values())).key
 
     @property
+    def words(self) -> str:
+        """What is switched on, and where."""
+        return f"{next(iter(self.remedies.values())).words}{self.where}"
+
+    @property
+    def promise(self) -> float:
+        """What it explains by the diagnosis before, in chi squared, of all its groups."""
+        return sum(remedy.chi2 for remedy in self.remedies.values())
+
+    @property
     def groups(self) -> tuple[str, ...]:
         """In which groups it is switched on, where not in all."""
         return () if self.all else tuple(self.remedies)
@@ -114,7 +124,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Untried:
-    """A move that could not be fitted, and why."""
+    """A move that was not fitted, and why."""
 
     move: Move
     words: str
@@ -195,7 +205,7 @@ def tried(
             fit = _fit(stands, begins, runs, names, aside)
             solution, _ = fit.with_levels(fit.solve(aside), aside)
         except OmnidynError as error:
-            found.append(Untried(move, words, str(error)))
+            found.append(Untried(move, words, f"cannot be fitted: {error}"))
             continue
         numbers = stands.numbers + sum(way.numbers for way in ways)
         found.append(Model(fit, solution, begins, move, words, numbers, stands, instead))
