@@ -136,8 +136,8 @@ def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
     """
     found, problem, noise = {}, solver.problem, noise_of(solver, solution)
     measured = [_measured(problem, column) for column in problem.columns]
-    own = [float(np.std(np.concatenate(parts))) * bool(np.ptp(np.concatenate(parts))) if parts else 0.0
-           for parts in measured]  # fmt: skip
+    whole = [np.concatenate(parts) if parts else np.zeros(1) for parts in measured]
+    own = [float(each.std()) if np.ptp(each) else 0.0 for each in whole]
     largest = {name: max(s for s, other in zip(own, problem.columns, strict=True) if other[0] == name)
                for name, _ in problem.columns}  # fmt: skip
     for c, (column, parts) in enumerate(zip(problem.columns, measured, strict=True)):

@@ -41,7 +41,7 @@ from omnidyn.run import Run
 STEPS = 4  # at most
 TRIED = 3  # remedies that are fitted in a step
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of BIC, from which one of two models is the better one; of a first step's chi squared
-MEND = "the model does not follow the logs: first mend signs, units, the order of wheels, sensors that are dead"
+MEND = "the model does not follow the logs: first mend signs, units, the order of wheels, dead sensors"
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
 BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
 Fits = Callable[[Move, Model, str], list[Model | Untried]]  # of a move from a model, and in the place of which step
@@ -60,11 +60,7 @@ def climb(
     purse = Purse()
     for step in range(begin, begin + STEPS):
         if unexplained(stands.solution.solver, stands.solution):
-            return _ended(
-                stands,
-                rungs,
-                "the model does not follow the logs: first mend signs, units, the order of wheels, dead sensors",
-            )
+            return _ended(stands, rungs, MEND)
         progress.doing(f"step {step} of the ladder: looking for what the model leaves out")
         seen = seen or _examined(stands)
         lacks = _lacks(seen)
