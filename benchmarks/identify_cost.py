@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,14 @@ from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
 
 FIRST = 10.0  # [s] of the command's first run
+DIAGNOSED = (
+    "gain",
+    "weak motor",
+    "turning frame",
+    "mass",
+    "Stribeck",
+    "cogging",
+)  # kinds of wrong_worlds, two logs each
 
 
 def speed(table: Table, robot: Robot, clean: Run) -> None:
@@ -111,3 +120,29 @@ def _command(place: Path, cache: str) -> float:
         capture_output=True, check=True,
     )  # fmt: skip
     return sum(os.times()[2:4]) - before
+
+
+def diagnosis(table: Table, _robot: Robot, _clean: Run) -> None:
+    """What `lack_of_fit` costs, in fits of the same log by the slower engine of the two: that of a turning frame."""
+    from benchmarks.wrong_worlds.kinds import by_name
+    from benchmarks.wrong_worlds.log import logged, robot_of
+    from benchmarks.wrong_worlds.remedies import FRICTION
+    from benchmarks.wrong_worlds.score import drawn
+
+    shares = []
+    for name in DIAGNOSED:
+        for number in range(2):
+            case, seed, _ = drawn(by_name(name), number)
+            log, robot = logged(case, seed), robot_of(case.told)
+            turning = robot.replace(body=robot.body.replace(rotating_frame=True))
+            began = time.process_time()
+            fit = omnidyn.identify(log, robot, free=FRICTION)
+            fitted = time.process_time()
+            assert fit.lack_of_fit is not None
+            done = time.process_time()
+            omnidyn.identify(log, turning, free=FRICTION)
+            shares.append((done - fitted) / max(time.process_time() - done, fitted - began))
+    least, worst = float(np.median(shares)), max(shares)
+    table.add("<= 2", least <= 2.0, what="diagnosis of wrong logs, in fits by the implicit engine: median",
+              draws=len(shares), value=least, unit="fits")  # fmt: skip
+    table.add("<= 2", worst <= 2.0, what="... the worst of them", draws=len(shares), value=worst, unit="fits")
