@@ -10,6 +10,8 @@ import pytest
 from benchmarks.blind.log import robot_of
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World, drive
 from omnidyn.identification.identify import Identification
+from omnidyn.identification.steady.moment import levelled
+from omnidyn.identification.steady.operating_points import steady_windows
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.run import Run
 
@@ -55,6 +57,22 @@ def test_a_change_is_found_with_its_time_and_both_levels(factor):
     assert moment.after == pytest.approx(factor * LEVEL, rel=0.01)
     assert moment.ci95[0] <= factor - 1.0 <= moment.ci95[1]
     assert any("changes within the run, most likely at" in words for words in study.warnings)
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_currents_that_are_gone_on_one_side_are_not_scaled(late):
+    whole = run(1)
+    gone, count = whole.current.copy(), len(whole.current)
+    gone[slice(count // 2, None) if late else slice(count // 2)] = 0.0
+    study = identify_steady([whole.replace(current=gone)], robot_of(WORLD))
+    (moment,) = study.moments
+    side = "after" if late else "before"
+    assert any(f"no force is seen {side} it: a sensor or a motor that does not work there" in w for w in study.warnings)
+    points = steady_windows([whole], robot_of(WORLD)).points(robot_of(WORLD))
+    left = levelled(points, [moment], {int(points.run[0]): moment.source})
+    known = points.span[:, 1] <= moment.at if late else points.span[:, 0] >= moment.at
+    assert 5 < len(left) == known.sum()
+    assert np.array_equal(left.wrench, points.wrench[known])
 
 
 def test_a_right_run_does_not_change():

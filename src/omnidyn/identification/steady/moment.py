@@ -24,6 +24,7 @@ FALSE = 0.01  # of right logs for which a change is told
 SPARE = 4  # windows beyond the commands that a test needs
 AS_GOOD = 6.0  # of t squared, by which a cut must be worse than the best to be ruled out
 MATTERS = 0.02  # of the force: a smaller change does not matter
+GONE = "a sensor or a motor that does not work there, or wheels off the floor"
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,11 @@ class Moment:
     p: float
     shape: str = ""
 
+    @property
+    def vanished(self) -> tuple[bool, bool]:
+        """Whether no force is left that is told from none, before and after: then nothing scales with it."""
+        return self.before_ci95[0] <= 0.0, self.after_ci95[0] <= 0.0
+
     def words(self) -> str:
         """In a sentence."""
         low, high = (100.0 * end for end in self.ci95)
@@ -52,27 +58,33 @@ class Moment:
         if self.shape:
             what = f"over that of the fitted shape ({self.shape})"
             rests = "; no command tells it by itself, so it is one only if that shape is right"
+        if any(self.vanished):
+            rests += f"; no force is seen {'before' if self.vanished[0] else 'after'} it: {GONE}"
         return (
             f"{self.source or 'the run'}: the force {what} changes within the run, most likely at "
             f"{self.at:.4g} s (between {self.between[0]:.4g} and {self.between[1]:.4g} s): from {self.before:.3g} N "
             f"[{self.before_ci95[0]:.3g}, {self.before_ci95[1]:.3g}] to {self.after:.3g} N "
-            f"[{self.after_ci95[0]:.3g}, {self.after_ci95[1]:.3g}], {100.0 * self.change:+.2g} % "
-            f"[{low:.2g}, {high:.2g}]; the levels of the fit lie between both{rests}"
+            f"[{self.after_ci95[0]:.3g}, {self.after_ci95[1]:.3g}], {100.0 * self.change:+.3g} % "
+            f"[{low:.3g}, {high:.3g}]; the levels of the fit lie between both{rests}"
         )
 
     def short(self) -> str:
         """In a few words."""
-        return f"{100.0 * self.change:+.2g} % in {self.source or 'the run'} at {self.at:.4g} s"
+        return f"{100.0 * self.change:+.3g} % in {self.source or 'the run'} at {self.at:.4g} s"
 
 
 def levelled(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> ForcePoints:
-    """The points as they would be had nothing changed: forces after each change over 1 + change, what it falls into
-    left out. sources: of the runs, by number."""
+    """The points as they would be had nothing changed: forces after each change over 1 + change; what it falls into,
+    and the side on which no force is left, go. sources: of the runs, by number."""
     wrench, kept = points.wrench.copy(), np.ones(len(points), bool)
     for each in found:
         own = np.array([sources[number] == each.source for number in points.run.tolist()])
-        wrench[own & (points.span[:, 0] >= each.at)] /= 1.0 + each.change
-        kept &= ~(own & (points.span[:, 0] < each.at) & (points.span[:, 1] > each.at))
+        before, after = own & (points.span[:, 1] <= each.at), own & (points.span[:, 0] >= each.at)
+        if any(each.vanished):
+            kept &= ~own | (after if each.vanished[0] else before)
+            continue
+        wrench[after] /= 1.0 + each.change
+        kept &= ~own | before | after
     return replace(points, wrench=wrench).chosen(kept)
 
 

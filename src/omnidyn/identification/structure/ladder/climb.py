@@ -56,7 +56,10 @@ def climb(
     seen: dict[str, Examined] | None = _examined(given)
     stands, rungs = calmed(given, seen, runs, names, progress)
     seen, begin = (seen, 1) if stands is given else (None, 2)
-    fits: Fits = lambda move, before, instead: tried(move, before, runs, names, progress, instead)  # noqa: E731
+
+    def fits(move: Move, before: Model, instead: str) -> list[Model | Untried]:
+        return tried(move, before, runs, names, progress, instead)
+
     purse = Purse()
     for step in range(begin, begin + STEPS):
         if unexplained(stands.solution.solver, stands.solution):
