@@ -63,8 +63,8 @@ class Noise:
     source: REPEATS, HOLDS, NEIGHBOURS, REST, or ROUNDING, which is known: tick/sqrt(12). level, residual: root mean
     square of both, in the unit of the output; chi2: their ratio squared; p: chance of as much where the model is right.
     degrees: of freedom of the level. share: of the variance of the residual that is no noise; of_moves: the level over
-    what the output moves by. from_hz: slower errors count in neither. new: the share in rows made white, 0 where these are
-    not looked at."""
+    what the output moves by. from_hz: slower errors count in neither. new: the share in rows made white, 0 where
+    these are not looked at."""
 
     source: str
     level: float

@@ -167,6 +167,15 @@ def test_an_axis_that_never_moved_is_bounded_from_below(axebot, clean):
     assert any("axis yaw never visibly moved" in words for words in fit.warnings)
 
 
+def test_a_dead_sensor_bounds_nothing(axebot, clean):
+    log = noisy(clean, 17)
+    fit = fit_output_error(log.replace(twist=log.twist * [1.0, 1.0, 0.0]), axebot, start="rest")
+    assert not fit.lower_bound
+    assert any(
+        "axis yaw never visibly moved" in w and "its sensor is dead: not one row differs" in w for w in fit.warnings
+    )
+
+
 def test_what_has_a_std_is_free_with_it_as_a_prior_but_never_one_of_an_earlier_fit(axebot, clean):
     log, key = noisy(clean, 18), "motor.resistance_ohm"
     robot = axebot.replace(priors={key: Prior(std=0.05, source="datasheet"), BOX[0]: Prior(std=1e-6)})

@@ -57,6 +57,7 @@ from omnidyn.run import Run
 
 EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
 NOTHING = 1e-9  # [N, N m] a drive that is only rounding
+DEAD = ", or its sensor is dead: not one row differs from another, so that no bound is told"
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 FINER = 1e-6  # the same where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
 ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
@@ -126,8 +127,9 @@ def make_group(
             warnings.append(f"{found.words(axis, name)} there")
             continue
         what = f"; it held {held:.4g} {unit(key)}" if held > NOTHING else "; nothing drove it"
+        what = f"{what}{DEAD}" if held > NOTHING and found.dead[axis] else what
         warnings.append(found.words(axis) + (what if found.seen[axis] else ""))
-        bounds |= {key: held} if held > NOTHING else {}
+        bounds |= {key: held} if held > NOTHING and not found.dead[axis] else {}
         if exact and robot.friction.axes.levels[2][axis] < held:
             robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)
     if alone and not found.moved.any():

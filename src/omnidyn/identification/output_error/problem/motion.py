@@ -32,12 +32,14 @@ class Motion:
     """moved (3,): whether an axis visibly moved; True where no twist is known.
 
     held (3,): largest drive [N, N, N m] of the axes that were measured; 0 where all have moved, and nothing was held.
-    seen (3,): whether anything tells of an axis; what was not measured has held nothing.
+    seen (3,): whether anything tells of an axis; what was not measured has held nothing. dead (3,): whether no row of
+    an axis differs from another, where others moved: it stood still, or its sensor is dead.
     """
 
     moved: BoolArray
     held: FloatArray
     seen: BoolArray
+    dead: BoolArray
 
     def words(self, axis: int, where: str = "") -> str:
         """Why the friction of an axis that did not move is not fitted."""
@@ -49,22 +51,24 @@ class Motion:
 
 def motion(records: Sequence[Record], robot: Robot) -> Motion:
     """What all logs together show."""
-    moved, seen = np.zeros(3, bool), np.zeros(3, bool)
+    moved, seen, dead = np.zeros(3, bool), np.zeros(3, bool), np.ones(3, bool)
     measured = []
     for record in records:
         twist = measured_twist(record, robot)
         if twist is None:
-            return Motion(np.ones(3, bool), np.zeros(3), np.ones(3, bool))
+            return Motion(np.ones(3, bool), np.zeros(3), np.ones(3, bool), np.zeros(3, bool))
         known = np.array([np.isfinite(twist[:, axis]).any() for axis in range(3)])
         measured.append(known)
         others = any(name != "twist" for name, _ in record.columns)  # which may tell of an axis without a speed
         seen |= known | others
         moved |= others & ~known
+        dead &= known & [not np.any(np.diff(own[np.isfinite(own)])) for own in twist.T]
         for first, last in record.pieces:
             rows = max(window_rows(record.t[first : last + 1]) // 2, 1)
             for axis in np.flatnonzero(known).tolist():
                 moved[axis] |= _moved(twist, axis, first, last, rows)
-    return Motion(moved, np.zeros(3) if moved.all() else _most_drive(records, measured, robot), seen)
+    held = np.zeros(3) if moved.all() else _most_drive(records, measured, robot)
+    return Motion(moved, held, seen, dead & bool(moved.any()))
 
 
 def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot: Robot) -> FloatArray:
