@@ -11,6 +11,9 @@ from hypothesis import HealthCheck, settings
 
 from omnidyn.model.robot_file import load_robot
 
+# Workers of pytest-xdist have the processors already; set before the first test loads NumPy.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Output is wrapped as it is without a terminal; the processes of pytest-xdist are told 80 columns.
 os.environ.pop("COLUMNS", None)
 

@@ -1,12 +1,13 @@
-"""Several tasks at a time: in order, under the caller's settings, and the first failure is raised."""
+"""Several tasks at a time: in order, under the caller's settings, and the first failure is raised; or one thread."""
 
 import threading
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from omnidyn.compiled import beside
-from omnidyn.compiled.beside import one_by_one, side_by_side
+from omnidyn.compiled.beside import one_by_one, side_by_side, small_matrices
 
 
 @pytest.fixture(autouse=True)
@@ -47,3 +48,26 @@ def test_large_results_are_not_made_before_they_are_wanted():
     assert next(results) == 0
     assert sorted(asked) == [0, 1]
     assert list(results) == [k * k for k in range(1, 9)]
+
+
+def blas_threads():
+    return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+
+def test_small_matrices_have_one_thread_until_the_last_has_left():
+    """One who leaves first must not give the threads back to another, nor the other keep them for ever."""
+    with threadpool_limits(2, user_api="blas"):
+        one, other = small_matrices(), small_matrices()
+        one.__enter__()
+        other.__enter__()
+        one.__exit__(None, None, None)
+        assert blas_threads() == {1}
+        other.__exit__(None, None, None)
+        assert blas_threads() == {2}
+
+
+def test_threads_come_back_after_a_failure():
+    with threadpool_limits(2, user_api="blas"):
+        with pytest.raises(ValueError, match="no"), small_matrices():
+            raise ValueError("no")
+        assert blas_threads() == {2}

@@ -1,12 +1,17 @@
-"""Several runs of kernels at a time: kernels leave the interpreter to other threads."""
+"""Several runs of kernels at a time: kernels leave the interpreter to other threads; and no threads where they cost."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import copy_context
+from functools import cache
+from threading import Lock
 from typing import TypeVar
+
+from threadpoolctl import ThreadpoolController
 
 MOST_THREADS = 8
 
@@ -32,3 +37,31 @@ def one_by_one(task: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
     every, threads = list(items), min(os.cpu_count() or 1, MOST_THREADS)
     for begin in range(0, len(every), threads):
         yield from side_by_side(task, every[begin : begin + threads])
+
+
+_within: list[AbstractContextManager[object]] = []  # the one limit, once for each who is within `small_matrices`
+_guard = Lock()
+
+
+@contextmanager
+def small_matrices() -> Iterator[None]:
+    """Within it the linear algebra of NumPy and SciPy uses one thread, in the whole process.
+
+    Threads of matrices of 100 rows wait for each other, and where other work runs on the machine they wait long: a
+    diagnosis took four times as much of the processors. The first who enters sets it, the last who leaves restores it.
+    """
+    with _guard:
+        _within.append(_within[0] if _within else _controller().limit(limits=1, user_api="blas"))
+    try:
+        yield
+    finally:
+        with _guard:
+            last = _within.pop()
+            if not _within:
+                last.__exit__(None, None, None)
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    """Finds the libraries once, which takes milliseconds."""
+    return ThreadpoolController()

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.beside import small_matrices
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
@@ -51,6 +52,7 @@ def diagnose(solution: Solution) -> Diagnosis:
     return examine(solution).diagnosis
 
 
+@small_matrices()
 def examine(solution: Solution) -> Examined:
     """The diagnosis of a fit at its best point, and what it was made with.
 
