@@ -125,8 +125,8 @@ def _command(place: Path, cache: str) -> float:
 
 
 def diagnosis(table: Table, _robot: Robot, _clean: Run) -> None:
-    """What `lack_of_fit` costs, in fits of the same log by the slowest engine that a candidate needs, where something is
-    found that of wheels that slip; and by the slower of the robot's own and that of a turning frame, which is stricter.
+    """What `lack_of_fit` costs, in fits of the log by the slowest engine that a candidate needs: where something is
+    found that of wheels that slip. And by the slower of the robot's own and that of a turning frame, which asks more.
     """
     from benchmarks.wrong_worlds.kinds import by_name
     from benchmarks.wrong_worlds.log import logged, robot_of

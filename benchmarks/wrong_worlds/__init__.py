@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from benchmarks.wrong_worlds.score import Seen
 
 SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
-LOGS, RIGHT_LOGS = max(round(25 * SHARE), 1), max(round(112 * SHARE), 1)  # of each kind, of each noise
+LOGS, TWO, RIGHT_LOGS = (max(round(n * SHARE), 1) for n in (25, 200, 112))  # of each kind, of two, of each noise
 SILENT, NAMED, CALM, HELD, FALSE, RICHER = 0.02, 0.9, 0.9, 0.9, 0.03, 0.05
 COLUMNS = [
     "world", "cause", "logs", "off", "silent", "found", "visible", "found of visible", "1st or 2nd", "sure", "held",
@@ -34,7 +34,7 @@ def measure() -> Table:
     """Each kind a row, then all of them, then right worlds."""
     from benchmarks.wrong_worlds.kinds import KINDS
     from benchmarks.wrong_worlds.right import NOISES, score_right
-    from benchmarks.wrong_worlds.score import score
+    from benchmarks.wrong_worlds.score import score, score_two
     from benchmarks.wrong_worlds.worker import Workers
 
     table = Table("wrong_worlds: `identify` where the model is wrong, and where it is right", COLUMNS)
@@ -52,6 +52,7 @@ def measure() -> Table:
             table.notes += list(dict.fromkeys(f"{kind.name}: {log.words}" for log in logs if log.words))[:2]
         table.notes += endless
         _add_totals(table, every)
+        _add_two(table, workers.ask_each(score_two, ((number,) for number in range(TWO))))
         calm: dict[str, list[Calm]] = {}
         for noise in NOISES:
             asked = workers.ask_each(score_right, ((noise, number) for number in range(RIGHT_LOGS)))
@@ -94,6 +95,17 @@ def _add_totals(table: Table, every: Sequence[tuple[Kind, Seen]]) -> None:
     table.add(world="those of them that are visible", logs=len(seen), **early_seen)
     table.add(f"sure <= {1.0 - CALM:.2g}", _at_most(sure, 1.0 - CALM), world="all others", logs=len(other), sure=sure)
     table.add(f"held >= {HELD}", _at_least(held, HELD), world="after the true remedy", logs=len(told), held=held)
+
+
+def _add_two(table: Table, asked: Sequence[Seen | None]) -> None:
+    """Two kinds at once, which no candidate describes alone: a goal of our own."""
+    logs = [log for log in asked if log is not None]
+    cells: dict[str, Any] = _cells("either", logs) | {"visible": None, "held": None}
+    table.add(
+        f"silent <= {SILENT}", _at_most(cells["silent"], SILENT), world="two kinds at once", cause="either", **cells
+    )
+    table.notes += [f"two kinds: {len(asked) - len(logs)} logs took too long"] * (None in asked)
+    table.notes += [f"two kinds, silent: {log.words}" for log in logs if log.silent]
 
 
 def _calm_cells(seen: Sequence[Calm]) -> dict[str, Any]:

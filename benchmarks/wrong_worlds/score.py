@@ -8,7 +8,7 @@ Where they are missing nothing is found.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from benchmarks.wrong_worlds.remedies import FRICTION, NUISANCES, held
 from benchmarks.wrong_worlds.sizes import SIZES
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.identify import identify
+from omnidyn.run import Run
 
 FIRST_SEED, SEEDS_EACH = 20_000, 100
 SPREAD = 0.4  # of the logarithm of a size, either way
@@ -70,23 +71,47 @@ def score(name: str, number: int) -> Seen:
     kind = by_name(name)
     case, seed, large = drawn(kind, number)
     run, out = logged(case, seed), Seen(large)
-    began = time.process_time()
-    try:
-        estimate = identify(run, robot_of(case.told), free=FRICTION)
-        lack = getattr(estimate, "lack_of_fit", None)
-        rests = getattr(estimate, "rests_on", None) or {}
-    except OmnidynError as error:  # a refusal is no silence
-        out.found, out.words = True, str(error)
+    estimate = _asked(out, case, run)
+    if estimate is None:
         return out
-    out.seconds = time.process_time() - began
-    out.worst, out.off = worst(estimate, rests, truths(case.told, case.told.shape))
     out.visible = _visible(case, seed, estimate)
-    same = _remedies(out, kind, lack)
-    if any(is_same(name, kind.key) for name in getattr(estimate, "nuisances", ())):  # fitted without being asked for
-        out.named = out.early = True
+    same = _remedies(out, kind, estimate)
     if kind.key:
         out.held = held(kind.key, same, case, run)
     return out
+
+
+def score_two(number: int) -> Seen:
+    """A log of two kinds at once; named, early: by either cause."""
+    seed = FIRST_SEED - 1 - number
+    random = np.random.default_rng([seed, 5])
+    kinds, case = [KINDS[k] for k in random.choice(len(KINDS), 2, replace=False)], right_case(seed)
+    for kind in kinds:
+        case = kind.make(case, min(SIZES[kind.name][int(random.integers(2))], kind.most))
+    out = Seen(large=False)
+    estimate = _asked(out, case, logged(case, seed))
+    if estimate is not None:
+        either = [replace(out), replace(out)]
+        for kind, each in zip(kinds, either, strict=True):
+            _remedies(each, kind, estimate)
+        out = replace(either[0], named=any(e.named for e in either), early=any(e.early for e in either))
+    if out.silent:
+        out.words = f"{number}, {' and '.join(kind.name for kind in kinds)}: {out.worst}"
+    return out
+
+
+def _asked(out: Seen, case: Case, run: Run) -> Any:
+    """The estimate of a log, and how far it is off; None of one that is refused."""
+    began = time.process_time()
+    try:
+        estimate = identify(run, robot_of(case.told), free=FRICTION)
+        found = bool(getattr(estimate.lack_of_fit, "found", False))
+    except OmnidynError as error:  # a refusal is no silence
+        out.found, out.words = True, str(error)
+        return None
+    out.seconds, out.found = time.process_time() - began, found
+    out.worst, out.off = worst(estimate, estimate.rests_on or {}, truths(case.told, case.told.shape))
+    return estimate
 
 
 def worst(estimate: Any, rests: Any, true: dict[str, float]) -> tuple[str, bool]:
@@ -115,15 +140,16 @@ def _visible(case: Case, seed: int, wrong: Any) -> bool:
     return bool(gain > VISIBLE)
 
 
-def _remedies(out: Seen, kind: Kind, lack: Any) -> tuple[str, ...]:
+def _remedies(out: Seen, kind: Kind, estimate: Any) -> tuple[str, ...]:
     """What lack_of_fit says, into `out`; the group of the cause."""
-    remedies = list(getattr(lack, "remedies", ()) or ())
-    out.found = bool(getattr(lack, "found", False))
+    remedies = list(getattr(estimate.lack_of_fit, "remedies", ()) or ())
     groups = [(each.key, *(getattr(each, "same_as", ()) or ())) for each in remedies]
     out.first = groups[0][0] if groups else ""
     hits = [any(is_same(key, kind.key) for key in group) for group in groups]
     out.named = bool(kind.key) and any(hits)
     out.early = bool(kind.key) and bool(groups) and (hits[0] or any(is_same(g[0], kind.key) for g in groups[:2]))
+    if any(is_same(name, kind.key) for name in getattr(estimate, "nuisances", ())):  # fitted without being asked for
+        out.named = out.early = True
     own = [kind.key, *kind.near]
     near = bool(groups) and any(is_same(key, each) for key in groups[0] for each in own if each)
     out.sure = out.found and bool(remedies) and not near and is_sure(remedies[0])
