@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.laws_ladder import of_law, right
-from omnidyn.identification.structure.missing.laws import arm, bent, bristled, other_laws, table_of
+from omnidyn.identification.structure.missing.laws import arm, bent, bristled, lowered, other_laws, table_of
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import LUGRE
 from omnidyn.model.robot_file import load_robot
@@ -94,13 +94,17 @@ def test_dahls_bristles_become_lugres_as_stiff_as_they_are():
             assert lugre.yaw_breakaway == pytest.approx(1.3 * law.yaw_coulomb)
 
 
-def test_bristles_are_no_stiffer_than_the_motors_can_bend_them():
-    """Where a fit drove a level far beyond what moves the robot."""
-    far = load_robot("axebot").replace(friction=Friction(direction=ROUND.replace(coulomb=(1e6, 1e6), yaw_coulomb=1e6)))
+def test_no_bristles_are_tried_that_the_motors_could_not_bend():
+    """Of a level that a fit drove far beyond what moves the robot; what stands up to it stays."""
     stall = 3.0 * 6.0 / 1.69 * 0.0059 * 19.0 / 0.035  # [N] of all three wheels
-    law = bent(far, DIRECTION, 1e-3).direction
-    assert law.stiffness == pytest.approx(2.0 * stall / 1e-3)
-    assert law.yaw_stiffness == pytest.approx(2.0 * stall * 0.1**2 / 1e-3)
+    wide = ROUND.replace(coulomb=(1e6, 1.5), yaw_coulomb=1e6)
+    boxed, rolling = BOX.replace(coulomb=(2.2, 1.5, 1e6)), ROLLING.replace(coulomb=1e6)
+    everywhere = Friction(axes=boxed, direction=wide, wheels=rolling)
+    robot = load_robot("axebot").replace(friction=everywhere)
+    assert lowered(robot, AXES).friction.axes.coulomb == pytest.approx((2.2, 1.5, 0.2 * stall))
+    found = lowered(robot, DIRECTION).friction.direction
+    assert (*found.coulomb, found.yaw_coulomb) == pytest.approx((2.0 * stall, 1.5, 0.2 * stall))
+    assert lowered(robot, WHEELS).friction.wheels.coulomb == pytest.approx(2.0 * stall)
 
 
 def test_the_law_that_is_right_is_kept():

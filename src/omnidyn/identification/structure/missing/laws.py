@@ -270,25 +270,33 @@ def _bending(law: Callable[[Robot, str, float], Friction], table: str) -> Callab
     """Bristles in the place of friction that holds exactly, at several lengths by which they bend."""
 
     def trials(bench: Workbench) -> list[Trial]:
-        robot = bench.robot
+        robot = lowered(bench.robot, table)
         return [Trial(bench.change(robot.model_copy(update={"friction": law(robot, table, z)})), z) for z in BENDS]
 
     return trials
 
 
+def lowered(robot: Robot, table: str) -> Robot:
+    """The robot with no level of a table beyond twice what its motors give together, to which a fit may drive one:
+    bristles would be as stiff, and steps as short."""
+    own, motor = table_of(robot.friction, table), robot.motor
+    volts = per_wheel(motor.voltage_limit, robot.wheels.count)
+    most = 2.0 * np.abs(traction(motor, robot.wheels, settled_current(motor, volts, np.zeros_like(volts)))).sum()
+    units = np.array([1.0, 1.0, arm(robot)]) if table == BODY_AXES else 1.0
+    changes = {"coulomb": _plain(np.minimum(own.coulomb, most * units))}
+    if table == DIRECTION:
+        changes["yaw_coulomb"] = float(min(own.yaw_coulomb, most * arm(robot)))
+    lower = _with_table(robot.friction, table, own.model_copy(update=changes))
+    return robot.model_copy(update={"friction": lower})
+
+
 def bent(robot: Robot, table: str, bend: float, law: str = DAHL) -> Friction:
     """The friction with bristles at a table, that bend by a length [m at the rims] before they slip, or are as stiff as
-    they are.
-
-    Levels that a fit drove far beyond what the motors give would make bristles as stiff, and steps as short.
-    """
-    own, far, motor = table_of(robot.friction, table), arm(robot), robot.motor
-    volts = per_wheel(motor.voltage_limit, robot.wheels.count)
-    current = settled_current(motor, volts, np.zeros_like(volts))
-    most = 2.0 * float(np.abs(traction(motor, robot.wheels, current)).sum())
+    they are."""
+    own, far = table_of(robot.friction, table), arm(robot)
 
     def stiff(level: ArrayLike, units: FloatArray | float = 1.0) -> Any:
-        return _plain(np.maximum(np.minimum(level, most * units) * units / bend, 1e-3))
+        return _plain(np.maximum(np.asarray(level) * units / bend, 1e-3))
 
     changes: dict[str, Any] = {"law": law}
     if own.stiffness is None and table == BODY_AXES:
