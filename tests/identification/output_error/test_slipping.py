@@ -164,8 +164,13 @@ def test_a_fit_that_wheels_that_slip_led_astray_is_diagnosed_in_bounded_time(mon
     astray = fit_output_error(run, AXEBOT, free=("friction",), outputs=("twist", "wheel_speed"))
     assert any("at the end of its search range" in words for words in astray.warnings)
     tried = []
-    raw = laws.bristled
-    monkeypatch.setattr(laws, "bristled", lambda robot, bend: tried.append(robot) or raw(robot, bend))
+    raw, words = laws.BRISTLES[laws.DAMPING]
+
+    def law(robot, table, bend):
+        tried.append(robot)
+        return raw(robot, table, bend)
+
+    monkeypatch.setitem(laws.BRISTLES, laws.DAMPING, (law, words))
     assert astray.lack_of_fit.found
     assert max(robot.friction.axes.coulomb[2] for robot in tried) < 10.0
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from benchmarks.laws_ladder import of_law, right
-from omnidyn.identification.structure.missing.laws import arm, bent, bristled, may_fall
-from omnidyn.model.friction import AxesFriction, Friction, WheelFriction
+from omnidyn.identification.structure.missing.laws import arm, bent, bristled, lowered, other_laws, table_of
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import LUGRE
 from omnidyn.model.robot_file import load_robot
 
@@ -51,20 +51,60 @@ def test_a_law_is_taken_where_a_linear_step_of_one_block_leads_far_astray():
     assert log.words.endswith("the residuals hold nothing but noise")
 
 
-def test_what_may_fall_is_level_at_every_speed():
-    axes = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))
-    assert may_fall(Friction(axes=axes)) == ["friction.axes"]
-    falling = axes.replace(breakaway=(2.8, 1.9, 0.13), stribeck_speed=(0.02, 0.02, 0.2))
-    assert may_fall(Friction(axes=falling, wheels=WheelFriction(coulomb=0.4))) == ["friction.wheels"]
+BOX = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))
+FALLING = BOX.replace(breakaway=(2.8, 1.9, 0.13), stribeck_speed=(0.02, 0.02, 0.2))
+ROUND = DirectionFriction(coulomb=(2.2, 1.5), yaw_coulomb=0.099)
+ROLLING = WheelFriction(coulomb=(0.4, 0.5, 0.6))
+STIFF = {"law": "dahl", "stiffness": 1e3, "yaw_stiffness": 10.0, "dahl_exponent": 1.5}
+AXES, DIRECTION, WHEELS = "friction.axes", "friction.direction", "friction.wheels"
+THREE = ("stribeck_speed", "stiffness", "damping")
 
 
-def test_dahls_bristles_on_the_axes_fall_with_lugres_law_only():
-    axes = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))
-    robot = load_robot("axebot").replace(friction=Friction(axes=axes))
-    dahl = bent(robot, 1e-3)
-    assert (dahl.axes.law, dahl.axes.breakaway) == ("dahl", None)
-    assert may_fall(dahl) == []
-    assert bristled(robot.replace(friction=dahl), 5e-3).axes.stiffness == dahl.axes.stiffness
+@pytest.mark.parametrize(
+    ("friction", "expected"),
+    [
+        (Friction(axes=BOX), {AXES: THREE}),
+        (Friction(axes=BOX, wheels=WheelFriction(viscous=0.3)), {AXES: THREE}),
+        (Friction(axes=BOX.replace(breakaway=(2.8, 1.9, 0.13))), {AXES: ("stribeck_speed", "damping")}),
+        (Friction(axes=BOX.replace(coulomb_backward=(2.0, 2.0, 0.1))), {AXES: ("stribeck_speed",)}),
+        (Friction(axes=FALLING, wheels=ROLLING), {AXES: ("damping",), WHEELS: THREE}),
+        (Friction(direction=ROUND), {DIRECTION: THREE}),
+        (Friction(direction=ROUND.replace(**STIFF)), {DIRECTION: ("damping",)}),
+        (Friction(wheels=ROLLING.replace(coulomb_backward=0.3)), {WHEELS: ("stribeck_speed",)}),
+        (Friction(wheels=ROLLING.replace(law="elastoplastic", stiffness=1e3)), {WHEELS: ("stribeck_speed",)}),
+    ],
+)  # fmt: skip
+def test_a_table_may_take_the_laws_that_it_has_not_where_it_has_coulomb_friction(friction, expected):
+    assert other_laws(friction) == [f"{table}.{name}" for table, names in expected.items() for name in names]
+
+
+def test_dahls_bristles_become_lugres_as_stiff_as_they_are():
+    """With a fall, and without an exponent that LuGre has not."""
+    robot = load_robot("axebot")
+    for table, own in ((AXES, {"axes": BOX}), (DIRECTION, {"direction": ROUND}), (WHEELS, {"wheels": ROLLING})):
+        dahl = bent(robot.replace(friction=Friction(**own)), table, 1e-3)
+        law = table_of(dahl, table)
+        assert (law.law, law.breakaway, law.stribeck_speed) == ("dahl", None, None)
+        softer = dahl.replace(**{table.rpartition(".")[2]: law.replace(dahl_exponent=1.5)})
+        lugre = table_of(bristled(robot.replace(friction=softer), table, 5e-3), table)
+        assert (lugre.law, lugre.stiffness, lugre.dahl_exponent) == ("lugre", law.stiffness, 1.0)
+        assert np.array(lugre.breakaway) == pytest.approx(1.3 * np.array(law.coulomb))
+        if table == DIRECTION:
+            assert lugre.yaw_stiffness == law.yaw_stiffness
+            assert lugre.yaw_breakaway == pytest.approx(1.3 * law.yaw_coulomb)
+
+
+def test_no_bristles_are_tried_that_the_motors_could_not_bend():
+    """Of a level that a fit drove far beyond what moves the robot; what stands up to it stays."""
+    stall = 3.0 * 6.0 / 1.69 * 0.0059 * 19.0 / 0.035  # [N] of all three wheels
+    wide = ROUND.replace(coulomb=(1e6, 1.5), yaw_coulomb=1e6)
+    boxed, rolling = BOX.replace(coulomb=(2.2, 1.5, 1e6)), ROLLING.replace(coulomb=1e6)
+    everywhere = Friction(axes=boxed, direction=wide, wheels=rolling)
+    robot = load_robot("axebot").replace(friction=everywhere)
+    assert lowered(robot, AXES).friction.axes.coulomb == pytest.approx((2.2, 1.5, 0.2 * stall))
+    found = lowered(robot, DIRECTION).friction.direction
+    assert (*found.coulomb, found.yaw_coulomb) == pytest.approx((2.0 * stall, 1.5, 0.2 * stall))
+    assert lowered(robot, WHEELS).friction.wheels.coulomb == pytest.approx(2.0 * stall)
 
 
 def test_the_law_that_is_right_is_kept():
@@ -74,13 +114,14 @@ def test_the_law_that_is_right_is_kept():
 
 
 def test_bristles_begin_as_long_as_they_are_said_to_bend():
-    """On every axis, at the rims; a fall that is there stays."""
-    axes = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))
-    robot = load_robot("axebot").replace(friction=Friction(axes=axes))
-    lugre = bristled(robot, 1e-3).axes
+    """At every table, at the rims; a fall that is there stays."""
+    robot = load_robot("axebot")
+    lugre = bristled(robot.replace(friction=Friction(axes=BOX)), AXES, 1e-3).axes
     assert lugre.law == LUGRE
-    lengths = np.array(axes.coulomb) / np.array(lugre.stiffness) * [1.0, 1.0, arm(robot)]
+    lengths = np.array(BOX.coulomb) / np.array(lugre.stiffness) * [1.0, 1.0, arm(robot)]
     assert lengths == pytest.approx([1e-3] * 3)
-    falling = axes.replace(breakaway=(2.8, 1.9, 0.13), stribeck_speed=(0.02, 0.02, 0.2))
-    again = bristled(robot.replace(friction=Friction(axes=falling)), 1e-3).axes
-    assert (again.breakaway, again.stribeck_speed) == (falling.breakaway, falling.stribeck_speed)
+    again = bristled(robot.replace(friction=Friction(axes=FALLING)), AXES, 1e-3).axes
+    assert (again.breakaway, again.stribeck_speed) == (FALLING.breakaway, FALLING.stribeck_speed)
+    dahl = bent(robot.replace(friction=Friction(direction=ROUND)), DIRECTION, 1e-3).direction
+    assert (dahl.stiffness, dahl.yaw_stiffness) == pytest.approx((1.85 / 1e-3, 0.099 * arm(robot) / 1e-3))
+    assert bent(robot.replace(friction=Friction(wheels=ROLLING)), WHEELS, 1e-3).wheels.stiffness == pytest.approx(500.0)

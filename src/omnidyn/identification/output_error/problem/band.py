@@ -52,8 +52,8 @@ def band_words(of: Robot) -> tuple[str, ...]:
     if not tables_with_band(of):
         return ()
     return (
-        f'law = "{KARNOPP}" is fitted as Coulomb friction with breakaway, which its band stands in for; '
-        "karnopp_speed is numerical and stays as it is",
+        f'law = "{KARNOPP}" is fitted as Coulomb friction with breakaway, which its band stands in for: to a log the '
+        "two are the same, but for a band as wide as the log resolves; karnopp_speed is numerical and stays as it is",
     )
 
 

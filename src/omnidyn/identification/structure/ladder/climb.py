@@ -30,9 +30,9 @@ from omnidyn.identification.structure.ladder.held_out import CLEAR, Errors, erro
 from omnidyn.identification.structure.ladder.models import Model, Move, Untried, can, moves, moves_apart, tried
 from omnidyn.identification.structure.ladder.slow import Purse, quick_first
 from omnidyn.identification.structure.missing.candidates import CHANGE
-from omnidyn.identification.structure.missing.laws import FALL, FALL_WORDS, USUAL_FALL, USUAL_SPEED, may_fall
+from omnidyn.identification.structure.missing.laws import FALL_WORDS, USUAL_FALL, USUAL_SPEED, other_laws
 from omnidyn.identification.structure.missing.odometry import hidden_by
-from omnidyn.identification.structure.missing.switches import EACH_WHEEL, LIMIT, simpler_first, told
+from omnidyn.identification.structure.missing.switches import EACH_WHEEL, FALLS, LIMIT, simpler_first, told
 from omnidyn.identification.structure.motion import motions
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
@@ -133,7 +133,7 @@ def unseen(lack: LackOfFit, stands: Model, group: str) -> list[Remedy]:
     found.append(Remedy(WHEELS, "friction at the wheels", 0.0, 0.0))
     found.append(Remedy(EACH_WHEEL, "Coulomb friction of its own at each wheel", 0.0, 0.0))
     usual = Remedy("", FALL_WORDS, 0.0, 0.0, size=(USUAL_FALL - 1.0,) * N_AXES, at=USUAL_SPEED)
-    found += [replace(usual, key=f"{table}.{FALL}") for table in may_fall(robot.friction)]
+    found += [replace(usual, key=key) for key in other_laws(robot.friction) if key in FALLS]
     if limit is None:
         most = np.concatenate([np.abs(motion.current).max(axis=1) for motion in motions(problem, point)])
         levels = np.quantile(most[most > 0.0], LIMITS).tolist() if most.any() else []

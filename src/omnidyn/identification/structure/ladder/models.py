@@ -24,10 +24,10 @@ from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.missing.laws import FALL, may_fall
+from omnidyn.identification.structure.missing.laws import other_laws
 from omnidyn.identification.structure.missing.switches import (
     EACH_WHEEL,
-    FALLS,
+    LAWS,
     Switch,
     as_it_ended,
     switches,
@@ -187,7 +187,7 @@ def can(key: str, robot: Robot) -> bool:
     if key == EACH_WHEEL:  # beside a box that acts where wheels do, too, only once they have a level for all
         one = bool(friction.wheels.coulomb) and not np.ndim(friction.wheels.coulomb)
         return one or (friction.wheels == WheelFriction() and any(friction.direction.coulomb))
-    return key not in FALLS or key in {f"{table}.{FALL}" for table in may_fall(friction)}
+    return key not in LAWS or key in other_laws(friction)
 
 
 def tried(

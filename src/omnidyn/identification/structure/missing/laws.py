@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.prepare import LOOP
@@ -20,15 +21,15 @@ from omnidyn.identification.structure.missing.candidates import (
 )
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
-from omnidyn.model.dynamics import drive_wrench, frame_wrench
+from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.friction.kinds import COULOMB, KINDS, LUGRE
+from omnidyn.model.friction.kinds import COULOMB, LUGRE
 from omnidyn.model.friction.stribeck import USUAL as EXPONENT
 from omnidyn.model.friction.stribeck import fallen
 from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
-from omnidyn.model.motor import mass_at_rim, per_wheel, traction
+from omnidyn.model.motor import mass_at_rim, per_wheel, settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.slip.plant import grips
 
@@ -167,27 +168,45 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
         yield Candidate(BODY_AXES, _in_place(along_axes), as_it_is("Coulomb friction on each axis by itself, a box"))
     if friction.wheels == WheelFriction():
         yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
-    for table in may_fall(friction):
-        yield Candidate(f"{table}.{FALL}", _falling(FORCES[table]), as_it_is(FALL_WORDS), 0.0)
-    if not boxed or axes.coulomb_backward is not None:
-        return
-    if axes.law == COULOMB and axes.breakaway is None:
-        yield Candidate(f"{BODY_AXES}.{BEND}", _bending(bent), as_it_is("friction that bends before it slips (Dahl)"))
-    if axes.law in (COULOMB, DAHL):
-        words = "friction that bends before it slips, falls and is damped (LuGre)"
-        yield Candidate(f"{BODY_AXES}.{DAMPING}", _bending(bristled), as_it_is(words))
+    for key in other_laws(friction):
+        table, _, name = key.rpartition(".")
+        if name == FALL:
+            yield Candidate(key, _falling(FORCES[table]), as_it_is(FALL_WORDS), 0.0)
+        else:
+            law, words = BRISTLES[name]
+            yield Candidate(key, _bending(law, table), as_it_is(words))
 
 
-def may_fall(friction: Friction) -> list[str]:
-    """The tables of friction whose level is the same at every speed; of Dahl's bristles on the axes LuGre's fall."""
-    laws = ((table, table_of(friction, table)) for table in (BODY_AXES, DIRECTION, WHEELS))
-    level = [table for table, law in laws if law.stribeck_speed is None and np.any(law.coulomb)]
-    return [table for table in level if table != BODY_AXES or friction.axes.law != DAHL]
+def other_laws(friction: Friction) -> list[str]:
+    """The laws that tables of friction may take, each by the number that names it: a fall, where the level is the same
+    at every speed, of Dahl's bristles by LuGre's law; bristles of either where it is, and the same both ways."""
+    found = []
+    for table in FORCES:
+        own = table_of(friction, table)
+        one_way = getattr(own, "coulomb_backward", None) is not None
+        if not np.any(own.coulomb):
+            continue
+        if own.stribeck_speed is None and own.law != DAHL:
+            found.append(f"{table}.{FALL}")
+        if own.law == COULOMB and own.breakaway is None and not one_way:
+            found.append(f"{table}.{BEND}")
+        if own.law in (COULOMB, DAHL) and not one_way:
+            found.append(f"{table}.{DAMPING}")
+    return found
 
 
 def table_of(friction: Friction, table: str) -> Any:
     """The friction of a table, such as "friction.axes"."""
     return getattr(friction, table.rpartition(".")[2])
+
+
+def _plain(levels: FloatArray) -> Any:
+    """A number, or a tuple of them, as a table of friction has it."""
+    return tuple(levels.tolist()) if np.ndim(levels) else float(levels)
+
+
+def _with_table(friction: Friction, table: str, law: Any) -> Friction:
+    return friction.model_copy(update={table.rpartition(".")[2]: law})
 
 
 def _falling(force: Callable[[Motion, float], FloatArray]) -> Callable[[Workbench], list[Trial]]:
@@ -205,20 +224,16 @@ def _falling(force: Callable[[Motion, float], FloatArray]) -> Callable[[Workbenc
 
 def falling(robot: Robot, table: str, above: FloatArray, over: float) -> Friction:
     """The friction with a level that is `above` times Coulomb friction at rest, and falls to it over a speed [m/s at
-    the rims]; with bristles of one level it is LuGre's law. above: of each axis; of the direction of travel and about
+    the rims]; with Dahl's bristles it is LuGre's law. above: of each axis; of the direction of travel and about
     yaw; of all wheels."""
-    own, about = table_of(robot.friction, table), over / arm(robot)
-    changes = {"breakaway": tuple((above[0] * np.array(own.coulomb)).tolist()), FALL: over}
-    if table == BODY_AXES:
-        changes = {"breakaway": tuple((above * own.coulomb).tolist()), FALL: (over, over, about)}
-    elif table == DIRECTION and own.yaw_coulomb > 0.0:
+    own, about, boxed = table_of(robot.friction, table), over / arm(robot), table == BODY_AXES
+    hold = (above if boxed else above[0]) * np.array(own.coulomb)
+    changes = {"breakaway": _plain(hold), FALL: (over, over, about) if boxed else over}
+    if table == DIRECTION and own.yaw_coulomb > 0.0:
         changes |= {"yaw_breakaway": float(above[1] * own.yaw_coulomb), f"yaw_{FALL}": about}
-    elif table == WHEELS:
-        levels = above[0] * per_wheel(own.coulomb, robot.wheels.count)
-        changes["breakaway"] = tuple(levels.tolist()) if np.ndim(own.coulomb) else float(levels[0])
-    one_level = KINDS[own.law].bends and not KINDS[own.law].falls
-    law = own.replace(**changes, law=LUGRE if one_level else own.law)
-    return robot.friction.model_copy(update={table.rpartition(".")[2]: law})
+    if own.law == DAHL:
+        changes |= {"law": LUGRE, "dahl_exponent": 1.0}
+    return _with_table(robot.friction, table, own.replace(**changes))
 
 
 def arm(robot: Robot) -> float:
@@ -251,40 +266,60 @@ def _of_rims(motion: Motion, over: float) -> FloatArray:
 FORCES = {BODY_AXES: _of_axes, DIRECTION: _of_travel, WHEELS: _of_rims}  # of a fall, of each table
 
 
-def _bending(law: Callable[[Robot, float], Friction]) -> Callable[[Workbench], list[Trial]]:
-    """Bristles in the place of friction that holds exactly, at several lengths by which they bend.
-
-    Levels that a fit drove far beyond what the motors give would make bristles as stiff, and steps as short.
-    """
+def _bending(law: Callable[[Robot, str, float], Friction], table: str) -> Callable[[Workbench], list[Trial]]:
+    """Bristles in the place of friction that holds exactly, at several lengths by which they bend."""
 
     def trials(bench: Workbench) -> list[Trial]:
-        axes, moved = bench.robot.friction.axes, bench.motions
-        drive = np.max([np.abs(drive_wrench(m.robot, 0.0 * m.twist, m.voltage)).max(axis=0) for m in moved], axis=0)
-        least = axes.model_copy(update={"coulomb": tuple(np.minimum(axes.coulomb, 2.0 * drive).tolist())})
-        robot = bench.robot.model_copy(update={"friction": bench.robot.friction.model_copy(update={"axes": least})})
-        return [Trial(bench.change(robot.model_copy(update={"friction": law(robot, z)})), z) for z in BENDS]
+        robot = lowered(bench.robot, table)
+        return [Trial(bench.change(robot.model_copy(update={"friction": law(robot, table, z)})), z) for z in BENDS]
 
     return trials
 
 
-def bent(robot: Robot, bend: float) -> Friction:
-    """The friction of the axes with Dahl's bristles, that bend by a length [m at the rims] before they slip."""
-    axes, units = robot.friction.axes, np.array([1.0, 1.0, arm(robot)])
-    stiffness = np.maximum(np.array(axes.coulomb) * units / bend, 1e-3)
-    other = axes.replace(law=DAHL, stiffness=tuple(stiffness.tolist()))
-    return robot.friction.model_copy(update={"axes": other})
+def lowered(robot: Robot, table: str) -> Robot:
+    """The robot with no level of a table beyond twice what its motors give together, to which a fit may drive one:
+    bristles would be as stiff, and steps as short."""
+    own, motor = table_of(robot.friction, table), robot.motor
+    volts = per_wheel(motor.voltage_limit, robot.wheels.count)
+    most = 2.0 * np.abs(traction(motor, robot.wheels, settled_current(motor, volts, np.zeros_like(volts)))).sum()
+    units = np.array([1.0, 1.0, arm(robot)]) if table == BODY_AXES else 1.0
+    changes = {"coulomb": _plain(np.minimum(own.coulomb, most * units))}
+    if table == DIRECTION:
+        changes["yaw_coulomb"] = float(min(own.yaw_coulomb, most * arm(robot)))
+    lower = _with_table(robot.friction, table, own.model_copy(update=changes))
+    return robot.model_copy(update={"friction": lower})
 
 
-def bristled(robot: Robot, bend: float) -> Friction:
-    """The friction of the axes with LuGre's bristles, that bend by a length [m at the rims] before they slip, or are as
-    stiff as they are; where the level does not fall yet, it falls as much and as fast as is usual."""
-    axes, units = robot.friction.axes, np.array([1.0, 1.0, arm(robot)])
-    falls = {} if axes.stribeck_speed is not None else {
-        "breakaway": tuple((USUAL_FALL * np.array(axes.coulomb)).tolist()), FALL: tuple((USUAL_SPEED / units).tolist())
-    }  # fmt: skip
-    stiffness = np.maximum(np.array(axes.coulomb) * units / bend, 1e-3)
-    other = axes.replace(law=LUGRE, stiffness=axes.stiffness or tuple(stiffness.tolist()), **falls)
-    return robot.friction.model_copy(update={"axes": other})
+def bent(robot: Robot, table: str, bend: float, law: str = DAHL) -> Friction:
+    """The friction with bristles at a table, that bend by a length [m at the rims] before they slip, or are as stiff as
+    they are."""
+    own, far = table_of(robot.friction, table), arm(robot)
+
+    def stiff(level: ArrayLike, units: FloatArray | float = 1.0) -> Any:
+        return _plain(np.maximum(np.asarray(level) * units / bend, 1e-3))
+
+    changes: dict[str, Any] = {"law": law}
+    if own.stiffness is None and table == BODY_AXES:
+        changes[BEND] = stiff(own.coulomb, np.array([1.0, 1.0, far]))
+    elif own.stiffness is None:
+        changes[BEND] = stiff(np.mean(own.coulomb))
+        if table == DIRECTION and own.yaw_coulomb > 0.0:
+            changes[f"yaw_{BEND}"] = stiff(own.yaw_coulomb, far)
+    return _with_table(robot.friction, table, own.replace(**changes))
+
+
+def bristled(robot: Robot, table: str, bend: float) -> Friction:
+    """The same with LuGre's bristles; where the level does not fall yet, it falls as much and as fast as is usual."""
+    if table_of(robot.friction, table).stribeck_speed is None:
+        falls = falling(robot, table, np.full(N_AXES, USUAL_FALL), USUAL_SPEED)
+        robot = robot.model_copy(update={"friction": falls})
+    return bent(robot, table, bend, LUGRE)
+
+
+BRISTLES = {
+    BEND: (bent, "friction that bends before it slips (Dahl)"),
+    DAMPING: (bristled, "friction that bends before it slips, falls and is damped (LuGre)"),
+}
 
 
 def along_travel(friction: Friction) -> Friction:

@@ -25,13 +25,13 @@ from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
 from omnidyn.identification.question import STUDENT, Question
 from omnidyn.identification.structure.missing.laws import (
     BEND,
+    BRISTLES,
     DAMPING,
     FALL,
+    FORCES,
     TRACTION,
     along_axes,
     along_travel,
-    bent,
-    bristled,
     falling,
     slippery,
     table_of,
@@ -44,11 +44,12 @@ from omnidyn.model.robot import Prior, Robot
 
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
 EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one of all
-FALLS = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS))
-BRISTLES = BENDS, DAMPS = f"{BODY_AXES}.{BEND}", f"{BODY_AXES}.{DAMPING}"  # Dahl's, LuGre's
+FALLS, BENDS, DAMPS = (tuple(f"{table}.{name}" for table in FORCES) for name in (FALL, BEND, DAMPING))
+LAWS = (*FALLS, *BENDS, *DAMPS)  # Stribeck's, Dahl's, LuGre's, of every table
 OF_GEAR = 0.01  # lost by a gear, from which its fit begins at least
 UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
 BREAK = "breakaway"
+NUMBERS = {FALL: (BREAK, FALL), BEND: (BEND,), DAMPING: (BREAK, FALL, BEND, DAMPING)}  # of laws
 ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {
@@ -90,7 +91,7 @@ def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
     """Without bristles behind a fall that explains more, and LuGre's behind Dahl's: they have their turn after it; a
     fit of bristles to a log without any takes long."""
     found = [remedy.key for remedy in remedies]
-    first = {BENDS: FALLS, DAMPS: (*FALLS, BENDS)}
+    first = dict.fromkeys(BENDS, FALLS) | dict.fromkeys(DAMPS, (*FALLS, *BENDS))
     return [r for k, r in enumerate(remedies) if not any(key in found[:k] for key in first.get(r.key, ()))]
 
 
@@ -128,10 +129,8 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         yield from _at_wheels(robot, asked)
     elif key == EACH_WHEEL:
         yield _at_each_wheel(robot, asked)
-    elif key in FALLS:
-        yield _falling(remedy, robot, asked)
-    elif key in BRISTLES:
-        yield _bending(remedy, robot, asked)
+    elif key in LAWS:
+        yield _of_another_law(remedy, robot, asked)
     elif key == LIMIT:
         limited = robot.replace(motor=robot.motor.replace(current_limit=remedy.at))
         yield Switch(limited, _free(asked, key), words)
@@ -210,21 +209,19 @@ def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
 
 
-def _falling(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
-    """Levels and speeds from which a fit finds how friction falls: those of the first step."""
-    table = remedy.key.rpartition(".")[0]
-    friction = falling(robot, table, np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at)
-    own, yaw = table_of(friction, table), (f"yaw_{BREAK}", f"yaw_{FALL}")
-    names = (BREAK, FALL, *(yaw if getattr(own, yaw[0], None) is not None else ()))
-    return _rough(robot.replace(friction=friction), asked, [f"{table}.{name}" for name in names], remedy.words)
-
-
-def _bending(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
-    """Dahl's law, or LuGre's with the critical damping to begin from."""
-    if remedy.key == BENDS:
-        return _rough(robot.replace(friction=bent(robot, remedy.at)), asked, [BENDS], remedy.words)
-    keys = [f"{BODY_AXES}.{name}" for name in (BREAK, FALL, BEND, DAMPING)]
-    return _rough(with_damping(robot.replace(friction=bristled(robot, remedy.at)), keys), asked, keys, remedy.words)
+def _of_another_law(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
+    """Levels and speeds from which a fit finds how friction falls, those of the first step; Dahl's law; or LuGre's with
+    the critical damping to begin from."""
+    table, _, law = remedy.key.rpartition(".")
+    if law == FALL:
+        friction = falling(robot, table, np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at)
+    else:
+        friction = BRISTLES[law][0](robot, table, remedy.at)
+    own, every = table_of(friction, table), [f"{yaw}{name}" for yaw in ("", "yaw_") for name in NUMBERS[law]]
+    # A damping is asked for where there are bristles: the critical one stands in no file.
+    names = [name for name in every if getattr(own, name.replace(DAMPING, BEND), None) is not None]
+    keys = [f"{table}.{name}" for name in names]
+    return _rough(with_damping(robot.replace(friction=friction), keys), asked, keys, remedy.words)
 
 
 def _rough(robot: Robot, asked: Question, names: Sequence[str], words: str) -> Switch:
