@@ -104,8 +104,6 @@ def _white(linear: Linear, k: int) -> tuple[FloatArray, IntArray, IntArray]:
     rows, piece = linear.rows, linear.rows.pieces[k]
     every = np.concatenate([rows.residual[k][:, :, None], rows.slopes[k], rows.own[k]], axis=2)
     x = linear.with_start(k, every)
-    if linear.rounding:
-        x = linear.effects(k).white(x)
     share = piece.record.share[piece.first : piece.last + 1]
     number = np.minimum((share * BLOCKS).astype(int), BLOCKS - 1)
     there = rows.there[k]

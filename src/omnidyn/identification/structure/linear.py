@@ -165,10 +165,6 @@ class Linear:
             found.append(values)
         return found
 
-    def effects(self, k: int) -> RandomEffects:
-        """What the inputs of piece k were rounded by, in its white rows, its start still in them."""
-        return RandomEffects.of(self.rounding[k].size * self.of_piece(k, self.rows.rounding[k]))
-
     def rounded_off(self, k: int, values: FloatArray) -> FloatArray:
         """What rounded inputs make of values (C, rows, K) of piece k, as likely as can be, in rows as they are."""
         if not self.rounding:
