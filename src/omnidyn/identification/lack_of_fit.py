@@ -168,6 +168,8 @@ class LackOfFit:
     then the last remedy, key "loss", is that, whether or not there is a misfit.
     noise: of outputs whose noise the log shows without the model, by the best source; None where that was not asked.
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
+    rounded: output -> share of the variance of its residuals that is what the inputs were rounded by, which is no lack
+    of fit, but hides one that is smaller.
     """
 
     found: bool
@@ -181,6 +183,7 @@ class LackOfFit:
     noise: Mapping[str, Noise] | None = None
     beyond: tuple[str, ...] = ()
     at_rest: Mapping[str, Noise] = field(default_factory=dict)
+    rounded: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def causes(self) -> tuple[Remedy, ...]:
@@ -247,9 +250,10 @@ class LackOfFit:
         return [self.words(), *shares, *self._levels(), *self._tails()]
 
     def _levels(self) -> list[str]:
-        """The noise by each source, and where the robot in motion leaves more than at rest."""
+        """What rounded inputs explain, the noise by each source, and where the robot in motion leaves more than at
+        rest."""
         if self.noise is None:
-            return []
+            return self._rounded()
         told = [] if self.noise else [UNTOLD]
         for source, (where, _) in WHERE.items():
             own = {name: each for name, each in self.noise.items() if each.source == source}
@@ -263,7 +267,14 @@ class LackOfFit:
                     f"noise: the log {where} {levels}, at most {100.0 * moves:.2g} % of what moves; chi2 of the "
                     f"residuals by that: {chi2}"
                 )
-        return [*told, *self._beyond_rest()]
+        return [*self._rounded(), *told, *self._beyond_rest()]
+
+    def _rounded(self) -> list[str]:
+        """Of the output that shows most of what the inputs were rounded by, in words; nothing where none does."""
+        worst = max(self.rounded, key=lambda name: self.rounded[name], default="")
+        share = self.rounded.get(worst, 0.0)
+        said = f"rounding of the inputs explains {100.0 * share:.0f} % of the variance of the residual of {worst}"
+        return [f"{said}, and may hide a misfit: log them with more digits"] if share >= WORTH else []
 
     def _beyond_rest(self) -> list[str]:
         """Of the output that most surely leaves more in motion than at rest, in words; nothing where none does."""
@@ -299,7 +310,7 @@ class LackOfFit:
             "wild": {name: asdict(each) for name, each in self.wild.items()},
             "noise": {name: asdict(each) for name, each in (self.noise or {}).items()},
             "beyond_noise": self.beyond,
-            "at_rest": {name: asdict(each) for name, each in self.at_rest.items()},
+            "at_rest": {name: asdict(each) for name, each in self.at_rest.items()}, "rounded_inputs": self.rounded,
         })  # fmt: skip
 
 

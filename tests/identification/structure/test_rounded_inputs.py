@@ -4,7 +4,8 @@ the motors took just these steps. Logs by the simulator of wrong_worlds, which s
 import numpy as np
 import pytest
 
-from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
+from benchmarks.wrong_worlds.kinds import KINDS
+from benchmarks.wrong_worlds.log import AR, SPEEDS, logged, right_case, robot_of, truths
 from omnidyn.identification.output_error.moved_by import beside_rounding
 from omnidyn.identification.output_error.problem.input_steps import input_steps
 from omnidyn.identification.output_error.problem.record import record
@@ -51,6 +52,65 @@ def test_a_supply_that_is_logged_makes_no_new_rounding_of_every_row():
         for size in (0.0, 0.01)
     )
     assert [uneven[key] / even[key] for key in even] == pytest.approx([1.0] * len(even), abs=0.15)
+
+
+def a_fit(seed, step, make=lambda case: case, sensor=SPEEDS, memory=0.0, duties=False):
+    """The fit to a log of a world whose inputs are rounded."""
+    case = make(right_case(3 * seed).setup_but(sensor=sensor, memory=memory, rate=50.0))
+    run = logged(case, 7000 + seed)
+    volts = rounded(run.voltage, step) if step else run.voltage
+    inputs = (
+        {"voltage": None, "duty": volts / 12.0, "supply": np.full(len(run.t), 12.0)} if duties else {"voltage": volts}
+    )
+    return fit_output_error(run.replace(**inputs), robot_of(case.told), free="friction")
+
+
+@pytest.mark.parametrize(("seed", "step", "duties"), [(0, 0.3, False), (1, 0.1, True)])
+def test_what_rounding_explains_is_no_lack_of_fit(seed, step, duties):
+    """Right worlds, which were said to leave something out: it is told what is rounding, and what would cure it."""
+    fit = a_fit(seed, step, duties=duties)
+    lack = fit.lack_of_fit
+    assert not lack.found
+    assert not lack.beyond
+    assert not fit.stability.found
+    assert 0.02 < max(lack.rounded.values()) < 0.5
+    assert any("rounding of the inputs explains" in each and "more digits" in each for each in lack.statements())
+    assert lack.to_dict()["rounded_inputs"] == pytest.approx(dict(lack.rounded))
+
+
+def test_a_log_whose_inputs_are_not_rounded_says_nothing_of_it():
+    lack = a_fit(0, 0.0).lack_of_fit
+    assert not lack.rounded
+    assert not any("rounding of the inputs" in each for each in lack.statements())
+
+
+def test_a_misfit_beyond_rounding_is_found_with_its_cause():
+    """An ellipse of friction under the file of a box, voltages in steps of .3 V."""
+    ellipse = next(kind for kind in KINDS if kind.name == "ellipse")
+    lack = a_fit(0, 0.3, lambda case: ellipse.make(case, 0.8)).lack_of_fit
+    assert lack.found
+    assert lack.remedies[0].key == ellipse.key
+    assert lack.remedies[0].confident
+
+
+def test_steps_that_the_motors_take_explain_nothing():
+    exact = rounded(voltages(np.random.default_rng(5), 30.0), 0.3)
+    lack = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=()).lack_of_fit
+    assert not lack.found
+    assert max(lack.rounded.values()) < 0.01
+
+
+@pytest.mark.long
+def test_right_worlds_over_many_logs():
+    """White noise and noise that remembers, voltages and duties."""
+    found = [
+        a_fit(seed, step, sensor=sensor, memory=memory, duties=bool(seed % 2)).lack_of_fit.found
+        for seed in range(8)
+        for step in (0.05, 0.1, 0.3)
+        for sensor, memory in ((SPEEDS, 0.0), (AR, 0.9))
+    ]
+    print(np.sum(found), len(found))
+    assert np.mean(found) <= 0.06
 
 
 @pytest.mark.long

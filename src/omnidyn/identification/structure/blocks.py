@@ -3,6 +3,7 @@
 Scalar products of [e, J, Z] of every piece, block by block and output by output; e: residuals made white, J: slopes by
 the parameters, Z: by the start of the piece. A part of the logs is some of the blocks: theirs are added, each output
 over the noise that it has in this part, and the start is taken out, in each part anew, as if it were fitted alone.
+What rounded inputs show is a part of the errors: rows are white beside it, too (random_effects.py).
 """
 
 from __future__ import annotations
@@ -102,7 +103,7 @@ def _white(linear: Linear, k: int) -> tuple[FloatArray, IntArray, IntArray]:
     """(white [e, J, Z] (N, 1 + P + S), the block of each row (N,), its output (N,)) of a piece."""
     rows, piece = linear.rows, linear.rows.pieces[k]
     every = np.concatenate([rows.residual[k][:, :, None], rows.slopes[k], rows.own[k]], axis=2)
-    x = linear.of_piece(k, every)
+    x = linear.with_start(k, every)
     share = piece.record.share[piece.first : piece.last + 1]
     number = np.minimum((share * BLOCKS).astype(int), BLOCKS - 1)
     there = rows.there[k]

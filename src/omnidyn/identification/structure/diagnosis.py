@@ -29,6 +29,7 @@ from omnidyn.identification.structure.missing.unoffered import unoffered
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.noise_level import noise_levels
 from omnidyn.identification.structure.rests_on import rests_on
+from omnidyn.identification.structure.rounded_inputs import rows_told, with_rounding
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
 from omnidyn.identification.structure.workbench import Workbench
@@ -61,10 +62,12 @@ def examine(solution: Solution) -> Examined:
     to 60 that have nothing in common, by draws from their scalar products.
     """
     solver, point = solution.solver, solution.state.point
-    problem = with_levels(solver.problem, levels_of(solution)).shortened(MOST_ROWS)
+    whole = with_levels(solver.problem, levels_of(solution))
+    problem = whole.shortened(rows_told(whole, MOST_ROWS))
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     parts = engine.residuals(point)
-    rows, moved = Rows.of(problem, point, as_counted(solution, problem, parts)), motions(problem, point)
+    moved = motions(problem, point)
+    rows = with_rounding(Rows.of(problem, point, as_counted(solution, problem, parts)), moved)
     seen = misfit(rows, moved)
     stable = stability(seen.linear)
     bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
@@ -88,8 +91,9 @@ def examine(solution: Solution) -> Examined:
     lack = LackOfFit(
         found, channels, levels.sizes(_sizes(seen, names)), seen.found, (*told, *calmer(seen, wild)), seen.tested,
         pictures, wild, levels.noise, levels.beyond, levels.at_rest,
+        dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {},
     )  # fmt: skip
-    diagnosis = Diagnosis(lack, rests_on(seen.linear, bench), stable)
+    diagnosis = Diagnosis(lack, rests_on(seen.linear.plain, bench), stable)
     return Examined(diagnosis, memory, len(tried), count)
 
 

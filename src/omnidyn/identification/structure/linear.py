@@ -4,13 +4,15 @@
 
 Each column of each piece is divided by the standard deviation of its noise, after a filter that whitens it; what the
 start of a piece explains (Piece.free) is projected out, and what is known beforehand stands below as rows of its own.
+Where the inputs are rounded, what that shows is a part of the errors, of known variance (random_effects.py).
 So every question about the fit is one of ordinary least squares with errors of variance 1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitened import known_rows, moving_rows
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
+from omnidyn.identification.structure.random_effects import RandomEffects, scaled
 from omnidyn.identification.structure.rounding import anew, of_rounding
 
 TINY = 1e-300
@@ -32,6 +35,7 @@ class Rows:
 
     there: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
     column: of each piece (C,), which column of the problem it is. moves: of each piece (C, rows), see `moving_rows`.
+    rounding: of each piece (C, rows, M), what is shown by what its inputs were rounded by; none where they are not.
     """
 
     problem: Problem
@@ -43,6 +47,7 @@ class Rows:
     steps: list[list[IntArray]]
     column: list[list[int]]
     moves: list[BoolArray]
+    rounding: list[FloatArray] = field(default_factory=list)
 
     @classmethod
     def of(cls, problem: Problem, point: Point, parts: Sequence[Parts]) -> Rows:
@@ -89,28 +94,54 @@ class Linear:
         """Degrees of freedom with which the noise is known where it is known least, at slow changes."""
         return min((memory.degrees for memory in self.memory), default=np.inf)
 
+    @cached_property
+    def plain(self) -> Linear:
+        """The same with all errors noise."""
+        return replace(self, rows=replace(self.rows, rounding=[])) if self.rows.rounding else self
+
+    @cached_property
+    def rounding(self) -> list[RandomEffects]:
+        """What the inputs of each piece were rounded by, by as much as the residuals show; none where they are not."""
+        if not self.rows.rounding:
+            return []
+        e, j = self.plain.whole()
+        shown = [self._without_start(k, values) for k, values in enumerate(self.rows.rounding)]
+        return scaled(shown, e - j @ solved(j, e), j @ root_of_covariance(j))
+
     def white(self, shown: Shown) -> FloatArray:
         """What is shown in the rows, as the fit sees it: (N, K), starts projected out, a row of 0 for each prior."""
-        found = []
-        for k, (piece, values) in enumerate(zip(self.rows.pieces, shown, strict=True)):
-            own = self.of_piece(k, self.rows.own[k])
-            one = self.of_piece(k, values)
-            if own.shape[1]:
-                _, known = piece.start_prior(self.rows.point.states[k])
-                held = np.sqrt(known[piece.free[: len(known)]])
-                extra = np.zeros((len(held), own.shape[1]))
-                extra[np.arange(len(held)), np.arange(len(held))] = held
-                own = np.vstack([own, extra])
-                one = np.vstack([one, np.zeros((len(held), one.shape[1]))])
-                size = np.linalg.norm(own, axis=0)
-                left, size_, _ = np.linalg.svd(own[:, size > 0.0] / size[size > 0.0], full_matrices=False)
-                left = left[:, size_ > 1e-9 * size_.max(initial=1e-300)]
-                one = one - left @ (left.T @ one)
-            found.append(one)
+        found = [self._without_start(k, values) for k, values in enumerate(shown)]
+        if self.rounding:
+            found = [own.white(values) for own, values in zip(self.rounding, found, strict=True)]
         return np.concatenate([*found, np.zeros((len(self.rows.problem.parameters), found[0].shape[1]))])
 
+    def _without_start(self, k: int, values: FloatArray) -> FloatArray:
+        """Columns of piece k made white, what its start explains projected out."""
+        piece, own, one = self.rows.pieces[k], self.of_piece(k, self.rows.own[k]), self.of_piece(k, values)
+        if not own.shape[1]:
+            return one
+        _, known = piece.start_prior(self.rows.point.states[k])
+        held = np.sqrt(known[piece.free[: len(known)]])
+        extra = np.zeros((len(held), own.shape[1]))
+        extra[np.arange(len(held)), np.arange(len(held))] = held
+        own = np.vstack([own, extra])
+        one = np.vstack([one, np.zeros((len(held), one.shape[1]))])
+        size = np.linalg.norm(own, axis=0)
+        left, size_, _ = np.linalg.svd(own[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+        left = left[:, size_ > 1e-9 * size_.max(initial=1e-300)]
+        return one - left @ (left.T @ one)
+
+    def with_start(self, k: int, values: FloatArray) -> FloatArray:
+        """Columns of piece k made white, its start still in them, what its inputs were rounded by in none."""
+        one = self.of_piece(k, values)
+        if not self.rounding:
+            return one
+        beside = self.rounding[k]
+        known = np.zeros((len(beside.z) - len(one), one.shape[1]))  # of its start beforehand
+        return beside.white(np.concatenate([one, known]))[: len(one)]
+
     def of_piece(self, k: int, values: FloatArray) -> FloatArray:
-        """Columns of piece k made white, its start still in them."""
+        """Columns of piece k made white, its start, and what its inputs were rounded by, still in them."""
         parts = [self.of_column(k, j, values[j]) for j in range(len(self.rows.column[k]))]
         return np.concatenate(parts) if parts else np.zeros((0, values.shape[2]))
 
@@ -122,15 +153,27 @@ class Linear:
         return new / np.sqrt(max(memory.variance, TINY))
 
     def without_starts(self, shown: Shown) -> list[FloatArray]:
-        """What is shown, in rows as they are, without what the starts of pieces explain of it. (C, rows, K) each."""
+        """What is shown, in rows as they are, without what the starts of pieces, and rounded inputs, explain of it.
+        (C, rows, K) each."""
         found = []
         for k, values in enumerate(shown):
+            values = values - self.rounded_off(k, values)
             own = self.rows.own[k]
             if own.shape[2]:
                 white_own = self.of_piece(k, own)
                 values = values - own @ solved(white_own, self.of_piece(k, values))
             found.append(values)
         return found
+
+    def rounded_off(self, k: int, values: FloatArray) -> FloatArray:
+        """What rounded inputs make of values (C, rows, K) of piece k, as likely as can be, in rows as they are."""
+        if not self.rounding:
+            return np.zeros_like(values)
+        return self.rows.rounding[k] @ self.rounding[k].predicted(self._without_start(k, values))
+
+    def open(self, k: int) -> FloatArray:
+        """What that may be off by, (C, rows, M) of variance 1 each."""
+        return self.rows.rounding[k] @ self.rounding[k].open
 
     def known(self, shown: Shown) -> FloatArray:
         """Degrees of freedom with which the noise along some directions is known, by how well the memory is. (K,).

@@ -33,8 +33,8 @@ class Misfit:
     """What the residuals follow. found: themes, first the one that explains most. tested: every theme, p of each.
 
     linear: the fit with the memory of what is left. shown: of each piece (C, rows, K), the directions that were found.
-    shares: of each column of the problem, of the variance of its
-    residuals that is no noise. explained: of each piece (C, rows), what the themes make of the residuals.
+    shares: of each column of the problem, of the variance of its residuals that is no noise; rounded: that its inputs
+    were rounded by. explained: of each piece (C, rows), what the themes make of the residuals.
     """
 
     found: tuple[Found, ...]
@@ -42,6 +42,7 @@ class Misfit:
     linear: Linear
     shown: list[FloatArray]
     shares: FloatArray
+    rounded: FloatArray
     explained: list[FloatArray]
 
 
@@ -67,7 +68,7 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
             best = _likeliest(scores)
         if not best or scores[best][1] > FALSE / len(themes):
             kept = [each[:, :, taken] for each in shown]
-            return Misfit(tuple(found), first, linear, kept, *_shares(rows, left, bool(found)))
+            return Misfit(tuple(found), first, linear, kept, *_shares(rows, *left, bool(found)))
         found.append(Found(best, *scores[best]))
         taken = np.concatenate([taken, at[best]])
 
@@ -75,11 +76,12 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
 def with_cause(seen: Misfit, cause: Sequence[FloatArray]) -> Misfit:
     """The same with what a cause shows (C, rows, K) of each piece beside what was found: it may explain far more."""
     rows = seen.linear.rows
-    left, _ = left_beside(
+    left, off, _ = left_beside(
         rows, seen.linear, [np.concatenate(both, axis=2) for both in zip(seen.shown, cause, strict=True)]
     )
-    shares, explained = _shares(rows, left, True)
-    return replace(seen, shares=shares, explained=explained) if shares.sum() > seen.shares.sum() else seen
+    shares, rounded, explained = _shares(rows, left, off, True)
+    better = shares.sum() > seen.shares.sum()
+    return replace(seen, shares=shares, rounded=rounded, explained=explained) if better else seen
 
 
 def chance(linear: Linear, shown: Sequence[FloatArray]) -> float:
@@ -147,20 +149,28 @@ class _Asked:
         return f, float(fdtrc(k, min(together, rows), f)), k
 
 
-def _whitened(rows: Rows, kept: Sequence[FloatArray]) -> tuple[Linear, list[FloatArray]]:
-    """(the fit with the memory of what it and `kept` leave, what they leave (C, rows) of each piece).
+def _whitened(
+    rows: Rows, kept: Sequence[FloatArray]
+) -> tuple[Linear, tuple[list[FloatArray], list[FloatArray]]]:  # fmt: skip
+    """(the fit with the memory of what it and `kept` leave; what they leave (C, rows) of each piece, and what rounded
+    inputs make of the rest).
 
     What they have taken out of the residuals belongs to the noise, too: see output_error/memory/whitening.py.
+    Rounds begin with noise that remembers nothing where inputs are rounded: that shows as a memory, and would stay one.
     """
-    linear, left = Linear(rows, _memories(rows, rows.residual, None)), list(rows.residual)
+    linear = Linear(rows, _memories(rows, rows.residual, None, 0 if rows.rounding else None))
+    left, off = list(rows.residual), list(rows.residual)
     for _ in range(ROUNDS):
-        left, taken = left_beside(rows, linear, kept)
+        left, off, taken = left_beside(rows, linear, kept)
         linear = Linear(rows, _memories(rows, left, taken))
-    return linear, left
+    return linear, (left, off)
 
 
-def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray] | None) -> list[AutoRegression]:
-    """The memory of each column. taken: of each piece (C, rows, K), what a fit has taken out, as likely as it is."""
+def _memories(
+    rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray] | None, most: int | None = None
+) -> list[AutoRegression]:
+    """The memory of each column. taken: of each piece (C, rows, K), what a fit has taken out, as likely as it is. most:
+    the highest order."""
     found = []
     for c in range(len(rows.problem.columns)):
         series, moves = list[FloatArray](), list[BoolArray]()
@@ -172,36 +182,47 @@ def _memories(rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray
                     series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
                     moves += without_gaps(rows.moves[k][j, there], rows.steps[k][j])
         plain, adds_up = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
-        is_white = rows.is_rounding(c, plain.variance)
+        is_white = most == 0 or rows.is_rounding(c, plain.variance)
         found.append(plain if is_white else autoregression(series, may_add_up=adds_up, moves=moves))
     return found
 
 
-def left_beside(rows: Rows, linear: Linear, kept: Sequence[FloatArray]) -> tuple[list[FloatArray], list[FloatArray]]:
-    """(residuals without what parameters, `kept` and the start of each piece explain, what that may be off by)."""
+def left_beside(
+    rows: Rows, linear: Linear, kept: Sequence[FloatArray]
+) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
+    """(residuals without what parameters, `kept`, the start of each piece and rounded inputs explain, what of that
+    rounded inputs do, what all that may be off by)."""
     e, j = linear.whole()
     z = np.hstack([j, linear.white(kept)]) if kept[0].shape[2] else j
     by, root = solved(z, e), root_of_covariance(z)
     both = [np.concatenate(each, axis=2) for each in zip(rows.slopes, kept, strict=True)]
     left = [r[:, :, None] - each @ by[:, None] for r, each in zip(rows.residual, both, strict=True)]
+    off = [linear.rounded_off(k, each)[:, :, 0] for k, each in enumerate(left)]
     found = [each[:, :, 0] for each in linear.without_starts(left)]
     taken = linear.without_starts([each @ root for each in both])
     for k, own in enumerate(rows.own):
         if own.shape[2]:
             taken[k] = np.concatenate([taken[k], own @ root_of_covariance(linear.of_piece(k, own))], axis=2)
+        if linear.rounding:
+            taken[k] = np.concatenate([taken[k], linear.open(k)], axis=2)
     most = max((each.shape[2] for each in taken), default=0)  # of some pieces less is told of their start
-    return found, [np.pad(each, ((0, 0), (0, 0), (0, most - each.shape[2]))) for each in taken]
+    return found, off, [np.pad(each, ((0, 0), (0, 0), (0, most - each.shape[2]))) for each in taken]
 
 
-def _shares(rows: Rows, left: Sequence[FloatArray], found: bool) -> tuple[FloatArray, list[FloatArray]]:
-    """(share of the variance of each column that is no noise, what is explained in each piece)."""
-    whole, rest = np.zeros(len(rows.problem.columns)), np.zeros(len(rows.problem.columns))
+def _shares(
+    rows: Rows, left: Sequence[FloatArray], off: Sequence[FloatArray], found: bool
+) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
+    """(shares of the variance of each column that are no noise, and that its inputs were rounded by; what is explained
+    in each piece)."""
+    whole, beside, rest = np.zeros((3, len(rows.problem.columns)))
     for k, columns in enumerate(rows.column):
         for j, c in enumerate(columns):
             there = rows.there[k][j]
             whole[c] += float((rows.residual[k][j][there] ** 2).sum())
+            beside[c] += float(((left[k] + off[k])[j][there] ** 2).sum())
             rest[c] += float((left[k][j][there] ** 2).sum())
-    explained = [a - b for a, b in zip(rows.residual, left, strict=True)]
-    shares = np.clip(1.0 - rest / np.maximum(whole, 1e-300), 0.0, 1.0) if found else 0.0 * whole
+    explained = [a - b - c for a, b, c in zip(rows.residual, left, off, strict=True)]
+    size = np.where(whole > 0.0, whole, np.inf)
+    shares = np.clip(1.0 - beside / size, 0.0, 1.0) if found else 0.0 * whole
     shares[whole == 0.0] = 0.0
-    return shares, explained
+    return shares, np.clip((beside - rest) / size, 0.0, 1.0), explained

@@ -1,0 +1,83 @@
+"""White rows whose errors have a part of known variance beside their noise: random effects.
+
+    e = J d + Z u + noise,   u and noise of variance 1,   so that cov e = I + Z Z'
+
+Made white by (I + Z Z')^-1/2, and predicted by E u = (I + Z'Z)^-1 Z'(e - J d), whose covariance is (I + Z'Z)^-1.
+C. R. Henderson, Biometrics 31, 423 (1975).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+
+SURE = 2.0  # standard errors beyond what is seen of a share
+
+
+@dataclass(frozen=True, eq=False)
+class RandomEffects:
+    """z (N, M): what each effect shows, `size` times what was given. square (M,), ways (M, M): eigenvalues and vectors
+    of Z'Z."""
+
+    z: FloatArray
+    square: FloatArray
+    ways: FloatArray
+    size: float = 1.0
+
+    @classmethod
+    def of(cls, z: FloatArray) -> RandomEffects:
+        """Of variance 1."""
+        square, ways = np.linalg.eigh(z.T @ z)
+        return cls(z, np.maximum(square, 0.0), ways)
+
+    def times(self, size: float) -> RandomEffects:
+        """Effects that are larger."""
+        return RandomEffects(size * self.z, size**2 * self.square, self.ways, size * self.size)
+
+    def white(self, values: FloatArray) -> FloatArray:
+        """(I + Z Z')^-1/2 times values (N, K)."""
+        root = np.sqrt(1.0 + self.square)
+        factor = 1.0 / (root * (1.0 + root))  # (1 - 1/root)/square
+        return values - self.z @ (self.ways @ (factor[:, None] * (self.ways.T @ (self.z.T @ values))))
+
+    def predicted(self, values: FloatArray) -> FloatArray:
+        """E u of each of K series (N, K), times `size`. Shape (M, K)."""
+        return self.size * self.ways @ ((self.ways.T @ (self.z.T @ values)) / (1.0 + self.square)[:, None])
+
+    @property
+    def open(self) -> FloatArray:
+        """A root of the covariance of what is predicted. Shape (M, M)."""
+        return self.size * self.ways / np.sqrt(1.0 + self.square)
+
+
+def share(seen: float, noise: float, apart: float, error: float) -> float:
+    """How much of a variance there is: what is seen beyond the noise and `SURE` errors over what there would be."""
+    return float(np.clip((seen - noise + SURE * error) / apart, 0.0, 1.0)) if apart > 0.0 else 0.0
+
+
+def scaled(shown: Sequence[FloatArray], left: FloatArray, fitted: FloatArray) -> list[RandomEffects]:
+    """Effects by as much of their variance as errors have: E |Z'e|^2 = tr S + s^2 tr S^2, S = Z'QZ, whose variance is
+    2 tr (S + s^2 S^2)^2.
+
+    shown: what those of each piece show in its own rows, one piece after the other. left (N,): the errors of all rows
+    without what parameters make of them; fitted (N, P'): an orthonormal basis of that, which Q takes out.
+    """
+    seen, noise, apart, both, first = 0.0, 0.0, 0.0, np.zeros(2 * fitted.shape[1:]), 0
+    effects = [RandomEffects.of(z) for z in shown]
+    for one in effects:
+        own = slice(first, first := first + len(one.z))
+        taken = one.z.T @ fitted[own]
+        seen += float(((one.z.T @ left[own]) ** 2).sum())
+        noise += float(one.square.sum() - (taken**2).sum())
+        apart += float((one.square**2).sum() - 2.0 * ((one.z @ taken) ** 2).sum())
+        both += taken.T @ taken
+    apart += float((both**2).sum())
+    square = np.concatenate([one.square for one in effects])
+    likely = share(seen, noise, apart, 0.0)
+    error = 2.0 * (apart + 2.0 * likely * float((square**3).sum()) + likely**2 * float((square**4).sum()))
+    part = share(seen, noise, apart, float(np.sqrt(max(error, 0.0))))
+    return [one.times(part**0.5) for one in effects]
