@@ -21,7 +21,6 @@ from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUS
 from omnidyn.identification.output_error.problem.parameters import AT, EFFICIENCY, WITHIN
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
-from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
 from omnidyn.identification.question import STUDENT, Question
 from omnidyn.identification.structure.missing.laws import (
     BEND,
@@ -31,24 +30,27 @@ from omnidyn.identification.structure.missing.laws import (
     along_axes,
     along_travel,
     bent,
+    breaking,
     bristled,
     falling,
+    held_above,
     slippery,
     table_of,
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
+from omnidyn.model.known.holding import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Prior, Robot
 
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
 EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one of all
+BREAKS = tuple(f"{table}.{BREAKAWAY}" for table in (BODY_AXES, DIRECTION, WHEELS))
 FALLS = tuple(f"{table}.{FALL}" for table in (BODY_AXES, DIRECTION, WHEELS))
 BRISTLES = BENDS, DAMPS = f"{BODY_AXES}.{BEND}", f"{BODY_AXES}.{DAMPING}"  # Dahl's, LuGre's
 OF_GEAR = 0.01  # lost by a gear, from which its fit begins at least
 UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
-BREAK = "breakaway"
 ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {
@@ -118,7 +120,7 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         yield Switch(robot.replace(body=body), asked, words)
     elif key == CENTRE:
         yield Switch(_balanced(robot, remedy.size), _free(asked, key), words)
-    elif key == BREAKAWAY:
+    elif key in BREAKS:
         yield _breaking_away(remedy, robot, asked)
     elif key == DIRECTION:
         yield Switch(robot.replace(friction=along_travel(friction)), _of_another_shape(asked), words)
@@ -155,11 +157,7 @@ def _where_it_ended(robot: Robot, found: Solution) -> Robot:
     for p, value, held in zip(problem.robot_parameters, found.state.point.values.tolist(), found.held, strict=False):
         if p.prior is None and not held:
             robot = p.on(robot, value)
-    axes, levels = robot.friction.axes, levels_of(found)
-    if levels is not None:  # of which none may be below Coulomb friction
-        higher = [max(pair) for pair in zip(levels, axes.coulomb, strict=True)]
-        axes = axes.replace(breakaway=tuple(higher))
-    return robot.replace(friction=robot.friction.replace(axes=axes))
+    return robot.replace(friction=holding(robot, levels_of(found)).friction.replace())
 
 
 def _as_it_settled(robot: Robot, question: Question, found: Solution) -> Question:
@@ -203,19 +201,20 @@ def _of_another_shape(asked: Question) -> Question:
 
 def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     """Levels above Coulomb friction as the first step has them; a profile finds better ones."""
-    axes = robot.friction.axes
+    table = remedy.key.rpartition(".")[0]
     above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
-    levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
-    changed = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=levels)))
-    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
+    changed = robot.replace(friction=breaking(robot, table, above))
+    held = [f"{table}.{field}" for field in held_above(robot, table, above)]
+    keys = [key for name in held for key in expand_keys(name, changed)]
+    return Switch(changed, _free(asked, *keys), remedy.words, len(keys))
 
 
 def _falling(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     """Levels and speeds from which a fit finds how friction falls: those of the first step."""
     table = remedy.key.rpartition(".")[0]
     friction = falling(robot, table, np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at)
-    own, yaw = table_of(friction, table), (f"yaw_{BREAK}", f"yaw_{FALL}")
-    names = (BREAK, FALL, *(yaw if getattr(own, yaw[0], None) is not None else ()))
+    own, yaw = table_of(friction, table), (f"yaw_{BREAKAWAY}", f"yaw_{FALL}")
+    names = (BREAKAWAY, FALL, *(yaw if getattr(own, yaw[0], None) is not None else ()))
     return _rough(robot.replace(friction=friction), asked, [f"{table}.{name}" for name in names], remedy.words)
 
 
@@ -223,7 +222,7 @@ def _bending(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     """Dahl's law, or LuGre's with the critical damping to begin from."""
     if remedy.key == BENDS:
         return _rough(robot.replace(friction=bent(robot, remedy.at)), asked, [BENDS], remedy.words)
-    keys = [f"{BODY_AXES}.{name}" for name in (BREAK, FALL, BEND, DAMPING)]
+    keys = [f"{BODY_AXES}.{name}" for name in (BREAKAWAY, FALL, BEND, DAMPING)]
     return _rough(with_damping(robot.replace(friction=bristled(robot, remedy.at)), keys), asked, keys, remedy.words)
 
 
