@@ -20,8 +20,9 @@ from omnidyn.identification.output_error.prepare import (
 from omnidyn.identification.output_error.problem.band import without_band
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.parameters import refuse_unknown
-from omnidyn.identification.output_error.trust.breakaway import KEY, asked_axes
+from omnidyn.identification.output_error.trust.breakaway import asked_levels, refuse_level
 from omnidyn.identification.question import Question
+from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -57,7 +58,8 @@ def begun(name: str, runs: Sequence[Run], robot: Robot, question: Question, join
         _refuse_joint(runs, robot, asked)
     records = read_records(runs, robot, asked)
     refuse_unknown(asked.fixed, robot)
-    asked_axes(robot, free, asked.fixed)
+    for level in asked_levels(robot, free, asked.fixed):
+        refuse_level(level, robot, free)
     keys = asked.free if asked.free is not None else guesses(robot)
     exact = exact and stays_exact(robot, [key for key in keys if key not in asked.fixed])
     group = make_group(name, records, robot, asked, exact, usual, alone=not joint)
@@ -66,16 +68,16 @@ def begun(name: str, runs: Sequence[Run], robot: Robot, question: Question, join
 
 
 def _refuse_profile(group: Group, question: Question) -> None:
-    axes = asked_axes(group.robot, question.free or (), question.fixed)
+    levels = [each for each in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(each)]
     why = "a speed loop" if group.engine == LOOP else ""
     if group.robot.wheels.traction_mu is not None:
         why = "wheels that may slip"
-    if why and any(group.moved[axis] for axis in axes):
+    if why and levels:
         raise UnsupportedError(
             "breakaway is profiled over voltages that are known, of wheels that roll", got=why,
             expected="neither a speed loop nor a traction limit", where="free",
-            remedy="give friction.axes a stribeck_speed and free it too: what falls with the speed is fitted here; or "
-            "hold breakaway, at the force with which slow ramps first move the robot",
+            remedy=f"give {Key.parse(levels[0]).table} a stribeck_speed and free it too: what falls with the speed is "
+            "fitted here; or hold breakaway, at the force with which slow ramps first move the robot",
         )  # fmt: skip
 
 
@@ -93,9 +95,10 @@ def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Ques
 
 
 def _refuse_joint(runs: Sequence[Run], robot: Robot, question: Question) -> None:
-    if asked_axes(robot, question.free or ()):
+    levels = asked_levels(robot, question.free or ())
+    if levels:
         raise UnsupportedError(
-            "breakaway is not profiled in groups", got=KEY, expected="other keys", remedy="fit each group alone",
+            "breakaway is not profiled in groups", got=levels[0], expected="other keys", remedy="fit each group alone",
             where="free",
         )  # fmt: skip
     why = why_no_inputs(runs, robot)

@@ -17,7 +17,7 @@ from omnidyn.identification.force_scale import scale_of_motion
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.belonging import key_of, with_nuisances
 from omnidyn.identification.output_error.combinations import combinations
-from omnidyn.identification.output_error.problem.falling import breaking_at, falls
+from omnidyn.identification.output_error.problem.falling import coulomb_below, falls
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, TRAVELS, implausible
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Column, Fitted, Problem, per_column
@@ -32,6 +32,7 @@ from omnidyn.identification.output_error.trust.ends import at_the_end, end_words
 from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import Trust, widened
 from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, unit, with_priors
+from omnidyn.model.known.holding import holding
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
 from omnidyn.statistics import difference_noise
@@ -67,7 +68,7 @@ def conclude(
     for name, (spread, interval) in (better or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
     data, names = _data(records), [p.name for p in problem.parameters]
-    own_levels, joint = _levels(levels, ci95), combinations(problem, values, known, moved)
+    own_levels, joint = _levels(problem.robot, levels, ci95), combinations(problem, values, known, moved)
     endless = [name for name, (_, (_, high)) in own_levels.items() if high == math.inf]
     fitted, correlation = problem.parameters[:own], _correlation(names, known)
     robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)
@@ -264,10 +265,7 @@ def _robot(
                 joint = together and (p.part == "motor" or Key.parse(key).level == VISCOUS)
                 source = printable(f"{WITH_THE_FIT}, {data}") if joint else before.source
                 found[key] = before.replace(std=float(before.std * share), source=source)
-    axes = robot.friction.axes
-    if axes.breakaway is not None:
-        robot = breaking_at(robot, np.array(axes.breakaway))
-    return with_priors(robot, found)
+    return with_priors(holding(robot), found)
 
 
 def prior_of(robot: Robot, key: str) -> Prior | None:
@@ -276,15 +274,15 @@ def prior_of(robot: Robot, key: str) -> Prior | None:
 
 
 def _levels(
-    found: Sequence[Breakaway], ci95: Mapping[str, tuple[float, float]]
+    robot: Robot, found: Sequence[Breakaway], ci95: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, tuple[float, float]]]:
     """Key -> (level, interval) of breakaway. Where it may be coulomb itself, it is as uncertain as coulomb is."""
     levels = {}
     for one in found:
-        coulomb = ci95.get(f"friction.axes.coulomb[{one.axis}]", (one.low, one.low))
+        coulomb = ci95.get(coulomb_below(one.name, robot), (one.low, one.low))
         low = coulomb[0] if one.tied else one.low
         high = max(one.high, coulomb[1]) if one.tied else one.high
-        levels[f"friction.axes.breakaway[{one.axis}]"] = (one.value, (low, high))
+        levels[one.name] = (one.value, (low, high))
     return levels
 
 
@@ -294,17 +292,12 @@ def _spread(interval: tuple[float, float]) -> float:
 
 
 def _with_levels(robot: Robot, levels: Mapping[str, tuple[float, tuple[float, float]]]) -> Robot:
-    """The robot with the levels of breakaway; the other axes keep theirs, which is coulomb where they had none."""
-    if not levels:
-        return robot
-    hold, coulomb = robot.friction.axes.levels[2].copy(), robot.friction.axes.coulomb
-    found = {}
-    for axis in range(3):
-        key = f"friction.axes.breakaway[{axis}]"
-        if key in levels:
-            hold[axis] = max(levels[key][0], coulomb[axis])
-            found[key] = identified(_spread(levels[key][1]), "output error, profile over the drives of the log")
-    return with_priors(breaking_at(robot, hold), found)
+    """The robot with the levels of breakaway, by key; others of their lists stay, or follow coulomb."""
+    found = {
+        name: identified(_spread(interval), "output error, profile over the drives of the log")
+        for name, (_, interval) in levels.items()
+    }
+    return with_priors(holding(robot, {name: level for name, (level, _) in levels.items()}), found) if found else robot
 
 
 def _correlation(names: Sequence[str], known: Trust) -> Correlation:

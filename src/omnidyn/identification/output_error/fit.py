@@ -39,7 +39,7 @@ from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, Progress
 from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver, State
-from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_axes, find_breakaway
+from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, refuse_bootstrap, resampled
@@ -350,16 +350,15 @@ class Fit:
         return left_out(group.records, solution.solver.problem.pieces) if alone else []
 
     def with_levels(self, solution: Solution, progress: Progress | None = None) -> tuple[Solution, list[Breakaway]]:
-        """Breakaway of the axes that were asked for, and the fit with it."""
+        """Breakaway that was asked for, and the fit with it."""
         group = self.groups[0]
-        axes = [
-            axis for axis in asked_axes(group.robot, self.question.free or (), self.question.fixed) if group.moved[axis]
-        ]
-        if not axes:
+        asked = asked_levels(group.robot, self.question.free or (), self.question.fixed)
+        names = [name for name in asked if group.tells(name)]
+        if not names:
             return solution, []
         kind = self.question.covariance
         known = trust(solution.solver, solution, SANDWICH if kind == AUTOREGRESSIVE else kind)
-        return find_breakaway(solution, axes, known, progress)
+        return find_breakaway(solution, names, known, progress)
 
 
 def degrees(loss: str) -> float:

@@ -30,11 +30,12 @@ from omnidyn.identification.output_error.problem.parameters import Parameter, na
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
 from omnidyn.identification.output_error.solve.loop import loop_keys, loop_pieces, looped
-from omnidyn.identification.output_error.trust.breakaway import KEY, is_profiled
+from omnidyn.identification.output_error.trust.breakaway import is_profiled
 from omnidyn.identification.question import Question
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import (
+    BODY_AXES,
     BOX,
     BREAKAWAY,
     CENTRE,
@@ -95,6 +96,11 @@ class Group:
     moved: BoolArray
     bounds: dict[str, float]
     warnings: tuple[str, ...]
+
+    def tells(self, name: str) -> bool:
+        """Whether these logs may tell of a level, by its key: of an axis that never moved they do not."""
+        axis = Key.parse(name).axis
+        return axis is None or bool(self.moved[axis])
 
     def problem(self, nuisances: Sequence[str] | None = None) -> Problem:
         """What is to be fitted. nuisances: those that were settled; None: those that are asked for."""
@@ -241,7 +247,7 @@ def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:
     A number of one wheel makes equal motors unequal, and the axes couple; friction that was off may come up.
     """
     other = [Key.parse(key) for key in keys if key not in BOX]
-    other = [key for key in other if key.name != KEY]
+    other = [key for key in other if (key.table, key.field) != (BODY_AXES, BREAKAWAY)]
     for k, key in enumerate(other):
         value, share = key.get(robot), ASIDE * (k + 1)
         robot = key.set(robot, value * (1.0 + share) or share, checked=False)

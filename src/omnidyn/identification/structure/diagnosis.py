@@ -13,7 +13,6 @@ from omnidyn.compiled.beside import small_matrices
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
-from omnidyn.identification.output_error.problem.falling import breaking_at
 from omnidyn.identification.output_error.problem.problem import Parts, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
@@ -33,6 +32,7 @@ from omnidyn.identification.structure.rounded_inputs import rows_told, with_roun
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
 from omnidyn.identification.structure.workbench import Workbench
+from omnidyn.model.known.holding import holding
 
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
 
@@ -137,11 +137,9 @@ def _with_first_step(again: Remedy, near: Remedy, fitted: Container[str]) -> Rem
     return replace(again, same_as=tuple(dict.fromkeys((*again.same_as, *same))))
 
 
-def with_levels(problem: Problem, levels: Sequence[float] | None) -> Problem:
+def with_levels(problem: Problem, levels: dict[str, float]) -> Problem:
     """The problem of a robot with the levels of breakaway that were found beside its numbers."""
-    if levels is None:
-        return problem
-    return replace(problem, robot=breaking_at(problem.robot, np.array(levels)))
+    return replace(problem, robot=holding(problem.robot, levels)) if levels else problem
 
 
 def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:

@@ -29,7 +29,8 @@ from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.beside import one_by_one
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.model.keys import BREAKAWAY, Key
+from omnidyn.model.keys import Key
+from omnidyn.model.known.holding import holding
 from omnidyn.model.known.told import SIGNED, Told, is_log, numbers_told, told
 from omnidyn.model.robot import Robot
 
@@ -165,7 +166,7 @@ def _aside(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> l
             changed = robot
             for key, value in zip(keys, (known.value + far * off).tolist(), strict=True):
                 changed = key.set(changed, value, checked=False)
-            moved.append(_holding(changed))
+            moved.append(holding(changed))
         if not _out_of_range(moved[1], robot):
             break
     return moved
@@ -178,7 +179,7 @@ def _drawn(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> R
         for k, key in enumerate(keys):
             value = float(known.value[k])
             draw = key.set(draw, _off(key, value, float(off[k]), bool(known.log[k])), checked=False)
-        draw = _holding(draw)
+        draw = holding(draw)
         bad = _out_of_range(draw, robot)
         if not bad:
             return draw
@@ -210,29 +211,6 @@ def _out_of_range(robot: Robot, origin: Robot) -> set[str]:
     return bad
 
 
-def _holding(robot: Robot) -> Robot:
-    """The robot with breakaway nowhere below Coulomb friction, of which it was drawn apart."""
-    friction, changed = robot.friction, {}
-    for name in type(friction).model_fields:
-        law = getattr(friction, name)
-        levels = {
-            field: _at_least(level, getattr(law, COULOMB_OF[field]) or 0.0)
-            for field, level in dict(law).items() if BREAKAWAY in field and level is not None
-        }  # fmt: skip
-        if levels:
-            changed[name] = law.model_copy(update=levels)
-    return robot.model_copy(update={"friction": friction.model_copy(update=changed)}) if changed else robot
-
-
-# What each level of breakaway is at least; `backward` of the wheels is coulomb where they have no other.
-COULOMB_OF = {"breakaway": "coulomb", "yaw_breakaway": "yaw_coulomb", "breakaway_backward": "backward"}
-
-
-def _at_least(level: float | tuple[float, ...], least: float | tuple[float, ...]) -> float | tuple[float, ...]:
-    higher = np.maximum(level, least)
-    return tuple(higher.tolist()) if higher.ndim else float(higher)
-
-
 def effects(robot: Robot, function: Callable[[Robot], ArrayLike], keys: Sequence[str]) -> dict[str, float]:
     """Key -> by how much the function changes, at the most, relative to itself, where that number alone is off.
 
@@ -244,7 +222,7 @@ def effects(robot: Robot, function: Callable[[Robot], ArrayLike], keys: Sequence
         value = float(key.get(robot))
         std = (own[name].std if name in own else None) or 0.01 * abs(value)
         log = is_log(name, value, std)
-        moved = _holding(key.set(robot, _off(key, value, std / value if log else std, log), checked=False))
+        moved = holding(key.set(robot, _off(key, value, std / value if log else std, log), checked=False))
         other = at if _out_of_range(moved, robot) else np.asarray(function(moved), dtype=float)
         with np.errstate(invalid="ignore", divide="ignore"):
             found[name] = float(np.nanmax(np.abs(other - at) / np.abs(at), initial=0.0))

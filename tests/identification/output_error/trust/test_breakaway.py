@@ -80,8 +80,8 @@ def test_it_is_found_in_a_turning_frame_too():
     assert fit.unidentifiable == (LEVELS[2],)
     assert fit.lower_bound == {LEVELS[2]: fit.ci95[LEVELS[2]][0]}
     assert fit.robot.priors[LEVELS[2]].std is None
-    assert any(each.startswith("how much y holds, fit ") for each in words)
-    assert sum(each.startswith("how much") for each in words) < 300
+    assert any(each.startswith("breakaway friction sideways, fit ") for each in words)
+    assert sum(each.startswith("breakaway friction") for each in words) < 300
 
 
 @pytest.mark.long

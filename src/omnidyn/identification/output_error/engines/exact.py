@@ -73,6 +73,7 @@ class ExactEngine:
     def __init__(self, problem: Problem, fast: bool = True):
         self.problem = problem
         self.mapping = Mapping(problem.robot, problem.robot_parameters)
+        self.levels: dict[str, float] = {}
         self._columns = problem.columns
         twists = all(name == "twist" for name, _ in self._columns)
         margins = any(piece.margin.any() for piece in problem.pieces)
@@ -86,16 +87,10 @@ class ExactEngine:
         engine.problem, engine._columns = problem, problem.columns
         return engine
 
-    @property
-    def breakaway(self) -> FloatArray:
-        """Fixed levels of breakaway (3,) [N, N, N m]; NaN where S follows coulomb."""
-        return self.mapping.breakaway
-
-    def with_breakaway(self, breakaway: FloatArray) -> ExactEngine:
-        """The same engine with other fixed levels of breakaway, shape (3,) [N, N, N m], NaN where S follows coulomb."""
+    def with_levels(self, levels: dict[str, float]) -> ExactEngine:
+        """The same engine with these levels of breakaway of the axes, key -> [N, N, N m]; see implicit.py."""
         engine = copy.copy(self)
-        engine.mapping = copy.copy(self.mapping)
-        engine.mapping.breakaway = breakaway
+        engine.levels, engine.mapping = levels, self.mapping.with_levels(levels)
         return engine
 
     def drives(self, point: Point) -> list[FloatArray]:

@@ -20,10 +20,10 @@ from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT, Weighting
 from omnidyn.identification.output_error.engines.sums import added
-from omnidyn.identification.output_error.problem.falling import breaking_at
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
+from omnidyn.model.known.holding import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
@@ -76,13 +76,13 @@ class ImplicitEngine:
                 remedy="leave it out of the nuisances", where=problem.robot.name,
             )  # fmt: skip
         self.last = LastPoints()
-        self.breakaway: FloatArray | None = None
+        self.levels: dict[str, float] = {}
 
-    def with_breakaway(self, breakaway: FloatArray) -> Self:
-        """The same engine with other fixed levels of breakaway of the body axes, shape (3,), NaN where S follows
-        coulomb; by default as the robot has it."""
+    def with_levels(self, levels: dict[str, float]) -> Self:
+        """The same engine with these levels of breakaway, key -> [N], about yaw [N m]; 0 follows coulomb. All others
+        stay as the robot has them."""
         engine = copy.copy(self)
-        engine.breakaway, engine.last = breakaway, LastPoints()
+        engine.levels, engine.last = levels, LastPoints()
         return engine
 
     def on(self, problem: Problem) -> Self:
@@ -104,19 +104,16 @@ class ImplicitEngine:
         return self.last.at(point, self._simulated)
 
     def _simulated(self, point: Point) -> list[Parts]:
-        robot, values = self._holding(self.problem.robot_at(point.values)), point.values
+        robot, values = holding(self.problem.robot_at(point.values), self.levels), point.values
         scales = [abs(float(value)) or 1.0 for value in values]
         moved = [
-            tuple(self._holding(p.on(robot, float(value) + side * EPS * scale)) for side in (1.0, -1.0))
+            tuple(holding(p.on(robot, float(value) + side * EPS * scale), self.levels) for side in (1.0, -1.0))
             for p, value, scale in zip(self.problem.robot_parameters, values, scales, strict=False)
         ]
         return side_by_side(
             lambda own: self._piece(robot, moved, scales, own[0], own[1], values),
             zip(self.problem.pieces, point.states, strict=True),
         )
-
-    def _holding(self, robot: Robot) -> Robot:
-        return robot if self.breakaway is None else breaking_at(robot, self.breakaway)
 
     def _piece(
         self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,

@@ -9,9 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.parameters import AT, Parameter
 from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BREAKAWAY, COULOMB, Key, find_key
@@ -30,14 +27,6 @@ def falls(name: str, robot: Robot) -> bool:
     return KINDS[law.law].falls and getattr(law, speed, None) is not None
 
 
-def breaking_at(robot: Robot, levels: FloatArray) -> Robot:
-    """The robot with these levels of breakaway of the body axes (3,) [N, N, N m], not checked: where one is NaN, or
-    below Coulomb friction, it is that."""
-    axes = robot.friction.axes
-    held = axes.model_copy(update={"breakaway": tuple(np.fmax(levels, axes.coulomb).tolist())})
-    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"axes": held})})
-
-
 def coulomb_below(name: str, robot: Robot | None = None) -> str:
     """The Coulomb level that this breakaway is at least; of a group, that of the group.
 
@@ -45,7 +34,8 @@ def coulomb_below(name: str, robot: Robot | None = None) -> str:
     """
     key, at, group = name.partition(AT)
     found = key.replace(BREAKAWAY, COULOMB)
-    if robot is not None and "_backward" in found and robot.friction.axes.coulomb_backward is None:
+    law = robot and getattr(robot.friction, Key.parse(key).table.rpartition(".")[2])
+    if law is not None and "_backward" in found and law.coulomb_backward is None:
         found = found.replace("_backward", "")
     return f"{found}{at}{group}"
 

@@ -7,8 +7,10 @@ numbers, and the whole fit.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -64,19 +66,26 @@ def primitives(robot: Robot, motors: MotorWrench | None = None) -> Primitives:
 class Mapping:
     """From the free parameters of a robot to its primitives and their derivatives.
 
-    breakaway (3,): levels S that stay [N, N, N m]; NaN where S follows coulomb. By default as the robot file has it.
+    breakaway (3,): levels S that stay [N, N, N m], as the robot file has them; NaN where S follows coulomb.
     """
 
-    def __init__(self, robot: Robot, parameters: Sequence[Parameter], breakaway: FloatArray | None = None):
+    def __init__(self, robot: Robot, parameters: Sequence[Parameter]):
         self.robot, self.parameters = robot, tuple(parameters)
         own = robot.friction.axes.breakaway
         self.breakaway = np.full(3, np.nan) if own is None else np.array(own)
-        self.breakaway = self.breakaway if breakaway is None else breakaway
         self.linear = all(p.name in BOX for p in parameters)
         self._start = np.array([Key.parse(p.name).get(robot) for p in parameters])
         motors = motor_wrench(robot)
         self._base, self._masses = primitives(robot, motors), axis_masses(robot)
         self._probe = self._friction_slopes(robot, self._base, motors)
+
+    def with_levels(self, levels: dict[str, float]) -> Self:
+        """The same with these levels of breakaway, by key; 0 follows coulomb."""
+        other = copy.copy(self)
+        other.breakaway = self.breakaway.copy()
+        for name, level in levels.items():
+            other.breakaway[Key.parse(name).axis] = level
+        return other
 
     def robot_at(self, values: FloatArray) -> Robot:
         """The robot with these values, not checked."""

@@ -1,38 +1,39 @@
 """Breakaway above coulomb: not a smooth number. What the log says of it is between which drives it lies.
 
-An axis at rest holds a drive up to S. Between two neighbouring drives of the log, S changes nothing; where it passes
-one, a release appears or vanishes, and the likelihood jumps. So S is profiled over these plateaus: the other numbers
-fitted anew at each S, the interval is where 2 (F - least F) stays below 7.35. That is the 95 % quantile for a number at
-which a model jumps (Hansen, Econometrica 68, 575 (2000), on thresholds); the 3.84 of chi^2 holds for smooth ones only.
-Where residuals are not white the likelihood is too steep, and the limit higher, as for coulomb (`Trust.rise`).
+What rests holds a drive up to S: an axis, the robot along its direction of travel, a wheel. Between two neighbouring
+drives of the log, S changes nothing; where it passes one, a release appears or vanishes, and the likelihood jumps. So S
+is profiled over these plateaus: the other numbers fitted anew at each S, the interval is where 2 (F - least F) stays
+below 7.35. That is the 95 % quantile for a number at which a model jumps (Hansen, Econometrica 68, 575 (2000), on
+thresholds); the 3.84 of chi^2 holds for smooth ones only. Where residuals are not white the likelihood is too steep,
+and the limit higher, as for coulomb (`Trust.rise`).
 
-The exact engine looks at every plateau between the drives of the log. In a robot whose axes couple, what an axis at
-rest balances changes while it rests, and moves with the other numbers: there a grid of levels is made ever finer, each
-fitted by the implicit engine from the nearest that is known (likely_levels.py).
+The exact engine looks at every plateau between the drives of the log. Where axes couple, or friction acts elsewhere,
+what rests balances a force that changes while it rests, and moves with the other numbers: there a grid of levels is
+made ever finer, each fitted by the implicit engine from the nearest that is known (likely_levels.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.errors import InputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.problem.falling import falls
+from omnidyn.identification.output_error.problem.falling import coulomb_below, falls
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.likely_levels import likely_levels
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
-from omnidyn.model.frames import AXES
-from omnidyn.model.keys import Key
-from omnidyn.model.layout import N_AXES
+from omnidyn.model.friction.kinds import KINDS
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, Key, in_words
+from omnidyn.model.known.holding import slides, slides_least
 from omnidyn.model.robot import Robot
 
-KEY = "friction.axes.breakaway"
 LIMIT = 7.35 / 2.0
 COARSE, NARROWER = 24, 0.2  # levels tried in a round, and the share of the range that the next one looks at
 HIGHEST = 3.0  # S/C is 1.1 to 1.6 in the literature
@@ -46,13 +47,13 @@ LEVEL = 1.0  # of F above the least, within which the middle of the likely level
 
 @dataclass(frozen=True)
 class Breakaway:
-    """One axis: level S and its 95 % interval [N, N m]; it is at least coulomb. tied: S = coulomb is as likely.
+    """A level S by its key, and its 95 % interval [N, N m]; it is at least coulomb. tied: S = coulomb is as likely.
 
     moves (P, K): what S being known only so far moves the others by, in the numbers that the solver sees: their
     covariance is moves moves^T; None where that is not looked for.
     """
 
-    axis: int
+    name: str
     value: float
     low: float
     high: float
@@ -60,35 +61,55 @@ class Breakaway:
     moves: FloatArray | None = None
 
 
-def asked_axes(robot: Robot, free: Sequence[str], fixed: Sequence[str] = ()) -> list[int]:
-    """The axes whose breakaway is to be profiled: among the free keys and not among the fixed ones."""
-    names = [f"{KEY}[{axis}]" for axis in range(3)]
-    return [k for k, name in enumerate(names) if name in free and name not in fixed and is_profiled(name, robot)]
+def asked_levels(robot: Robot, free: Sequence[str], fixed: Sequence[str] = ()) -> list[str]:
+    """The keys of breakaway that are to be profiled: among the free keys and not among the fixed ones."""
+    return [name for name in free if is_profiled(name, robot) and name not in fixed]
 
 
 def is_profiled(name: str, robot: Robot) -> bool:
-    """Whether this is a breakaway of the body axes that no slope tells of."""
-    return Key.parse(name).name == KEY and not falls(name, robot)
+    """Whether this is a breakaway that no slope tells of."""
+    return Key.parse(name).level == BREAKAWAY and not falls(name, robot)
+
+
+def refuse_level(name: str, robot: Robot, free: Sequence[str]) -> None:
+    """Raises InputError for a breakaway of a table whose law has none, or that has no Coulomb friction to be above."""
+    key, below = Key.parse(name), Key.parse(coulomb_below(name, robot)).name
+    law = getattr(robot.friction, key.table.rpartition(".")[2]).law
+    if KINDS[law].bends:
+        raise InputError(
+            "bristles bend before anything breaks away", got=f'{name} of law = "{law}"', expected="a law that sticks",
+            remedy="give the table a stribeck_speed, where its law takes one: then breakaway is fitted", where="free",
+        )  # fmt: skip
+    if not np.any(slides(robot, key)) and not any(Key.parse(each).name == below for each in free):
+        raise InputError(
+            "no Coulomb friction that it could be above", got=f"{name}, {below} is 0", expected="a level in that table",
+            remedy=f"give {below} a first value in the robot file, or free the breakaway of the table that has one",
+            where="free",
+        )  # fmt: skip
 
 
 class _Profile:
-    """Least F at levels of S of one axis, remembered; each from `point`, or `nearest` from the nearest known level."""
+    """Least F at levels of one S, remembered; each from `point`, or `nearest` from the nearest known level.
+
+    ways: the levels, by their keys, that a level of it may stand for: the likeliest of them counts.
+    """
 
     def __init__(
-        self, solver: Solver, levels: FloatArray, axis: int, point: Point, limit: int = REFIT, nearest: bool = False,
-        progress: Progress | None = None,
+        self, solver: Solver, ways: Callable[[float], list[dict[str, float]]], point: Point, limit: int = REFIT,
+        nearest: bool = False, doing: Callable[[str], None] | None = None,
     ):  # fmt: skip
-        self.solver, self.levels, self.axis, self.point, self.limit = solver, levels, axis, point, limit
-        self.nearest, self.progress = nearest, progress or Progress()
+        self.solver, self.ways, self.point, self.limit = solver, ways, point, limit
+        self.nearest, self.doing = nearest, doing or (lambda _: None)
         self.known: dict[float, Solution] = {}
 
     def at(self, level: float) -> Solution:
         if level not in self.known:
-            self.progress.doing(f"how much {AXES[self.axis]} holds, fit {len(self.known) + 1}")
+            self.doing(f"fit {len(self.known) + 1}")
             start = self.point
             if self.nearest and self.known:
                 start = self.known[min(self.known, key=lambda own: abs(own - level))].state.point
-            self.known[level] = with_breakaway(self.solver, self._with(level)).minimise(start, self.limit)
+            fits = [with_levels(self.solver, way).minimise(start, self.limit) for way in self.ways(level)]
+            self.known[level] = min(fits, key=lambda fit: fit.state.objective)
         return self.known[level]
 
     def cost(self, level: float) -> float:
@@ -104,70 +125,123 @@ class _Profile:
         values = [self.solver.inner(self.known[level].state.point.values) for level in levels]
         return np.sqrt(share / share.sum()) * (np.array(values) - self.solver.inner(at)).T
 
-    def _with(self, level: float) -> FloatArray:
-        levels = self.levels.copy()
-        levels[self.axis] = level
-        return levels
 
-
-def with_breakaway(solver: Solver, levels: FloatArray) -> Solver:
-    """The solver at fixed levels of breakaway, shape (3,), NaN where S follows coulomb."""
+def with_levels(solver: Solver, levels: dict[str, float]) -> Solver:
+    """The solver at fixed levels of breakaway, by their keys; 0 follows coulomb."""
     assert isinstance(solver.engine, (ExactEngine, ImplicitEngine))
-    return Solver(solver.problem, solver.engine.with_breakaway(levels), solver.nu, solver.close)
+    return Solver(solver.problem, solver.engine.with_levels(levels), solver.nu, solver.close)
 
 
-def levels_of(solution: Solution) -> list[float] | None:
-    """The levels of breakaway of a solution [N, N, N m]; None where all follow coulomb."""
-    problem, engine = solution.solver.problem, solution.solver.engine
-    axes = problem.robot_at(solution.state.point.values).friction.axes
-    found = getattr(engine, "breakaway", None)
-    if found is None:
-        return None if axes.breakaway is None else list(axes.breakaway)
-    if np.isnan(found).all():
-        return None
-    return np.where(np.isnan(found), axes.coulomb, found).tolist()
+def levels_of(solution: Solution) -> dict[str, float]:
+    """Key -> level of breakaway that was found beside the numbers of a solution [N], about yaw [N m]."""
+    problem, found = solution.solver.problem, getattr(solution.solver.engine, "levels", {})
+    robot = problem.robot_at(solution.state.point.values) if found else None
+    return {name: max(level, slides_least(robot, name)) for name, level in found.items()} if robot else {}
 
 
 def find_breakaway(
-    solution: Solution, axes: list[int], known: Trust, progress: Progress | None = None
+    solution: Solution, names: Sequence[str], known: Trust, progress: Progress | None = None
 ) -> tuple[Solution, list[Breakaway]]:
-    """Profile S of the axes, one after the other, twice where there are several: (solution, levels) there.
+    """Profile levels S by their keys, one after the other, twice where there are several: (solution, levels) there.
 
-    known: how far the solution can be trusted.
+    Those of one table that hold together, travel along x and y or several wheels, first by what they have in common;
+    and at last each with the others anywhere between their ends. known: how far the solution can be trusted.
     """
-    solver, found = solution.solver, []
-    exact = solver.engine if isinstance(solver.engine, ExactEngine) else None
-    levels = exact.breakaway.copy() if exact else np.array(levels_of(solution) or [np.nan] * N_AXES)
-    for _ in range(1 if len(axes) == 1 else 2):
-        before, found = {one.axis: one for one in found}, []
-        for axis in axes:
-            limit = LIMIT * _steeper(solver, known, axis)
-            if exact:
-                one = _one_axis(solver, solution, levels, axis, limit)
+    solver, found = solution.solver, list[Breakaway]()
+    levels = _in_common(solution, names, known, progress)
+    for _ in range(1 if len(names) == 1 else 2):
+        before, found = {one.name: one for one in found}, []
+        for name in names:
+            limit = LIMIT * _steeper(solver, known, name)
+            if isinstance(solver.engine, ExactEngine):
+                one = _one_axis(solver, solution, levels, name, limit)
             else:
-                one = _by_a_grid(solution, levels, axis, limit, before.get(axis), progress)
-            levels[axis] = np.nan if one.tied and one.value <= one.low else one.value
-            solution = with_breakaway(solver, levels).minimise(solution.state.point)
+                one = _by_a_grid(solution, levels, name, limit, before.get(name), progress)
+            levels = levels | {name: 0.0 if one.tied and one.value <= one.low else one.value}
+            solution = with_levels(solver, levels).minimise(solution.state.point)
             found.append(one)
-    return solution, found
+    wider = [_beside_the_others(solution, levels, one, found, known, progress) for one in found]
+    return solution, wider
 
 
-def _steeper(solver: Solver, known: Trust, axis: int) -> float:
+def _in_common(
+    solution: Solution, names: Sequence[str], known: Trust, progress: Progress | None
+) -> dict[str, float]:  # fmt: skip
+    """Levels that are the same times Coulomb friction in each list that holds together, where the logs want that."""
+    levels: dict[str, float] = {}
+    for name in names:
+        own = _together(name, names)
+        if len(own) > 1 and name == own[0]:
+            slide = {each: _coulomb(solution.solver, solution.state.point, each) for each in own}
+            profile = _by_the_engine(
+                solution, lambda by, own=slide: [levels | {k: by * c for k, c in own.items()}], own[0], progress
+            )
+            grid = np.geomspace(1.0, HIGHEST, GRID).tolist()
+            best, _, _ = likely_levels(profile.cost, grid, LIMIT * _steeper(solution.solver, known, name))
+            levels = levels | {each: best * c for each, c in slide.items()}
+    return levels
+
+
+def _together(name: str, names: Sequence[str]) -> list[str]:
+    """The levels among `names` that hold together with this one: of a body axis none but itself."""
+    key = Key.parse(name)
+    return [each for each in names if each == name or (key.table != BODY_AXES and Key.parse(each).name == key.name)]
+
+
+def _beside_the_others(
+    solution: Solution, levels: dict[str, float], one: Breakaway, every: Sequence[Breakaway], known: Trust,
+    progress: Progress | None,
+) -> Breakaway:  # fmt: skip
+    """The level with the interval that it has while another that holds together with it is at either end of its own."""
+    own = _together(one.name, [each.name for each in every])
+    others = [each for each in every if each.name in own and each is not one]
+    if not others:
+        return one
+    limit, coulomb = (
+        LIMIT * _steeper(solution.solver, known, one.name),
+        _coulomb(solution.solver, solution.state.point, one.name),
+    )
+    ends = [{}] + [
+        {each.name: end} for each in others
+        for end in (each.low, each.high if np.isfinite(each.high) else HIGHEST * max(each.value, each.low))
+    ]  # fmt: skip
+    profile = _by_the_engine(
+        solution, lambda level: [levels | end | {one.name: level} for end in ends], one.name, progress
+    )
+    most = WIDER * one.high if np.isfinite(one.high) else HIGHEST * coulomb
+    grid = np.geomspace(coulomb, max(most, WIDER * coulomb), 2 * ANEW).tolist()
+    best, low, high = likely_levels(profile.cost, grid, limit)
+    tied = one.tied or profile.cost(0.0) <= profile.cost(best) + limit
+    return replace(one, low=0.0 if tied else min(low, one.low), high=max(high, one.high), tied=tied)
+
+
+def _by_the_engine(
+    solution: Solution, ways: Callable[[float], list[dict[str, float]]], name: str, progress: Progress | None
+) -> _Profile:
+    """A profile by the implicit engine, at a tolerance that is enough to tell levels apart."""
+    own, engine, told = solution.solver, solution.solver.engine, progress or Progress()
+    assert isinstance(engine, ImplicitEngine)
+    solver = Solver(own.problem, type(engine)(own.problem, TOL), own.nu, NEAR)
+    doing: Callable[[str], None] = lambda words: told.doing(f"{in_words(name)}, {words}")  # noqa: E731
+    return _Profile(solver, ways, solution.state.point, FEW, True, doing)
+
+
+def _steeper(solver: Solver, known: Trust, name: str) -> float:
     """What the likelihood is too steep by where residuals are not white, as for coulomb; 1 where they are."""
-    key = f"friction.axes.coulomb[{axis}]"
+    key = coulomb_below(name, solver.problem.robot)
     if key in solver.problem.names and not known.blind[j := solver.problem.names.index(key)]:
         return known.rise(np.eye(len(known.std))[j]) / RISE
     return known.widening**2 if known.kind == SANDWICH else 1.0
 
 
-def _one_axis(solver: Solver, solution: Solution, levels: FloatArray, axis: int, limit: float) -> Breakaway:
+def _one_axis(solver: Solver, solution: Solution, levels: dict[str, float], name: str, limit: float) -> Breakaway:
     """The plateau of the least F, and the likely ones around it."""
     point = solution.state.point
-    coulomb = _coulomb(solver, point, axis)
-    edges = _edges(solver, point, axis, 0.5 * coulomb)
-    profile = _Profile(solver, levels, axis, point)
+    coulomb = _coulomb(solver, point, name)
+    edges = _edges(solver, point, Key.parse(name).axis or 0, 0.5 * coulomb)
+    profile = _Profile(solver, lambda level: [levels | {name: level}], point)
     if len(edges) < 2:
-        return Breakaway(axis, coulomb, coulomb, np.inf, True)
+        return Breakaway(name, coulomb, coulomb, np.inf, True)
     middles = 0.5 * (edges[1:] + edges[:-1])
     best, reach = _search(profile, middles)
     profile.point = profile.at(middles[best]).state.point
@@ -175,28 +249,26 @@ def _one_axis(solver: Solver, solution: Solution, levels: FloatArray, axis: int,
     best = _descend(profile, middles, best, reach)
     least = min(profile.cost(middles[best]), profile.cost(0.0))
     low, high = (_walk(profile, middles, best, way, least + limit) for way in (-1, 1))
-    own = _coulomb(solver, profile.at(middles[best]).state.point, axis)
+    own = _coulomb(solver, profile.at(middles[best]).state.point, name)
     tied = profile.cost(0.0) <= least + limit
-    floor = _coulomb(solver, profile.at(0.0).state.point, axis)
+    floor = _coulomb(solver, profile.at(0.0).state.point, name)
     if profile.cost(0.0) <= profile.cost(middles[best]):
-        return Breakaway(axis, floor, 0.0, max(float(edges[high + 1]), floor), True)
+        return Breakaway(name, floor, 0.0, max(float(edges[high + 1]), floor), True)
     return Breakaway(
-        axis, max(float(middles[best]), own), 0.0 if tied else max(float(edges[low]), 0.0), float(edges[high + 1]), tied
+        name, max(float(middles[best]), own), 0.0 if tied else max(float(edges[low]), 0.0), float(edges[high + 1]), tied
     )
 
 
 def _by_a_grid(
-    solution: Solution, levels: FloatArray, axis: int, limit: float, before: Breakaway | None,
+    solution: Solution, levels: dict[str, float], name: str, limit: float, before: Breakaway | None,
     progress: Progress | None,
 ) -> Breakaway:  # fmt: skip
-    """The likely levels by the implicit engine. before: what was found with other levels of the other axes."""
-    own, engine, point = solution.solver, solution.solver.engine, solution.state.point
-    assert isinstance(engine, ImplicitEngine)
-    solver = Solver(own.problem, type(engine)(own.problem, TOL), own.nu, NEAR)
-    profile = _Profile(solver, levels, axis, point, FEW, True, progress)
-    coulomb = _coulomb(own, point, axis)
+    """The likely levels by the implicit engine. before: what was found with other levels of the others."""
+    own, point = solution.solver, solution.state.point
+    profile = _by_the_engine(solution, lambda level: [levels | {name: level}], name, progress)
+    coulomb = _coulomb(own, point, name)
     if coulomb <= 0.0:  # friction acts elsewhere
-        return Breakaway(axis, 0.0, 0.0, np.inf, True)
+        return Breakaway(name, 0.0, 0.0, np.inf, True)
     least, most, count = coulomb, HIGHEST * coulomb, GRID
     if before is not None and np.isfinite(before.high):
         least, most, count = max(before.low / WIDER, coulomb), WIDER * before.high, ANEW
@@ -204,17 +276,17 @@ def _by_a_grid(
     best, low, high = likely_levels(profile.cost, grid, limit)
     middle = float(np.sqrt(low * high)) if np.isfinite(high) else best
     value = middle if profile.cost(middle) <= profile.cost(best) + LEVEL else best
-    slides = _coulomb(own, profile.at(value).state.point, axis)
+    below = _coulomb(own, profile.at(value).state.point, name)
     level = min(profile.cost(value), profile.cost(best))
     tied = profile.cost(0.0) <= level + limit
     if profile.cost(0.0) <= level or (tied and high == np.inf):
-        value, slides, low = 0.0, _coulomb(own, profile.at(0.0).state.point, axis), 0.0
+        value, below, low = 0.0, _coulomb(own, profile.at(0.0).state.point, name), 0.0
     moves = profile.moves(profile.at(value).state.point.values, limit / LIMIT)
-    return Breakaway(axis, max(value, slides), 0.0 if tied else low, max(high, slides), tied, moves)
+    return Breakaway(name, max(value, below), 0.0 if tied else low, max(high, below), tied, moves)
 
 
-def _coulomb(solver: Solver, point: Point, axis: int) -> float:
-    return float(solver.problem.robot_at(point.values).friction.axes.coulomb[axis])
+def _coulomb(solver: Solver, point: Point, name: str) -> float:
+    return slides_least(solver.problem.robot_at(point.values), name)
 
 
 def _edges(solver: Solver, point: Point, axis: int, lowest: float) -> FloatArray:

@@ -24,8 +24,9 @@ from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.missing.laws import other_laws
+from omnidyn.identification.structure.missing.laws import may_break_away, other_laws
 from omnidyn.identification.structure.missing.switches import (
+    BREAKS,
     EACH_WHEEL,
     LAWS,
     Switch,
@@ -34,7 +35,7 @@ from omnidyn.identification.structure.missing.switches import (
     with_levels_as_they_are,
 )
 from omnidyn.model.friction import WheelFriction
-from omnidyn.model.keys import BODY_AXES, DIRECTION, FRICTION, WHEELS, find_key
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, DIRECTION, FRICTION, WHEELS, find_key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -187,6 +188,8 @@ def can(key: str, robot: Robot) -> bool:
     if key == EACH_WHEEL:  # beside a box that acts where wheels do, too, only once they have a level for all
         one = bool(friction.wheels.coulomb) and not np.ndim(friction.wheels.coulomb)
         return one or (friction.wheels == WheelFriction() and any(friction.direction.coulomb))
+    if key in BREAKS:
+        return key in {f"{table}.{BREAKAWAY}" for table in may_break_away(friction)}
     return key not in LAWS or key in other_laws(friction)
 
 

@@ -26,7 +26,7 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, Wh
 from omnidyn.model.friction.kinds import COULOMB, LUGRE
 from omnidyn.model.friction.stribeck import USUAL as EXPONENT
 from omnidyn.model.friction.stribeck import fallen
-from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, WHEELS, find_key, in_words, unit
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, WHEELS, find_key, in_words, unit
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import mass_at_rim, per_wheel, settled_current, traction
@@ -157,8 +157,8 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
     friction = bench.robot.friction
     axes, direction = friction.axes, friction.direction
     boxed, round_ = any(axes.coulomb), any(direction.coulomb)
-    if boxed and axes.breakaway is None:
-        yield Candidate(f"{BODY_AXES}.breakaway", _breakaway, as_it_is("breakaway above Coulomb friction"))
+    for table in may_break_away(friction):
+        yield Candidate(f"{table}.{BREAKAWAY}", _breaking(table), as_it_is("breakaway above Coulomb friction"))
     if boxed and not round_:
         yield Candidate(
             DIRECTION, _in_place(along_travel),
@@ -195,6 +195,12 @@ def other_laws(friction: Friction) -> list[str]:
     return found
 
 
+def may_break_away(friction: Friction) -> list[str]:
+    """The tables of friction that hold no more than they slide with."""
+    laws = ((table, table_of(friction, table)) for table in (BODY_AXES, DIRECTION, WHEELS))
+    return [table for table, law in laws if law.breakaway is None and np.any(law.coulomb)]
+
+
 def table_of(friction: Friction, table: str) -> Any:
     """The friction of a table, such as "friction.axes"."""
     return getattr(friction, table.rpartition(".")[2])
@@ -227,13 +233,24 @@ def falling(robot: Robot, table: str, above: FloatArray, over: float) -> Frictio
     the rims]; with Dahl's bristles it is LuGre's law. above: of each axis; of the direction of travel and about
     yaw; of all wheels."""
     own, about, boxed = table_of(robot.friction, table), over / arm(robot), table == BODY_AXES
-    hold = (above if boxed else above[0]) * np.array(own.coulomb)
-    changes = {"breakaway": _plain(hold), FALL: (over, over, about) if boxed else over}
-    if table == DIRECTION and own.yaw_coulomb > 0.0:
-        changes |= {"yaw_breakaway": float(above[1] * own.yaw_coulomb), f"yaw_{FALL}": about}
+    changes = held_above(robot, table, above) | {FALL: (over, over, about) if boxed else over}
+    if f"yaw_{BREAKAWAY}" in changes:
+        changes[f"yaw_{FALL}"] = about
     if own.law == DAHL:
         changes |= {"law": LUGRE, "dahl_exponent": 1.0}
     return _with_table(robot.friction, table, own.replace(**changes))
+
+
+def held_above(robot: Robot, table: str, above: FloatArray) -> dict[str, Any]:
+    """The levels of breakaway of a table that are `above` times Coulomb friction, see `falling`."""
+    own = table_of(robot.friction, table)
+    if table == BODY_AXES:
+        return {BREAKAWAY: tuple((above * own.coulomb).tolist())}
+    if table == DIRECTION:
+        yaw = {f"yaw_{BREAKAWAY}": float(above[1] * own.yaw_coulomb)} if own.yaw_coulomb > 0.0 else {}
+        return {BREAKAWAY: tuple((above[0] * np.array(own.coulomb)).tolist())} | yaw
+    levels = above[0] * np.array(own.coulomb)
+    return {BREAKAWAY: tuple(levels.tolist()) if levels.ndim else float(levels)}
 
 
 def arm(robot: Robot) -> float:
@@ -345,18 +362,31 @@ def _in_place(other: Callable[[Friction], Friction]) -> Callable[[Workbench], li
     return lambda b: [Trial(b.change(b.robot.model_copy(update={"friction": other(b.robot.friction)})))]
 
 
-def _breakaway(bench: Workbench) -> list[Trial]:
-    friction = bench.robot.friction
-    found = []
-    for share in ABOVE:
-        columns = []
-        for axis in range(N_AXES):
-            levels = tuple(c * (1.0 + share * (a == axis)) for a, c in enumerate(friction.axes.coulomb))
-            axes = friction.axes.model_copy(update={"breakaway": levels})
-            robot = bench.robot.model_copy(update={"friction": friction.model_copy(update={"axes": axes})})
-            columns.append(bench.change(robot))
-        found.append(Trial([np.concatenate(each, axis=2) for each in zip(*columns, strict=True)], share))
-    return found
+def breaking(robot: Robot, table: str, above: FloatArray) -> Friction:
+    """The friction with levels of breakaway that are `above` times Coulomb friction, see `falling`."""
+    law = table_of(robot.friction, table).model_copy(update=held_above(robot, table, above))
+    return robot.friction.model_copy(update={table.rpartition(".")[2]: law})
+
+
+def _breaking(table: str) -> Callable[[Workbench], list[Trial]]:
+    """Breakaway above Coulomb friction by several shares, a number for each part of the table."""
+
+    def trials(bench: Workbench) -> list[Trial]:
+        found, robot = [], bench.robot
+        for share in ABOVE:
+            every = 1.0 + share * np.eye(_parts(robot, table))
+            columns = [
+                bench.change(robot.model_copy(update={"friction": breaking(robot, table, above)})) for above in every
+            ]
+            found.append(Trial([np.concatenate(each, axis=2) for each in zip(*columns, strict=True)], share))
+        return found
+
+    return trials
+
+
+def _parts(robot: Robot, table: str) -> int:
+    """How many levels hold for themselves: each axis; travel, and turning where friction resists it; all wheels."""
+    return {BODY_AXES: N_AXES, DIRECTION: 1 + (robot.friction.direction.yaw_coulomb > 0.0), WHEELS: 1}[table]
 
 
 def _at_wheels(bench: Workbench) -> list[Trial]:

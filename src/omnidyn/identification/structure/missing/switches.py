@@ -21,7 +21,6 @@ from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUS
 from omnidyn.identification.output_error.problem.parameters import AT, EFFICIENCY, WITHIN
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
-from omnidyn.identification.output_error.trust.breakaway import KEY as BREAKAWAY
 from omnidyn.identification.question import STUDENT, Question
 from omnidyn.identification.structure.missing.laws import (
     BEND,
@@ -32,24 +31,28 @@ from omnidyn.identification.structure.missing.laws import (
     TRACTION,
     along_axes,
     along_travel,
+    breaking,
     falling,
+    held_above,
     slippery,
     table_of,
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.keys import BODY_AXES, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
+from omnidyn.model.known.holding import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Prior, Robot
 
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
 EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one of all
-FALLS, BENDS, DAMPS = (tuple(f"{table}.{name}" for table in FORCES) for name in (FALL, BEND, DAMPING))
+BREAKS, FALLS, BENDS, DAMPS = (
+    tuple(f"{table}.{name}" for table in FORCES) for name in (BREAKAWAY, FALL, BEND, DAMPING)
+)
 LAWS = (*FALLS, *BENDS, *DAMPS)  # Stribeck's, Dahl's, LuGre's, of every table
 OF_GEAR = 0.01  # lost by a gear, from which its fit begins at least
 UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
-BREAK = "breakaway"
-NUMBERS = {FALL: (BREAK, FALL), BEND: (BEND,), DAMPING: (BREAK, FALL, BEND, DAMPING)}  # of laws
+NUMBERS = {FALL: (BREAKAWAY, FALL), BEND: (BEND,), DAMPING: (BREAKAWAY, FALL, BEND, DAMPING)}  # of laws
 ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {
@@ -119,7 +122,7 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         yield Switch(robot.replace(body=body), asked, words)
     elif key == CENTRE:
         yield Switch(_balanced(robot, remedy.size), _free(asked, key), words)
-    elif key == BREAKAWAY:
+    elif key in BREAKS:
         yield _breaking_away(remedy, robot, asked)
     elif key == DIRECTION:
         yield Switch(robot.replace(friction=along_travel(friction)), _of_another_shape(asked), words)
@@ -154,11 +157,7 @@ def _where_it_ended(robot: Robot, found: Solution) -> Robot:
     for p, value, held in zip(problem.robot_parameters, found.state.point.values.tolist(), found.held, strict=False):
         if p.prior is None and not held:
             robot = p.on(robot, value)
-    axes, levels = robot.friction.axes, levels_of(found)
-    if levels is not None:  # of which none may be below Coulomb friction
-        higher = [max(pair) for pair in zip(levels, axes.coulomb, strict=True)]
-        axes = axes.replace(breakaway=tuple(higher))
-    return robot.replace(friction=robot.friction.replace(axes=axes))
+    return robot.replace(friction=holding(robot, levels_of(found)).friction.replace())
 
 
 def _as_it_settled(robot: Robot, question: Question, found: Solution) -> Question:
@@ -202,11 +201,12 @@ def _of_another_shape(asked: Question) -> Question:
 
 def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     """Levels above Coulomb friction as the first step has them; a profile finds better ones."""
-    axes = robot.friction.axes
+    table = remedy.key.rpartition(".")[0]
     above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
-    levels = tuple(float(c * by) for c, by in zip(axes.coulomb, above, strict=True))
-    changed = robot.replace(friction=robot.friction.replace(axes=axes.replace(breakaway=levels)))
-    return Switch(changed, _free(asked, *expand_keys(BREAKAWAY, changed)), remedy.words, N_AXES)
+    changed = robot.replace(friction=breaking(robot, table, above))
+    held = [f"{table}.{field}" for field in held_above(robot, table, above)]
+    keys = [key for name in held for key in expand_keys(name, changed)]
+    return Switch(changed, _free(asked, *keys), remedy.words, len(keys))
 
 
 def _of_another_law(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
