@@ -6,7 +6,6 @@ import pytest
 import omnidyn
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.deadzone import breakaway_voltage
-from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.model.surroundings.floor import GRAVITY, Floor
 from omnidyn.simulation.live import LiveRobot
@@ -323,11 +322,8 @@ def test_a_floor_of_the_file_can_be_slippery():
         (lambda r: r.replace(wheels=r.wheels.replace(wheel_inertia=0.0)), "wheels that weigh nothing"),
         (lambda r: r.replace(friction=r.friction.replace(axes=r.friction.axes.replace(law="karnopp"))),
          r'law = "karnopp" of \[friction.axes\]'),
-        (lambda r: r.replace(friction=Friction(direction=DirectionFriction(
-            law="dahl", coulomb=(2.0, 2.0), stiffness=1e4, yaw_coulomb=0.1, yaw_stiffness=100.0))),
-         r"bristles of \[friction.direction\]"),
     ],
-    ids=["weightless", "karnopp", "bristles of the direction"],
+    ids=["weightless", "karnopp"],
 )  # fmt: skip
 def test_what_has_no_law_here_is_named(change, named):
     with pytest.raises(UnsupportedError, match=rf"\[wheels\] traction_mu: .*got .*{named}"):
