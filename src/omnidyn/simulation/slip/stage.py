@@ -84,8 +84,7 @@ def solve_stage(plant, stage, start, room, x, each):
             )  # fmt: skip
             for a in range(3):
                 total[a] += plant.g[w, a] * (f - own.force)
-            own.force, x[3 + w] = f, s
-            loads += abs(f)
+            own.force, x[3 + w], loads = f, s, loads + abs(f)
             own.sign, own.contact = sign, contact
         if bends:
             worst = plane_block(plant, stage, heavy, total, each)
