@@ -229,6 +229,9 @@ def measure() -> Table:
         for name in ("Coulomb", "LuGre"):
             words = f"omnidyn fixed 1 ms, law: {name}, wheels slip"
             add(words, ours(slipping(with_law(name)), voltage, None, 20)[0], True)
+        for name in ("Coulomb", "Dahl", "LuGre", "elasto-plastic"):
+            words = f"omnidyn fixed 1 ms, law: {name} along the way, wheels slip"
+            add(words, ours(slipping(along(name)), voltage, None, 20)[0], True)
         for tol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
             cells, twist = ours(paper(), voltage, tol, 3)
             found = errors(twist, truth)

@@ -31,6 +31,7 @@ MEANING = {
     "wheels.wheel_radius_m": "r, of the wheels",
     "wheels.roller_angle_deg": "0 for omni wheels, ±45 for mecanum wheels",
     "wheels.inertia_kg_m2": "J_w, of one wheel about its axle",
+    "wheels.wheelbase_m": "of mecanum wheels, from the axles in front to those behind; what they carry depends on it",
     "wheels.traction_mu": "μ, what the floor takes of a wheel over what it carries; absent: it never slips",
     "motor.resistance_ohm": "R, of the winding, with what stands in series",
     "motor.inductance_H": "L, of the winding; needed for dynamic electrics",

@@ -7,14 +7,15 @@ a = (v', s'), of the body and of the rims, under forces F and elements e of dry 
 Elements are the axes, the friction of the wheels, and their contacts: d = s - g . v, level mu N. The mass of the body
 is that of its centre, M = T^T diag(m, m, I) T. What gives way is told by least squares within bounds, its levels those
 that hold; what it says moves slides from then on, and the question is asked again. Friction along the direction of
-travel is a pair of multipliers within an ellipse; in motion it is C^2 v/|C v|.
+travel is a pair of multipliers within an ellipse; in motion it is C^2 v/|C v|. What bends there is a force with a
+pair of states (bristles.py).
 """
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from omnidyn.model.wheels import per_wheel
-from tests.reference.bristles import BENDS, rate_of
+from tests.reference.bristles import BENDS, plane_rate, rate_of
 from tests.reference.slip_holds import Ellipse, least, room
 
 EDGE = 1e-9  # [N, m/s^2] by which what holds and what drives must differ, for a draw to count
@@ -45,11 +46,11 @@ class Element:
 
     def bends(self, speed, z):
         """(force, z') of a bristle."""
-        stiffness, damping = self.bristle
+        stiffness, damping, fades = self.bristle
         g, law = self.moving(speed, speed), self.law
         power = law.dahl_exponent if law.law == "dahl" else 1.0
         rate = rate_of(speed, stiffness * z / g, power, law.elastic_share if law.law == "elastoplastic" else None)
-        return stiffness * z + damping * rate, rate
+        return stiffness * z + damping * np.exp(-((speed * fades) ** 2)) * rate, rate
 
 
 class Slip:
@@ -92,18 +93,25 @@ class Slip:
                 bristle = None
                 if law.law in BENDS:
                     damping = 0.0 if law.damping is None else np.broadcast_to(law.damping, count)[j]
-                    bristle = np.broadcast_to(law.stiffness, count)[j], damping
+                    fades = np.broadcast_to(np.inf if law.damping_speed is None else law.damping_speed, count)[j]
+                    bristle = np.broadcast_to(law.stiffness, count)[j], damping, 1.0 / fades
                 levels = np.array([slide[j], back[j]]), np.array([fore[j], hold])
                 if levels[1].any() or (first and self.eta[j] != 1.0):
                     every.append(Element(law, unit[first + j], *levels, 1.0 / speed[j], bristle))
         if way.yaw_coulomb > 0.0:
             hold = way.yaw_coulomb if way.yaw_breakaway is None else way.yaw_breakaway
             fall = 0.0 if way.yaw_stribeck_speed is None else 1.0 / way.yaw_stribeck_speed
-            every.append(Element(way, unit[2], np.full(2, way.yaw_coulomb), np.full(2, hold), fall))
-        self.way, self.E = None, np.eye(2, self.k)
-        if any(way.coulomb):
+            fades, bristle = 1.0 / (way.yaw_damping_speed or np.inf), None
+            if way.law in BENDS:
+                bristle = way.yaw_stiffness, way.yaw_damping or 0.0, fades
+            every.append(Element(way, unit[2], np.full(2, way.yaw_coulomb), np.full(2, hold), fall, bristle))
+        self.way, self.E, self.plane = None, np.eye(2, self.k), None
+        if any(way.coulomb) and way.law in BENDS:
+            self.plane = way
+        elif any(way.coulomb):
             self.way = Ellipse(way, 0.0 if way.stribeck_speed is None else 1.0 / way.stribeck_speed)
         self.bristles = [e for e in every if e.bristle]
+        self.bent = len(self.bristles) + (2 if self.plane else 0)
         self.dry = [e for e in every if not e.bristle]
         for e in self.dry:
             wheel = np.flatnonzero(e.d[3:])
@@ -136,7 +144,20 @@ class Slip:
             bent, rate = e.bends(e.d @ y[: self.k], z)
             force -= e.d * bent
             rates.append(rate)
+        if self.plane:
+            bent, rate = self._bends_along(v[:2], y[self.k + self.n + len(self.bristles) :][:2])
+            force[:2] -= bent
+            rates.extend(rate)
         return force, self_turn, np.array(rates)
+
+    def _bends_along(self, v, z):
+        """(force, z') of the bristle along the direction of travel, pairs."""
+        way, speed = self.plane, np.hypot(*v)
+        slide, hold = (np.array(own) for own in (way.coulomb, way.breakaway or way.coulomb))
+        levels = falling(way, speed, slide, hold, 1.0 / (way.stribeck_speed or np.inf))
+        rate = plane_rate(way, v, z, levels)
+        fades = np.exp(-((speed / (way.damping_speed or np.inf)) ** 2))
+        return way.stiffness * z + (way.damping or 0.0) * fades * rate, rate
 
     def loss(self, y, u, e):
         """What a gear holds beside its levels, forward and backward."""
@@ -271,7 +292,7 @@ class Slip:
     def run(self, voltage, dt, twist=(0.0, 0.0, 0.0)):
         """Twist, rim speeds and contacts after each row, shapes (rows + 1, 3), (rows + 1, n), (rows + 1, n); `pose`
         then has the places (x, y, heading), shape (rows + 1, 3), and `current` the currents of windings."""
-        y = np.concatenate([twist, self.G.T @ twist, np.zeros(self.n + len(self.bristles) + 3)])
+        y = np.concatenate([twist, self.G.T @ twist, np.zeros(self.n + self.bent + 3)])
         mode = np.sign(self.D @ y[: self.k])
         mode[len(self.dry) :] = 0.0
         mode = np.append(mode, 1.0 if self.way is None or np.hypot(*y[:2]) > 0.0 else 0.0)

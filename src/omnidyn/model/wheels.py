@@ -8,7 +8,7 @@ Column i for a wheel at azimuth phi, at distance b from the centre, with rollers
     [-sin phi - tan gamma cos phi,  cos phi - tan gamma sin phi,  b]
 
 gamma = 0 is an omni wheel. For a mecanum wheel phi is the azimuth of its axle, gamma the roller angle
-(+-45 degrees), and b = half track + half wheelbase.
+(+-45 degrees), and b = half track + |tan gamma| wheelbase/2: where it stands follows from b and the wheelbase alone.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ class Wheels(Value):
     azimuth_deg: where each wheel stands, seen from the centre, counter-clockwise from forward [degree].
     robot_radius: distance b from the centre to the wheels [m]. wheel_radius: r [m].
     roller_angle_deg: 0 for omni wheels, +-45 for mecanum wheels [degree]. wheel_inertia: of a wheel about its axle
-    [kg m^2]. traction_mu: of what a wheel carries, the share beyond which it slips; None: it never does.
+    [kg m^2]. wheelbase: of mecanum wheels, from the axles in front to those behind [m]; None: not known, and only what
+    they carry depends on it. traction_mu: of what a wheel carries, the share beyond which it slips; None: never.
     """
 
     azimuth_deg: Annotated[
@@ -55,6 +56,10 @@ class Wheels(Value):
         per_wheel_number(0.0, 1e4),
         Field(alias="inertia_kg_m2", description="J_w, of one wheel about its axle"),
     ] = 0.0
+    wheelbase: Annotated[
+        Annotated[float, number(1e-3, 100.0)] | None,
+        Field(alias="wheelbase_m", description="of mecanum wheels, from the axles in front to those behind"),
+    ] = None
     traction_mu: Annotated[
         Annotated[PerWheel, per_wheel_number(1e-3, 100.0)] | None,
         Field(description="mu, what the floor takes over the load"),
@@ -67,7 +72,21 @@ class Wheels(Value):
         scaled = self.wrench_matrix / np.array([[1.0], [1.0], [np.mean(self.robot_radius)]])
         if np.linalg.cond(scaled) > MAX_CONDITION:
             raise ValueError(f"wheels at azimuths {list(self.azimuth_deg)} cannot move the robot in every direction")
+        if self.wheelbase is not None:
+            self._refuse_wheelbase(self.wheelbase)
         return self
+
+    def _refuse_wheelbase(self, wheelbase: float) -> None:
+        """Raises ValueError for one of omni wheels, or one that leaves no track."""
+        sin, cos = sin_cos_deg(per_wheel(self.roller_angle_deg, self.count))
+        if not sin.all():
+            raise ValueError(f"wheelbase_m {wheelbase} is of mecanum wheels; roller_angle_deg has a 0: leave it out")
+        most = float((2.0 * per_wheel(self.robot_radius, self.count) * cos / np.abs(sin)).min())
+        if wheelbase >= most:
+            raise ValueError(
+                f"wheelbase_m {wheelbase} leaves no track: robot_radius_m is half track + half wheelbase; expected "
+                f"less than {most:.4g}"
+            )
 
     @property
     def count(self) -> int:
@@ -83,6 +102,20 @@ class Wheels(Value):
     def radii(self) -> FloatArray:
         """Wheel radius of each wheel [m]. Shape (wheels,)."""
         return per_wheel(self.wheel_radius, self.count)
+
+    @property
+    def places(self) -> FloatArray | None:
+        """Where the wheels touch the floor, x and y from the centre [m]. Shape (2, wheels); None: no key says it.
+
+        Along the axle (cos phi, sin phi): b - |tan gamma| wheelbase/2; across it: sign(gamma) wheelbase/2.
+        """
+        sin, cos = sin_cos_deg(self.azimuth_deg)
+        roller_sin, roller_cos = sin_cos_deg(per_wheel(self.roller_angle_deg, self.count))
+        if self.wheelbase is None and roller_sin.any():
+            return None
+        ahead = 0.5 * (self.wheelbase or 0.0) * np.sign(roller_sin)
+        out = per_wheel(self.robot_radius, self.count) - ahead * roller_sin / roller_cos
+        return np.stack([out * cos - ahead * sin, out * sin + ahead * cos])
 
     @property
     def wrench_matrix(self) -> FloatArray:

@@ -33,8 +33,7 @@ FADES = 0.75  # times the damping: the steepest way in which one that fades lets
 
 NUMBER_OF = {each.KIND.word: number for number, each in enumerate(LAWS)}
 _rate = one_of([each.rate for each in LAWS])
-plane_rate = one_of([each.plane for each in LAWS])
-"""What the ellipse bends by, its first argument the number of the law."""
+_plane_rate = one_of([each.plane for each in LAWS])
 
 
 @part
@@ -67,6 +66,34 @@ def bristle_force(own, speed, aimed, tau):
     bent = aimed + tau * rate
     force = -own.stiffness * bent - damping * rate
     return force, -(own.stiffness * tau + damping) * slope - fades * rate, bent
+
+
+@part
+def levels_xy(body, x, y, slide, hold):
+    """(Cx, Cy, their slopes by |v|, |v|) of an ellipse that falls from `hold` to `slide`."""
+    size = math.hypot(x, y)
+    f, slope = fall(size * body.fall, body.form, body.exponent)
+    more_x, more_y, slope = hold[0] - slide[0], hold[1] - slide[1], slope * body.fall
+    return slide[0] + more_x * f, slide[1] + more_y * f, more_x * slope, more_y * slope, size
+
+
+@part
+def plane_force(body, x, y, aimed, tau):
+    """((fx, fy), their slopes (fx by x, fx by y, fy by x, fy by y), z) of the ellipse, as of `bristle_force`.
+
+    (x, y): its speed; body: the record BODY; aimed: z*, a pair.
+    """
+    levels = levels_xy(body, x, y, body.bristle_coulomb, body.bristle_breakaway)
+    x_rate, y_rate, x_x, x_y, y_x, y_y = _plane_rate(body.law, body, (aimed[0], aimed[1]), (x, y), tau, levels)
+    damping, fades = damping_at(levels[4], body.damping, body.fade)
+    gain, size = body.stiffness * tau + damping, max(levels[4], 1e-150)
+    fades_x, fades_y, bent = fades * x / size, fades * y / size, (aimed[0] + tau * x_rate, aimed[1] + tau * y_rate)
+    force = (-body.stiffness * bent[0] - damping * x_rate, -body.stiffness * bent[1] - damping * y_rate)
+    slopes = (
+        -gain * x_x - fades_x * x_rate, -gain * x_y - fades_y * x_rate,
+        -gain * y_x - fades_x * y_rate, -gain * y_y - fades_y * y_rate,
+    )  # fmt: skip
+    return force, slopes, bent
 
 
 def fade_of(own: Any) -> float:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.model.friction.bristle import bristle_force, damping_at, plane_rate
-from omnidyn.model.friction.stribeck import excess, fall
+from omnidyn.model.friction.bristle import bristle_force, levels_xy, plane_force
+from omnidyn.model.friction.stribeck import excess
 
 
 @part
@@ -37,19 +37,10 @@ def speed_of(plant, stage, e, x):
 
 
 @part
-def _levels_xy(body, x, y, slide, hold):
-    """(Cx, Cy, their slopes by |v|, |v|) of an ellipse that falls from `hold` to `slide`."""
-    size = math.hypot(x, y)
-    f, slope = fall(size * body.fall, body.form, body.exponent)
-    more_x, more_y, slope = hold[0] - slide[0], hold[1] - slide[1], slope * body.fall
-    return slide[0] + more_x * f, slide[1] + more_y * f, more_x * slope, more_y * slope, size
-
-
-@part
 def _add_ellipse(plant, stage, x):
     """Friction (Cx^2 vx, Cy^2 vy)/D, D^2 = Cx^2 vx^2 + Cy^2 vy^2, of levels that fall with |v|."""
     work = stage.work
-    cx, cy, dx, dy, size = _levels_xy(plant.body, x[0], x[1], plant.body.coulomb, stage.task.hold)
+    cx, cy, dx, dy, size = levels_xy(plant.body, x[0], x[1], plant.body.coulomb, stage.task.hold)
     d = max(math.hypot(cx * x[0], cy * x[1]), 1e-150)
     px, py = cx * cx * x[0] / d, cy * cy * x[1] / d
     work.residual[0] += px
@@ -68,28 +59,17 @@ def _add_ellipse(plant, stage, x):
 
 
 @part
-def _plane_rate(plant, stage, x, y, tau):
-    """(zx', zy', their slopes by x and y) of the bristle of the ellipse."""
-    body, aimed = plant.body, (stage.task.aimed_bend[0], stage.task.aimed_bend[1])
-    levels = _levels_xy(body, x, y, body.bristle_coulomb, body.bristle_breakaway)
-    return plane_rate(body.law, body, aimed, (x, y), tau, levels)
-
-
-@part
 def _add_plane_bristle(plant, stage, x):
     """The bristle of the ellipse, which turns with the body."""
-    body, task, work = plant.body, stage.task, stage.work
-    tau, size = task.tau, math.hypot(x[0], x[1])
-    damping, fades = damping_at(size, body.damping, body.fade)
-    gain, nx, ny = body.stiffness * tau + damping, x[0] / max(size, 1e-150), x[1] / max(size, 1e-150)
-    x_rate, y_rate, x_x, x_y, y_x, y_y = _plane_rate(plant, stage, x[0], x[1], tau)
-    task.bend[0], task.bend[1] = task.aimed_bend[0] + tau * x_rate, task.aimed_bend[1] + tau * y_rate
-    work.residual[0] += body.stiffness * task.bend[0] + damping * x_rate
-    work.residual[1] += body.stiffness * task.bend[1] + damping * y_rate
-    work.jacobian[0, 0] += gain * x_x + fades * x_rate * nx
-    work.jacobian[0, 1] += gain * x_y + fades * x_rate * ny
-    work.jacobian[1, 0] += gain * y_x + fades * y_rate * nx
-    work.jacobian[1, 1] += gain * y_y + fades * y_rate * ny
+    task, work = stage.task, stage.work
+    force, slopes, bent = plane_force(plant.body, x[0], x[1], task.aimed_bend, task.tau)
+    task.bend[0], task.bend[1] = bent
+    work.residual[0] -= force[0]
+    work.residual[1] -= force[1]
+    work.jacobian[0, 0] -= slopes[0]
+    work.jacobian[0, 1] -= slopes[1]
+    work.jacobian[1, 0] -= slopes[2]
+    work.jacobian[1, 1] -= slopes[3]
 
 
 @part
@@ -130,12 +110,11 @@ def push_of_laws(plant, stage, x, push):
         push[1] += force * own.g[1]
         push[2] += force * own.g[2]
     if body.stiffness > 0.0:
-        damping = damping_at(math.hypot(x[0], x[1]), body.damping, body.fade)[0]
-        x_rate, y_rate = _plane_rate(plant, stage, x[0], x[1], 0.0)[:2]
-        push[0] -= body.stiffness * task.aimed_bend[0] + damping * x_rate
-        push[1] -= body.stiffness * task.aimed_bend[1] + damping * y_rate
+        force_x, force_y = plane_force(body, x[0], x[1], task.aimed_bend, 0.0)[0]
+        push[0] += force_x
+        push[1] += force_y
     elif body.fall > 0.0 and task.ellipse == 1.0:
-        cx, cy = _levels_xy(plant.body, x[0], x[1], plant.body.coulomb, stage.task.hold)[:2]
+        cx, cy = levels_xy(plant.body, x[0], x[1], plant.body.coulomb, stage.task.hold)[:2]
         now, rest = math.hypot(cx * x[0], cy * x[1]), math.hypot(task.hold[0] * x[0], task.hold[1] * x[1])
         if now > 0.0:
             push[0] += (task.hold[0] ** 2 / rest - cx * cx / now) * x[0]

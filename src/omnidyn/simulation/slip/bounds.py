@@ -16,9 +16,9 @@ CURRENT_SHARE = 1e-2  # and of a current
 def _pushes(plant, stage):
     """Bounds of how a body and a rim speed up, whatever an event does [m/s^2]: (body, the worst of the rims)."""
     body, worst = plant.body[0], 0.0
-    forces = abs(plant.room[0]) + abs(plant.room[1]) + body.breakaway[0] + body.breakaway[1]
+    forces = abs(plant.room[0]) + abs(plant.room[1])
     for a in range(2):
-        forces += _most_of(plant.element[a])
+        forces += _most_of(plant.element[a]) + body.breakaway[a] + body.bristle_breakaway[a]
     for w in range(len(plant.spin)):
         own, at = plant.element[3 + w], stage.each[3 + w]
         most = max(abs(at.voltage) / own.resistance, abs(at.aimed_current))
@@ -90,7 +90,10 @@ def growth(plant, lines, start, end, h):
             worst = max(worst, grown(heavy, abs(start.x[e]) * own.fall, own.form, own.exponent, more, gain))
     m = len(plant.element)
     if body.fall > 0.0 and not (start.each[m].sign == 0.0 and end.each[m].sign == 0.0):
-        more = max(body.breakaway[0] - body.coulomb[0], body.breakaway[1] - body.coulomb[1])
+        more = 0.0
+        for a in range(2):
+            dry, bristle = body.breakaway[a] - body.coulomb[a], body.bristle_breakaway[a] - body.bristle_coulomb[a]
+            more = max(more, dry, bristle)
         u = math.hypot(start.x[0], start.x[1]) * body.fall
         gain = math.hypot(end.x[0] - start.x[0], end.x[1] - start.x[1]) / h
         worst = max(worst, grown(plant.alone * plant.mass[0], u, body.form, body.exponent, more, gain))
@@ -129,6 +132,10 @@ def memory_error(plant, one, two):
             worst = max(worst, CURRENT_SHARE * abs(a.current - b.current))
         if own.stiffness > 0.0:
             worst = max(worst, _speed_of_bend(plant, e) * abs(a.bend - b.bend))
+    if plant.body[0].stiffness > 0.0:
+        m, speed = len(plant.element), math.sqrt(plant.body[0].stiffness / plant.mass[0])
+        for e in range(m, m + 2):
+            worst = max(worst, speed * abs(one.each[e].bend - two.each[e].bend))
     return worst
 
 
@@ -142,4 +149,7 @@ def bristle_turns(plant, a, b, h):
             side = 0 if a.x[e] > 0.0 else 1
             bent = min(abs(a.each[e].bend) * own.stiffness / own.bristle_coulomb[side], 1.0)
             worst = max(worst, _speed_of_bend(plant, e) * bent * h * abs(b.x[e] - a.x[e]))
+    x, y, stiffness = a.x, b.x, plant.body[0].stiffness
+    if stiffness > 0.0 and x[0] * y[0] + x[1] * y[1] < 0.0:
+        worst = max(worst, math.sqrt(stiffness / plant.mass[0]) * h * math.hypot(x[0] - y[0], x[1] - y[1]))
     return 0.25 * worst

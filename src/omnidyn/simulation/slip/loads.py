@@ -21,7 +21,6 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings.floor import GRAVITY
-from omnidyn.model.wheels import per_wheel, sin_cos_deg
 
 ROUNDING = 1e-9  # of the weight
 
@@ -42,19 +41,18 @@ class WheelLoads:
 def wheel_loads(robot: Robot) -> WheelLoads:
     """The static loads of the wheels of a robot [N].
 
-    Raises UnsupportedError for mecanum wheels under a centre of mass beside their own: no key has their places.
+    Raises UnsupportedError for mecanum wheels without a wheelbase under a centre of mass beside their own.
     """
     count, centre = robot.wheels.count, robot.body.centre
-    if any(centre) and np.any(np.asarray(robot.wheels.roller_angle_deg) != 0.0):
+    if any(centre) and robot.wheels.places is None:
         raise UnsupportedError(
             "what mecanum wheels carry depends on where they stand, and no key says so", got=f"centre_m = {[*centre]}",
-            expected="[0, 0] for mecanum wheels that slip", remedy="leave [wheels] traction_mu out",
+            expected="[0, 0] for mecanum wheels that slip, or [wheels] wheelbase_m",
+            remedy="add wheelbase_m, from the axles in front to those behind",
             where="[body] centre_m",
         )  # fmt: skip
-    sin, cos = sin_cos_deg(robot.wheels.azimuth_deg)
-    arm = per_wheel(robot.wheels.robot_radius, count)
     weight = robot.body.mass * GRAVITY * float(np.cos(np.radians(robot.floor.tilt)))
-    places = np.stack([np.ones(count), arm * cos, arm * sin])
+    places = _places(robot)
     down = np.ones(count, dtype=bool)
     while True:
         loads = np.zeros(count)
@@ -67,7 +65,10 @@ def wheel_loads(robot: Robot) -> WheelLoads:
 
 def load_shift(robot: Robot) -> FloatArray:
     """What a force of the floor along x and along y adds to each load [N/N]. Shape (wheels, 2)."""
-    count, height = robot.wheels.count, robot.body.centre_height
-    sin, cos = sin_cos_deg(robot.wheels.azimuth_deg)
-    arm = per_wheel(robot.wheels.robot_radius, count)
-    return -height * np.asarray(np.linalg.pinv(np.stack([np.ones(count), arm * cos, arm * sin]))[:, 1:], dtype=float)
+    return -robot.body.centre_height * np.asarray(np.linalg.pinv(_places(robot))[:, 1:], dtype=float)
+
+
+def _places(robot: Robot) -> FloatArray:
+    """Rows of 1, x and y of the wheels; of mecanum wheels whose places no key has, one that is told not to matter."""
+    places = robot.wheels.places
+    return np.vstack([np.ones(robot.wheels.count), np.zeros((2, robot.wheels.count)) if places is None else places])

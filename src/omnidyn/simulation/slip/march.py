@@ -74,10 +74,10 @@ class SlipRoom(NamedTuple):
 
 
 class SlipOutcome(NamedTuple):
-    """Row 0 is the start. pose (rows + 1, 3); state (rows + 1, 6 + 3 n): twist, rim speeds [m/s], currents of windings
-    [A], bends of the axes [m, m, rad] and of the wheels [m]; contact (rows + 1, n): 0 where a wheel grips, else the
-    side to which it spins; capped: rows in which the solver gave up its last digits; lifted (n,): rows at the end of
-    which a wheel would have to be held down."""
+    """Row 0 is the start. pose (rows + 1, 3); state (rows + 1, 8 + 3 n): twist, rim speeds [m/s], currents of windings
+    [A], bends of the axes [m, m, rad], of the wheels and along the direction of travel [m]; contact (rows + 1, n): 0
+    where a wheel grips, else the side to which it spins; capped: rows in which the solver gave up its last digits;
+    lifted (n,): rows at the end of which a wheel would have to be held down."""
 
     pose: FloatArray
     state: FloatArray
@@ -108,11 +108,11 @@ def run_slipping(
 ) -> SlipOutcome:  # fmt: skip
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: a step a row.
 
-    voltage [V], bound [A]: (rows, n); state (6 + 3 n,), see `rolling`. Raises InputError where motion is so fast that
+    voltage [V], bound [A]: (rows, n); state (8 + 3 n,), see `rolling`. Raises InputError where motion is so fast that
     no patience would do.
     """
     rows, n = len(dt), len(plant.spin)
-    pose_, states, contact = (np.zeros((rows + 1, width)) for width in (3, 6 + 3 * n, n))
+    pose_, states, contact = (np.zeros((rows + 1, width)) for width in (3, 8 + 3 * n, n))
     out = SlipOutcome(pose_, states, contact, 0, np.zeros(n))
     out.pose[0], out.state[0] = pose, state
     most = (MOST[0] + MOST[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
@@ -137,10 +137,10 @@ def _room(plant: SlipPlant) -> SlipRoom:
 
 def rolling(plant: SlipPlant, twist: FloatArray, current: FloatArray | None = None) -> FloatArray:
     """The state of a robot whose wheels all grip, as SlipOutcome has it: its twist, the speeds of their rims, currents
-    [A], no bend. Shape (6 + 3 n,)."""
+    [A], no bend. Shape (8 + 3 n,)."""
     n = len(plant.spin)
     flows = np.zeros(n) if current is None else current
-    return np.concatenate([twist, plant.g @ twist, flows, np.zeros(N_AXES + n)])
+    return np.concatenate([twist, plant.g @ twist, flows, np.zeros(N_AXES + n + 2)])
 
 
 @part
@@ -272,8 +272,8 @@ def _load(state, row):
     n = len(state.x) - 3
     for j in range(3 + n):
         state.x[j] = row[j]
-    for e in range(3 + n):
-        state.each[e].current = row[n + e] if e >= 3 else 0.0
+    for e in range(5 + n):
+        state.each[e].current = row[n + e] if 3 <= e < 3 + n else 0.0
         state.each[e].bend = row[3 + 2 * n + e]
 
 
@@ -283,8 +283,8 @@ def _keep(state, row):
     n = len(state.x) - 3
     for j in range(3 + n):
         row[j] = state.x[j]
-    for e in range(3 + n):
-        if e >= 3:
+    for e in range(5 + n):
+        if 3 <= e < 3 + n:
             row[n + e] = state.each[e].current
         row[3 + 2 * n + e] = state.each[e].bend
 

@@ -9,7 +9,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.friction.bristle import fade_of
-from omnidyn.model.friction.kinds import AXES, DIRECTION, KARNOPP, KINDS, WHEELS
+from omnidyn.model.friction.kinds import AXES, COULOMB, DIRECTION, KARNOPP, WHEELS
 from omnidyn.model.friction.stribeck import steepest_of
 from omnidyn.model.layout import BODY, N_AXES, YAW, Plant
 from omnidyn.model.mass import off_centre
@@ -72,7 +72,8 @@ def slip_plant(robot: Robot) -> SlipPlant:
     steep = max(float(body.steep) + float(element["steep"][:N_AXES].sum()), float(element["steep"][N_AXES:].max()))
     more = (element["breakaway"] > element["coulomb"]).any(axis=1) & (element["fall"] == 0.0)
     gaps = more.any() or (body.fall == 0.0 and (body.breakaway > body.coulomb).any())
-    remembers = (element["stiffness"] > 0.0).any() or (element["inductance"] > 0.0).any()
+    bends = body.stiffness > 0.0 or (element["stiffness"] > 0.0).any()
+    remembers = bends or (element["inductance"] > 0.0).any()
     slowest = float(np.max(mass / np.maximum(element["viscous"][:N_AXES], 1e-9 * mass)))
     return SlipPlant(
         mass, np.array(robot.body.centre), alone, robot.body.mass if robot.body.rotating_frame else 0.0,
@@ -124,15 +125,15 @@ def _refuse(robot: Robot) -> None:
     if (mass_at_rim(robot.motor, robot.wheels) <= 0.0).any():
         found.append("wheels that weigh nothing ([wheels] inertia_kg_m2 = 0)")
     places = (AXES, DIRECTION, WHEELS)
-    found += [f'law = "{KARNOPP}" of [friction.{place}]' for place in places if _law(robot, place) == KARNOPP]
-    if KINDS[_law(robot, DIRECTION)].bends:
-        found.append('bristles of [friction.direction] (law = "coulomb" knows stribeck_speed and breakaway)')
-    if robot.body.centre_height > 0.0 and np.any(np.asarray(robot.wheels.roller_angle_deg) != 0.0):
-        found.append("the height of the centre of mass on mecanum wheels, whose places no key has")
+    bands = [place for place in places if _law(robot, place) == KARNOPP]
+    found += [f'law = "{KARNOPP}" of [friction.{place}]' for place in bands]
+    if robot.body.centre_height > 0.0 and robot.wheels.places is None:
+        found.append("the height of the centre of mass on mecanum wheels without wheelbase_m")
     if found:
         raise UnsupportedError(
             "wheels that slip are simulated without some of what this robot has", got="; ".join(found),
-            expected="wheels with an inertia; laws that stick, or bend on axes and wheels",
+            expected="wheels with an inertia; laws that stick, or bend",
             where="[wheels] traction_mu",
-            remedy="change that, or leave traction_mu out",
+            remedy=f'take law = "{COULOMB}", which sticks with the same levels: "{KARNOPP}" stands in for it where a '
+            "solver cannot stick" if bands else "change that, or leave traction_mu out",
         )  # fmt: skip

@@ -2,11 +2,12 @@
 
     M (v - v*) / tau = G f + pull + turning frame - B v - dry friction of the axes and of the direction of travel
 
-Each wheel, each axis and the ellipse is a block with one exact answer, given the force of all others (wheel.py). With
-loads that do not depend on the motion all of it is the minimum of a convex function, to which the blocks lead from
-anywhere. What a centre of mass beside that of the wheels couples counts as a force, like that of the turning frame:
-from sweep to sweep it is off by c/sqrt(I/M + c^2) of what it was. Steps are SDIRK2, as in implicit/step.py; friction
-holds exactly: what rests has a speed of literal 0.
+Each wheel, each axis and the ellipse is a block with one exact answer, given the force of all others (wheel.py,
+body.py). With loads that do not depend on the motion all of it is the minimum of a convex function, to which the blocks
+lead from anywhere; bristles of a vector are near one, and a block that misses its answer is seen. What a centre of mass
+beside that of the wheels couples counts as a force, like that of the turning frame: from sweep to sweep it is off by
+c/sqrt(I/M + c^2) of what it was. Steps are SDIRK2, as in implicit/step.py; friction holds exactly: what rests has a
+speed of literal 0.
 """
 
 from __future__ import annotations
@@ -15,78 +16,16 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.bristle import bristle_force
-from omnidyn.model.friction.newton import SETTLED, newton
 from omnidyn.model.layout import Plant
 from omnidyn.model.stick_slip.copies import copy_row
-from omnidyn.model.stick_slip.laws import aim_bristles
+from omnidyn.model.stick_slip.laws import aim_bristles, keep_bristles
 from omnidyn.simulation.implicit.step import BACK, GAMMA, STIFF
+from omnidyn.simulation.slip.body import body_blocks, plane_block
 from omnidyn.simulation.slip.levels import begin_levels, follow_speeds, give_way, settle_rest, stops
-from omnidyn.simulation.slip.wheel import FREE, GRIPS, STEPS, current_at, set_line, wheel_answer
+from omnidyn.simulation.slip.wheel import GRIPS, current_at, set_line, wheel_answer
 
 SWEEPS = 4000
 TIGHT = 2e-15  # of the speeds at hand: a change that is rounding
-
-
-@part
-def _travel_speed(b, m, c):
-    """(v_x, v_y) with m v + c^2 v/sqrt(cx^2 vx^2 + cy^2 vy^2) = b; (0, 0) where the ellipse holds b."""
-    if (b[0] / c[0]) ** 2 + (b[1] / c[1]) ** 2 <= 1.0:
-        return 0.0, 0.0
-    low, high = 0.0, max(abs(b[0]) * c[0] / m[0], abs(b[1]) * c[1] / m[1]) * 1.5
-    q = 0.5 * high
-    for _ in range(200):
-        x, y = c[0] * b[0] / (m[0] * q + c[0] ** 2), c[1] * b[1] / (m[1] * q + c[1] ** 2)
-        rises = 2.0 * (x * x * m[0] / (m[0] * q + c[0] ** 2) + y * y * m[1] / (m[1] * q + c[1] ** 2))
-        before = q
-        q, low, high = newton(q, 1.0 - x * x - y * y, rises, low, high)
-        if abs(q - before) <= SETTLED * q:
-            break
-    return b[0] * q / (m[0] * q + c[0] ** 2), b[1] * q / (m[1] * q + c[1] ** 2)
-
-
-@part
-def _axis_speed(own, at, tau, heavy, alone, level):
-    """v with heavy v = alone + bristle(v) - level: an axis that slides to the side of its level."""
-    forward = alone + bristle_force(own, 0.0, at.aimed_bend, tau)[0] - level > 0.0
-    v, low, high = 0.0, (0.0 if forward else -math.inf), (math.inf if forward else 0.0)
-    for _ in range(STEPS):
-        bent, steep, _ = bristle_force(own, v, at.aimed_bend, tau)
-        before, off = v, heavy * v - alone - bent + level
-        v, low, high = newton(v, off, heavy - steep, low, high)
-        if abs(v - before) <= SETTLED * abs(v) or off == 0.0:
-            break
-    return v
-
-
-@part
-def _body_blocks(plant, stage, heavy, total, each):
-    """Dry friction of the direction of travel, then of the axes, each given all other forces; in place."""
-    along, across, hold = each[len(each) - 2], each[len(each) - 1], stage.task.hold
-    along.sign = FREE
-    if hold[0] > 0.0:
-        b0, b1 = total[0] - along.force, total[1] - across.force
-        t0, t1 = _travel_speed((b0, b1), (heavy[0], heavy[1]), (hold[0], hold[1]))
-        along.sign = 0.0 if t0 == 0.0 and t1 == 0.0 else 1.0
-        total[0], total[1] = heavy[0] * t0, heavy[1] * t1
-        along.force, across.force = total[0] - b0, total[1] - b1
-    for a in range(3):
-        axis, own, at = each[a], plant.element[a], stage.each[a]
-        axis.sign = FREE
-        bends = own.stiffness > 0.0
-        if own.active != 0.0 or bends:
-            alone, bent = total[a] - axis.force, 0.0
-            if bends:
-                bent = bristle_force(own, 0.0, at.aimed_bend, stage.task.tau)[0]
-            driven = alone + bent
-            held = -at.hold[1] <= driven <= at.hold[0]
-            level = at.hold[0] if driven > 0.0 else -at.hold[1]
-            if own.active != 0.0:
-                axis.sign = 0.0 if held else math.copysign(1.0, driven)
-            if bends and not held:
-                total[a] = heavy[a] * _axis_speed(own, at, stage.task.tau, heavy[a], alone, level)
-            else:
-                total[a] = 0.0 if held else alone - level
-            axis.force = total[a] - alone
 
 
 @part
@@ -114,7 +53,7 @@ def solve_stage(plant, stage, start, room, x, each):
     """
     goal, pull, space, lines = room.goal, room.pull, room.space, room.lines
     n, heavy, total, frame, offset = len(plant.spin), space[:3], space[3:6], space[6:9], space[9:12]
-    tau, falls = stage.task.tau, plant.steep > 0.0
+    tau, falls, bends = stage.task.tau, plant.steep > 0.0, plant.body[0].stiffness > 0.0
     for a in range(3):
         heavy[a] = plant.mass[a] / tau + plant.element[a].viscous
         offset[a] = plant.mass[a] / tau * goal[a] + pull[a]
@@ -145,10 +84,11 @@ def solve_stage(plant, stage, start, room, x, each):
             )  # fmt: skip
             for a in range(3):
                 total[a] += plant.g[w, a] * (f - own.force)
-            own.force, x[3 + w] = f, s
-            loads += abs(f)
+            own.force, x[3 + w], loads = f, s, loads + abs(f)
             own.sign, own.contact = sign, contact
-        _body_blocks(plant, stage, heavy, total, each)
+        if bends:
+            worst = plane_block(plant, stage, heavy, total, each)
+        body_blocks(plant, stage, heavy, total, each)
         for a in range(3):
             now, was = total[a] / heavy[a], (v0 if a == 0 else (v1 if a == 1 else v2))
             reach = math.sqrt(plant.mass[a] / plant.mass[0])  # yaw as a length
@@ -237,5 +177,6 @@ def slip_step(plant, stage, h, start, end, room):
         count = max(count, solve_stage(plant, stage, start.x, room, x, end.each))
     if plant.remembers != 0.0:
         for e in range(len(plant.element)):
-            end.each[e].current, end.each[e].bend = stage.each[e].current, stage.each[e].bend
+            end.each[e].current = stage.each[e].current
+        keep_bristles(Plant(plant.body[0], plant.element), stage, end)
     return count

@@ -1,0 +1,124 @@
+"""The friction of the body over an implicit stage: of its axes and of its direction of travel, block by block.
+
+Dry friction of the axes, of an ellipse, and what bends along either: each is solved exactly, given all other forces.
+"""
+
+from __future__ import annotations
+
+import math
+
+from omnidyn.compiled.kernel import part
+from omnidyn.model.friction.bristle import bristle_force, plane_force
+from omnidyn.model.friction.newton import SETTLED, newton
+from omnidyn.simulation.slip.wheel import FREE, STEPS
+
+TRIES, SMALLEST = 200, 1e-9  # of Newton's steps, and a share of one
+ROUGH = 1e-13  # of the forces at work: what may be left of them
+
+
+@part
+def _travel_speed(b, m, c):
+    """(v_x, v_y) with m v + c^2 v/sqrt(cx^2 vx^2 + cy^2 vy^2) = b; (0, 0) where the ellipse holds b."""
+    if (b[0] / c[0]) ** 2 + (b[1] / c[1]) ** 2 <= 1.0:
+        return 0.0, 0.0
+    low, high = 0.0, max(abs(b[0]) * c[0] / m[0], abs(b[1]) * c[1] / m[1]) * 1.5
+    q = 0.5 * high
+    for _ in range(200):
+        x, y = c[0] * b[0] / (m[0] * q + c[0] ** 2), c[1] * b[1] / (m[1] * q + c[1] ** 2)
+        rises = 2.0 * (x * x * m[0] / (m[0] * q + c[0] ** 2) + y * y * m[1] / (m[1] * q + c[1] ** 2))
+        before = q
+        q, low, high = newton(q, 1.0 - x * x - y * y, rises, low, high)
+        if abs(q - before) <= SETTLED * q:
+            break
+    return b[0] * q / (m[0] * q + c[0] ** 2), b[1] * q / (m[1] * q + c[1] ** 2)
+
+
+@part
+def _axis_speed(own, at, tau, heavy, alone, level):
+    """v with heavy v = alone + bristle(v) - level: an axis that slides to the side of its level."""
+    forward = alone + bristle_force(own, 0.0, at.aimed_bend, tau)[0] - level > 0.0
+    v, low, high = 0.0, (0.0 if forward else -math.inf), (math.inf if forward else 0.0)
+    for _ in range(STEPS):
+        bent, steep, _ = bristle_force(own, v, at.aimed_bend, tau)
+        before, off = v, heavy * v - alone - bent + level
+        v, low, high = newton(v, off, heavy - steep, low, high)
+        if abs(v - before) <= SETTLED * abs(v) or off == 0.0:
+            break
+    return v
+
+
+@part
+def _left(body, aimed, tau, b, m, v):
+    """(what is left of m v - b - bristle(v), a pair; its slopes; the size of what it is made of; z at v)."""
+    force, slopes, bent = plane_force(body, v[0], v[1], aimed, tau)
+    off = (m[0] * v[0] - b[0] - force[0], m[1] * v[1] - b[1] - force[1])
+    size = abs(m[0] * v[0]) + abs(m[1] * v[1]) + abs(b[0]) + abs(b[1]) + abs(force[0]) + abs(force[1])
+    return off, slopes, size, bent
+
+
+@part
+def _plane_speed(body, aimed, tau, b, m, guess):
+    """(v with m v = b + bristle(v), z there, the speed that is missing if it was not found): pairs.
+
+    Newton's steps, each halved until less is left.
+    """
+    v, step, share, left, size, bent = guess, (0.0, 0.0), 1.0, math.inf, 0.0, (0.0, 0.0)
+    for _ in range(TRIES):
+        tried = (v[0] + share * step[0], v[1] + share * step[1])
+        off, by, size_then, bent_then = _left(body, aimed, tau, b, m, tried)
+        left_then, share = math.hypot(off[0], off[1]), 0.5 * share
+        if left_then < left:
+            v, left, size, bent = tried, left_then, size_then, bent_then
+            xx, xy, yx, yy = m[0] - by[0], -by[1], -by[2], m[1] - by[3]
+            below = xx * yy - xy * yx
+            step, share = ((xy * off[1] - yy * off[0]) / below, (yx * off[0] - xx * off[1]) / below), 1.0
+        if left <= SETTLED * size or share < SMALLEST:
+            break
+    return v, bent, (0.0 if left <= ROUGH * size else left / min(m[0], m[1]))
+
+
+@part
+def plane_block(plant, stage, heavy, total, each):
+    """What bends along the direction of travel, given all other forces; in place.
+
+    Returns a speed by which it has missed its answer [m/s]: 0 but for rounding.
+    """
+    along, across, task = each[len(each) - 2], each[len(each) - 1], stage.task
+    b, m = (total[0] - along.force, total[1] - across.force), (heavy[0], heavy[1])
+    guess = (total[0] / m[0], total[1] / m[1])
+    v, bent, missed = _plane_speed(plant.body[0], task.aimed_bend, task.tau, b, m, guess)
+    total[0], total[1] = m[0] * v[0], m[1] * v[1]
+    along.force, across.force = total[0] - b[0], total[1] - b[1]
+    task.bend[0], task.bend[1] = bent
+    return missed
+
+
+@part
+def body_blocks(plant, stage, heavy, total, each):
+    """Dry friction of the direction of travel, then of the axes, each given all other forces; in place."""
+    along, across, hold = each[len(each) - 2], each[len(each) - 1], stage.task.hold
+    along.sign = FREE
+    if hold[0] > 0.0:
+        b0, b1 = total[0] - along.force, total[1] - across.force
+        t0, t1 = _travel_speed((b0, b1), (heavy[0], heavy[1]), (hold[0], hold[1]))
+        along.sign = 0.0 if t0 == 0.0 and t1 == 0.0 else 1.0
+        total[0], total[1] = heavy[0] * t0, heavy[1] * t1
+        along.force, across.force = total[0] - b0, total[1] - b1
+    for a in range(3):
+        axis, own, at = each[a], plant.element[a], stage.each[a]
+        axis.sign = FREE
+        bends = own.stiffness > 0.0
+        if own.active != 0.0 or bends:
+            alone, bent = total[a] - axis.force, 0.0
+            if bends:
+                bent = bristle_force(own, 0.0, at.aimed_bend, stage.task.tau)[0]
+            driven = alone + bent
+            held = -at.hold[1] <= driven <= at.hold[0]
+            level = at.hold[0] if driven > 0.0 else -at.hold[1]
+            if own.active != 0.0:
+                axis.sign = 0.0 if held else math.copysign(1.0, driven)
+            if bends and not held:
+                total[a] = heavy[a] * _axis_speed(own, at, stage.task.tau, heavy[a], alone, level)
+            else:
+                total[a] = 0.0 if held else alone - level
+            axis.force = total[a] - alone
