@@ -62,7 +62,7 @@ class Question:
         "the robot has, and every number that has a std which no earlier fit wrote. Such a std is a prior, listed or "
         "not. The EMF constant follows the torque constant, wheel by wheel, unless both are listed. Breakaway "
         'follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" asks for its interval, without '
-        '"[0]" for all.',
+        '"[0]" for all; so do those of friction.direction and friction.wheels.',
         of=(FIT,), metavar="KEY", first=True,
     )  # fmt: skip
     fixed: tuple[str, ...] = _option(

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from benchmarks.laws_ladder import of_law, right
-from omnidyn.identification.structure.missing.laws import arm, bent, bristled, lowered, other_laws, table_of
+from omnidyn.identification.structure.missing.laws import (
+    arm,
+    bent,
+    bristled,
+    held_above,
+    lowered,
+    may_break_away,
+    other_laws,
+    table_of,
+)
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import LUGRE
 from omnidyn.model.robot_file import load_robot
@@ -58,6 +67,20 @@ ROLLING = WheelFriction(coulomb=(0.4, 0.5, 0.6))
 STIFF = {"law": "dahl", "stiffness": 1e3, "yaw_stiffness": 10.0, "dahl_exponent": 1.5}
 AXES, DIRECTION, WHEELS = "friction.axes", "friction.direction", "friction.wheels"
 THREE = ("stribeck_speed", "stiffness", "damping")
+
+
+def test_breakaway_is_offered_where_friction_holds_no_more_than_it_slides_with():
+    """Of the paper's robot one law, as before; along the direction of travel a level of that, and one of turning."""
+    box = load_robot("axebot")
+    assert may_break_away(box.friction) == ["friction.axes"]
+    round_ = DirectionFriction(coulomb=(2.0, 1.6), yaw_coulomb=0.1)
+    both = box.replace(friction=Friction(direction=round_, wheels=WheelFriction(coulomb=(0.4, 0.5, 0.6))))
+    assert may_break_away(both.friction) == ["friction.direction", "friction.wheels"]
+    held = held_above(both, "friction.direction", np.array([1.5, 1.2]))
+    assert held == {"breakaway": (3.0, pytest.approx(2.4)), "yaw_breakaway": pytest.approx(0.12)}
+    assert held_above(both, "friction.wheels", np.array([2.0])) == {"breakaway": (0.8, 1.0, 1.2)}
+    rests = round_.replace(breakaway=(2.5, 2.0))
+    assert may_break_away(Friction(direction=rests)) == []
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def test_an_ellipse_in_a_turning_frame_seen_late(ellipse, log):
 def test_what_the_second_engine_does_not_know(ellipse, log):
     slips = ellipse.replace(wheels=ellipse.wheels.replace(traction_mu=0.8, wheel_inertia=1e-5))
     with pytest.raises(UnsupportedError, match=r"breakaway is profiled .*; got wheels that may slip"):
-        fit_output_error(log, slips, free=[*TRUTH, "friction.axes.breakaway[0]"], start="rest", nuisances=())
+        fit_output_error(log, slips, free=[*TRUTH, "friction.direction.breakaway[0]"], start="rest", nuisances=())
     problem = make_problem([record(log, ellipse)], ellipse, Question(free=tuple(TRUTH), start="rest", nuisances=()))
     unknown = replace(problem, parameters=(*problem.parameters, Parameter("slip", 0.0, 0.0, 1.0)))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got slip.*leave it out"):

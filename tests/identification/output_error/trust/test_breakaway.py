@@ -6,9 +6,11 @@ import pytest
 from benchmarks.wrong_worlds.log import NOISE as SENSOR
 from benchmarks.wrong_worlds.log import Case, commands, robot_of, truths
 from benchmarks.wrong_worlds.world import World, drive
+from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.output_error.solve.progress import Progress
-from omnidyn.identification.whole_logs import fit_output_error
-from omnidyn.model.friction import AxesFriction, Friction
+from omnidyn.identification.whole_logs import fit_output_error, identify_groups
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
+from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from tests.reference import modes
@@ -91,3 +93,73 @@ def test_intervals_in_a_turning_frame_hold_the_truth():
     others = [each[key] for each in every for key in each if key not in LEVELS]
     assert np.mean(levels) >= 0.9
     assert np.mean(others) >= 0.9
+
+
+PLANE = ["friction.direction.breakaway[0]", "friction.direction.breakaway[1]"]
+OF_TABLE = {"direction": [*PLANE, "friction.direction.yaw_breakaway"], "wheels": ["friction.wheels.breakaway"]}
+
+
+def starts(world, rng, count, turns):
+    """Voltages of starts from rest, each its own way: they rise in steps to about twice what Coulomb friction holds,
+    then leap, then end. turns: whether every third turns."""
+    per = world.ke / np.array(world.resistance)
+    out = [np.zeros((30, 3))]
+    for k in range(1, 1 + count):
+        along = bool(k % 3) or not turns
+        angle, way = rng.uniform(-np.pi, np.pi), rng.choice([-1.0, 1.0]) / world.robot_radius
+        rim = np.array([np.cos(angle), np.sin(angle), 0.0] if along else [0.0, 0.0, way]) @ world.G
+        wrench = world.G @ (per * rim)
+        held = world.coulomb[0] / np.hypot(*wrench[:2]) if along else world.coulomb[2] / abs(wrench[2])
+        held = world.rim[0] / np.abs(per * rim).max() if world.shape == "wheels" else held
+        rise = np.concatenate([np.repeat(np.linspace(0.4, 1.0, 10), 10), np.full(40, 3.0)])
+        out += [np.outer(rise, 2.0 * held * rng.uniform(0.8, 1.2) * rim), np.zeros((40, 3))]
+    return np.concatenate(out)
+
+
+def of_starts(seed, shape, keys, count=14, turns=True):
+    """(fit, truth) of starts in a turning frame, by the simulator of the wrong worlds."""
+    world = World(frame=True, breakaway=RATIO, shape=shape)
+    asked = starts(world, np.random.default_rng([seed, 4]), count, turns)
+    t = np.arange(len(asked)) / 100.0
+    speed = drive(world, t, asked, t).wheel_speed
+    speed = speed + SENSOR * np.random.default_rng([seed, 5]).normal(size=speed.shape)
+    fit = fit_output_error(Run(t, voltage=asked, wheel_speed=speed), robot_of(world), free=["friction", *keys])
+    truth = truths(world, shape)
+    return fit, truth | {key: RATIO * truth[key.replace("breakaway", "coulomb")] for key in keys}
+
+
+@pytest.mark.parametrize("shape, keys", [("direction", PLANE), ("wheels", OF_TABLE["wheels"])])
+def test_it_is_found_wherever_friction_acts(shape, keys):
+    """The truth lies clear of Coulomb friction, and between the ends. It was refused, or taken for a smooth number."""
+    fit, truth = of_starts(0, shape, keys, 8, shape != "direction")
+    assert all(held(fit, {key: truth[key] for key in fit.value}).values())
+    for key in keys:
+        low, high = fit.ci95[key]
+        assert 1.1 * truth[key.replace("breakaway", "coulomb")] < low < high < 1.3 * truth[key]
+        assert Key.parse(key).get(fit.robot) == fit.value[key]
+        assert fit.robot.priors[key].std == pytest.approx(fit.std[key])
+    assert not set(keys) & set(fit.unidentifiable)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("shape", OF_TABLE)
+def test_intervals_hold_the_truth_wherever_friction_acts(shape):
+    keys = OF_TABLE[shape]
+    every = [held(*of_starts(seed, shape, keys)) for seed in range(12)]
+    assert np.mean([each[key] for each in every for key in keys]) >= 0.9
+    assert np.mean([each[key] for each in every for key in each if key not in keys]) >= 0.9
+
+
+def test_a_level_that_no_law_has_is_refused_by_name():
+    log = Run(t=DT * np.arange(5), voltage=np.ones((5, 3)), twist=np.zeros((5, 3)))
+    box, round_ = robot_of(World()), robot_of(World(shape="direction"))
+    with pytest.raises(InputError, match=r"no Coulomb friction .*; got friction\.wheels\.breakaway, .*coulomb is 0"):
+        fit_output_error(log, box, free=["friction", "friction.wheels.breakaway"])
+    bristles = DirectionFriction(coulomb=(3.9, 3.9), law="dahl", stiffness=1e3)
+    bends = round_.replace(friction=Friction(direction=bristles))
+    with pytest.raises(
+        InputError, match=r'bristles bend before .*; got friction\.direction\.breakaway\[0\] of law = "dahl"'
+    ):
+        fit_output_error(log, bends, free=["friction", "friction.direction.breakaway"])
+    with pytest.raises(UnsupportedError, match=r"not profiled in groups; got friction\.direction\.breakaway\[0\]"):
+        identify_groups([log, log], round_, ["a", "b"], free=["friction", "friction.direction.breakaway"])

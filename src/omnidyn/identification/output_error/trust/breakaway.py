@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -167,19 +168,21 @@ def find_breakaway(
 def _in_common(
     solution: Solution, names: Sequence[str], known: Trust, progress: Progress | None
 ) -> dict[str, float]:  # fmt: skip
-    """Levels that are the same times Coulomb friction in each list that holds together, where the logs want that."""
+    """Levels that are the same times Coulomb friction in each list that holds together, the likeliest one."""
     levels: dict[str, float] = {}
     for name in names:
         own = _together(name, names)
         if len(own) > 1 and name == own[0]:
             slide = {each: _coulomb(solution.solver, solution.state.point, each) for each in own}
-            profile = _by_the_engine(
-                solution, lambda by, own=slide: [levels | {k: by * c for k, c in own.items()}], own[0], progress
-            )
+            profile = _by_the_engine(solution, partial(_times, levels, slide), name, progress)
             grid = np.geomspace(1.0, HIGHEST, GRID).tolist()
             best, _, _ = likely_levels(profile.cost, grid, LIMIT * _steeper(solution.solver, known, name))
-            levels = levels | {each: best * c for each, c in slide.items()}
+            levels = _times(levels, slide, best)[0]
     return levels
+
+
+def _times(levels: dict[str, float], slide: dict[str, float], by: float) -> list[dict[str, float]]:
+    return [levels | {name: by * level for name, level in slide.items()}]
 
 
 def _together(name: str, names: Sequence[str]) -> list[str]:
