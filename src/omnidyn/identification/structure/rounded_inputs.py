@@ -111,7 +111,7 @@ def _drawn(motion: Motion, random: np.random.Generator) -> FloatArray:
     for w in np.flatnonzero(steps).tolist():
         stretch = np.cumsum(_changed(inputs, w)) - 1
         off[:, :, w] = steps[w] * random.uniform(-0.5, 0.5, (int(stretch[-1]) + 1, DRAWS))[stretch]
-    return off * inputs.any(axis=1)[:, None, None]  # what is off is off
+    return off * np.any(inputs, axis=1, keepdims=True)[:, :, None]  # what is off is off
 
 
 def _shown(motion: Motion, volts: FloatArray) -> FloatArray:
