@@ -108,6 +108,18 @@ class Linear:
         shown = [self._without_start(k, values) for k, values in enumerate(self.rows.rounding)]
         return scaled(shown, e - j @ solved(j, e), j @ root_of_covariance(j))
 
+    @cached_property
+    def rounded_square(self) -> float:
+        """The sum of squares that rounded inputs explain of the residuals, in rows white beside the noise alone."""
+        if not self.rounding:
+            return 0.0
+        (e, j), (bare, slopes), first, found = self.whole(), self.plain.whole(), 0, 0.0
+        left = bare - slopes @ solved(j, e)
+        for one in self.rounding:
+            own = slice(first, first := first + len(one.z))
+            found += float(((one.z @ one.predicted(left[own]) / max(one.size, TINY)) ** 2).sum())
+        return found
+
     def white(self, shown: Shown) -> FloatArray:
         """What is shown in the rows, as the fit sees it: (N, K), starts projected out, a row of 0 for each prior."""
         found = [self._without_start(k, values) for k, values in enumerate(shown)]

@@ -23,6 +23,7 @@ from omnidyn.identification.structure.linear import Gram, Linear, Rows, root_of_
 from omnidyn.identification.structure.motion import Motion
 
 FALSE = 0.02  # of right models for which something is found, all tests together
+BENT = 0.01  # of what rounded inputs show: what their first order is off by is no evidence
 ROUNDS = 2  # of memory and fit in turn
 TOLD = 10.0  # degrees of freedom with which the noise along a direction must be known for it to be tested
 NEW = 1e-4  # share of a direction that no parameter explains, from which it is one to test
@@ -131,7 +132,8 @@ class _Asked:
         """(F, p, directions) of what some columns of what is shown explain of what is left.
 
         Along directions in which the noise is known to TOLD degrees of freedom: slow errors may be anything in a log
-        that is not many times as long as they remember, and what follows them is no evidence.
+        that is not many times as long as they remember, and what follows them is no evidence. Of rounded inputs the
+        first order is known: where it is thousands of times the noise, as in counted angles, what it is off by is not.
         """
         explained, weights = self.gram.directions(self.known, 1 + self.gram.count + own, NEW)
         if not len(explained):
@@ -144,7 +146,8 @@ class _Asked:
         told = degrees >= TOLD
         if not told.any():
             return 0.0, 1.0, 0
-        k, f = int(told.sum()), float(explained[told].mean() / noise)
+        k, bent = int(told.sum()), BENT**2 * self.linear.rounded_square
+        f = max(float(explained[told].sum()) - bent, 0.0) / k / noise
         together = float(np.mean(degrees[told] ** -0.5) ** -2.0)  # all may be off the same way
         return f, float(fdtrc(k, min(together, rows), f)), k
 

@@ -97,9 +97,10 @@ def _stretches(piece: Piece) -> list[tuple[int, int, int, float]]:
 def _changed(inputs: FloatArray, w: int) -> BoolArray:
     """The rows from which on an input may have been rounded by something else: the first, those in which it changes,
     and those in which all others do, for then it is another command that came to the same step. (rows,)."""
-    every = np.diff(inputs, axis=0) != 0.0
-    others = np.delete(every, w, axis=1)
-    return np.concatenate([[True], every[:, w] | (others.all(axis=1) & (others.shape[1] > 0))])
+    changes = np.ones(inputs.shape, dtype=bool)
+    changes[1:] = np.diff(inputs, axis=0) != 0.0
+    others = np.delete(changes, w, axis=1)
+    return changes[:, w] | (others.all(axis=1) & others.any(axis=1))
 
 
 def _drawn(motion: Motion, random: np.random.Generator) -> FloatArray:
@@ -107,10 +108,10 @@ def _drawn(motion: Motion, random: np.random.Generator) -> FloatArray:
     record, rows = motion.piece.record, slice(motion.piece.first, motion.piece.last + 1)
     inputs, steps = as_logged(record)[rows], input_steps(record)
     off = np.zeros((len(inputs), DRAWS, len(steps)))
-    for w in np.flatnonzero(steps):
+    for w in np.flatnonzero(steps).tolist():
         stretch = np.cumsum(_changed(inputs, w)) - 1
         off[:, :, w] = steps[w] * random.uniform(-0.5, 0.5, (int(stretch[-1]) + 1, DRAWS))[stretch]
-    return off * inputs.any(axis=1)[:, None, None]  # what is off is off
+    return off * np.any(inputs, axis=1, keepdims=True)[:, :, None]  # what is off is off
 
 
 def _shown(motion: Motion, volts: FloatArray) -> FloatArray:
