@@ -13,7 +13,7 @@ from omnidyn.compiled.beside import small_matrices
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
-from omnidyn.identification.output_error.problem.problem import Parts, Problem
+from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
@@ -62,7 +62,7 @@ def examine(solution: Solution) -> Examined:
     to 60 that have nothing in common, by draws from their scalar products.
     """
     solver, point = solution.solver, solution.state.point
-    whole = with_levels(solver.problem, levels_of(solution))
+    whole = with_levels(solver.problem, point, levels_of(solution))
     problem = whole.shortened(rows_told(whole, MOST_ROWS))
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     parts = engine.residuals(point)
@@ -137,9 +137,10 @@ def _with_first_step(again: Remedy, near: Remedy, fitted: Container[str]) -> Rem
     return replace(again, same_as=tuple(dict.fromkeys((*again.same_as, *same))))
 
 
-def with_levels(problem: Problem, levels: dict[str, float]) -> Problem:
-    """The problem of a robot with the levels of breakaway that were found beside its numbers."""
-    return replace(problem, robot=holding(problem.robot, levels)) if levels else problem
+def with_levels(problem: Problem, point: Point, levels: dict[str, float]) -> Problem:
+    """The problem of a robot with the levels of breakaway that were found beside its numbers; what else stands in their
+    lists is the Coulomb friction of the point, not that from which the fit began."""
+    return replace(problem, robot=holding(problem.robot_at(point.values), levels)) if levels else problem
 
 
 def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:

@@ -134,10 +134,13 @@ def with_levels(solver: Solver, levels: dict[str, float]) -> Solver:
 
 
 def levels_of(solution: Solution) -> dict[str, float]:
-    """Key -> level of breakaway that was found beside the numbers of a solution [N], about yaw [N m]."""
+    """Key -> level of breakaway that was found beside the numbers of a solution [N], about yaw [N m]; none where all
+    are those of Coulomb friction."""
     problem, found = solution.solver.problem, getattr(solution.solver.engine, "levels", {})
-    robot = problem.robot_at(solution.state.point.values) if found else None
-    return {name: max(level, slides_least(robot, name)) for name, level in found.items()} if robot else {}
+    robot = problem.robot_at(solution.state.point.values)
+    levels = {name: (level, slides_least(robot, name)) for name, level in found.items()}
+    above = any(level > least for level, least in levels.values())
+    return {name: max(each) for name, each in levels.items()} if above else {}
 
 
 def find_breakaway(
