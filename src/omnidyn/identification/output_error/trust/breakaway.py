@@ -43,6 +43,8 @@ FAR = 12  # plateaus without a likely one after which the interval ends
 GRID, ANEW = 20, 7  # levels that the implicit engine begins with, and once more
 WIDER = 1.07  # how far that reaches beyond the first ends
 FEW, NEAR, TOL = 4, 0.1, 1e-3  # iterations of it at each; squared standard errors to its best point; [m/s]
+ASIDE, FARTHER = (0.08, 0.02, 0.005), 1.08  # by which levels are moved that make up for another, and that one itself
+HOPELESS = 30.0  # limits above the least F, beyond which the finer of these is not tried
 LEVEL = 1.0  # of F above the least, within which the middle of the likely levels is as good as the best
 
 
@@ -127,6 +129,54 @@ class _Profile:
         return np.sqrt(share / share.sum()) * (np.array(values) - self.solver.inner(at)).T
 
 
+class _MadeUpFor(_Profile):
+    """The same where others are as likely as can be at each level: from those of the nearest known one, each is moved
+    as long as that is better. What is held on the slant says of two sides of an ellipse what they are together."""
+
+    def __init__(self, plain: _Profile, levels: dict[str, float], name: str, others: Sequence[str], enough: float):
+        super().__init__(plain.solver, plain.ways, plain.point, plain.limit, True, plain.doing)
+        self.levels, self.name, self.others, self.enough = levels, name, others, enough
+
+    def at(self, level: float) -> Solution:
+        if level not in self.known:
+            self.doing(f"fit {len(self.known) + 1}, whatever else holds")
+            point, levels, least = self.point, self.levels, np.inf
+            if self.known:
+                near = self.known[min(self.known, key=lambda own: abs(own - level))]
+                point, levels = near.state.point, _levels_in(near)
+                least = min(each.state.objective for each in self.known.values())
+            found = with_levels(self.solver, levels | {self.name: level}).minimise(point, self.limit)
+            for share in ASIDE:
+                above = found.state.objective - least
+                if above > self.enough and not (share != ASIDE[0] and above > HOPELESS * self.enough):
+                    found = self._moved(found, share)
+            self.known[level] = found
+        return self.known[level]
+
+    def _moved(self, found: Solution, share: float) -> Solution:
+        """The best with other levels, each a share larger or smaller as often as that is better."""
+        for name in self.others:
+            for way in (1.0 + share, 1.0 / (1.0 + share)):
+                while True:
+                    point = found.state.point
+                    floor = _coulomb(self.solver, point, name)
+                    level = way * max(_levels_in(found)[name], floor)
+                    if not floor / (1.0 + share) < level < 2.0 * HIGHEST * floor:
+                        break
+                    other = with_levels(found.solver, _levels_in(found) | {name: level}).minimise(point, self.limit)
+                    if other.state.objective >= found.state.objective:
+                        break
+                    found = other
+        return found
+
+
+def _levels_in(solution: Solution) -> dict[str, float]:
+    """The levels that a solution was found with, as they were asked for."""
+    engine = solution.solver.engine
+    assert isinstance(engine, (ExactEngine, ImplicitEngine))
+    return engine.levels
+
+
 def with_levels(solver: Solver, levels: dict[str, float]) -> Solver:
     """The solver at fixed levels of breakaway, by their keys; 0 follows coulomb."""
     assert isinstance(solver.engine, (ExactEngine, ImplicitEngine))
@@ -198,25 +248,27 @@ def _beside_the_others(
     solution: Solution, levels: dict[str, float], one: Breakaway, every: Sequence[Breakaway], known: Trust,
     progress: Progress | None,
 ) -> Breakaway:  # fmt: skip
-    """The level with the interval that it has while another that holds together with it is at either end of its own."""
-    own = _together(one.name, [each.name for each in every])
-    others = [each for each in every if each.name in own and each is not one]
+    """The level with the interval that it has whatever the others are that hold together with it.
+
+    From its value on in both directions, as long as others can make up for it.
+    """
+    others = [each for each in _together(one.name, [each.name for each in every]) if each != one.name]
     if not others:
         return one
-    limit, coulomb = (
-        LIMIT * _steeper(solution.solver, known, one.name),
-        _coulomb(solution.solver, solution.state.point, one.name),
-    )
-    ends = [{}] + [
-        {each.name: end} for each in others
-        for end in (each.low, each.high if np.isfinite(each.high) else HIGHEST * max(each.value, each.low))
-    ]  # fmt: skip
-    profile = _by_the_engine(
-        solution, lambda level: [levels | end | {one.name: level} for end in ends], one.name, progress
-    )
-    most = WIDER * one.high if np.isfinite(one.high) else HIGHEST * coulomb
-    grid = np.geomspace(coulomb, max(most, WIDER * coulomb), 2 * ANEW).tolist()
-    best, low, high = likely_levels(profile.cost, grid, limit)
+    limit = LIMIT * _steeper(solution.solver, known, one.name)
+    coulomb = _coulomb(solution.solver, solution.state.point, one.name)
+    plain = _by_the_engine(solution, lambda level: [levels | {one.name: level}], one.name, progress)
+    profile, tried = _MadeUpFor(plain, levels, one.name, others, limit), [max(one.value, coulomb)]
+    least = profile.cost(tried[0])
+    for way in (FARTHER, 1.0 / FARTHER):
+        level, beyond = tried[0], 0
+        while beyond < 2 and coulomb < way * level < HIGHEST * coulomb:
+            tried.append(level := way * level)
+            least = min(least, profile.cost(level))
+            beyond = beyond + 1 if profile.cost(level) > least + limit else 0
+        if beyond < 2:
+            tried.append(coulomb if way < 1.0 else HIGHEST * coulomb)
+    best, low, high = likely_levels(profile.cost, sorted(set(tried)), limit)
     tied = one.tied or profile.cost(0.0) <= profile.cost(best) + limit
     return replace(one, low=0.0 if tied else min(low, one.low), high=max(high, one.high), tied=tied)
 
