@@ -234,7 +234,7 @@ def _wheels(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Wheel
     from omnidyn.model.first_guess import mecanum_wheels
     from omnidyn.model.wheels import Wheels
 
-    known = {key: value[key] for key in ("wheel_radius", "robot_radius") if key in value}
+    known: dict[str, Any] = {key: value[key] for key in ("wheel_radius", "robot_radius") if key in value}
     if preset is not None and not mecanum:
         changed = {"azimuth_deg": value["azimuth"]} if "azimuth" in value else {}
         return preset.wheels.replace(**known, **changed)

@@ -85,11 +85,20 @@ def test_a_path_is_followed_as_on_the_twin_that_sticks(name, controller):
     assert found <= (1.01 * rigid if "Karnopp" in name else more * rigid + 2.0 * 2.2 / 1e4)
 
 
-@pytest.mark.parametrize(
-    "robot, words",
-    [(SLIDING["LuGre along"], r"bristles of \[friction.direction\]"), (SLIDING["Karnopp"], 'law = "karnopp"')],
-)
-def test_what_cannot_slip_is_refused_by_name(robot, words):
-    floor = robot.replace(wheels=robot.wheels.replace(traction_mu=0.6, wheel_inertia=2e-6))
-    with pytest.raises(UnsupportedError, match=words):
+def slippery(robot):
+    return robot.replace(wheels=robot.wheels.replace(traction_mu=0.6, wheel_inertia=2e-6))
+
+
+def test_a_path_is_followed_where_wheels_slip_and_bristles_bend_along_it():
+    """As on the twin that sticks: there the grip of the floor, and no bristle, is what is missed by."""
+    found, rigid = (
+        omnidyn.track(each, "eight", "mpc", plant=each).rmse_position for each in map(slippery, TRACKED["LuGre along"])
+    )
+    assert found <= 1.1 * rigid
+
+
+@pytest.mark.parametrize("name", ["Karnopp", "Karnopp along"])
+def test_what_cannot_slip_is_refused_by_name(name):
+    floor = slippery(SLIDING[name])
+    with pytest.raises(UnsupportedError, match='law = "karnopp"'):
         omnidyn.track(floor, "eight", "mpc", plant=floor)

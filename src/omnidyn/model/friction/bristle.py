@@ -87,13 +87,14 @@ def plane_force(body, x, y, aimed, tau):
     x_rate, y_rate, x_x, x_y, y_x, y_y = _plane_rate(body.law, body, (aimed[0], aimed[1]), (x, y), tau, levels)
     damping, fades = damping_at(levels[4], body.damping, body.fade)
     gain, size = body.stiffness * tau + damping, max(levels[4], 1e-150)
-    fades_x, fades_y, bent = fades * x / size, fades * y / size, (aimed[0] + tau * x_rate, aimed[1] + tau * y_rate)
-    force = (-body.stiffness * bent[0] - damping * x_rate, -body.stiffness * bent[1] - damping * y_rate)
+    fades_x, fades_y = fades * x / size, fades * y / size
+    x_bent, y_bent = aimed[0] + tau * x_rate, aimed[1] + tau * y_rate
+    force = (-body.stiffness * x_bent - damping * x_rate, -body.stiffness * y_bent - damping * y_rate)
     slopes = (
         -gain * x_x - fades_x * x_rate, -gain * x_y - fades_y * x_rate,
         -gain * y_x - fades_x * y_rate, -gain * y_y - fades_y * y_rate,
     )  # fmt: skip
-    return force, slopes, bent
+    return force, slopes, (x_bent, y_bent)
 
 
 def fade_of(own: Any) -> float:

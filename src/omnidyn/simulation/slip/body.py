@@ -74,7 +74,7 @@ def _plane_speed(body, aimed, tau, b, m, guess):
             step, share = ((xy * off[1] - yy * off[0]) / below, (yx * off[0] - xx * off[1]) / below), 1.0
         if left <= SETTLED * size or share < SMALLEST:
             break
-    return v, bent, (0.0 if left <= ROUGH * size else left / min(m[0], m[1]))
+    return (v[0], v[1]), bent, (0.0 if left <= ROUGH * size else left / min(m[0], m[1]))
 
 
 @part
