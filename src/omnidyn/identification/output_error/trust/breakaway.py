@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.likely_levels import likely_levels
+from omnidyn.identification.output_error.trust.traded_levels import Place, trade
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
 from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, Key, in_words
@@ -43,8 +45,6 @@ FAR = 12  # plateaus without a likely one after which the interval ends
 GRID, ANEW = 20, 7  # levels that the implicit engine begins with, and once more
 WIDER = 1.07  # how far that reaches beyond the first ends
 FEW, NEAR, TOL = 4, 0.1, 1e-3  # iterations of it at each; squared standard errors to its best point; [m/s]
-ASIDE, FARTHER = (0.08, 0.02, 0.005), 1.08  # by which levels are moved that make up for another, and that one itself
-HOPELESS = 30.0  # limits above the least F, beyond which the finer of these is not tried
 LEVEL = 1.0  # of F above the least, within which the middle of the likely levels is as good as the best
 
 
@@ -94,33 +94,42 @@ def refuse_level(name: str, robot: Robot, free: Sequence[str]) -> None:
 class _Profile:
     """Least F at levels of one S, remembered; each from `point`, or `nearest` from the nearest known level.
 
-    ways: the levels, by their keys, that a level of it may stand for: the likeliest of them counts.
+    ways: the levels, by their keys, that a level of it may stand for: the likeliest of them counts. A place of several
+    levels is as good as a level.
     """
 
     def __init__(
-        self, solver: Solver, ways: Callable[[float], list[dict[str, float]]], point: Point, limit: int = REFIT,
+        self, solver: Solver, ways: Callable[[Any], list[dict[str, float]]], point: Point, limit: int = REFIT,
         nearest: bool = False, doing: Callable[[str], None] | None = None,
     ):  # fmt: skip
         self.solver, self.ways, self.point, self.limit = solver, ways, point, limit
         self.nearest, self.doing = nearest, doing or (lambda _: None)
-        self.known: dict[float, Solution] = {}
+        self.known: dict[float | Place, Solution] = {}
 
-    def at(self, level: float) -> Solution:
+    def at(self, level: float | Place) -> Solution:
         if level not in self.known:
             self.doing(f"fit {len(self.known) + 1}")
             start = self.point
             if self.nearest and self.known:
-                start = self.known[min(self.known, key=lambda own: abs(own - level))].state.point
-            fits = [with_levels(self.solver, way).minimise(start, self.limit) for way in self.ways(level)]
-            self.known[level] = min(fits, key=lambda fit: fit.state.objective)
+                start = self.known[min(self.known, key=lambda own: _apart(own, level))].state.point
+            self.known[level] = min(
+                (self._fit(way, start) for way in self.ways(level)), key=lambda fit: fit.state.objective
+            )
         return self.known[level]
 
-    def cost(self, level: float) -> float:
+    def _fit(self, levels: dict[str, float], start: Point) -> Solution:
+        return with_levels(self.solver, levels).minimise(start, self.limit)
+
+    def cost(self, level: float | Place) -> float:
         return self.at(level).state.objective
+
+    def beside(self, levels: dict[str, float], level: float | Place) -> float:
+        """F at any other levels, from the fit at one."""
+        return self._fit(levels, self.at(level).state.point).state.objective
 
     def moves(self, at: FloatArray, steep: float) -> FloatArray:
         """Distances of the numbers from `at` at the K levels, by the root of how likely each is. Shape (P, K)."""
-        levels = np.array(sorted(level for level in self.known if level > 0.0))
+        levels = np.array(sorted(level for level in self.known if isinstance(level, float) and level > 0.0))
         if len(levels) < 2:
             return np.zeros((len(at), 0))
         cost = np.array([self.cost(level) for level in levels])
@@ -129,52 +138,8 @@ class _Profile:
         return np.sqrt(share / share.sum()) * (np.array(values) - self.solver.inner(at)).T
 
 
-class _MadeUpFor(_Profile):
-    """The same where others are as likely as can be at each level: from those of the nearest known one, each is moved
-    as long as that is better. What is held on the slant says of two sides of an ellipse what they are together."""
-
-    def __init__(self, plain: _Profile, levels: dict[str, float], name: str, others: Sequence[str], enough: float):
-        super().__init__(plain.solver, plain.ways, plain.point, plain.limit, True, plain.doing)
-        self.levels, self.name, self.others, self.enough = levels, name, others, enough
-
-    def at(self, level: float) -> Solution:
-        if level not in self.known:
-            self.doing(f"fit {len(self.known) + 1}, whatever else holds")
-            point, levels, least = self.point, self.levels, np.inf
-            if self.known:
-                near = self.known[min(self.known, key=lambda own: abs(own - level))]
-                point, levels = near.state.point, _levels_in(near)
-                least = min(each.state.objective for each in self.known.values())
-            found = with_levels(self.solver, levels | {self.name: level}).minimise(point, self.limit)
-            for share in ASIDE:
-                above = found.state.objective - least
-                if above > self.enough and not (share != ASIDE[0] and above > HOPELESS * self.enough):
-                    found = self._moved(found, share)
-            self.known[level] = found
-        return self.known[level]
-
-    def _moved(self, found: Solution, share: float) -> Solution:
-        """The best with other levels, each a share larger or smaller as often as that is better."""
-        for name in self.others:
-            for way in (1.0 + share, 1.0 / (1.0 + share)):
-                while True:
-                    point = found.state.point
-                    floor = _coulomb(self.solver, point, name)
-                    level = way * max(_levels_in(found)[name], floor)
-                    if not floor / (1.0 + share) < level < 2.0 * HIGHEST * floor:
-                        break
-                    other = with_levels(found.solver, _levels_in(found) | {name: level}).minimise(point, self.limit)
-                    if other.state.objective >= found.state.objective:
-                        break
-                    found = other
-        return found
-
-
-def _levels_in(solution: Solution) -> dict[str, float]:
-    """The levels that a solution was found with, as they were asked for."""
-    engine = solution.solver.engine
-    assert isinstance(engine, (ExactEngine, ImplicitEngine))
-    return engine.levels
+def _apart(one: float | Place, other: float | Place) -> float:
+    return float(np.abs(np.subtract(one, other)).sum())
 
 
 def with_levels(solver: Solver, levels: dict[str, float]) -> Solver:
@@ -214,8 +179,7 @@ def find_breakaway(
             levels = levels | {name: 0.0 if one.tied and one.value <= one.low else one.value}
             solution = with_levels(solver, levels).minimise(solution.state.point)
             found.append(one)
-    wider = [_beside_the_others(solution, levels, one, found, known, progress) for one in found]
-    return solution, wider
+    return solution, _beside_the_others(solution, levels, found, known, progress)
 
 
 def _in_common(
@@ -245,36 +209,46 @@ def _together(name: str, names: Sequence[str]) -> list[str]:
 
 
 def _beside_the_others(
-    solution: Solution, levels: dict[str, float], one: Breakaway, every: Sequence[Breakaway], known: Trust,
-    progress: Progress | None,
-) -> Breakaway:  # fmt: skip
-    """The level with the interval that it has whatever the others are that hold together with it.
+    solution: Solution, levels: dict[str, float], found: Sequence[Breakaway], known: Trust, progress: Progress | None,
+) -> list[Breakaway]:  # fmt: skip
+    """The levels with the intervals that they have whatever the others are that hold together with them."""
+    wider = {one.name: one for one in found}
+    for one in found:
+        group = _together(one.name, list(wider))
+        if len(group) > 2 or (len(group) == 2 and one.name == group[0]):
+            _traded(solution, levels, [one.name, *(each for each in group if each != one.name)], wider, known, progress)
+    return list(wider.values())
 
-    From its value on in both directions, as long as others can make up for it.
-    """
-    others = [each for each in _together(one.name, [each.name for each in every]) if each != one.name]
-    if not others:
-        return one
-    limit = LIMIT * _steeper(solution.solver, known, one.name)
-    coulomb = _coulomb(solution.solver, solution.state.point, one.name)
-    plain = _by_the_engine(solution, lambda level: [levels | {one.name: level}], one.name, progress)
-    profile, tried = _MadeUpFor(plain, levels, one.name, others, limit), [max(one.value, coulomb)]
-    least = profile.cost(tried[0])
-    for way in (FARTHER, 1.0 / FARTHER):
-        level, beyond = tried[0], 0
-        while beyond < 2 and coulomb < way * level < HIGHEST * coulomb:
-            tried.append(level := way * level)
-            least = min(least, profile.cost(level))
-            beyond = beyond + 1 if profile.cost(level) > least + limit else 0
-        if beyond < 2:
-            tried.append(coulomb if way < 1.0 else HIGHEST * coulomb)
-    best, low, high = likely_levels(profile.cost, sorted(set(tried)), limit)
-    tied = one.tied or profile.cost(0.0) <= profile.cost(best) + limit
-    return replace(one, low=0.0 if tied else min(low, one.low), high=max(high, one.high), tied=tied)
+
+def _traded(
+    solution: Solution, levels: dict[str, float], group: Sequence[str], wider: dict[str, Breakaway], known: Trust,
+    progress: Progress | None,
+) -> None:  # fmt: skip
+    """Widen the intervals of a group by how far its first level goes with the others against it, and they with it."""
+    coulomb = {name: _coulomb(solution.solver, solution.state.point, name) for name in group}
+    least = {name: max(wider[name].value, coulomb[name]) for name in group}
+
+    def at(place: Place) -> dict[str, float]:
+        return {name: place.s * least[name] * (place.q if name == group[0] else 1.0 / place.q) for name in group}
+
+    def inside(place: Place) -> bool:
+        return all(coulomb[name] < level < 2.0 * HIGHEST * coulomb[name] for name, level in at(place).items())
+
+    profile = _by_the_engine(solution, lambda place: [levels | at(place)], group[0], progress)
+    limit = LIMIT * max(_steeper(solution.solver, known, name) for name in group)
+    walk = trade(profile.cost, limit, inside)
+    lowest = min(map(profile.cost, profile.known))
+    for name in group:
+        reached, one = [at(place)[name] for place in walk.edges], wider[name]
+        falls = [place for place in walk.gone if at(place)[name] < least[name]]
+        slides = any(profile.beside(levels | at(place) | {name: 0.0}, place) <= lowest + limit for place in falls)
+        low, high = max(min(reached), coulomb[name]), max(reached)
+        tied = one.tied or slides
+        wider[name] = replace(one, low=0.0 if tied else min(low, one.low), high=max(high, one.high), tied=tied)
 
 
 def _by_the_engine(
-    solution: Solution, ways: Callable[[float], list[dict[str, float]]], name: str, progress: Progress | None
+    solution: Solution, ways: Callable[[Any], list[dict[str, float]]], name: str, progress: Progress | None
 ) -> _Profile:
     """A profile by the implicit engine, at a tolerance that is enough to tell levels apart."""
     own, engine, told = solution.solver, solution.solver.engine, progress or Progress()
