@@ -226,6 +226,8 @@ def _traded(
 ) -> None:  # fmt: skip
     """Widen the intervals of a group by how far its first level goes with the others against it, and they with it."""
     coulomb = {name: _coulomb(solution.solver, solution.state.point, name) for name in group}
+    if min(coulomb.values()) <= 0.0:  # friction acts elsewhere
+        return
     least = {name: max(wider[name].value, coulomb[name]) for name in group}
 
     def at(place: Place) -> dict[str, float]:
@@ -242,8 +244,8 @@ def _traded(
         reached, one = [at(place)[name] for place in walk.edges], wider[name]
         falls = [place for place in walk.gone if at(place)[name] < least[name]]
         slides = any(profile.beside(levels | at(place) | {name: 0.0}, place) <= lowest + limit for place in falls)
-        low, high = max(min(reached), coulomb[name]), max(reached)
-        tied = one.tied or slides
+        tied, low, high = one.tied or slides, max(min(reached), coulomb[name]), max(reached)
+        high = high if high < HIGHEST * coulomb[name] else np.inf
         wider[name] = replace(one, low=0.0 if tied else min(low, one.low), high=max(high, one.high), tied=tied)
 
 

@@ -17,11 +17,8 @@ from omnidyn.identification.output_error.trust.likely_levels import likely_level
 
 FIRST = (0.94, 0.97, 0.99, 0.997, 1.0, 1.003, 1.01, 1.03, 1.06)  # s to begin with, at q = 1
 LEAST, MOST = 0.005, 0.08  # steps of the logarithm of q
-ROW, NARROW, WIDER = (
-    9,
-    0.003,
-    1.5,
-)  # values of s at each q; how far they reach, and what that is of the last likely ones
+ROW = 9  # values of s at each q
+NARROW, WIDER = 0.003, 1.5  # how far they reach at least, and in shares of how far the last likely ones did
 ANEW = 0.02  # steps of q that are so small try twice as many, twice as far, before the ridge ends there
 
 
