@@ -151,7 +151,7 @@ def _filtered(
 
 def _moved(found: Solution, before: Point) -> float:
     """How far a fit has moved the number that it has moved furthest, in standard errors."""
-    std = np.sqrt(np.diag(_inverse(Normal(found.solver, found.state).information)))
+    std = np.sqrt(np.maximum(np.diag(_inverse(Normal(found.solver, found.state).information)), 0.0))
     moved = np.abs(found.solver.inner(found.state.point.values) - found.solver.inner(before.values))
     return float((moved[std > 0.0] / std[std > 0.0]).max(initial=0.0))
 
