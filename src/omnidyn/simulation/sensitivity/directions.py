@@ -36,6 +36,7 @@ class Directions(NamedTuple):
     aim: FloatArray  # (K, D) derivative of x*, i* and z*; D = 3 + n, and all elements and the plane where any bends
     middle: FloatArray  # (K, D) derivative at stage 1
     half: FloatArray  # (K, D) derivative after the first half step
+    rate: FloatArray  # (D,) derivative by time
     first: State  # ends of a piece of a half step
     last: State
     gained: FloatArray  # (3,) acceleration
@@ -84,7 +85,7 @@ def directions_of(
     return Directions(
         plants=own, stages=new_stage(own), arm=arm, voltage=rates, push=push,
         lift=np.zeros((3, 6)), held=np.zeros((2, 3), np.int64), point=np.zeros((5, 3)), aim=work[0], middle=work[1],
-        half=work[2], first=new_state(numbers),
+        half=work[2], rate=np.zeros(width(numbers)), first=new_state(numbers),
         last=new_state(numbers), gained=np.zeros(3), carry=np.zeros((3, n)),
         kept=work[3],
     )  # fmt: skip

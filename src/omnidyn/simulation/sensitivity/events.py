@@ -215,7 +215,7 @@ def _gap_beside(along, j, start, d, eps):
 @part
 def _later(plant, stage, along, start, acceleration):
     """Time derivative of phi while what is stuck in `start` still holds."""
-    own, rate = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.aim[0]
+    own, rate = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.rate
     m, each = len(plant.element), own.each
     _copy_problem(along, stage)
     put(own, start.each)
