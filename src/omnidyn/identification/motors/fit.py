@@ -35,12 +35,13 @@ from omnidyn.identification.output_error.fit import degrees
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.ends import at_the_end
-from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
+from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, WHITE, Trust, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run, as_list
 
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
+EDGE = 0.99  # of an input under which the motor rested
 FREE_RUN_INPUTS = ("voltage", "duty")
 
 
@@ -84,8 +85,23 @@ def fit_motor(
             fit = _with_rival(fit, answers[way])
     if fit.dead_band_seen:
         fit = _with_bend(fit, bend(found[chosen][0], found[chosen][1].state))
-    way = orientation_of(logs, motor)
-    return fit.bounded(turned_under(logs, motor, way=way), rested_under(logs, motor))
+    way, rested = orientation_of(logs, motor), rested_under(logs, motor)
+    if _told_by_an_edge(*found[chosen], rested):
+        blind = tuple(dict.fromkeys((*fit.unidentifiable, BAND)))
+        fit = replace(fit, std={**fit.std, BAND: float("nan")}, unidentifiable=blind)
+    return fit.bounded(turned_under(logs, motor, way=way), rested)
+
+
+def _told_by_an_edge(solver: Solver[MotorProblem], solution: Solution, rested: float) -> bool:
+    """Whether the dead band ended just below the largest input under which the motor rested, and beyond it no row tells
+    of it: below, those rows would turn, and only rounding says how far."""
+    point, at = solution.state.point, solver.problem.where(BAND)
+    if at < 0 or not EDGE * rested < point.values[at] <= rested:
+        return False
+    values = point.values.copy()
+    values[at] = rested / EDGE
+    beyond = replace(solution, state=solver.state(replace(point, values=values)))
+    return bool(trust(solver, beyond, WHITE).blind[at])
 
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
