@@ -78,7 +78,8 @@ def solved(fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[s
 
 def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
     """What a solution says, each estimate with its diagnosis, which is made when it is first asked for."""
-    solution = fit.settled_without(solution, progress)
+    if not solution.converged:
+        solution = fit.with_latencies_only(solution, progress) or solution
     try:
         answer = fit.answer(solution, progress, _MOVED_BY)
     except InsufficientDataError:

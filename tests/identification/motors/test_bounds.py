@@ -72,6 +72,7 @@ def test_a_free_run_at_one_speed_says_between_what():
     assert {"dead_band", "lag"} <= set(fit.unidentifiable)
     assert all(np.isnan(fit.std[name]) for name in ("dead_band", "lag", "inertia"))
     assert fit.ci95["dead_band"] == pytest.approx((0.35, 2.0))
+    assert fit.ci95["slope"][0] < 0.01  # that of a dead band just below 2 V; rounding had it at 0.37 on some processors
     assert "lag not determined" in fit.statement()
     assert "it is between 0.35 and 2 V, for it turned steadily under that" in fit.statement()
 

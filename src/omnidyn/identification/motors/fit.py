@@ -35,7 +35,7 @@ from omnidyn.identification.output_error.fit import degrees
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.ends import at_the_end
-from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, WHITE, Trust, trust
+from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run, as_list
@@ -76,7 +76,8 @@ def fit_motor(
     cost = {way: end.state.objective for way, (_, end) in found.items()}
     chosen = between if between != AUTO else min(cost, key=lambda way: cost[way])
     # rows of a refined log have no measured neighbours, so that auto would not see whether these resemble
-    known = {way: trust(*pair, SANDWICH if way == CURVE else AUTO) for way, pair in found.items()}
+    rested = rested_under(logs, motor)
+    known = {way: _trusted(*pair, SANDWICH if way == CURVE else AUTO, rested) for way, pair in found.items()}
     answers = {way: _answer(*pair, known[way], logs, motor, way) for way, pair in found.items()}
     fit = answers[chosen]
     rise = RISE * max(known[chosen].widening, 1.0) ** 2  # coloured residuals make every likelihood too steep
@@ -85,23 +86,22 @@ def fit_motor(
             fit = _with_rival(fit, answers[way])
     if fit.dead_band_seen:
         fit = _with_bend(fit, bend(found[chosen][0], found[chosen][1].state))
-    way, rested = orientation_of(logs, motor), rested_under(logs, motor)
-    if _told_by_an_edge(*found[chosen], rested):
-        blind = tuple(dict.fromkeys((*fit.unidentifiable, BAND)))
-        fit = replace(fit, std={**fit.std, BAND: float("nan")}, unidentifiable=blind)
-    return fit.bounded(turned_under(logs, motor, way=way), rested)
+    return fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), rested)
 
 
-def _told_by_an_edge(solver: Solver[MotorProblem], solution: Solution, rested: float) -> bool:
-    """Whether the dead band ended just below the largest input under which the motor rested, and beyond it no row tells
-    of it: below, those rows would turn, and only rounding says how far."""
-    point, at = solution.state.point, solver.problem.where(BAND)
+def _trusted(solver: Solver[MotorProblem], solution: Solution, kind: str, rested: float) -> Trust:
+    """How far a fit can be trusted, and where only an edge tells of the dead band, how far beyond that.
+
+    rested: the largest input under which the motor rested. Just below it rows at rest would turn, which looks like
+    information; above it, where they rest, no row of a run at one speed tells of the dead band.
+    """
+    known, point, at = trust(solver, solution, kind), solution.state.point, solver.problem.where(BAND)
     if at < 0 or not EDGE * rested < point.values[at] <= rested:
-        return False
+        return known
     values = point.values.copy()
     values[at] = rested / EDGE
-    beyond = replace(solution, state=solver.state(replace(point, values=values)))
-    return bool(trust(solver, beyond, WHITE).blind[at])
+    beyond = trust(solver, replace(solution, state=solver.state(replace(point, values=values))), kind)
+    return beyond if beyond.blind[at] else known
 
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:

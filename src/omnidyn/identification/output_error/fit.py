@@ -250,20 +250,10 @@ class Fit:
             progress = progress.aside(f"once more without {', '.join(lost)}")
         return replace(self._solve(group, group.problem(kept), progress), notes=notes)
 
-    def settled_without(self, found: Solution, progress: Progress) -> Solution:
-        """A fit that was cut short, made again with latencies only, where there are others that nobody asked for.
-
-        Numbers of the robot and automatic nuisances that trade never end: which of them is left is up to rounding.
-        """
-        plainer = None if found.converged else self.with_latencies_only(found, progress, "the fit does not settle")
-        return found if plainer is None else plainer
-
-    def with_latencies_only(
-        self, found: Solution, progress: Progress, why: str = "these logs tell no number of the robot"
-    ) -> Solution | None:  # fmt: skip
+    def with_latencies_only(self, found: Solution, progress: Progress) -> Solution | None:
         """The fit of one group without other automatic nuisances; None where there are none, or they were asked for.
 
-        Beside them the logs may tell no number of the robot at all. why: what to say of them.
+        Beside them the logs may tell no number of the robot at all, or trade them without end, until rounding decides.
         """
         names = _nuisances(found.solver.problem)
         lost = [name for name in names if name.partition(".")[0] != LATENCY]
@@ -271,7 +261,7 @@ class Fit:
             return None
         group = self.groups[0]
         plainer = self._solve(group, group.problem([name for name in names if name not in lost]), progress)
-        note = f"beside {' and '.join(lost)} {why}: not fitted"
+        note = f"beside {' and '.join(lost)} these logs do not settle the numbers of the robot: not fitted"
         return replace(plainer, notes=(*found.notes, note))
 
     def _solve(self, group: Group, problem: Problem, progress: Progress) -> Solution:

@@ -107,6 +107,7 @@ class _Profile:
         self.known: dict[float | Place, Solution] = {}
 
     def at(self, level: float | Place) -> Solution:
+        """The fit at a level, made once."""
         if level not in self.known:
             self.doing(f"fit {len(self.known) + 1}")
             start = self.point

@@ -73,7 +73,7 @@ def _outwards(
     cost: Callable[[Place], float], limit: float, inside: Callable[[Place], bool], start: _Row, way: float, walk: Walk,
 ) -> None:  # fmt: skip
     rows, step, most = [start], LEAST, min(start.cost) + limit
-    beyond: Place | None = None
+    beyond: list[Place] = []
     while step >= LEAST:
         q = float(rows[-1].q * np.exp(way * step))
         s, reach = _next(rows, q, most)
@@ -83,14 +83,14 @@ def _outwards(
             row = _row(cost, q, s, 2.0 * reach, 2 * ROW)
             most = min(most, min(row.cost) + limit)
         if row.likely(most) is None:
-            beyond, step = Place(q, s), 0.5 * step
+            beyond, step = [Place(q, row.s[0]), Place(q, row.s[-1])], 0.5 * step
             continue
-        beyond, step = None, min(2.0 * step, MOST)
+        beyond, step = [], min(2.0 * step, MOST)
         rows.append(row)
         if not inside(here := Place(q, row.middle(most)[0])):
             walk.gone.append(here)
             break
-    walk.edges.extend([] if beyond is None else [beyond])
+    walk.edges.extend(beyond)
     for row in rows:
         for k in row.likely(most) or ():
             walk.edges.extend(Place(row.q, row.s[j]) for j in (max(k - 1, 0), min(k + 1, len(row.s) - 1)))
