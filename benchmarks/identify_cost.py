@@ -16,6 +16,11 @@ import numpy as np
 import omnidyn
 from benchmarks.identify_log import cpu, fit_output_error
 from benchmarks.table import Table
+from benchmarks.wrong_worlds.kinds import by_name
+from benchmarks.wrong_worlds.log import logged, robot_of
+from benchmarks.wrong_worlds.remedies import FRICTION
+from benchmarks.wrong_worlds.score import drawn
+from omnidyn.identification.structure.missing.laws import TRACTION, slippery
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -128,28 +133,18 @@ def diagnosis(table: Table, _robot: Robot, _clean: Run) -> None:
     """What `lack_of_fit` costs, in fits of the log by the slowest engine that a candidate needs: where something is
     found that of wheels that slip. And by the slower of the robot's own and that of a turning frame, which asks more.
     """
-    from benchmarks.wrong_worlds.kinds import by_name
-    from benchmarks.wrong_worlds.log import logged, robot_of
-    from benchmarks.wrong_worlds.remedies import FRICTION
-    from benchmarks.wrong_worlds.score import drawn
-    from omnidyn.identification.structure.missing.laws import TRACTION, slippery
-
     by_slowest, by_implicit, slow = [], [], []
     for name in DIAGNOSED:
         for number in range(2):
             case, seed, _ = drawn(by_name(name), number)
             log, robot = logged(case, seed), robot_of(case.told)
-            began = time.process_time()
-            fit = omnidyn.identify(log, robot, free=FRICTION)
-            own = time.process_time() - began
-            found = bool(fit.lack_of_fit and fit.lack_of_fit.found)
-            asked = time.process_time() - began - own
+            own, asked, found = _diagnosed(log, robot)
             turning = robot.replace(body=robot.body.replace(rotating_frame=True))
             implicit = max(own, _spent(log, turning, FRICTION))
             by_implicit.append(asked / implicit)
             slowest = implicit
             if found:
-                slow.append(_spent(log, slippery(robot, GRIP), (*FRICTION, TRACTION)))
+                slow.append(_spent(log, slippery(robot, GRIP), (*FRICTION, TRACTION), 1))  # the diagnosis compiled it
                 slowest = max(implicit, slow[-1])
             by_slowest.append(asked / slowest)
     worst = max(by_slowest)
@@ -164,8 +159,24 @@ def diagnosis(table: Table, _robot: Robot, _clean: Run) -> None:
         )
 
 
-def _spent(log: Run, robot: Robot, free: Sequence[str]) -> float:
-    """Processor time of a fit [s]."""
-    began = time.process_time()
-    omnidyn.identify(log, robot, free=free)
-    return time.process_time() - began
+def _diagnosed(log: Run, robot: Robot) -> tuple[float, float, bool]:
+    """Processor time of a fit and of its diagnosis [s], the less of two, as the first compiles; what it found."""
+    spent = []
+    for _ in range(2):
+        began = time.process_time()
+        fit = omnidyn.identify(log, robot, free=FRICTION)
+        fitted = time.process_time()
+        found = bool(fit.lack_of_fit and fit.lack_of_fit.found)
+        spent.append((fitted - began, time.process_time() - fitted))
+    own, asked = (min(each) for each in zip(*spent, strict=True))
+    return own, asked, found
+
+
+def _spent(log: Run, robot: Robot, free: Sequence[str], times: int = 2) -> float:
+    """Processor time of a fit [s], the least of some."""
+    spent = []
+    for _ in range(times):
+        began = time.process_time()
+        omnidyn.identify(log, robot, free=free)
+        spent.append(time.process_time() - began)
+    return min(spent)

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from benchmarks.wrong_worlds.kinds import by_name
+from benchmarks.wrong_worlds.log import logged, right_case, robot_of
+from omnidyn.identification.lack_of_fit import LOSS
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.prepare import EXACT, make_engine
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.linear import Rows
-from omnidyn.identification.structure.tails import as_counted
+from omnidyn.identification.structure.tails import as_counted, sprinkled
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -111,3 +114,27 @@ def test_quantised_speeds_have_none():
     run = log(np.random.default_rng(4).normal(size=CLEAN.twist.shape) * NOISE)
     rounded = Run(t=run.t, voltage=run.voltage, twist=np.round(run.twist / step) * step, source="log")
     assert not fit_output_error(rounded, AXEBOT, nuisances=()).lack_of_fit.wild
+
+
+def test_samples_that_a_wrong_model_leaves_far_out_are_not_wild():
+    """Of a load put on within the log, by the simulator of wrong_worlds: a hundred samples beyond five deviations, all
+    where the robot speeds up or slows down. Student's t, which counts them little, hid the load."""
+    seed = 136_000
+    case = by_name("payload").make(right_case(seed), 2.7)
+    lack = fit_output_error(logged(case, seed), robot_of(case.told), free=("friction",)).lack_of_fit
+    assert lack.found
+    assert not lack.wild
+    assert LOSS not in [remedy.key for remedy in lack.remedies]
+
+
+def test_samples_far_out_are_sprinkled_where_they_come_one_by_one_whatever_the_robot_does():
+    rng, n, near = np.random.default_rng(7), 3000, 50.0
+    change = rng.random(n)
+    scattered = np.zeros(n, dtype=bool)
+    scattered[rng.choice(n, 40, replace=False)] = True
+    bursts = np.zeros(n, dtype=bool)
+    bursts[(rng.choice(n // 300, 8, replace=False)[:, None] * 300 + np.arange(0, 20, 4)).ravel()] = True
+    assert sprinkled(scattered, change, near)
+    assert not sprinkled(bursts, change, near)
+    assert not sprinkled(scattered, change + scattered, near)  # where the motion changes most
+    assert not sprinkled(np.arange(n) < 3, change, near)  # one, of three rows

@@ -86,7 +86,7 @@ def examine(solution: Solution) -> Examined:
     levels = noise_levels(seen.linear, moved, solver.nu > 0.0)
     found = found or bool(levels.beyond)
     channels = levels.channels(dict(zip(names, seen.shares.tolist(), strict=True)))
-    wild = {} if solver.nu else wild_samples(seen)
+    wild = {} if solver.nu else wild_samples(seen, moved)
     pictures = binned(rows, moved, int(np.argmax([*channels.values()]))) if found else ()
     lack = LackOfFit(
         found, channels, levels.sizes(_sizes(seen, names)), seen.found, (*told, *calmer(seen, wild)), seen.tested,

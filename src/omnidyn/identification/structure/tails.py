@@ -1,7 +1,9 @@
 """Heavy tails: a few wild samples that hold much of the squares of residuals, which normal noise does not.
 
-They are no misfit of the model. What makes up for them is a loss that counts them little, Student's t: a remedy by what
-held-out blocks gain, which Huber's loss measures, as the square of a wild sample would drown every gain.
+They are no misfit of the model: they come one by one, whatever the robot does. What makes up for them is a loss that
+counts them little, Student's t: a remedy by what held-out blocks gain, which Huber's loss measures, as the square of a
+wild sample would drown every gain. Samples that are far out one after another, or where the robot speeds up or slows
+down most, are what a wrong model leaves, and a loss that counts them little would hide it.
 """
 
 from __future__ import annotations
@@ -9,8 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
+from scipy.special import bdtrc
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
 from omnidyn.identification.output_error.fit import NU
 from omnidyn.identification.output_error.kernel.of_rows import row_terms
@@ -19,34 +23,68 @@ from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.linear import solved
 from omnidyn.identification.structure.misfit import Misfit
 from omnidyn.identification.structure.missing.remedies import Blocks
+from omnidyn.identification.structure.motion import Motion
+from omnidyn.model.mass import mass_matrix
 from omnidyn.statistics import HUBER_CLIP, huber_loss, robust_std
 
 BEYOND = 5.0  # robust standard deviations: of normal noise one sample in two million is so far out
 LEAST, HELD = 3, 0.1  # samples, and their share of the squares, from which they are worth a word
+ONE, NEAR = 2, 0.5  # rows within which samples far out are one; [s] in which an error of the motion dies away
+AFTER, LOUD = 0.05, 0.25  # [s] in which a change of the motion shows in a sample; share of the rows with the largest
+SPRINKLED = 0.01  # chance of so many of them near each other, or among those, from which they come at random
 ROUNDS = 20  # of weights and fit in turn
 
 
-def wild_samples(seen: Misfit) -> dict[str, Wild]:
+def wild_samples(seen: Misfit, moved: Sequence[Motion]) -> dict[str, Wild]:
     """Output -> its wild samples, where there are some: in what is left beside all that residuals follow, made white.
 
-    F. R. Hampel's rule with the median absolute deviation, J. Am. Stat. Assoc. 69, 383 (1974).
+    F. R. Hampel's rule with the median absolute deviation, J. Am. Stat. Assoc. 69, 383 (1974), where they are
+    sprinkled at random over the rows.
     """
-    linear, rows = seen.linear, seen.linear.rows
-    series: dict[int, list[np.ndarray]] = {}
+    linear, rows, change = seen.linear, seen.linear.rows, [_change(motion) for motion in moved]
+    series: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
     for k, columns in enumerate(rows.column):
         left = rows.residual[k] - seen.explained[k]
         for j, c in enumerate(columns):
-            series.setdefault(c, []).append(linear.of_column(k, j, left[j][:, None])[:, 0])
-    found = {}
+            new = linear.of_column(k, j, left[j][:, None])[:, 0]
+            series.setdefault(c, []).append((new, change[k][rows.there[k][j]]))
+    found, near = {}, NEAR / float(np.median([np.median(np.diff(motion.t)) for motion in moved]))
     for c, pieces in series.items():
-        new = np.concatenate(pieces)
+        new, by = (np.concatenate(each) for each in zip(*pieces, strict=True))
         scale = float(robust_std(new, 0.0)) if new.size else 0.0
         out = np.abs(new) > BEYOND * scale
         held = float((new[out] ** 2).sum() / max((new**2).sum(), 1e-300))
-        if scale > 0.0 and out.sum() >= LEAST and held > HELD:
+        if scale > 0.0 and out.sum() >= LEAST and held > HELD and sprinkled(out, by, near):
             name, i = rows.problem.columns[c]
             found[f"{name}[{i}]"] = Wild(float(out.mean()), held)
     return found
+
+
+def _change(motion: Motion) -> FloatArray:
+    """How much the motion changes about each row (n,): the largest change over a row, in kinetic energy."""
+    step = np.diff(motion.twist, axis=0, prepend=motion.twist[:1])
+    energy = np.einsum("ni,ij,nj->n", step, mass_matrix(motion.robot), step)
+    about = 1 + 2 * round(AFTER / float(np.median(np.diff(motion.t))))
+    return np.asarray(maximum_filter1d(energy, about, mode="nearest"))
+
+
+def sprinkled(out: BoolArray, change: FloatArray, near: float) -> bool:
+    """Whether some rows come at random: one by one, not in bursts, and not where the motion changes most.
+
+    near: rows in which an error of the motion dies away.
+    """
+    at = np.flatnonzero(out)
+    gaps = np.diff(at)
+    apart, gaps = at[np.append(True, gaps > ONE)], gaps[gaps > ONE]
+    loud = change > np.quantile(change, 1.0 - LOUD)
+    by_chance = 1.0 - (1.0 - len(apart) / len(out)) ** (near - ONE)
+    chances = _chance(loud[apart], float(loud.mean())), _chance(gaps <= near, by_chance)
+    return len(apart) >= LEAST and min(chances) > SPRINKLED
+
+
+def _chance(true: BoolArray, share: float) -> float:
+    """Of as many that are true, where each is with a chance `share`."""
+    return float(bdtrc(int(true.sum()) - 1, len(true), share)) if true.any() else 1.0
 
 
 def calmer(seen: Misfit, wild: Mapping[str, Wild]) -> tuple[Remedy, ...]:

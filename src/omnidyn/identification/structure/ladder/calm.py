@@ -1,4 +1,4 @@
-"""The first step where samples are wild: a fit that counts them little, before any other, for they hide causes."""
+"""A step where samples are wild: a fit that counts them little, before any other, for they hide causes."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from omnidyn.run import Run
 
 
 def calmed(
-    stands: Model, seen: Mapping[str, Examined], runs: Sequence[Run], names: Sequence[str] | None, progress: Progress
-) -> tuple[Model, list[Rung]]:
-    """(the model to go on from, the rungs): of Student's t where that predicts better, by more than a standard error,
-    what is not wild; as it stands, and no rungs, where no sample is wild. It counts as no number of the fit."""
+    step: int, stands: Model, seen: Mapping[str, Examined], runs: Sequence[Run], names: Sequence[str] | None,
+    progress: Progress,
+) -> tuple[Model, list[Rung]]:  # fmt: skip
+    """(the model to go on from, the rungs of a step): of Student's t where that predicts better, by more than a
+    standard error, what is not wild; as it stands, and no rungs, where no sample is wild. It counts as no number of
+    the fit."""
     own = {
         group: remedy for group, each in seen.items() for remedy in each.diagnosis.lack_of_fit.remedies
         if remedy.key == LOSS
@@ -30,13 +32,13 @@ def calmed(
     best = max(own.values(), key=lambda remedy: remedy.gain - remedy.gain_std)
     made = tried(Move(dict.fromkeys(stands.begins, best)), stands, runs, names, progress)[0]
     count, nothing = len(stands.value), np.nan
-    rung = Rung(1, LOSS, best.words, count, nothing, best.gain, best.gain_std, nothing)
-    first = Rung(0, "", STANDS, count, nothing, taken=True, value=stands.value)
+    rung = Rung(step, LOSS, best.words, count, nothing, best.gain, best.gain_std, nothing)
+    first = [Rung(0, "", STANDS, count, nothing, taken=True, value=stands.value)] if step == 1 else []
     if isinstance(made, Model) and unexplained(made.solution.solver, made.solution):
         return stands, []
     if not isinstance(made, Model):
-        return stands, [first, replace(rung, why=made.why)]
+        return stands, [*first, replace(rung, why=made.why)]
     if not best.gain > best.gain_std:
-        return stands, [first, replace(rung, why="predicts what it was not fitted to no better", value=made.value)]
+        return stands, [*first, replace(rung, why="predicts what it was not fitted to no better", value=made.value)]
     taken = replace(rung, why="pays", value=made.value, taken=True)
-    return replace(made, before=None), [first, taken]
+    return replace(made, before=None), [*first, taken]

@@ -6,7 +6,8 @@ of friction, a usual fall, a limit; and, once it has found the best, the same wi
 predict blocks of the logs which they were not fitted to better than what stands, by more than a standard error, and
 that BIC prefers though they are the best of many, the simplest within a standard error of the best is taken, unless BIC
 prefers the best by far. Then the fit is diagnosed again. What no robot file holds is never taken; nor is what explains
-less than such a cause would. Before all this, where samples are wild, is a loss that bears them.
+less than such a cause would. Before all this, where samples are wild, is a loss that bears them; and so it is later,
+where only what is left beside a cause shows them.
 """
 
 from __future__ import annotations
@@ -52,20 +53,24 @@ def climb(
 ) -> tuple[Fit, Solution, Ladder]:
     """The best fit of some runs, its solution, and the way to it. fit, solution: of the robot as it was given. names:
     of the group of each run, where there are groups."""
-    given = Model.first(fit, solution)
-    seen: dict[str, Examined] | None = _examined(given)
-    stands, rungs = calmed(given, seen, runs, names, progress)
-    seen, begin = (seen, 1) if stands is given else (None, 2)
+    stands, rungs, calm = Model.first(fit, solution), list[Rung](), False
+    seen: dict[str, Examined] | None = None
 
     def fits(move: Move, before: Model, instead: str) -> list[Model | Untried]:
         return tried(move, before, runs, names, progress, instead)
 
-    purse = Purse()
-    for step in range(begin, begin + STEPS):
-        if unexplained(stands.solution.solver, stands.solution):
-            return _ended(stands, rungs, MEND)
+    purse, step, most = Purse(), 0, STEPS
+    while (step := step + 1) <= most:
         progress.doing(f"step {step} of the ladder: looking for what the model leaves out")
         seen = seen or _examined(stands)
+        if not calm:
+            made, found = calmed(step, stands, seen, runs, names, progress)
+            rungs, calm = [*rungs, *found], bool(found)
+            if made is not stands:
+                stands, seen, most = made, None, most + 1
+                continue
+        if unexplained(stands.solution.solver, stands.solution):
+            return _ended(stands, rungs, MEND)
         lacks = _lacks(seen)
         if not lacks:
             return _ended(stands, rungs, "the residuals hold nothing but noise")
