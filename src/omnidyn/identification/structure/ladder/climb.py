@@ -41,7 +41,8 @@ from omnidyn.run import Run
 
 STEPS = 4  # at most
 TRIED = 3  # remedies that are fitted in a step
-TOLD_APART, ROUGHLY = 6.0, 0.05  # of BIC, from which one of two models is the better one; of a first step's chi squared
+TOLD_APART = 10.0  # of BIC, from which one of two models is the better one: very strong (Kass & Raftery, 1995)
+ROUGHLY = 0.05  # of a first step's chi squared, which is that rough
 MEND = "the model does not follow the logs: first mend signs, units, the order of wheels, dead sensors"
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
 BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
@@ -109,8 +110,8 @@ def _climbed(
 
 
 def _examined(model: Model) -> dict[str, Examined]:
-    """What a model leaves out, of each group."""
-    return {group: examine(alone) for group, alone in model.alone.items()}
+    """What a model leaves out, of each group, as its answer would say."""
+    return {group: examine(alone) for group, alone in model.answered().items()}
 
 
 def _lacks(seen: Mapping[str, Examined]) -> dict[str, LackOfFit]:
