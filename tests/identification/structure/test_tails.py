@@ -137,4 +137,15 @@ def test_samples_far_out_are_sprinkled_where_they_come_one_by_one_whatever_the_r
     assert sprinkled(scattered, change, near)
     assert not sprinkled(bursts, change, near)
     assert not sprinkled(scattered, change + scattered, near)  # where the motion changes most
+    assert not sprinkled(scattered & (change > 0.5), change, near)  # never where it hardly does
     assert not sprinkled(np.arange(n) < 3, change, near)  # one, of three rows
+
+
+def test_bursts_in_one_output_are_the_cause_of_what_is_far_out_in_the_others():
+    rng = np.random.default_rng(8)
+    noise = rng.normal(size=CLEAN.twist.shape) * NOISE
+    noise[:, 0] *= np.where(rng.random(len(noise)) < 0.02, 30.0, 1.0)
+    assert set(fit_output_error(log(noise), AXEBOT, nuisances=()).lack_of_fit.wild) == {"twist[0]"}
+    for start in range(200, 3000, 400):
+        noise[start : start + 40 : 4, 1] *= 30.0
+    assert not fit_output_error(log(noise), AXEBOT, nuisances=()).lack_of_fit.wild

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 from scipy.special import bdtrc
+from scipy.stats import mannwhitneyu
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
@@ -30,16 +31,16 @@ from omnidyn.statistics import HUBER_CLIP, huber_loss, robust_std
 BEYOND = 5.0  # robust standard deviations: of normal noise one sample in two million is so far out
 LEAST, HELD = 3, 0.1  # samples, and their share of the squares, from which they are worth a word
 ONE, NEAR = 2, 0.5  # rows within which samples far out are one; [s] in which an error of the motion dies away
-AFTER, LOUD = 0.05, 0.25  # [s] in which a change of the motion shows in a sample; share of the rows with the largest
-SPRINKLED = 0.01  # chance of so many of them near each other, or among those, from which they come at random
+AFTER = 0.05  # [s] in which a change of the motion shows in a sample
+SPRINKLED = 0.01  # chance of so many of them near each other, or where it changes so much, from which they are random
 ROUNDS = 20  # of weights and fit in turn
 
 
 def wild_samples(seen: Misfit, moved: Sequence[Motion]) -> dict[str, Wild]:
     """Output -> its wild samples, where there are some: in what is left beside all that residuals follow, made white.
 
-    F. R. Hampel's rule with the median absolute deviation, J. Am. Stat. Assoc. 69, 383 (1974), where they are
-    sprinkled at random over the rows.
+    F. R. Hampel's rule with the median absolute deviation, J. Am. Stat. Assoc. 69, 383 (1974), where those of every
+    output are sprinkled at random over its rows: else they are of one cause, and none is wild.
     """
     linear, rows, change = seen.linear, seen.linear.rows, [_change(motion) for motion in moved]
     series: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
@@ -54,7 +55,9 @@ def wild_samples(seen: Misfit, moved: Sequence[Motion]) -> dict[str, Wild]:
         scale = float(robust_std(new, 0.0)) if new.size else 0.0
         out = np.abs(new) > BEYOND * scale
         held = float((new[out] ** 2).sum() / max((new**2).sum(), 1e-300))
-        if scale > 0.0 and out.sum() >= LEAST and held > HELD and sprinkled(out, by, near):
+        if scale > 0.0 and out.sum() >= LEAST and held > HELD:
+            if not sprinkled(out, by, near):
+                return {}
             name, i = rows.problem.columns[c]
             found[f"{name}[{i}]"] = Wild(float(out.mean()), held)
     return found
@@ -69,22 +72,20 @@ def _change(motion: Motion) -> FloatArray:
 
 
 def sprinkled(out: BoolArray, change: FloatArray, near: float) -> bool:
-    """Whether some rows come at random: one by one, not in bursts, and not where the motion changes most.
+    """Whether some rows come at random: one by one, not in bursts, and not where the motion changes more.
 
-    near: rows in which an error of the motion dies away.
+    near: rows in which an error of the motion dies away. H. B. Mann and D. R. Whitney, Ann. Math. Stat. 18, 50 (1947).
     """
     at = np.flatnonzero(out)
     gaps = np.diff(at)
     apart, gaps = at[np.append(True, gaps > ONE)], gaps[gaps > ONE]
-    loud = change > np.quantile(change, 1.0 - LOUD)
+    if len(apart) < LEAST:
+        return False
     by_chance = 1.0 - (1.0 - len(apart) / len(out)) ** (near - ONE)
-    chances = _chance(loud[apart], float(loud.mean())), _chance(gaps <= near, by_chance)
-    return len(apart) >= LEAST and min(chances) > SPRINKLED
-
-
-def _chance(true: BoolArray, share: float) -> float:
-    """Of as many that are true, where each is with a chance `share`."""
-    return float(bdtrc(int(true.sum()) - 1, len(true), share)) if true.any() else 1.0
+    close = int((gaps <= near).sum())
+    bursts = float(bdtrc(close - 1, len(gaps), by_chance)) if close else 1.0
+    rises = float(mannwhitneyu(change[apart], change[~out], alternative="greater").pvalue)
+    return min(bursts, rises) > SPRINKLED
 
 
 def calmer(seen: Misfit, wild: Mapping[str, Wild]) -> tuple[Remedy, ...]:
