@@ -30,6 +30,8 @@ WHERE = {  # how a log shows its noise, and what is said of more than that
     ROUNDING: ("is rounded within", "misfit, or noise beside what the encoder rounds"),
     REST: ("scatters at rest by", "misfit, or noise that comes of motion"),
 }  # fmt: skip
+NOTHING = "hold nothing but noise"
+DRIFTS = "the errors last about as long as the logs: no test tells them from what the model leaves out; log for longer"
 UNTOLD = "this log cannot tell its noise from misfit: repeat a command, or let the robot rest for a second"
 FAR = 0.001, 0.1  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
 WORTH = 0.01  # share of the variance of a residual that is worth a line
@@ -169,7 +171,8 @@ class LackOfFit:
     noise: of outputs whose noise the log shows without the model, by the best source; None where that was not asked.
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
     rounded: output -> share of the variance of its residuals that is what the inputs were rounded by, which is no lack
-    of fit, but hides one that is smaller.
+    of fit, but hides one that is smaller. drifts: whether errors last about as long as the logs, so that no test tells
+    them from a misfit.
     """
 
     found: bool
@@ -184,6 +187,7 @@ class LackOfFit:
     beyond: tuple[str, ...] = ()
     at_rest: Mapping[str, Noise] = field(default_factory=dict)
     rounded: Mapping[str, float] = field(default_factory=dict)
+    drifts: bool = False
 
     @property
     def causes(self) -> tuple[Remedy, ...]:
@@ -193,7 +197,7 @@ class LackOfFit:
     def words(self) -> str:
         """In a sentence, "" for a model that fits."""
         if not self.found:
-            return ""
+            return DRIFTS if self.drifts else ""
         worst = max(self.channels, key=lambda name: self.channels[name], default="")
         share = f" ({100.0 * self.channels[worst]:.0f} % of the residual of {worst} is no noise)" if worst else ""
         what = all_of([each.theme for each in self.follows[:2]])
@@ -241,8 +245,8 @@ class LackOfFit:
     def statements(self) -> list[str]:
         """What was found, a sentence each."""
         if not self.found:
-            calm = "follow nothing that a model should know" if self._beyond_rest() else "hold nothing but noise"
-            return [f"the residuals {calm}, as far as these logs tell", *self._levels(), *self._tails()]
+            calm = "follow nothing that a model should know" if self._beyond_rest() else NOTHING
+            return [self.words() or f"the residuals {calm}, as far as these logs tell", *self._levels(), *self._tails()]
         shares = [
             f"{name}: {self.sizes[name]:.2g} of its residual is no noise, {100.0 * share:.0f} % of the variance"
             for name, share in self.channels.items() if share >= WORTH
@@ -311,6 +315,7 @@ class LackOfFit:
             "noise": {name: asdict(each) for name, each in (self.noise or {}).items()},
             "beyond_noise": self.beyond,
             "at_rest": {name: asdict(each) for name, each in self.at_rest.items()}, "rounded_inputs": self.rounded,
+            "drifts": self.drifts,
         })  # fmt: skip
 
 

@@ -52,7 +52,7 @@ def fits_verdict(
 def _led_by_misfit(fit: OutputErrorEstimate, words: str) -> str:
     """The verdict of a fit, led by what it leaves out."""
     lack = fit.lack_of_fit
-    if lack is not None and lack.found and not fit.not_followed:
+    if lack is not None and lack.words() and not fit.not_followed:
         return f"{sentence(lack.words())} {words}"
     return words
 

@@ -9,11 +9,12 @@ from scipy.integrate import cumulative_simpson
 from scipy.signal import lfilter
 
 from benchmarks.wrong_worlds.kinds import by_name
-from benchmarks.wrong_worlds.log import COUNTS, logged, robot_of
+from benchmarks.wrong_worlds.log import COUNTS, logged, right_case, robot_of
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.score import drawn
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.identification.structure.rounding import of_rounding
+from omnidyn.identification.verdict import fits_verdict
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -35,6 +36,21 @@ def remembered(rho, seed):
 def test_a_memory_alone_is_no_lack_of_fit(rho):
     found = [fit_output_error(remembered(rho, seed), AXEBOT, nuisances=()).lack_of_fit.found for seed in (7, 8, 9)]
     assert not any(found)
+
+
+def test_errors_that_last_as_long_as_the_log_are_not_called_noise():
+    """Friction at the wheels under a file with a box, by counts: a Coulomb level of 0 where it is 4.1 N, angles 1 rad
+    off, and errors that an autoregression takes for a drift of twenty logs. Nothing is found, and that is said."""
+    seed = 142_004
+    case = by_name("wheels").make(right_case(seed), 0.00638747)
+    fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
+    lack = fit.lack_of_fit
+    assert fit.value["friction.axes.coulomb[1]"] < 0.5
+    assert not lack.found
+    assert lack.drifts
+    assert lack.to_dict()["drifts"]
+    assert "no test tells them from what the model leaves out" in lack.statements()[0]
+    assert fits_verdict({"": fit}, {}).startswith("The errors last about as long as the logs")
 
 
 def test_how_well_the_power_of_slow_errors_is_known_follows_from_the_memory():

@@ -34,6 +34,7 @@ from omnidyn.identification.structure.tails import as_counted, calmer, wild_samp
 from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.known.holding import holding
 
+SURE = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
 MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
 
 
@@ -91,7 +92,7 @@ def examine(solution: Solution) -> Examined:
     lack = LackOfFit(
         found, channels, levels.sizes(_sizes(seen, names)), seen.found, (*told, *calmer(seen, wild)), seen.tested,
         pictures, wild, levels.noise, levels.beyond, levels.at_rest,
-        dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {},
+        dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {}, seen.linear.degrees < SURE,
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear.plain, bench), stable)
     return Examined(diagnosis, memory, len(tried), count)

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.document import all_of
-from omnidyn.identification.lack_of_fit import LOSS, UNOFFERED, LackOfFit, Remedy
+from omnidyn.identification.lack_of_fit import DRIFTS, LOSS, NOTHING, UNOFFERED, LackOfFit, Remedy
 from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import WHOLE
 from omnidyn.identification.output_error.conclusion import unexplained
@@ -74,7 +74,8 @@ def climb(
             return _ended(stands, rungs, MEND)
         lacks = _lacks(seen)
         if not lacks:
-            return _ended(stands, rungs, "the residuals hold nothing but noise")
+            drifts = any(each.diagnosis.lack_of_fit.drifts for each in seen.values())
+            return _ended(stands, rungs, DRIFTS if drifts else f"the residuals {NOTHING}")
         found, best, after = _climbed(step, stands, seen, lacks, fits, purse)
         rungs += [rung for rung in found if rung.step or not rungs]
         rungs += [_untried(step, each) for each in purse.told()]
