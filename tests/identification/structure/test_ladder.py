@@ -16,7 +16,6 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.climb import offered
 from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
-from omnidyn.identification.structure.ladder.models import Model
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot, save_robot
 from omnidyn.report.fit_page import render_fit
@@ -49,20 +48,6 @@ def test_a_right_world_takes_no_step():
     assert plain.ladder is None
     assert estimate.value == plain.value
     assert "ladder" not in plain.to_dict()
-
-
-def test_it_looks_at_what_the_answer_says():
-    """A fit that counts errors as white, and one that knows their memory, leave out different things."""
-    case = by_name("mass").make(right_case(SEED).setup_but(sensor=SPEEDS, memory=0.9), 0.3)
-    run, robot = logged(case, SEED), robot_of(case.told)
-    fit = Fit.of(run, robot, Question(free=FREE))
-    model = Model.first(fit, fit.solve())
-    plain = fit_output_error(run, robot, free=FREE)
-    (seen,) = model.answered().values()
-    assert "autoregressive" in plain.method
-    values = dict(zip(seen.solver.problem.names, seen.state.point.values.tolist(), strict=True))
-    assert {name: values[name] for name in plain.value} == plain.value
-    assert {name: model.value[name] for name in plain.value} != pytest.approx(plain.value, rel=1e-3)
 
 
 @pytest.mark.parametrize(

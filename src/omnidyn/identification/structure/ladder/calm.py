@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from omnidyn.identification.lack_of_fit import LOSS
+from omnidyn.identification.lack_of_fit import LOSS, LackOfFit
 from omnidyn.identification.ladder import STANDS, Rung
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.solve.progress import Progress
@@ -21,11 +21,11 @@ def calmed(
     progress: Progress,
 ) -> tuple[Model, list[Rung]]:  # fmt: skip
     """(the model to go on from, the rungs of a step): of Student's t where that predicts better, by more than a
-    standard error, what is not wild; as it stands, and no rungs, where no sample is wild. It counts as no number of
-    the fit."""
+    standard error, what is not wild; as it stands, and no rungs, where no sample is wild, or a cause gains more.
+    It counts as no number of the fit."""
     own = {
         group: remedy for group, each in seen.items() for remedy in each.diagnosis.lack_of_fit.remedies
-        if remedy.key == LOSS
+        if remedy.key == LOSS and remedy.gain > _best_cause(each.diagnosis.lack_of_fit)
     }  # fmt: skip
     if not own:
         return stands, []
@@ -42,3 +42,8 @@ def calmed(
         return stands, [*first, replace(rung, why="predicts what it was not fitted to no better", value=made.value)]
     taken = replace(rung, why="pays", value=made.value, taken=True)
     return replace(made, before=None), [*first, taken]
+
+
+def _best_cause(lack: LackOfFit) -> float:
+    """What the best cause of a misfit gains in held-out error; minus infinity where there is none."""
+    return max((remedy.gain for remedy in lack.causes if lack.found and remedy.offered), default=-np.inf)

@@ -111,8 +111,8 @@ def _climbed(
 
 
 def _examined(model: Model) -> dict[str, Examined]:
-    """What a model leaves out, of each group, as its answer would say."""
-    return {group: examine(alone) for group, alone in model.answered().items()}
+    """What a model leaves out, of each group. Of the fit that counts errors as white: a memory takes up slips."""
+    return {group: examine(alone) for group, alone in model.alone.items()}
 
 
 def _lacks(seen: Mapping[str, Examined]) -> dict[str, LackOfFit]:
