@@ -70,6 +70,17 @@ def test_what_is_missing_is_switched_on_and_then_nothing_is(name, size, key):
     assert held(estimate, true) >= 5
 
 
+def test_no_ladder_ends_calm_on_a_fit_that_its_answer_finds_wrong():
+    """Of counts: a fit that takes errors for white leaves drifts, and what looks wild; one that knows their memory
+    finds the forces of a turning frame, as the answer without the ladder does."""
+    seed = 134_004
+    case = by_name("turning frame").make(right_case(seed), 0.39462)
+    run, robot = logged(case, seed), robot_of(case.told)
+    assert fit_output_error(run, robot, free=FREE).lack_of_fit.causes[0].key == "body.rotating_frame"
+    best = fit_output_error(run, robot, free=FREE, ladder=True)
+    assert [rung.key for rung in best.ladder.taken] == ["body.rotating_frame"]
+
+
 def test_the_robot_that_is_written_is_the_fitted_one(tmp_path):
     estimate, _ = climbed("turning frame", 1.0)
     save_robot(estimate.robot, tmp_path / "robot.toml")

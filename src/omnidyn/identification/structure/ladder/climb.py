@@ -111,8 +111,10 @@ def _climbed(
 
 
 def _examined(model: Model) -> dict[str, Examined]:
-    """What a model leaves out, of each group. Of the fit that counts errors as white: a memory takes up slips."""
-    return {group: examine(alone) for group, alone in model.alone.items()}
+    """What a model leaves out, of each group. Of the fit that counts errors as white, for a memory takes up slips; and
+    where that finds nothing, as its answer would say: no ladder ends calm on a fit that its answer finds wrong."""
+    seen = {group: examine(alone) for group, alone in model.alone.items()}
+    return seen if _lacks(seen) else {group: examine(alone) for group, alone in model.answered().items()}
 
 
 def _lacks(seen: Mapping[str, Examined]) -> dict[str, LackOfFit]:

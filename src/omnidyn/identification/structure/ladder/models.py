@@ -106,10 +106,17 @@ class Model:
     @cached_property
     def alone(self) -> dict[str, Solution]:
         """What the solution is for each group."""
-        engine = self.solution.solver.engine
+        return self._alone(self.solution)
+
+    def answered(self) -> dict[str, Solution]:
+        """The same where an answer has it: fitted once more where errors remember."""
+        return self._alone(self.fit.weighed(self.solution).plain)
+
+    def _alone(self, solution: Solution) -> dict[str, Solution]:
+        engine = solution.solver.engine
         if not isinstance(engine, JointEngine):
-            return {self.fit.groups[0].name: self.solution}
-        return {member.name: engine.alone(member, self.solution) for member in engine.members}
+            return {self.fit.groups[0].name: solution}
+        return {member.name: engine.alone(member, solution) for member in engine.members}
 
     def robot(self, group: str) -> Robot:
         """The fitted robot of a group."""
