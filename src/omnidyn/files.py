@@ -163,10 +163,18 @@ def read_bytes(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> byte
     with open_regular(path) as stream:
         content = stream.read(max_bytes + 1)
     if not content:
-        raise InputError("the file is empty", got="0 bytes", where=str(path))
+        raise empty(path)
     if len(content) > max_bytes:
         raise too_large(path, max_bytes)
     return content
+
+
+def empty(path: object) -> InputError:
+    """For a file that holds nothing."""
+    return InputError(
+        "the file is empty", got="0 bytes", expected="a file with content", remedy="copy or make it once more",
+        where=str(path)
+    )  # fmt: skip
 
 
 def too_large(path: str | os.PathLike, max_bytes: int, remedy: str = "") -> InputError:

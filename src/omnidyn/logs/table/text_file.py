@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from omnidyn.errors import InputError
-from omnidyn.files import file_format, growth, open_regular, text_format, too_large
+from omnidyn.files import empty, file_format, growth, open_regular, text_format, too_large
 
 BLOCK_BYTES = 2**20
 SHOWN_BYTES = 8  # of a file that is no text
@@ -102,7 +102,7 @@ class TextFile:
                     self._progress(done, total)
             self.notes += growth(stream, total)
         if not done:
-            raise InputError("the file is empty", got="0 bytes", where=self.source)
+            raise empty(self.source)
 
     def _refuse_format(self, start: bytes) -> None:
         kind = file_format(start)
