@@ -70,6 +70,23 @@ def test_a_cause_that_wild_samples_hide_is_found_behind_them():
     assert fit_output_error(run, light, nuisances=(), loss="student-t").lack_of_fit.found
 
 
+@pytest.mark.long
+def test_the_loss_is_tried_where_the_cause_that_gains_more_does_not_pay():
+    """Another floor halfway, which no robot file holds, among wild samples: the fit bears them all the same."""
+    case = by_name("floor").make(right_case(91), 0.5)
+    run, robot, rng = logged(case, 91), robot_of(case.told), np.random.default_rng(7)
+    assert run.wheel_speed is not None
+    far = rng.normal(size=run.wheel_speed.shape) * np.where(rng.random(run.wheel_speed.shape) < 0.02, 1.0, 0.0)
+    level = np.median(np.abs(np.diff(run.wheel_speed, n=2, axis=0)), axis=0)  # about 1.6 times the noise
+    wild = run.replace(wheel_speed=run.wheel_speed + 10.0 * level * far)
+    best = fit_output_error(wild, robot, free=("friction",), ladder=True)
+    rungs = [rung for rung in best.ladder.rungs if rung.step == 1]
+    assert any(rung.key == "fade" and rung.gain > rung.gain_std and not rung.taken for rung in rungs)
+    assert [rung.key for rung in best.ladder.taken] == ["loss"]
+    assert "friction that changes" in best.ladder.end
+    assert best.lack_of_fit.found
+
+
 def test_pulled_in_residuals_leave_a_robust_fit_where_it_is():
     """Least squares of them go nowhere from its best point, in standard errors; of the residuals as they are, far."""
     solution = Fit.of(spoiled(5, 30.0), AXEBOT, Question(nuisances=(), loss="student-t")).solve()

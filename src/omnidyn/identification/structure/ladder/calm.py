@@ -18,14 +18,14 @@ from omnidyn.run import Run
 
 def calmed(
     step: int, stands: Model, seen: Mapping[str, Examined], runs: Sequence[Run], names: Sequence[str] | None,
-    progress: Progress,
+    progress: Progress, gave_up: bool = False,
 ) -> tuple[Model, list[Rung]]:  # fmt: skip
     """(the model to go on from, the rungs of a step): of Student's t where that predicts better, by more than a
     standard error, what is not wild; as it stands, and no rungs, where no sample is wild, or a cause gains more.
-    It counts as no number of the fit."""
+    gave_up: no such cause paid. It counts as no number of the fit."""
     own = {
         group: remedy for group, each in seen.items() for remedy in each.diagnosis.lack_of_fit.remedies
-        if remedy.key == LOSS and remedy.gain > _best_cause(each.diagnosis.lack_of_fit)
+        if remedy.key == LOSS and (gave_up or remedy.gain > _best_cause(each.diagnosis.lack_of_fit))
     }  # fmt: skip
     if not own:
         return stands, []

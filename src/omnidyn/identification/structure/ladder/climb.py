@@ -80,7 +80,11 @@ def climb(
         rungs += [rung for rung in found if rung.step or not rungs]
         rungs += [_untried(step, each) for each in purse.told()]
         if best is None:
-            return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}")
+            made, found = (stands, []) if calm else calmed(step, stands, seen, runs, names, progress, gave_up=True)
+            rungs, calm = [*rungs, *(rung for rung in found if rung.step)], True
+            if made is stands:
+                return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}")
+            best, after, most = made, None, most + 1
         stands, seen = best, after
     return _ended(stands, rungs, f"{STEPS} steps are the most that it takes")
 
