@@ -13,6 +13,7 @@ from omnidyn.document import (
     cell,
     chance_cell,
     interval_cell,
+    short,
 )
 
 LONG = "the wheels work against each other " * 8
@@ -127,3 +128,19 @@ def test_characters_beyond_ascii_stay_or_are_escaped():
 )
 def test_numbers_of_tables(found, expected):
     assert found == expected
+
+
+@pytest.mark.parametrize(
+    "value, form, words",
+    [
+        (0.0123, ".2g", "0.012"),
+        (99.4, ".2g", "99"),
+        (123.4, ".2g", "120"),
+        (-101.0, "+.2g", "-100"),
+        (3600.0, ".3g", "3600"),
+        (2.5e7, ".2g", "2.5e+07"),
+        (math.nan, ".2g", "nan"),
+    ],
+)
+def test_a_number_of_a_sentence_has_no_exponent_that_people_need_not_read(value, form, words):
+    assert short(value, form) == words

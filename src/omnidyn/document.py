@@ -16,6 +16,7 @@ from omnidyn.glossary import explained
 WIDTH = 100  # columns of text that knows no terminal
 GAP = "  "  # between two columns of a table
 TINY_CHANCE = 0.001
+MOST_WHOLE = 1e6  # from which on an exponent reads better
 
 Paint = Callable[[str, str], str]  # a word and its tone -> the word in the colour of that tone
 
@@ -157,6 +158,12 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not -float("inf") < value < float("inf"):
         return None
     return value
+
+
+def short(value: float, form: str = ".2g") -> str:
+    """A number of a sentence: 120, where Python writes 1.2e+02."""
+    text = f"{value:{form}}"
+    return f"{float(text):{form[: form.index('.')]}.0f}" if "e+" in text and abs(value) < MOST_WHOLE else text
 
 
 def cell(value: float | None, form: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import BoolArray, IntArray
-from omnidyn.document import Document, Words, plain, sentence
+from omnidyn.document import Document, Words, plain, sentence, short
 from omnidyn.findings.use import Use, good_for
 from omnidyn.logs.log import Log
 from omnidyn.shown import FIGURE, Shown, make
@@ -198,7 +198,9 @@ def _excited(excitation: Mapping[str, float]) -> Words:
     known = {name: value for name, value in excitation.items() if math.isfinite(value)}
     parts = []
     if "moving" in known:
-        parts.append(f"in motion for {100.0 * known['moving']:.0f} % of {known.get('time_s', math.nan):.3g} s")
+        parts.append(
+            f"in motion for {100.0 * known['moving']:.0f} % of {short(known.get('time_s', math.nan), '.3g')} s"
+        )
     for axis, unit in (("x", "m/s"), ("y", "m/s"), ("yaw", "rad/s")):
         if axis in known:
             parts.append(f"{axis} {known[axis]:.3g} {unit} rms, up to {known.get(f'{axis}_max', math.nan):.3g}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.document import short
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
@@ -118,8 +119,8 @@ def _blocked(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
         return []
     return [Finding(
         "blocked", WARN, "",
-        f"for {bad.sum() * work.step:.3g} s the robot stands although it is driven hard enough to move: it was held, "
-        "stood against something, or its friction is far above that of the robot file",
+        f"for {short(bad.sum() * work.step, '.3g')} s the robot stands although it is driven hard enough to move: it "
+        "was held, stood against something, or its friction is far above that of the robot file",
         "leave those rows out", work.lines(bad), int(bad.sum()), {"seconds": float(bad.sum() * work.step)},
     )]  # fmt: skip
 

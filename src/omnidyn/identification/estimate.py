@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Points, Table, all_of, interval_cell, plain, sentence
+from omnidyn.document import Document, Part, Points, Table, all_of, interval_cell, plain, sentence, short
 from omnidyn.errors import shortened
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.model.first_guess import rests_on as guesses_under
@@ -124,7 +124,7 @@ class Estimate(Shown):
         if known:
             widest = max(known, key=lambda name: known[name])
             which = "" if one else f", the widest ({in_words(widest)})"
-            words += f"{which} within {max(0.1, 100.0 * known[widest]):.2g} %"
+            words += f"{which} within {short(max(0.1, 100.0 * known[widest]))} %"
         return f"{words}; not {named}" if missing else words
 
     def _shares(self) -> dict[str, float]:

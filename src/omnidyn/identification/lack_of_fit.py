@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Part, Table, all_of, plain
+from omnidyn.document import Part, Table, all_of, plain, short
 from omnidyn.identification.stability import Stability
 from omnidyn.model.keys import find_key, in_words, unit
 
@@ -96,7 +96,7 @@ class Noise:
         new = f", {100.0 * self.new:.0f} % of what is new from row to row," if self.new > self.share else ""
         return (
             f"the residual of {output} is {self.residual:.2g} {self.unit} where the log {where} {self.level:.2g} "
-            f"{self.unit} ({100.0 * self.of_moves:.2g} % of what moves): {100.0 * self.share:.0f} % of its "
+            f"{self.unit} ({short(100.0 * self.of_moves)} % of what moves): {100.0 * self.share:.0f} % of its "
             f"variance{new} is {more}"
         )
 
@@ -235,7 +235,7 @@ class LackOfFit:
     def table(self) -> Table:
         """The remedies, a row each."""
         rows = [
-            (r.words, r.key, f"{100.0 * r.gain:.2g} +- {100.0 * r.gain_std:.2g} %", r.would_change(1),
+            (r.words, r.key, f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %", r.would_change(1),
              all_of([*map(named, r.same_as)]))
             for r in self.remedies
         ]  # fmt: skip
@@ -268,7 +268,7 @@ class LackOfFit:
                     dict.fromkeys(f"{pick(each.chi2 for each in own.values()):.2f}" for pick in (min, max))
                 )
                 told.append(
-                    f"noise: the log {where} {levels}, at most {100.0 * moves:.2g} % of what moves; chi2 of the "
+                    f"noise: the log {where} {levels}, at most {short(100.0 * moves)} % of what moves; chi2 of the "
                     f"residuals by that: {chi2}"
                 )
         return [*self._rounded(), *told, *self._beyond_rest()]
@@ -331,7 +331,9 @@ class Diagnosis:
         """What each number rests on, a row each; None where nothing moves any."""
         rows = []
         for name, by in self.rests_on.items():
-            told = [f"{named(key)} {100.0 * share:+.2g} %" for key, share in by.items() if abs(share) >= MOVES]
+            told = [
+                f"{named(key)} {short(100.0 * share, '+.2g')} %" for key, share in by.items() if abs(share) >= MOVES
+            ]
             if told:
                 rows.append((named(name), name, ", ".join(told[:MOST_NAMED])))
         return Table(("number", "key", "moves, for +1 % of"), rows, "<<<") if rows else None

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from omnidyn.document import Part, Table, all_of, plain
+from omnidyn.document import Part, Table, all_of, plain, short
 from omnidyn.identification.lack_of_fit import named
 from omnidyn.model.keys import FRICTION, in_words, unit
 
@@ -80,9 +80,9 @@ class Ladder:
     def table(self) -> Table:
         """Every model that was fitted, a row each."""
         rows = [
-            (str(r.step), r.words, r.key, str(r.numbers or ""), _cell(r.held_out, "{:.4g}"),
-             _cell(r.gain, "{:.2g}", 100.0) + _cell(r.gain_std, " +- {:.2g} %", 100.0) if r.step else "",
-             _cell(r.bic, "{:+.3g}") if r.step else "", "taken" if r.taken else r.why)
+            (str(r.step), r.words, r.key, str(r.numbers or ""), _cell(r.held_out, ".4g"),
+             f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %" if r.step and math.isfinite(r.gain) else "",
+             _cell(r.bic, "+.3g") if r.step else "", "taken" if r.taken else r.why)
             for r in self.rungs
         ]  # fmt: skip
         head = ("step", "with", "key", "numbers", "held-out error", "less by", "BIC", "")
@@ -97,9 +97,9 @@ class Ladder:
         return plain({"rungs": [asdict(rung) for rung in self.rungs], "end": self.end})
 
 
-def _cell(value: float, form: str, times: float = 1.0) -> str:
+def _cell(value: float, form: str) -> str:
     """A number in a table, "" for one that there is not."""
-    return form.format(times * value) if math.isfinite(value) else ""
+    return short(value, form) if math.isfinite(value) else ""
 
 
 def _with_others(rung: Rung) -> str:

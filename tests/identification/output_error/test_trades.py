@@ -70,6 +70,9 @@ def test_a_latency_beyond_the_search_is_no_estimate():
         (Parameter("fade", 0.0, -0.9, 0.9), -0.9, True),
         (Parameter("gain", 1.0, 0.1, 10.0, True), 0.1, True),
         (Parameter("friction.axes.coulomb[0]", 1.0, 0.0, 1e6), 0.0, False),
+        (Parameter("motor.gear_efficiency", 0.9, 9e-5, 1.0, True), 0.94, False),
+        (Parameter("motor.gear_efficiency[1]", 0.9, 9e-5, 1.0, True), 1.0, False),
+        (Parameter("motor.gear_efficiency", 0.9, 9e-5, 1.0, True), 9e-5, True),
     ],
 )
 def test_which_ends_are_no_estimates(parameter, value, ended):

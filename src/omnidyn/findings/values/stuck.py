@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.document import short
 from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.predicted_wheel import WheelPredictor
@@ -52,7 +53,7 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             found.append(Finding(
                 "stuck", WARN, component,
                 f"{component} repeats one value to the last digit {len(each)} time{'s' * (len(each) > 1)}, "
-                f"for up to {longest:.3g} s, while the robot moves",
+                f"for up to {short(float(longest), '.3g')} s, while the robot moves",
                 "those rows of it are not used; look at the encoder and its cable", work.lines(bad), int(bad.sum()),
                 {"longest_s": float(longest), "share": float(bad.mean())},
             ))  # fmt: skip

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.document import short
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.problem.input_steps import input_steps
 from omnidyn.identification.output_error.problem.record import Record
@@ -35,4 +36,4 @@ def beside_rounding(
     with np.errstate(divide="ignore", invalid="ignore"):
         wider = float(np.nanmax(known.std / sure.known.std, initial=1.0))
     words = f"inputs are logged in steps of {steps:.2g} V: what they may have been rounded by is in the intervals"
-    return known, [f"{words}, which are up to {wider:.2g} times as wide for it"] if wider > WIDER else []
+    return known, [f"{words}, which are up to {short(wider)} times as wide for it"] if wider > WIDER else []

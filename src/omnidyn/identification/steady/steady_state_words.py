@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtr
 
 from omnidyn.arrays import FloatArray
+from omnidyn.document import short
 from omnidyn.identification.steady.line import Line
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, wrench_from_currents
@@ -62,7 +63,7 @@ def _about_scatter(head: str, line: Line, absolute_std: bool) -> list[str]:
         return []
     used = "the std given" if absolute_std else "the scatter itself"
     return [
-        f"{head}: the points scatter {np.sqrt(line.reduced_chi2):.2g} times as much as their std says; "
+        f"{head}: the points scatter {short(np.sqrt(line.reduced_chi2))} times as much as their std says; "
         f"the intervals follow {used}"
     ]
 

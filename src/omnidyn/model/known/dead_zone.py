@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Table, Words, all_of, plain
+from omnidyn.document import Document, Part, Table, Words, all_of, plain, short
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
 from omnidyn.model.frames import AXES
@@ -147,7 +147,9 @@ class DeadZone:
         words = []
         for what, duty in (("it rests", False), ("the duty rests", True)):
             named = [each for each in self.rests_on if each.guessed and each.duty == duty]
-            known = [f"{each.key} ({100.0 * each.effect:.2g} % by its std)" for each in named if each.std is not None]
+            known = [
+                f"{each.key} ({short(100.0 * each.effect)} % by its std)" for each in named if each.std is not None
+            ]
             bare = [f"{each.key} (no std: in no interval)" for each in named if each.std is None]
             if named:
                 words.append(f"{what} on guesses: {', '.join([*known, *bare])}")

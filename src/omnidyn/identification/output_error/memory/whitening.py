@@ -32,6 +32,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.beside import side_by_side
+from omnidyn.document import short
 from omnidyn.identification.output_error.memory.across import widening
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.near import near
@@ -312,13 +313,13 @@ def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trus
     yield (
         f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
         f"errors of each output are fitted as {' or '.join(ways)}, with a memory of up to "
-        f"{lasts:.2g} s; {widened(known)}"
+        f"{short(lasts)} s; {widened(known)}"
     )
     if model.rows < FEW * model.memory:
         yield (
-            f"the errors of {longest[0]}[{longest[1]}] remember {lasts:.2g} s, and the logs last "
+            f"the errors of {longest[0]}[{longest[1]}] remember {short(lasts)} s, and the logs last "
             f"{model.rows / model.memory:.1f} times that: how long they remember is hardly known, nor how sure the "
-            f"numbers are; logs of {FEW * lasts:.2g} s or longer tell"
+            f"numbers are; logs of {short(FEW * lasts)} s or longer tell"
         )
     uneven = max(spacing(pieces, column)[2] for column in models)
     if uneven > UNEVEN:

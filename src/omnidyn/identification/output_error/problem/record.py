@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.document import short
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.findings.needs import LOOP_REMEDY, has_set_speeds
 from omnidyn.identification.output_error.problem.differences import Differences
@@ -104,7 +105,7 @@ def record(
     if len(parts) > 1:
         lost = [float(run.t[b.start] - run.t[a.stop - 1]) for a, b in pairwise(parts)]
         many = "a gap" if len(lost) == 1 else f"{len(lost)} gaps, the longest"
-        notes.append(f"{many} of {max(lost):.3g} s: what lies between gaps is fitted from a start of its own")
+        notes.append(f"{many} of {short(max(lost), '.3g')} s: what lies between gaps is fitted from a start of its own")
     if not pieces:
         raise InsufficientDataError(
             "no stretch of the log has inputs throughout", got=f"{int(known.sum())} rows of {len(run)} with all inputs",

@@ -13,7 +13,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.compiled.beside import side_by_side
-from omnidyn.document import all_of
+from omnidyn.document import all_of, short
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.engines.actuation import driver_of
 from omnidyn.identification.output_error.problem.motion import DRIVE
@@ -94,7 +94,7 @@ def _words(changes: Mapping[str, float], exact: bool) -> str:
     largest = max(map(abs, changes.values()))
     sign = np.sign(next(iter(changes.values())))
     percent = {name: 100.0 * TOLD * sign * change / largest for name, change in changes.items()}
-    parts = all_of([f"{name} {share:+.2g} %" for name, share in _alike(percent)])
+    parts = all_of([f"{name} {short(share, '+.2g')} %" for name, share in _alike(percent)])
     return f"{parts}: {'the same to this log' if exact else 'this log hardly tells them apart'}"
 
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.document import short
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import PieceSums, per_column
@@ -320,4 +321,4 @@ def widened(known: Trust) -> str:
     """How much wider the intervals are than for white noise, in words."""
     if known.widening < WIDER:
         return "the intervals are no wider for it"
-    return f"the intervals are up to {known.widening:.2g} times as wide as for white noise"
+    return f"the intervals are up to {short(known.widening)} times as wide as for white noise"

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.document import short
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
@@ -96,7 +97,7 @@ def _number(robot: Robot, key: str, beside: str = "") -> Iterator[Candidate]:
     def trials(bench: Workbench) -> list[Trial]:
         return [Trial([own / STEP for own in bench.change(changed)])]
 
-    yield Candidate(key, trials, lambda change, _: f"{in_words(key)} {100.0 * change:+.2g} %", LEAST)
+    yield Candidate(key, trials, lambda change, _: f"{in_words(key)} {short(100.0 * change, '+.2g')} %", LEAST)
 
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
@@ -165,7 +166,7 @@ def _later(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[
 def _when(bench: Workbench, share: float) -> str:
     """A moment of the logs, in seconds where all of them are as long."""
     spans = [piece.record.span for piece in bench.problem.pieces]
-    seconds = f", at {share * max(spans):.3g} s" if max(spans) < 1.02 * min(spans) else ""
+    seconds = f", at {short(share * max(spans), '.3g')} s" if max(spans) < 1.02 * min(spans) else ""
     return f"{100.0 * share:.0f} % into the log{seconds}"
 
 
