@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.kernel import one_of, part, plain
+from omnidyn.compiled.kernel import kernel, one_of, part, plain
 from omnidyn.model.friction import exponential, lorentzian
 
 SHAPES = {"exponential": exponential, "lorentzian": lorentzian}
@@ -58,6 +58,12 @@ def steepest(u, shape, exponent):
     return -fall(max(u, worst), shape, exponent)[1]
 
 
+@kernel
+def steepest_of_all(shape, exponent):
+    """The largest -f' of all, for callers outside kernels."""
+    return steepest(0.0, shape, exponent)
+
+
 @part
 def steepness_left(u, shape, exponent):
     """The steepest fall at u Stribeck speeds and beyond, over the steepest of all."""
@@ -82,7 +88,7 @@ def steepest_of(own: Any) -> float:
         return 0.0
     more = max((own.breakaway - own.coulomb).max(), 0.0)
     bends = max((own.bristle_breakaway - own.bristle_coulomb).max(), 0.0)
-    return (more + BENDS * bends) * own.fall * steepest(0.0, own.form, own.exponent)
+    return (more + BENDS * bends) * own.fall * steepest_of_all(own.form, own.exponent)
 
 
 def fallen(speed: ArrayLike, inverse: ArrayLike, exponent: ArrayLike, shape: ArrayLike = 0.0) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from omnidyn.model.friction.bristle import fade_of
-from omnidyn.model.friction.stribeck import BENDS, steepest, steepest_of
+from omnidyn.model.friction.stribeck import BENDS, steepest_of, steepest_of_all
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import added_mass, off_centre
 from omnidyn.model.motor import DYNAMIC
@@ -58,7 +58,7 @@ def _bound_laws(plant: Plant) -> None:
         bends = float((body.bristle_breakaway - body.bristle_coulomb).max())
         round_ = body.coulomb[0] == body.coulomb[1] and body.breakaway[0] == body.breakaway[1]
         rate = more * (1.0 if round_ else 2.0) + 2.0 * BENDS * bends  # an ellipse falls faster than its levels do
-        steep += rate * body.fall * steepest(0.0, body.form, body.exponent)
+        steep += rate * body.fall * steepest_of_all(body.form, body.exponent)
     body.steep = steep / body.least
     body.steep_sum = body.steep + plant.element["steep"].sum()
     body.bristles = plant.element["bristle_breakaway"].max(axis=1).sum() + body.bristle_breakaway.sum()
