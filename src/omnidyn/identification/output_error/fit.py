@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
@@ -38,7 +37,7 @@ from omnidyn.identification.output_error.solve.first_point import coarse_point, 
 from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, Progress
-from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver, State
+from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
@@ -275,14 +274,11 @@ class Fit:
             return solver.minimise(first_point(solver, group.records), watch=progress)
         near = coarse_point(problem, self.nu, progress)
         halfway = Solver(problem, make_engine(group.engine, problem, HALFWAY), self.nu, ENOUGH)
-        nearer = halfway.minimise(near.point, watch=progress, scales=self._scales(near))
+        scales = near.variance if self.nu else None  # counts find theirs anew: a step a row is too coarse for them
+        nearer = halfway.minimise(near.point, watch=progress, scales=scales)
         return Solver(problem, engine, self.nu, CLOSE).minimise(
-            nearer.state.point, watch=progress, blocked=nearer.blocked, scales=self._scales(nearer.state)
+            nearer.state.point, watch=progress, blocked=nearer.blocked, scales=nearer.state.variance
         )
-
-    def _scales(self, near: State) -> FloatArray | None:
-        """What a fit goes on with where it is one of Student's t; counts find theirs anew."""
-        return near.variance if self.nu else None
 
     def _settled_alone(self, progress: Progress, unearned: Unearned | None) -> tuple[str, ...] | None:
         """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""
