@@ -24,8 +24,11 @@ from omnidyn.run import Run
 from omnidyn.statistics import MAD_TO_STD, TEXT, find_tick, stretches
 
 ORDER = 5  # of the differences: an acceleration that dies away within ten rows is gone from them
-FEW, MANY = 1, 4  # rows at a time: where the two kinds are alike, and where they are 4 times apart
-APART = 2.0  # the middle between 1 and 4
+FEW, MANY = (
+    1,
+    3,
+)  # rows at a time: where the two kinds are alike, and where they are 3 apart; beyond, motion shows
+APART = MANY**0.5  # the middle between 1 and 3
 LEAST, MOST = (
     0.7,
     10.0,
