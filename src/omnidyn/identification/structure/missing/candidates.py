@@ -175,11 +175,8 @@ def _about(robot: Robot, words: str, change: float) -> str:
     first = float(robot.body.mass)
     if words == "mass":
         return f"{words} that changes from {first:.3g} to about {max(first + change, 0.0):.2g} kg"
-    return (
-        f"{words} that changes to about {1.0 + change:.3g} times as much"
-        if words == "supply"
-        else f"{words} that changes"
-    )
+    by = f" by about {short(100.0 * change, '+.2g')} %" if words == "supply" else ""
+    return f"{words} that changes{by}"
 
 
 def _friction(motion: Motion) -> FloatArray:
