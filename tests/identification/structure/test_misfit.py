@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_simpson
 from scipy.signal import lfilter
 
 from benchmarks.wrong_worlds.kinds import by_name
-from benchmarks.wrong_worlds.log import COUNTS, TICKS, logged, right_case, robot_of
+from benchmarks.wrong_worlds.log import COUNTS, logged, right_case, robot_of
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.score import drawn
 from omnidyn.identification.output_error.memory.autoregression import autoregression
@@ -42,7 +42,7 @@ def test_errors_that_last_as_long_as_the_log_are_not_called_noise():
     """Friction at the wheels under a file with a box, by counts: a Coulomb level of 0 where it is 4.1 N, angles 1 rad
     off, and errors that an autoregression takes for a drift of twenty logs. Nothing is found, and that is said."""
     seed = 142_004
-    case = by_name("wheels").make(right_case(seed), 0.00638747).setup_but(sensor=TICKS)
+    case = by_name("wheels").make(right_case(seed), 0.00638747)
     fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
     lack = fit.lack_of_fit
     assert fit.value["friction.axes.coulomb[1]"] < 0.5
