@@ -31,7 +31,7 @@ WHERE = {  # how a log shows its noise, and what is said of more than that
     REST: ("scatters at rest by", "misfit, or noise that comes of motion"),
 }  # fmt: skip
 NOTHING = "hold nothing but noise"
-DRIFTS = "the errors last about as long as the logs: no test tells them from what the model leaves out; log for longer"
+DRIFTS = "the errors last so long that no test in these logs tells them from what the model leaves out; log for longer"
 UNTOLD = "this log cannot tell its noise from misfit: repeat a command, or let the robot rest for a second"
 FAR = 0.001, 0.1  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
 WORTH = 0.01  # share of the variance of a residual that is worth a line
@@ -171,8 +171,7 @@ class LackOfFit:
     noise: of outputs whose noise the log shows without the model, by the best source; None where that was not asked.
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
     rounded: output -> share of the variance of its residuals that is what the inputs were rounded by, which is no lack
-    of fit, but hides one that is smaller. drifts: whether errors last about as long as the logs, so that no test tells
-    them from a misfit.
+    of fit, but hides one that is smaller. drifts: whether errors last so long that no test tells them from a misfit.
     """
 
     found: bool

@@ -92,7 +92,8 @@ def examine(solution: Solution) -> Examined:
     lack = LackOfFit(
         found, channels, levels.sizes(_sizes(seen, names)), seen.found, (*told, *calmer(seen, wild)), seen.tested,
         pictures, wild, levels.noise, levels.beyond, levels.at_rest,
-        dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {}, seen.linear.degrees < SURE,
+        dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {},
+        seen.linear.degrees < SURE or seen.tells_nothing,
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear.plain, bench), stable)
     return Examined(diagnosis, memory, len(tried), count)
