@@ -9,9 +9,10 @@ from scipy.integrate import cumulative_simpson
 from scipy.signal import lfilter
 
 from benchmarks.wrong_worlds.kinds import by_name
-from benchmarks.wrong_worlds.log import COUNTS, logged, right_case, robot_of
+from benchmarks.wrong_worlds.log import COUNTS, TICKS, logged, right_case, robot_of
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.score import drawn
+from benchmarks.wrong_worlds.world import World
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.identification.structure.rounding import of_rounding
 from omnidyn.identification.verdict import fits_verdict
@@ -51,6 +52,21 @@ def test_errors_that_last_as_long_as_the_log_are_not_called_noise():
     assert lack.to_dict()["drifts"]
     assert "no test in these logs tells them from what the model leaves out" in lack.statements()[0]
     assert fits_verdict({"": fit}, {}).startswith("The errors last so long that no test")
+
+
+def test_errors_of_angles_in_which_nothing_can_be_tested_are_not_called_noise():
+    """A current limit under a file without one, by angles: viscous friction 12 times too large. Its errors remember for
+    a second or two, the log has few such, and no theme is tested. By the same truth, nothing of the kind is said."""
+    case, seed, _ = drawn(by_name("current limit"), 4)
+    case = case.setup_but(sensor=TICKS, memory=0.0)
+    fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
+    assert fit.value["friction.axes.viscous[0]"] > 5.0 * case.told.viscous[0]
+    assert not fit.lack_of_fit.found
+    assert fit.lack_of_fit.drifts
+    right = case.world_but(limit=World.limit)
+    fit = fit_output_error(logged(right, seed), robot_of(right.told), free=FRICTION)
+    assert not fit.lack_of_fit.found
+    assert not fit.lack_of_fit.drifts
 
 
 def test_how_well_the_power_of_slow_errors_is_known_follows_from_the_memory():
