@@ -37,6 +37,9 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
     """(what it stands for, how to make it), in the order in which they are wanted. Compiled, each takes below 1 s."""
     paper, four, other, looped = (load_robot(name) for name in ("axebot", "four-wheel", "mecanum", "robotino"))
     slips = paper.replace(wheels=paper.wheels.replace(traction_mu=0.4, wheel_inertia=2e-5))
+    axes = paper.friction.axes
+    falls = axes.replace(breakaway=tuple(2.0 * level for level in axes.coulomb), stribeck_speed=(0.05, 0.05, 0.5))
+    falling = paper.replace(friction=paper.friction.replace(axes=falls))
     winding = four.replace(motor=four.motor.replace(electrical=DYNAMIC, inductance=1e-3))
     return [
         ("simulation, friction of the axes", partial(_run, paper)),
@@ -52,6 +55,7 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("fit of counted angles, any friction", partial(_fit, other, "wheel_angle")),
         ("fit in a speed loop", partial(_fit, looped, "twist")),
         ("simulation, inductance", partial(_run, winding)),
+        ("simulation, friction that falls with speed", partial(_run, falling)),
         ("simulation, wheels that slip", partial(_run, slips)),
     ]
 
