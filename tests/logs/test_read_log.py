@@ -112,6 +112,27 @@ def test_a_log_on_change_holds_commands_and_makes_nothing_up(tmp_path):
     np.testing.assert_allclose(late.wheel_speed[:, 0], [10, np.nan, np.nan, 40, np.nan, np.nan])
 
 
+def test_a_sensor_that_is_out_for_long_is_no_log_on_change(tmp_path):
+    rows = [f"{0.1 * k:.1f},{k % 5},{'' if 40 <= k < 80 else k}" for k in range(100)]
+    path = write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows))
+    run, log = read_log(path), load_log(path)
+    assert not any("recorded on change" in words for words in run.warnings)
+    filled = log.aligned("wheel_speed", log.channels["wheel_speed"], [])
+    np.testing.assert_array_equal(np.isnan(filled[:, 0]), (np.arange(100) >= 40) & (np.arange(100) < 80))
+
+
+def test_a_log_on_change_has_gaps_too(tmp_path):
+    """The line is drawn between the measurements on change, not across the time when there was none."""
+    rows = [f"{0.1 * k:.1f},{k % 5},{'' if 40 <= k < 80 or k % 3 else k}" for k in range(121)]
+    log = load_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows)))
+    words: list[str] = []
+    filled = log.aligned("wheel_speed", log.channels["wheel_speed"], words)[:, 0]
+    known = (np.arange(121) <= 39) | (np.arange(121) >= 81)
+    np.testing.assert_array_equal(np.isfinite(filled), known)
+    np.testing.assert_allclose(filled[known], np.arange(121)[known])
+    assert words == ["w1 is recorded on change (65% of its cells are blank): nothing is made up between"]
+
+
 def test_rows_of_one_time_that_fill_each_other_s_blanks_are_one_row(tmp_path):
     """Every topic writes a row of its own; the battery stands in both, with the same number."""
     text = "t_s,u1_V,w1_rad_s,supply_V\n" + "".join(f"0.{k},{k},,9\n0.{k},,{10 * k},9\n" for k in range(6))

@@ -15,11 +15,12 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import components, place
 from omnidyn.logs.columns.mapping import ColumnMap
+from omnidyn.logs.segments import segments
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
-ON_CHANGE = 0.2  # a component with more blank cells than this share is recorded on change
+ON_CHANGE = 0.2  # a component with more blank cells than this share, gaps left out, is recorded on change
 NEAR = 1e-6  # of a row: times that are no farther apart are one
 HELD = ("voltage", "duty", "wheel_speed_command", "twist_command")  # what is commanded holds until the next value
 NEVER_MADE_UP = (*HELD, "supply")  # a battery is an input like any other: it holds too
@@ -153,14 +154,13 @@ class Log:
         """A channel in every row of the log, once its times can be trusted; what was done goes to `warnings`.
 
         What was recorded on change, or by a topic with a clock of its own: commands held, measurements on the line
-        between two of them, which `between` tells from what was measured. And the latency of each component taken out.
-        `values` has the shape of the channel, and so has the result.
+        between two of them, which `between` tells from what was measured; nothing in a gap, where a sensor was out.
+        And the latency of each component taken out. `values` has the shape of the channel, and so has the result.
         """
         columns = values.reshape(len(self), -1)
         changed = columns.copy()
         for k, component in enumerate(components(channel, columns.shape[1])):
-            blank = np.isnan(columns[:, k])
-            share = float(blank.mean())
+            share = self._blank(channel, columns[:, k])
             if self._is_sparse(share):
                 hold = channel in NEVER_MADE_UP
                 changed[:, k] = _held(columns[:, k]) if hold else _interpolated(self.t, columns[:, k])
@@ -173,6 +173,15 @@ class Log:
                 warnings.append(f"{component} was moved back by its latency of {late:g} s")
         return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
 
+    def _blank(self, channel: str, values: FloatArray) -> float:
+        """The share of blanks in a component: of a measurement outside its gaps, for a sensor that is out is no log
+        on change. A command holds however long."""
+        there = np.isfinite(values)
+        if channel in NEVER_MADE_UP:
+            return 1.0 - float(there.mean())
+        covered = there | np.isfinite(_interpolated(self.t, values))
+        return 1.0 - float(there.sum() / max(covered.sum(), 1))
+
     def _is_sparse(self, share: float) -> bool:
         """Whether a component with such a share of blanks was recorded when it changed, or at times of its own."""
         return 0.0 < share < 1.0 if self.own_clocks else ON_CHANGE < share < 1.0
@@ -183,7 +192,7 @@ class Log:
         made_up = np.zeros(columns.shape, dtype=bool)
         for k, component in enumerate(components(channel, columns.shape[1])):
             blank = np.isnan(columns[:, k])
-            if channel in NEVER_MADE_UP or not self._is_sparse(float(blank.mean())):
+            if channel in NEVER_MADE_UP or not self._is_sparse(self._blank(channel, columns[:, k])):
                 continue
             late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
             made_up[:, k] = _far_from(self.t + late, self.t[~blank], self.t) if late else blank
@@ -252,9 +261,13 @@ def _held(values: FloatArray) -> FloatArray:
 
 
 def _interpolated(t: FloatArray, values: FloatArray) -> FloatArray:
-    """Each blank between two values on the line between them; outside there is none."""
-    known = np.isfinite(values)
-    return np.interp(t, t[known], values[known], left=np.nan, right=np.nan)
+    """Each blank between two values on the line between them; outside, and in a gap between values, there is none."""
+    filled, known = values.copy(), np.flatnonzero(np.isfinite(values))
+    for each in segments(t[known]):
+        rows = known[each]
+        if rows.size:
+            filled[rows[0] : rows[-1] + 1] = np.interp(t[rows[0] : rows[-1] + 1], t[rows], values[rows])
+    return filled
 
 
 def _nearest(at: FloatArray, t: FloatArray) -> IntArray:

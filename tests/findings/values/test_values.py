@@ -121,6 +121,17 @@ def test_missing_values_are_counted(log, robot, with_channels):
     assert (finding.level, finding.where, finding.count) == ("note", "i1", 50)
 
 
+def test_a_sensor_that_is_out_for_long_is_missing_and_no_other_fault(log, robot, with_channels, grave):
+    """A line across 27 % of the rows was taken for a speed, and its energy for impossible."""
+    values = log.channels["wheel_speed"].copy()
+    out = slice(len(log) // 3, len(log) // 3 + round(0.27 * len(log)))
+    values[out, 1] = np.nan
+    broken = with_channels(wheel_speed=values)
+    (finding,) = check(broken, robot).of("missing")
+    assert (finding.where, finding.count) == ("w2", out.stop - out.start)
+    assert grave(check(broken, robot)) == {"missing"}
+
+
 @pytest.mark.parametrize("missing", [None, 0, 1])
 def test_a_slow_wheel_that_reads_zero(robot, log, with_channels, missing):
     """Against its own command, whichever other wheel was not logged."""
