@@ -40,13 +40,9 @@ def test_a_memory_alone_is_no_lack_of_fit(rho):
 
 
 def test_errors_that_last_as_long_as_the_log_are_not_called_noise():
-    """Friction at the wheels under a file with a box, by counts: a Coulomb level of 0 where it is 4.1 N, angles 1 rad
-    off, and errors that an autoregression takes for a drift of twenty logs. Nothing is found, and that is said."""
-    seed = 142_004
-    case = by_name("wheels").make(right_case(seed), 0.00638747)
-    fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
+    """Of a right robot, with a memory of twenty seconds in a log of thirty. Nothing is found, and that is said."""
+    fit = fit_output_error(remembered(0.999, 7), AXEBOT, nuisances=())
     lack = fit.lack_of_fit
-    assert fit.value["friction.axes.coulomb[1]"] < 0.5
     assert not lack.found
     assert lack.drifts
     assert lack.to_dict()["drifts"]
@@ -54,15 +50,28 @@ def test_errors_that_last_as_long_as_the_log_are_not_called_noise():
     assert fits_verdict({"": fit}, {}).startswith("The errors last so long that no test")
 
 
-def test_errors_of_angles_in_which_nothing_can_be_tested_are_not_called_noise():
-    """A current limit under a file without one, by angles: viscous friction 12 times too large. Its errors remember for
-    a second or two, the log has few such, and no theme is tested. By the same truth, nothing of the kind is said."""
+@pytest.mark.parametrize("sensor", [COUNTS, TICKS])
+def test_friction_at_the_wheels_under_a_box_is_found_by_counts(sensor):
+    """A Coulomb level of 0 where it is 4.1 N, and angles 1 rad off, which were called noise."""
+    seed = 142_004
+    case = by_name("wheels").make(right_case(seed), 0.00638747).setup_but(sensor=sensor)
+    fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
+    assert fit.value["friction.axes.coulomb[1]"] < 0.5
+    assert fit.lack_of_fit.found
+    assert fit.lack_of_fit.remedies[0].key == "friction.wheels"
+
+
+def test_a_gross_misfit_of_angles_is_found():
+    """A current limit under a file without one: viscous friction 12 times too large. Rows in which an encoder counts
+    next to nothing are no rows of the residuals: taken as if none were missing there, their memory told nothing."""
     case, seed, _ = drawn(by_name("current limit"), 4)
     case = case.setup_but(sensor=TICKS, memory=0.0)
     fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
     assert fit.value["friction.axes.viscous[0]"] > 5.0 * case.told.viscous[0]
-    assert not fit.lack_of_fit.found
-    assert fit.lack_of_fit.drifts
+    assert fit.lack_of_fit.found
+    assert not fit.lack_of_fit.drifts
+    noise = fit.lack_of_fit.noise["wheel_angle[0]"]
+    assert noise.residual == pytest.approx(fit.noise["wheel_angle[0]"], rel=0.1)  # of the fit, not of a step beyond it
     right = case.world_but(limit=World.limit)
     fit = fit_output_error(logged(right, seed), robot_of(right.told), free=FRICTION)
     assert not fit.lack_of_fit.found

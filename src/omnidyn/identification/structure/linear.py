@@ -190,16 +190,18 @@ class Linear:
     def known(self, shown: Shown) -> FloatArray:
         """Degrees of freedom with which the noise along some directions is known, by how well the memory is. (K,).
 
-        shown: of each piece (C, rows, K), as it is, of length 1 once white. The variance that a memory gives to a
-        direction is off by dV = -dw_k g' g(k rows on)/s^2, see AutoRegression.scatter; 2/var V: Satterthwaite's.
+        shown: of each piece (C, rows, K), as it is, of length 1 once white. By how far the variance may be off that a
+        memory gives to a direction, see AutoRegression.scatter; 2/var V: Satterthwaite's.
         """
         scatter = np.zeros(shown[0].shape[2])
         for c, memory in enumerate(self.memory):
-            reach = np.zeros((memory.order + 1, len(scatter)))
+            leaning = np.zeros((1 + memory.order, len(scatter)))
             for k, columns in enumerate(self.rows.column):
                 for j in (j for j, column in enumerate(columns) if column == c):
-                    reach += memory.products(shown[k][j][self.rows.there[k][j]])
-            scatter += memory.scatter(reach / max(memory.variance, TINY))
+                    there, steps = self.rows.there[k][j], self.rows.steps[k][j]
+                    own = np.ascontiguousarray(shown[k][j][there])
+                    leaning += memory.leaning(own, memory.new(own, steps, self.rows.moves[k][j, there]), steps)
+            scatter += memory.scatter(leaning / max(memory.variance, TINY))
         return 2.0 / np.maximum(scatter, TINY)
 
     def rounded(self, shown: Shown) -> FloatArray:

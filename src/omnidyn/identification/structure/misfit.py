@@ -16,7 +16,7 @@ from scipy.special import fdtrc
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Found
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
-from omnidyn.identification.output_error.memory.whitened import without_gaps
+from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.problem.outputs import TRAVEL
 from omnidyn.identification.structure.disturbances import THEMES, Theme, shown_by_themes
 from omnidyn.identification.structure.linear import Gram, Linear, Rows, root_of_covariance, solved

@@ -41,6 +41,7 @@ FORGOTTEN = 0.05  # correlation of repeats below which slow errors differ in the
 ENOUGH = 50.0  # degrees of freedom of errors as they are, slow ones too, below which slow ones are left out
 FOLLOWED, LEAST_ROWS = 1000, 200  # rows by which errors have forgotten; differences without which nothing is told
 COARSE = 0.5  # of a step of the sensor: less noise leaves rounding that repeats itself
+FAR = 2.0  # times the sum of squares
 KNOWN = 1e9  # degrees of freedom of what is known
 THIRD = np.array([1.0, -3.0, 3.0, -1.0])
 WHITE = 0.1  # relative difference of the variance by second and by fourth differences up to which noise is white
@@ -68,11 +69,9 @@ class Levels:
 def noise_levels(linear: Linear, motions: Sequence[Motion], pulled_in: bool = False) -> Levels:
     """What the log shows of the noise of each output, and whether the fit leaves more.
 
-    Of residuals without what the parameters make of them in white rows: errors with a memory may have pulled them off.
-    pulled_in: whether they are as Student's t counts them (tails.py), and so no longer those of the rows of the log.
+    pulled_in: whether residuals are as Student's t counts them (tails.py), and so no longer those of the rows.
     """
-    none = [np.zeros((*each.shape, 0)) for each in linear.rows.residual]
-    rows = replace(linear.rows, residual=left_beside(linear.rows, linear, none)[0])
+    rows = replace(linear.rows, residual=_without_pull(linear))
     every = {
         f"{column[0]}[{column[1]}]": _of_column(rows, c, own, linear.memory[c], pulled_in)
         for c, (own, column) in enumerate(zip(shown(rows, motions), rows.problem.columns, strict=True))
@@ -87,6 +86,21 @@ def noise_levels(linear: Linear, motions: Sequence[Motion], pulled_in: bool = Fa
             beyond.append(name)
     at_rest = {name: each for name, own in every.items() for each in own if each.source == REST}
     return Levels(noise, at_rest, tuple(beyond))
+
+
+def _without_pull(linear: Linear) -> list[FloatArray]:
+    """Residuals without what the parameters make of them in white rows: errors with a memory may have pulled them off.
+
+    A step that makes a column FAR larger leads beyond where the model is straight: such a one stays as it is.
+    """
+    rows, none = linear.rows, [np.zeros((*each.shape, 0)) for each in linear.rows.residual]
+    left = left_beside(rows, linear, none)[0]
+    for c in range(len(rows.problem.columns)):
+        at = [(k, columns.index(c)) for k, columns in enumerate(rows.column) if c in columns]
+        before, after = (sum(float(np.nansum(each[k][j] ** 2)) for k, j in at) for each in (rows.residual, left))
+        for k, j in at if after > FAR * before else ():
+            left[k][j] = rows.residual[k][j]
+    return left
 
 
 def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression, pulled_in: bool) -> list[Noise]:

@@ -105,3 +105,32 @@ def test_nothing_is_added_at_rest():
     assert model.adds_up
     halting = np.repeat(walk, np.where(np.arange(2000) % 20 == 0, 30, 1), axis=0)
     assert autoregression([halting], may_add_up=True).variance == pytest.approx(model.variance, rel=0.01)
+
+
+@pytest.mark.parametrize("adds_up", [False, True])
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_what_a_sum_of_squares_leans_on_is_its_slope_by_the_memory_rows_missing_or_not(adds_up, share):
+    """Against differences of the dense quadratic form, once over 400 rows and once with every tenth stretch lost."""
+    rng, n = np.random.default_rng(6), 400
+    at = np.arange(n)
+    ways = np.column_stack([np.sin(at / 15.0), at % 50 < 25, rng.normal(size=n)]) + 0.0
+    left = np.flatnonzero((rng.random(n // 4) >= share).repeat(4))
+    steps = np.concatenate([[0], np.diff(left)])
+    model = AutoRegression(THREE.partial, 1.0, n, adds_up=adds_up)
+
+    def squares(phi):
+        """g' (covariance of rows/variance of what is new)^-1 g, by phi."""
+        response = lfilter([1.0], np.concatenate([[1.0], -phi]), np.eye(1, 2000)[0])
+        dense = toeplitz([response[: 2000 - k] @ response[k:] for k in range(n)])
+        if adds_up:
+            dense = np.tri(n) @ dense @ np.tri(n).T + 1e6
+        own = ways[left]
+        return (own * np.linalg.solve(dense[np.ix_(left, left)], own)).sum(axis=0)
+
+    found = model.leaning(ways[left], model.new(ways[left], steps, np.ones(len(left), bool)), steps)
+    np.testing.assert_allclose(found[0], squares(model.coefficients), rtol=1e-3)
+    step = 1e-4
+    for i, slope in enumerate(found[1:]):
+        up, down = (squares(model.coefficients + sign * step * np.eye(3)[i]) for sign in (1.0, -1.0))
+        scale = np.abs(found[1:]).max(axis=0)
+        np.testing.assert_allclose(slope / scale, (up - down) / (2.0 * step) / scale, atol=0.15)

@@ -21,7 +21,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
-from omnidyn.identification.output_error.memory.innovations import innovations
+from omnidyn.identification.output_error.memory.innovations import innovations, without_gaps
 from omnidyn.identification.output_error.memory.mixed import coefficients, mixed, told_by_many
 from omnidyn.identification.output_error.memory.moving import Moving, new_while_moving, while_moving
 
@@ -121,33 +121,30 @@ class AutoRegression:
         slowest = min(float(np.abs(np.roots([1.0, *-self.coefficients])).max()), 1.0 - 1.0 / FOLLOWED)
         return (1.0 + slowest) / (1.0 - slowest)
 
-    def products(self, ways: FloatArray) -> FloatArray:
-        """Sums of a series times itself k rows on, for k from 0 to p, both ways. ways (n, K): K series. (p + 1, K)."""
-        ways = np.diff(ways, axis=0) if self.adds_up else ways
-        found = np.zeros((self.order + 1, ways.shape[1]))
-        for k in range(min(len(found), len(ways))):
-            found[k] = (1.0 if k == 0 else 2.0) * (ways[k:] * ways[: len(ways) - k]).sum(axis=0)
-        return found
+    def leaning(self, ways: FloatArray, new: FloatArray, steps: IntArray) -> FloatArray:
+        """(sum of squares of what is `new` in ways, slopes of it by phi). ways, new (n, K): K series; (1 + p, K).
 
-    def scatter(self, reach: FloatArray) -> FloatArray:
+        The slopes are those of the rows of which p before are known, for what they have of the sum.
+        """
+        length, p = (new**2).sum(axis=0), self.order
+        own, slopes = np.zeros_like(length), np.zeros((p, len(length)))
+        for each in without_gaps(ways, steps) if p else ():
+            each = np.diff(each, axis=0) if self.adds_up else each
+            rest = each[p:].copy()
+            for i, phi in enumerate(self.coefficients.tolist(), 1):
+                rest -= phi * each[p - i : len(each) - i][: len(rest)]
+            own += (rest**2).sum(axis=0)
+            slopes -= 2.0 * np.array([(rest * each[p - i : len(each) - i][: len(rest)]).sum(axis=0)
+                                      for i in range(1, p + 1)])  # fmt: skip
+        return np.vstack([length, slopes * (length / np.maximum(own, 1e-300))])
+
+    def scatter(self, leaning: FloatArray) -> FloatArray:
         """Variance that the uncertainty of this memory itself gives to each variance V = (J~' J~/s^2)^-1. Shape (K,).
 
-        J~' J~ = sum over k of w_k J' J(k rows on), w_k = sum of a_i a_(i+k), a = (1, -phi), so that with g = J V
-        dV = -dw_k g' g(k rows on)/s^2; reach (p + 1, K): these `products` of g over s^2.
+        dV = -g~' dg~/s^2 with g = J V: by phi, and by s^2 itself. leaning (1 + p, K): that of g, over s^2.
         """
-        p, a = self.order, np.concatenate([[1.0], -self.coefficients])
-        wide = np.concatenate([np.zeros(p + 1), a, np.zeros(p + 1)])
-        weights = np.array([a[: p + 1 - k] @ a[k:] for k in range(p + 1)])
-        rows = max(self.rows, 1)
-        total = 2.0 / rows * (weights @ reach) ** 2
-        if not p:
-            return total
-        at = np.arange(1, p + 1)[:, None] + p + 1
-        lag = np.arange(p + 1)
-        slope = -(wide[at + lag] + wide[at - lag])  # of w_k by phi_i
-        slope[:, 0] = -2.0 * a[1:]
-        by_phi = slope @ reach
-        return total + self._scattered(by_phi) / rows
+        total = 2.0 / max(self.rows, 1) * leaning[0] ** 2
+        return total + self._scattered(leaning[1:]) / max(self.rows, 1) if self.order else total
 
     def _scattered(self, by_phi: FloatArray) -> FloatArray:
         """Variance, times rows, of what has the slopes by_phi (p, K) by phi. Shape (K,)."""

@@ -9,10 +9,16 @@ e_t - sum of phi_i e_(t-i).
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from omnidyn.arrays import IntArray
 from omnidyn.compiled.kernel import kernel, part
+from omnidyn.statistics import stretches
+
+T = TypeVar("T", bound=np.generic)
 
 
 @kernel
@@ -92,3 +98,9 @@ def learn(row, state, spread, pulled, out):
     for a in range(p):
         for b in range(p):
             spread[a, b] -= pulled[a] * pulled[b] * ahead
+
+
+def without_gaps(series: NDArray[T], steps: IntArray) -> list[NDArray[T]]:
+    """The stretches of a series (n, ..) in which no row is missing."""
+    joined = stretches(np.append(steps[1:] == 1, False)) if len(steps) > 1 else np.zeros((0, 2), int)
+    return [series[first : last + 1] for first, last in joined.tolist()]

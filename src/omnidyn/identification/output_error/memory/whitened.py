@@ -7,7 +7,6 @@ errors, and the solver, the priors and the covariance are as they are for white 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,8 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.problem.outputs import SPEEDS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine
-from omnidyn.statistics import stretches
 
 FORGOTTEN = 1000  # rows missing in a row after which a stretch begins anew
-T = TypeVar("T", bound=np.generic)
 Rows = tuple[NDArray[np.intp], IntArray]  # which rows of a piece are known, rows since the one before (0: at a start)
 
 
@@ -127,12 +124,6 @@ def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:
     steps = np.concatenate([[0], np.maximum(np.round(apart / usual), 1.0)]).astype(np.intp)
     steps[steps > FORGOTTEN] = 0
     return rows, steps
-
-
-def without_gaps(series: NDArray[T], steps: IntArray) -> list[NDArray[T]]:
-    """The stretches of a series (n, ..) in which no row is missing."""
-    joined = stretches(np.append(steps[1:] == 1, False)) if len(steps) > 1 else np.zeros((0, 2), int)
-    return [series[first : last + 1] for first, last in joined.tolist()]
 
 
 def spacing(pieces: Sequence[Piece], column: Column) -> tuple[float, float, float]:

@@ -35,6 +35,7 @@ from omnidyn.compiled.beside import side_by_side
 from omnidyn.document import short
 from omnidyn.identification.output_error.memory.across import widening
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
+from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.memory.near import near
 from omnidyn.identification.output_error.memory.whitened import (
     TangentEngine,
@@ -42,7 +43,6 @@ from omnidyn.identification.output_error.memory.whitened import (
     known_rows,
     moving_rows,
     spacing,
-    without_gaps,
 )
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
@@ -282,19 +282,22 @@ def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegressi
     if not told.any():
         return float(max(known.degrees, 1))
     solver = found.solver
-    reach = {column: np.zeros((model.order + 1, int(told.sum()))) for column, model in models.items()}
+    leaning = {column: np.zeros((1 + model.order, int(told.sum()))) for column, model in models.items()}
     of_pieces = _of_pieces(found, known.plain)
     scale = Normal(solver, found.state).scale[told]
     pieces = zip(solver.problem.pieces, below(solver).residuals(found.state.point), of_pieces, strict=True)
     for piece, parts, covariance in pieces:
         ways = covariance[:, : len(told)][:, told] / scale
-        for column, _, _, slopes, _ in _columns(piece, parts):
-            if column not in reach:
+        moves = moving_rows(piece, parts[0])
+        for column, rows, _, slopes, steps in _columns(piece, parts):
+            if column not in models:
                 continue
-            reach[column] += models[column].products(slopes @ ways[parts[2]])
+            own = slopes @ ways[parts[2]]
+            new = models[column].new(own, steps, moves[piece.record.columns.index(column), rows])
+            leaning[column] += models[column].leaning(own, new, steps)
     variance, scatter = np.diag(known.plain)[told], np.zeros(int(told.sum()))
     for column, model in models.items():
-        scatter += model.scatter(reach[column] / found.state.variance[solver.problem.columns.index(column)])
+        scatter += model.scatter(leaning[column] / found.state.variance[solver.problem.columns.index(column)])
     degrees = 2.0 * variance**2 / np.maximum(scatter, 1e-300)
     return float(np.clip(degrees.min(), 3.0, max(known.degrees, 3)))
 
