@@ -5,6 +5,9 @@ import pytest
 from scipy.signal import lfilter
 
 from benchmarks.coloured import TICK, counted
+from benchmarks.wrong_worlds.kinds import by_name
+from benchmarks.wrong_worlds.log import TICK as TICKS
+from benchmarks.wrong_worlds.log import logged, right_case
 from omnidyn.comparison.compare import compare
 from omnidyn.identification.output_error.problem.differences import added_up, differences
 from omnidyn.identification.output_error.problem.record import record
@@ -47,6 +50,18 @@ def test_counts_and_their_tick_are_found(log):
     angle, lost = added_up(log, found)
     assert np.diff(angle, axis=0) == pytest.approx(log.wheel_speed[1:] / RATE)
     assert not lost.any()
+
+
+@pytest.mark.parametrize("name, seed", [("ellipse", 340_004), ("turning frame", 8141), ("wheels", 142_004)])
+def test_counts_of_a_robot_that_moves_briskly_at_50_rows_a_second_are_found(name, seed):
+    """Over four rows its motion alone looks like a sum that wanders."""
+    case = by_name(name).make(right_case(seed).setup_but(sensor="counts", memory=0.0, rate=50.0), 0.03)
+    assert differences([logged(case, seed)]) is not None
+    own = logged(case.setup_but(sensor="speeds"), seed, noisy=False)
+    step, rng = TICKS * 50.0, np.random.default_rng(seed)
+    assert own.wheel_speed is not None
+    anew = np.floor(own.wheel_speed / step + rng.random(own.wheel_speed.shape)) * step
+    assert differences([with_speed(own, anew)]) is None
 
 
 def test_a_text_of_two_decimals_and_a_clock_of_milliseconds_keep_them(log):

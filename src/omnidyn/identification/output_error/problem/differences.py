@@ -24,8 +24,7 @@ from omnidyn.run import Run
 from omnidyn.statistics import MAD_TO_STD, TEXT, find_tick, stretches
 
 ORDER = 5  # of the differences: an acceleration that dies away within ten rows is gone from them
-FEW, MANY = 1, 4  # rows at a time: where the two kinds are alike, and where they are 4 times apart
-APART = 2.0  # the middle between 1 and 4
+MANY = (2, 3, 4)  # rows at a time, at which errors of each row scatter so many times as much; most of them decide
 LEAST, MOST = 0.7, 10.0  # of the spread of rounding: less is no such difference, more is not coarse beside its noise
 ENOUGH = 100  # differences over moving rows, without which nothing is told
 JUMP = 0.05  # of the range of an input: after a greater change the acceleration jumps
@@ -126,13 +125,15 @@ def _adds_up(logs: Sequence[Run], found: Differences) -> bool:
     """Whether the sum of the speeds wanders no more than rounded counts do; False where nothing tells."""
     inputs = [_inputs(run) for run in logs]
     for which in range(3):
-        few, many = (
+        one, *many = (
             np.concatenate([np.zeros(0), *(d for run, own in zip(logs, inputs, strict=True)
                                            for d in _high(run, found, own[which], rows))])
-            for rows in (FEW, MANY)
+            for rows in (1, *MANY)
         )  # fmt: skip
-        if min(len(few), len(many)) >= ENOUGH:
-            return LEAST <= _level(few) <= MOST and _level(many) <= APART * _level(few)
+        if min(map(len, (one, *many))) >= ENOUGH:
+            level = _level(one)
+            steady = sum(_level(each) <= rows**0.5 * level for rows, each in zip(MANY, many, strict=True))
+            return LEAST <= level <= MOST and 2 * steady > len(MANY)
     return False
 
 
