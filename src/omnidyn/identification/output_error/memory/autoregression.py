@@ -21,7 +21,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
-from omnidyn.identification.output_error.memory.innovations import innovations, without_gaps
+from omnidyn.identification.output_error.memory.innovations import innovations
 from omnidyn.identification.output_error.memory.mixed import coefficients, mixed, told_by_many
 from omnidyn.identification.output_error.memory.moving import Moving, new_while_moving, while_moving
 
@@ -126,17 +126,14 @@ class AutoRegression:
 
         The slopes are those of the rows of which p before are known, for what they have of the sum.
         """
-        length, p = (new**2).sum(axis=0), self.order
-        own, slopes = np.zeros_like(length), np.zeros((p, len(length)))
-        for each in without_gaps(ways, steps) if p else ():
-            each = np.diff(each, axis=0) if self.adds_up else each
-            rest = each[p:].copy()
-            for i, phi in enumerate(self.coefficients.tolist(), 1):
-                rest -= phi * each[p - i : len(each) - i][: len(rest)]
-            own += (rest**2).sum(axis=0)
-            slopes -= 2.0 * np.array([(rest * each[p - i : len(each) - i][: len(rest)]).sum(axis=0)
-                                      for i in range(1, p + 1)])  # fmt: skip
-        return np.vstack([length, slopes * (length / np.maximum(own, 1e-300))])
+        length, p, phi = (new**2).sum(axis=0), self.order, self.coefficients
+        ways = np.diff(ways, axis=0, prepend=ways[:1]) if self.adds_up else ways
+        row = np.arange(len(ways))
+        since = row - np.maximum.accumulate(np.where(steps == 1, 0, row))  # the last row that had none before it
+        at = row[since >= p + self.adds_up]
+        rest = ways[at] - sum(phi[i - 1] * ways[at - i] for i in range(1, p + 1))
+        slopes = np.array([-2.0 * (rest * ways[at - i]).sum(axis=0) for i in range(1, p + 1)]).reshape(p, -1)
+        return np.vstack([length, slopes * (length / np.maximum((rest**2).sum(axis=0), 1e-300))])
 
     def scatter(self, leaning: FloatArray) -> FloatArray:
         """Variance that the uncertainty of this memory itself gives to each variance V = (J~' J~/s^2)^-1. Shape (K,).
