@@ -50,11 +50,11 @@ def test_errors_that_last_as_long_as_the_log_are_not_called_noise():
     assert fits_verdict({"": fit}, {}).startswith("The errors last so long that no test")
 
 
-@pytest.mark.parametrize("sensor", [COUNTS, TICKS])
-def test_friction_at_the_wheels_under_a_box_is_found_by_counts(sensor):
+def test_friction_at_the_wheels_under_a_box_is_found_by_counts():
     """A Coulomb level of 0 where it is 4.1 N, and angles 1 rad off, which were called noise."""
     seed = 142_004
-    case = by_name("wheels").make(right_case(seed), 0.00638747).setup_but(sensor=sensor)
+    case = by_name("wheels").make(right_case(seed), 0.00638747)
+    assert case.setup.sensor == COUNTS
     fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
     assert fit.value["friction.axes.coulomb[1]"] < 0.5
     assert fit.lack_of_fit.found

@@ -93,7 +93,7 @@ def examine(solution: Solution) -> Examined:
         found, channels, levels.sizes(_sizes(seen, names)), seen.found, (*told, *calmer(seen, wild)), seen.tested,
         pictures, wild, levels.noise, levels.beyond, levels.at_rest,
         dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {},
-        seen.linear.degrees < SURE or seen.tells_nothing,
+        seen.linear.degrees < SURE,
     )  # fmt: skip
     diagnosis = Diagnosis(lack, rests_on(seen.linear.plain, bench), stable)
     return Examined(diagnosis, memory, len(tried), count)

@@ -46,11 +46,6 @@ class Misfit:
     rounded: FloatArray
     explained: list[FloatArray]
 
-    @property
-    def tells_nothing(self) -> bool:
-        """Whether no theme could be tested: along all directions the noise is known too little."""
-        return all(p == 1.0 for p in self.tested.values())
-
 
 def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEMES) -> Misfit:
     """Test every theme, step by step: what is found first is part of the model when the rest is tested."""

@@ -134,3 +134,9 @@ def test_what_a_sum_of_squares_leans_on_is_its_slope_by_the_memory_rows_missing_
         up, down = (squares(model.coefficients + sign * step * np.eye(3)[i]) for sign in (1.0, -1.0))
         scale = np.abs(found[1:]).max(axis=0)
         np.testing.assert_allclose(slope / scale, (up - down) / (2.0 * step) / scale, atol=0.15)
+
+
+def test_without_a_memory_nothing_leans_on_one():
+    ways = np.random.default_rng(7).normal(size=(50, 2))
+    found = AutoRegression(np.zeros(0), 1.0, 50).leaning(ways, ways, np.ones(50, int))
+    np.testing.assert_allclose(found, (ways**2).sum(axis=0)[None])

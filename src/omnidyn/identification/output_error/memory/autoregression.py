@@ -132,8 +132,8 @@ class AutoRegression:
         since = row - np.maximum.accumulate(np.where(steps == 1, 0, row))  # the last row that had none before it
         at = row[since >= p + self.adds_up]
         rest = ways[at] - sum(phi[i - 1] * ways[at - i] for i in range(1, p + 1))
-        slopes = np.array([-2.0 * (rest * ways[at - i]).sum(axis=0) for i in range(1, p + 1)]).reshape(p, -1)
-        return np.vstack([length, slopes * (length / np.maximum((rest**2).sum(axis=0), 1e-300))])
+        share = length / np.maximum((rest**2).sum(axis=0), 1e-300)
+        return np.vstack([length, *(-2.0 * (rest * ways[at - i]).sum(axis=0) * share for i in range(1, p + 1))])
 
     def scatter(self, leaning: FloatArray) -> FloatArray:
         """Variance that the uncertainty of this memory itself gives to each variance V = (J~' J~/s^2)^-1. Shape (K,).
