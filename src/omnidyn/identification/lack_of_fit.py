@@ -36,6 +36,7 @@ UNTOLD = "this log cannot tell its noise from misfit: repeat a command, or let t
 FAR = 0.001, 0.1  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
 WORTH = 0.01  # share of the variance of a residual that is worth a line
 CHANGED, SEEN = 2, 0.02  # numbers that a remedy would change that are named; relative change that is worth it
+LARGE = 100.0  # chi2 of which nobody needs decimals
 NONE = 1e-3  # of what a number was, below which nothing is left of it
 MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
@@ -263,9 +264,8 @@ class LackOfFit:
             if own:
                 levels = ", ".join(f"{name} {each.level:.2g} {each.unit}" for name, each in own.items())
                 moves = max(each.of_moves for each in own.values())
-                chi2 = " to ".join(
-                    dict.fromkeys(f"{pick(each.chi2 for each in own.values()):.2f}" for pick in (min, max))
-                )
+                far = [pick(each.chi2 for each in own.values()) for pick in (min, max)]
+                chi2 = " to ".join(dict.fromkeys(f"{x:.2f}" if x < LARGE else short(x, ".3g") for x in far))
                 told.append(
                     f"noise: the log {where} {levels}, at most {short(100.0 * moves)} % of what moves; chi2 of the "
                     f"residuals by that: {chi2}"

@@ -70,6 +70,9 @@ def test_a_gross_misfit_of_angles_is_found():
     assert fit.value["friction.axes.viscous[0]"] > 5.0 * case.told.viscous[0]
     assert fit.lack_of_fit.found
     assert not fit.lack_of_fit.drifts
+    for name, share in fit.lack_of_fit.channels.items():  # of the speeds of the same log: .94, .95, .90
+        assert 0.5 < share < 1.0
+        assert fit.lack_of_fit.sizes[name] == pytest.approx(share**0.5 * fit.noise[name], rel=0.1)
     noise = fit.lack_of_fit.noise["wheel_angle[0]"]
     assert noise.residual == pytest.approx(fit.noise["wheel_angle[0]"], rel=0.1)  # of the fit, not of a step beyond it
     right = case.world_but(limit=World.limit)

@@ -3,7 +3,7 @@ the same throughout the logs."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,7 +90,7 @@ def examine(solution: Solution) -> Examined:
     wild = {} if solver.nu else wild_samples(seen, moved)
     pictures = binned(rows, moved, int(np.argmax([*channels.values()]))) if found else ()
     lack = LackOfFit(
-        found, channels, levels.sizes(_sizes(seen, names)), seen.found, (*told, *calmer(seen, wild)), seen.tested,
+        found, channels, _sizes(rows, channels), seen.found, (*told, *calmer(seen, wild)), seen.tested,
         pictures, wild, levels.noise, levels.beyond, levels.at_rest,
         dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {},
         seen.linear.degrees < SURE,
@@ -145,12 +145,13 @@ def with_levels(problem: Problem, point: Point, levels: dict[str, float]) -> Pro
     return replace(problem, robot=holding(problem.robot_at(point.values), levels)) if levels else problem
 
 
-def _sizes(seen: Misfit, names: list[str]) -> dict[str, float]:
-    square, number = np.zeros(len(names)), np.zeros(len(names))
-    rows = seen.linear.rows
+def _sizes(rows: Rows, channels: Mapping[str, float]) -> dict[str, float]:
+    """How large a share of each column is, root mean square."""
+    square, number = np.zeros((2, len(channels)))
     for k, columns in enumerate(rows.column):
         for j, c in enumerate(columns):
-            there = rows.there[k][j]
-            square[c] += float((seen.explained[k][j][there] ** 2).sum())
-            number[c] += int(there.sum())
-    return dict(zip(names, np.sqrt(square / np.maximum(number, 1)).tolist(), strict=True))
+            own = rows.residual[k][j][rows.there[k][j]]
+            square[c] += float((own**2).sum())
+            number[c] += own.size
+    sizes = np.sqrt(np.array([*channels.values()]) * square / np.maximum(number, 1.0))
+    return dict(zip(channels, sizes.tolist(), strict=True))

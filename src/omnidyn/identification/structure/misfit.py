@@ -69,7 +69,7 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
             best = _likeliest(scores)
         if not best or scores[best][1] > FALSE / len(themes):
             kept = [each[:, :, taken] for each in shown]
-            return Misfit(tuple(found), first, linear, kept, *_shares(rows, *left, bool(found)))
+            return Misfit(tuple(found), first, linear, kept, *_shares(linear, *left, bool(found)))
         found.append(Found(best, *scores[best]))
         taken = np.concatenate([taken, at[best]])
 
@@ -80,7 +80,7 @@ def with_cause(seen: Misfit, cause: Sequence[FloatArray]) -> Misfit:
     left, off, _ = left_beside(
         rows, seen.linear, [np.concatenate(both, axis=2) for both in zip(seen.shown, cause, strict=True)]
     )
-    shares, rounded, explained = _shares(rows, left, off, True)
+    shares, rounded, explained = _shares(seen.linear, left, off, True)
     better = shares.sum() > seen.shares.sum()
     return replace(seen, shares=shares, rounded=rounded, explained=explained) if better else seen
 
@@ -213,19 +213,24 @@ def left_beside(
 
 
 def _shares(
-    rows: Rows, left: Sequence[FloatArray], off: Sequence[FloatArray], found: bool
+    linear: Linear, left: Sequence[FloatArray], off: Sequence[FloatArray], found: bool
 ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
     """(shares of the variance of each column that are no noise, and that its inputs were rounded by; what is explained
-    in each piece)."""
-    whole, beside, rest = np.zeros((3, len(rows.problem.columns)))
+    in each piece).
+
+    Errors that last may be larger once a misfit is taken out of them: the share is then that of what is new in a row.
+    """
+    rows = linear.rows
+    whole, beside, rest, new, new_beside = np.zeros((5, len(rows.problem.columns)))
     for k, columns in enumerate(rows.column):
         for j, c in enumerate(columns):
-            there = rows.there[k][j]
-            whole[c] += float((rows.residual[k][j][there] ** 2).sum())
-            beside[c] += float(((left[k] + off[k])[j][there] ** 2).sum())
+            there, both = rows.there[k][j], np.stack([rows.residual[k][j], (left[k] + off[k])[j]], axis=1)
+            whole[c], beside[c] = np.array([whole[c], beside[c]]) + (both[there] ** 2).sum(axis=0)
+            new[c], new_beside[c] = np.array([new[c], new_beside[c]]) + (linear.of_column(k, j, both) ** 2).sum(axis=0)
             rest[c] += float((left[k][j][there] ** 2).sum())
     explained = [a - b - c for a, b, c in zip(rows.residual, left, off, strict=True)]
-    size = np.where(whole > 0.0, whole, np.inf)
-    shares = np.clip(1.0 - beside / size, 0.0, 1.0) if found else 0.0 * whole
+    size, size_of_new = (np.where(each > 0.0, each, np.inf) for each in (whole, new))
+    shares = np.where(beside > whole, 1.0 - new_beside / size_of_new, 1.0 - beside / size)
+    shares = np.clip(shares, 0.0, 1.0) if found else 0.0 * whole
     shares[whole == 0.0] = 0.0
     return shares, np.clip((beside - rest) / size, 0.0, 1.0), explained

@@ -60,11 +60,6 @@ class Levels:
         """Shares of the variance of residuals that are no noise, by what they follow or by the level of the noise."""
         return dict(shares) | {name: max(shares[name], self.noise[name].share) for name in self.beyond}
 
-    def sizes(self, sizes: Mapping[str, float]) -> dict[str, float]:
-        """How large that is, in the unit of each output."""
-        own = {name: self.noise[name].share ** 0.5 * self.noise[name].residual for name in self.beyond}
-        return dict(sizes) | {name: max(sizes[name], size) for name, size in own.items()}
-
 
 def noise_levels(linear: Linear, motions: Sequence[Motion], pulled_in: bool = False) -> Levels:
     """What the log shows of the noise of each output, and whether the fit leaves more.
