@@ -87,6 +87,17 @@ def test_rows_that_are_missing_cost_what_they_tell(axebot, clean):
         assert abs(less.value[key] - TRUTH[key]) < 4.0 * less.std[key]
 
 
+def test_a_piece_that_starts_at_rest_is_fitted_with_one_that_starts_in_motion(axebot, clean):
+    """What was commanded is not known for a while; after it the speeds of the start are to be found, before it none."""
+    log = remembering(clean, 0.9, 5)
+    voltage = log.voltage.copy()
+    voltage[1500:1600] = np.nan
+    fit = fit_output_error(log.replace(voltage=voltage), axebot)
+    assert fit.covariance == "autoregressive"
+    for key in BOX:
+        assert abs(fit.value[key] - TRUTH[key]) < 4.0 * fit.std[key]
+
+
 def test_what_the_fit_has_swallowed_is_counted(axebot, clean):
     """Over 15 logs the memory found is the true one, 0.98: its mean is known to 0.0036/sqrt(45)."""
     found = []

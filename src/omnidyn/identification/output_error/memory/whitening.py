@@ -184,7 +184,7 @@ def _memory(
     solver = solution.solver
     series: dict[Column, list[FloatArray]] = {column: [] for column in solver.problem.columns}
     moving: dict[Column, list[BoolArray]] = {column: [] for column in solver.problem.columns}
-    taken = None if covariance is None else [_root(own) for own in _of_pieces(solution, covariance)]
+    taken = None if covariance is None else _roots(_of_pieces(solution, covariance))
     for k, parts in enumerate(below(solver).residuals(solution.state.point)):
         piece = solver.problem.pieces[k]
         mine = moving_rows(piece, parts[0]) if moves is None else moves[k]
@@ -227,6 +227,13 @@ def _inverse(information: FloatArray) -> FloatArray:
     size = np.sqrt(np.maximum(information.diagonal(), 0.0))
     size[size == 0.0] = 1.0
     return np.linalg.pinv(information / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size)
+
+
+def _roots(covariances: Sequence[FloatArray]) -> list[FloatArray]:
+    """The roots of several, of as many columns each: a piece whose start is seen has more that are open."""
+    roots = [_root(own) for own in covariances]
+    most = max((root.shape[1] for root in roots), default=0)
+    return [np.pad(root, ((0, 0), (0, most - root.shape[1]))) for root in roots]
 
 
 def _root(covariance: FloatArray) -> FloatArray:
