@@ -165,30 +165,18 @@ def test_an_error_has_no_colour_codes(tmp_path):
     assert "\x1b" not in result.stdout
 
 
-def test_help_imports_nothing_heavy(tmp_path):
+def test_help_is_quick(tmp_path):
+    """It imports nothing heavy, and little at all: a count, for seconds depend on the machine."""
     script = (
         "import sys\nfrom omnidyn.cli import main\nmain(['--help'])\n"
         "heavy = {'click', 'numpy', 'numba', 'scipy', 'pydantic', 'matplotlib', 'rich'}\n"
-        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
+        "print(sorted(heavy & set(sys.modules)), len(sys.modules) < 300, file=sys.stderr)"
     )
     result = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60,
         check=True,
     )  # fmt: skip
-    assert result.stderr == "[]\n"
-
-
-@posix
-def test_help_is_quick(tmp_path):
-    assert min(_seconds_of_work(tmp_path) for _ in range(5)) < 0.3
-
-
-def _seconds_of_work(cwd):
-    """Processor time, so that a busy machine does not count."""
-    before = os.times()
-    omnidyn("--help", cwd=cwd)
-    after = os.times()
-    return after.children_user + after.children_system - before.children_user - before.children_system
+    assert result.stderr == "[] True\n"
 
 
 def test_work_past_two_seconds_shows_progress(capsys, monkeypatch):
