@@ -121,6 +121,20 @@ def test_a_sensor_that_is_out_for_long_is_no_log_on_change(tmp_path):
     np.testing.assert_array_equal(np.isnan(filled[:, 0]), (np.arange(100) >= 40) & (np.arange(100) < 80))
 
 
+def test_a_command_that_is_out_for_long_is_not_held(tmp_path):
+    rows = [f"{0.1 * k:.1f},{'' if 40 <= k < 80 else k % 5},{k}" for k in range(100)]
+    run = read_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows)))
+    assert not any("recorded on change" in words for words in run.warnings)
+    np.testing.assert_array_equal(np.isnan(run.voltage[:, 0]), (np.arange(100) >= 40) & (np.arange(100) < 80))
+
+
+def test_a_command_on_change_is_held_however_long(tmp_path):
+    rows = [f"{0.1 * k:.1f},{k if k % 3 == 0 and not 40 <= k < 80 else ''},{k}" for k in range(121)]
+    run = read_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows)))
+    assert any("u1 is recorded on change (77% of its cells are blank): held" in words for words in run.warnings)
+    np.testing.assert_array_equal(run.voltage[39:82, 0], [39.0] * 42 + [81.0])
+
+
 def test_a_log_on_change_has_gaps_too(tmp_path):
     """The line is drawn between the measurements on change, not across the time when there was none."""
     rows = [f"{0.1 * k:.1f},{k % 5},{'' if 40 <= k < 80 or k % 3 else k}" for k in range(121)]
@@ -130,7 +144,7 @@ def test_a_log_on_change_has_gaps_too(tmp_path):
     known = (np.arange(121) <= 39) | (np.arange(121) >= 81)
     np.testing.assert_array_equal(np.isfinite(filled), known)
     np.testing.assert_allclose(filled[known], np.arange(121)[known])
-    assert words == ["w1 is recorded on change (65% of its cells are blank): nothing is made up between"]
+    assert words == ["w1 is recorded on change (77% of its cells are blank): nothing is made up between"]
 
 
 def test_rows_of_one_time_that_fill_each_other_s_blanks_are_one_row(tmp_path):

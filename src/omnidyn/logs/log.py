@@ -160,12 +160,12 @@ class Log:
         columns = values.reshape(len(self), -1)
         changed = columns.copy()
         for k, component in enumerate(components(channel, columns.shape[1])):
-            share = self._blank(channel, columns[:, k])
-            if self._is_sparse(share):
+            if self.now_and_then(columns[:, k]):
                 hold = channel in NEVER_MADE_UP
                 changed[:, k] = _held(columns[:, k]) if hold else _interpolated(self.t, columns[:, k])
                 how = "held" if hold else "nothing is made up between"
                 if not self.own_clocks:
+                    share = float(np.isnan(columns[:, k]).mean())
                     warnings.append(f"{component} is recorded on change ({share:.0%} of its cells are blank): {how}")
             late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
             if late:
@@ -173,18 +173,14 @@ class Log:
                 warnings.append(f"{component} was moved back by its latency of {late:g} s")
         return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
 
-    def _blank(self, channel: str, values: FloatArray) -> float:
-        """The share of blanks in a component: of a measurement outside its gaps, for a sensor that is out is no log
-        on change. A command holds however long."""
-        there = np.isfinite(values)
-        if channel in NEVER_MADE_UP:
-            return 1.0 - float(there.mean())
-        covered = there | np.isfinite(_interpolated(self.t, values))
-        return 1.0 - float(there.sum() / max(covered.sum(), 1))
+    def now_and_then(self, values: FloatArray) -> bool:
+        """Whether a component, shape (rows,), was recorded when it changed, or at times of its own.
 
-    def _is_sparse(self, share: float) -> bool:
-        """Whether a component with such a share of blanks was recorded when it changed, or at times of its own."""
-        return 0.0 < share < 1.0 if self.own_clocks else ON_CHANGE < share < 1.0
+        By the share of blanks outside its gaps: where a sensor or a driver was out, it is missing.
+        """
+        there = np.isfinite(values)
+        covered = there | np.isfinite(_interpolated(self.t, values))
+        return (0.0 if self.own_clocks else ON_CHANGE) < 1.0 - there.sum() / max(covered.sum(), 1) < 1.0
 
     def between(self, channel: str) -> BoolArray:
         """Which values of `aligned` lie between measurements, where no sensor gave any. Shape as in the channel."""
@@ -192,7 +188,7 @@ class Log:
         made_up = np.zeros(columns.shape, dtype=bool)
         for k, component in enumerate(components(channel, columns.shape[1])):
             blank = np.isnan(columns[:, k])
-            if channel in NEVER_MADE_UP or not self._is_sparse(self._blank(channel, columns[:, k])):
+            if channel in NEVER_MADE_UP or not self.now_and_then(columns[:, k]):
                 continue
             late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
             made_up[:, k] = _far_from(self.t + late, self.t[~blank], self.t) if late else blank

@@ -21,7 +21,7 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.findings.finding import Span, spans_of
 from omnidyn.findings.signal.robust import clusters
 from omnidyn.logs.channels import components
-from omnidyn.logs.log import ON_CHANGE, Log
+from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL
 
@@ -105,8 +105,9 @@ class LogUnderCheck:
         logged = self.log.channels.get(channel)
         if logged is None:
             return np.arange(len(self))
-        there = np.isfinite(logged.reshape(len(self.log), -1)[self.rows, k])
-        return np.flatnonzero(there) if 1.0 - there.mean() > ON_CHANGE else np.arange(len(self))
+        values = logged.reshape(len(self.log), -1)[self.rows, k]
+        in_order = replace(self.log, t=self.t, channels={})
+        return np.flatnonzero(np.isfinite(values)) if in_order.now_and_then(values) else np.arange(len(self))
 
     def replace(self, **channels: FloatArray | None) -> LogUnderCheck:
         """The log with some channels changed, or taken out where None."""

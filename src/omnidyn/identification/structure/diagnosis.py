@@ -146,12 +146,6 @@ def with_levels(problem: Problem, point: Point, levels: dict[str, float]) -> Pro
 
 
 def _sizes(rows: Rows, channels: Mapping[str, float]) -> dict[str, float]:
-    """How large a share of each column is, root mean square."""
-    square, number = np.zeros((2, len(channels)))
-    for k, columns in enumerate(rows.column):
-        for j, c in enumerate(columns):
-            own = rows.residual[k][j][rows.there[k][j]]
-            square[c] += float((own**2).sum())
-            number[c] += own.size
-    sizes = np.sqrt(np.array([*channels.values()]) * square / np.maximum(number, 1.0))
-    return dict(zip(channels, sizes.tolist(), strict=True))
+    """How large a share of the residual of each column is, root mean square."""
+    mean = rows.squares(rows.residual) / np.maximum(rows.added(lambda k, j: rows.there[k][j]), 1.0)
+    return dict(zip(channels, np.sqrt(np.array([*channels.values()]) * mean).tolist(), strict=True))

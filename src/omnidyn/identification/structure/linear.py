@@ -10,7 +10,7 @@ So every question about the fit is one of ordinary least squares with errors of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -80,6 +80,18 @@ class Rows:
     @property
     def pieces(self) -> tuple[Piece, ...]:
         return self.problem.pieces
+
+    def squares(self, values: Sequence[FloatArray]) -> FloatArray:
+        """Squares of values (C, rows) of each piece in the rows that count, added up for each column of the problem."""
+        return self.added(lambda k, j: values[k][j][self.there[k][j]] ** 2)
+
+    def added(self, of: Callable[[int, int], FloatArray]) -> FloatArray:
+        """What each piece k and its column j has, added up for each column of the problem. Shape (columns,)."""
+        found = np.zeros(len(self.problem.columns))
+        for k, columns in enumerate(self.column):
+            for j, c in enumerate(columns):
+                found[c] += float(of(k, j).sum())
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +175,10 @@ class Linear:
         there = rows.there[k][j]
         new = memory.new(np.ascontiguousarray(values[there]), rows.steps[k][j], rows.moves[k][j, there])
         return new / np.sqrt(max(memory.variance, TINY))
+
+    def squares(self, values: Sequence[FloatArray]) -> FloatArray:
+        """The same as of `Rows`, of values made white."""
+        return self.rows.added(lambda k, j: self.of_column(k, j, values[k][j][:, None]) ** 2)
 
     def without_starts(self, shown: Shown) -> list[FloatArray]:
         """What is shown, in rows as they are, without what the starts of pieces, and rounded inputs, explain of it.

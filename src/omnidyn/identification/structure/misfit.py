@@ -19,7 +19,7 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.problem.outputs import TRAVEL
 from omnidyn.identification.structure.disturbances import THEMES, Theme, shown_by_themes
-from omnidyn.identification.structure.linear import Gram, Linear, Rows, root_of_covariance, solved
+from omnidyn.identification.structure.linear import TINY, Gram, Linear, Rows, root_of_covariance, solved
 from omnidyn.identification.structure.motion import Motion
 
 FALSE = 0.02  # of right models for which something is found, all tests together
@@ -221,16 +221,12 @@ def _shares(
     Errors that last may be larger once a misfit is taken out of them: the share is then that of what is new in a row.
     """
     rows = linear.rows
-    whole, beside, rest, new, new_beside = np.zeros((5, len(rows.problem.columns)))
-    for k, columns in enumerate(rows.column):
-        for j, c in enumerate(columns):
-            there, both = rows.there[k][j], np.stack([rows.residual[k][j], (left[k] + off[k])[j]], axis=1)
-            whole[c], beside[c] = np.array([whole[c], beside[c]]) + (both[there] ** 2).sum(axis=0)
-            new[c], new_beside[c] = np.array([new[c], new_beside[c]]) + (linear.of_column(k, j, both) ** 2).sum(axis=0)
-            rest[c] += float((left[k][j][there] ** 2).sum())
-    explained = [a - b - c for a, b, c in zip(rows.residual, left, off, strict=True)]
-    size, size_of_new = (np.where(each > 0.0, each, np.inf) for each in (whole, new))
-    shares = np.where(beside > whole, 1.0 - new_beside / size_of_new, 1.0 - beside / size)
-    shares = np.clip(shares, 0.0, 1.0) if found else 0.0 * whole
-    shares[whole == 0.0] = 0.0
-    return shares, np.clip((beside - rest) / size, 0.0, 1.0), explained
+    both = [a + b for a, b in zip(left, off, strict=True)]
+    whole, beside, rest = (rows.squares(each) for each in (rows.residual, both, left))
+    lasts = beside > whole
+    before, after = (
+        np.where(lasts, linear.squares(of), plain) for of, plain in ((rows.residual, whole), (both, beside))
+    )
+    shares = found * np.clip((before - after) / np.maximum(before, TINY), 0.0, 1.0)
+    explained = [a - b for a, b in zip(rows.residual, both, strict=True)]
+    return shares, np.clip((beside - rest) / np.maximum(whole, TINY), 0.0, 1.0), explained

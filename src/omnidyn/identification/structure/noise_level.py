@@ -41,7 +41,7 @@ FORGOTTEN = 0.05  # correlation of repeats below which slow errors differ in the
 ENOUGH = 50.0  # degrees of freedom of errors as they are, slow ones too, below which slow ones are left out
 FOLLOWED, LEAST_ROWS = 1000, 200  # rows by which errors have forgotten; differences without which nothing is told
 COARSE = 0.5  # of a step of the sensor: less noise leaves rounding that repeats itself
-FAR = 2.0  # times the sum of squares
+FAR = 2.0  # times the sum of squares of residuals, which a step within a straight model hardly changes
 KNOWN = 1e9  # degrees of freedom of what is known
 THIRD = np.array([1.0, -3.0, 3.0, -1.0])
 WHITE = 0.1  # relative difference of the variance by second and by fourth differences up to which noise is white
@@ -90,12 +90,9 @@ def _without_pull(linear: Linear) -> list[FloatArray]:
     """
     rows, none = linear.rows, [np.zeros((*each.shape, 0)) for each in linear.rows.residual]
     left = left_beside(rows, linear, none)[0]
-    for c in range(len(rows.problem.columns)):
-        at = [(k, columns.index(c)) for k, columns in enumerate(rows.column) if c in columns]
-        before, after = (sum(float(np.nansum(each[k][j] ** 2)) for k, j in at) for each in (rows.residual, left))
-        for k, j in at if after > FAR * before else ():
-            left[k][j] = rows.residual[k][j]
-    return left
+    beyond = rows.squares(left) > FAR * rows.squares(rows.residual)
+    own = [beyond[columns][:, None] for columns in rows.column]
+    return [np.where(far, before, after) for far, before, after in zip(own, rows.residual, left, strict=True)]
 
 
 def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression, pulled_in: bool) -> list[Noise]:

@@ -136,6 +136,18 @@ def test_what_a_sum_of_squares_leans_on_is_its_slope_by_the_memory_rows_missing_
         np.testing.assert_allclose(slope / scale, (up - down) / (2.0 * step) / scale, atol=0.15)
 
 
+def test_a_memory_longer_than_every_stretch_is_not_taken_for_known():
+    """Of an order of 60, whose last ones are next to nothing, in stretches of 40 rows: what it leans on is there."""
+    long = AutoRegression(np.append(np.array([0.9]), np.zeros(59)), 1.0, 400)
+    short = AutoRegression(np.array([0.9]), 1.0, 400)
+    ways = np.sin(np.arange(400) / 15.0)[:, None]
+    steps = np.where(np.arange(400) % 40, 1, 3)
+    steps[0] = 0
+    slope, expected = (m.leaning(ways, m.new(ways, steps, np.ones(400, bool)), steps)[1, 0] for m in (long, short))
+    assert slope == pytest.approx(expected, rel=0.3)
+    assert abs(expected) > 0.0
+
+
 def test_without_a_memory_nothing_leans_on_one():
     ways = np.random.default_rng(7).normal(size=(50, 2))
     found = AutoRegression(np.zeros(0), 1.0, 50).leaning(ways, ways, np.ones(50, int))

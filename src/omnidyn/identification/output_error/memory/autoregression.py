@@ -124,16 +124,19 @@ class AutoRegression:
     def leaning(self, ways: FloatArray, new: FloatArray, steps: IntArray) -> FloatArray:
         """(sum of squares of what is `new` in ways, slopes of it by phi). ways, new (n, K): K series; (1 + p, K).
 
-        The slopes are those of the rows of which p before are known, for what they have of the sum.
+        The slopes are those of the rows of which p before are known, for what they have of the sum; where no stretch
+        is twice as long, of the later half of the longest ones, by what is known there.
         """
         length, p, phi = (new**2).sum(axis=0), self.order, self.coefficients
         ways = np.diff(ways, axis=0, prepend=ways[:1]) if self.adds_up else ways
         row = np.arange(len(ways))
-        since = row - np.maximum.accumulate(np.where(steps == 1, 0, row))  # the last row that had none before it
-        at = row[since >= p + self.adds_up]
-        rest = ways[at] - sum(phi[i - 1] * ways[at - i] for i in range(1, p + 1))
-        share = length / np.maximum((rest**2).sum(axis=0), 1e-300)
-        return np.vstack([length, *(-2.0 * (rest * ways[at - i]).sum(axis=0) * share for i in range(1, p + 1))])
+        since = row - np.maximum.accumulate(np.where(steps == 1, 0, row)) - self.adds_up  # rows known before, in a row
+        at = row[since >= min(p, int(since.max(initial=0)) // 2)]
+        past = [ways[at - i] * (since[at] >= i)[:, None] for i in range(1, p + 1)]
+        rest = ways[at] - sum(each * own for each, own in zip(phi, past, strict=True))
+        square = (rest**2).sum(axis=0)
+        share = length / np.where(square > 0.0, square, np.inf)
+        return np.vstack([length, *(-2.0 * (rest * each).sum(axis=0) * share for each in past)])
 
     def scatter(self, leaning: FloatArray) -> FloatArray:
         """Variance that the uncertainty of this memory itself gives to each variance V = (J~' J~/s^2)^-1. Shape (K,).

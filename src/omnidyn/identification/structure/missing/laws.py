@@ -372,6 +372,7 @@ def _breaking(table: str) -> Callable[[Workbench], list[Trial]]:
     """Breakaway above Coulomb friction by several shares, a number for each part of the table."""
 
     def trials(bench: Workbench) -> list[Trial]:
+        """One for each share."""
         found, robot = [], bench.robot
         for share in ABOVE:
             every = 1.0 + share * np.eye(_parts(robot, table))
