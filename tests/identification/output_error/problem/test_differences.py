@@ -131,6 +131,16 @@ def test_missing_rows_split_the_log(axebot, log):
     assert any("3 rows lack counts of an encoder" in words for words in read.notes)
 
 
+def test_a_wheel_that_is_out_for_long_is_one_loss(axebot, log):
+    speed = log.wheel_speed.copy()
+    speed[800:1200, 1] = np.nan
+    run = with_speed(log, speed)
+    read = record(run, axebot, counted=differences([run]))
+    assert read.pieces == ((0, 799), (1199, len(log) - 1))
+    assert {name for name, _ in read.columns} == {"wheel_angle"}
+    assert any("400 rows lack counts of an encoder" in words for words in read.notes)
+
+
 def test_too_many_missing_rows_leave_them_as_they_are(axebot, log):
     kept = np.random.default_rng(6).random(len(log)) > 0.04
     run = with_speed(log, log.wheel_speed, kept)

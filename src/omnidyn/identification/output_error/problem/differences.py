@@ -187,8 +187,8 @@ def _hindrance(logs: Sequence[Run], found: Differences) -> str:
     whole = np.concatenate([each[each < LOST] for each in steps])
     if not found.stamped and np.mean(np.abs(whole - 1.0) <= UNEVEN) < NEARLY:
         return "the stamps of the rows are uneven"
-    lost = sum(int(_turned(run, found)[1][1:].sum()) for run in logs)
-    rows = sum(map(len, logs))
-    if lost * SHORT > rows:
+    rows, missing = sum(map(len, logs)), [_turned(run, found)[1][1:] for run in logs]
+    if sum(len(stretches(lost)) for lost in missing) * SHORT > rows:
+        lost = sum(int(each.sum()) for each in missing)
         return f"{lost} of {rows} rows are missing, and what was turned there with them"
     return ""
