@@ -148,6 +148,13 @@ def test_a_memory_longer_than_every_stretch_is_not_taken_for_known():
     assert abs(expected) > 0.0
 
 
+def test_a_memory_longer_than_a_whole_piece_leans_on_what_there_is():
+    ways = np.random.default_rng(3).normal(size=(5, 2))
+    found = AutoRegression(np.array([0.5, 0, 0, 0, 0, 0.1]), 1.0, 400).leaning(ways, ways, np.array([0, 1, 1, 1, 1]))
+    assert np.isfinite(found).all()
+    assert (found[6] == 0.0).all()  # nothing is six rows before another
+
+
 def test_without_a_memory_nothing_leans_on_one():
     ways = np.random.default_rng(7).normal(size=(50, 2))
     found = AutoRegression(np.zeros(0), 1.0, 50).leaning(ways, ways, np.ones(50, int))

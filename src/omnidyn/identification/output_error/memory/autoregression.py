@@ -132,7 +132,7 @@ class AutoRegression:
         row = np.arange(len(ways))
         since = row - np.maximum.accumulate(np.where(steps == 1, 0, row)) - self.adds_up  # rows known before, in a row
         at = row[since >= min(p, int(since.max(initial=0)) // 2)]
-        past = [ways[at - i] * (since[at] >= i)[:, None] for i in range(1, p + 1)]
+        past = [ways[np.maximum(at - i, 0)] * (since[at] >= i)[:, None] for i in range(1, p + 1)]
         rest = ways[at] - sum(each * own for each, own in zip(phi, past, strict=True))
         square = (rest**2).sum(axis=0)
         share = length / np.where(square > 0.0, square, np.inf)
