@@ -171,8 +171,9 @@ class LackOfFit:
     then the last remedy, key "loss", is that, whether or not there is a misfit.
     noise: of outputs whose noise the log shows without the model, by the best source; None where that was not asked.
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
-    rounded: output -> share of the variance of its residuals that is what the inputs were rounded by, which is no lack
-    of fit, but hides one that is smaller. drifts: whether errors last so long that no test tells them from a misfit.
+    rounded: output -> share of the variance of its residuals that is of inputs that were rounded, or changed while rows
+    are missing, which is no lack of fit, but hides one that is smaller. drifts: whether errors last so long that no
+    test tells them from a misfit.
     """
 
     found: bool
@@ -273,11 +274,12 @@ class LackOfFit:
         return [*self._rounded(), *told, *self._beyond_rest()]
 
     def _rounded(self) -> list[str]:
-        """Of the output that shows most of what the inputs were rounded by, in words; nothing where none does."""
+        """Of the output that shows most of what the log does not tell of its inputs, in words; none where none does."""
         worst = max(self.rounded, key=lambda name: self.rounded[name], default="")
         share = self.rounded.get(worst, 0.0)
-        said = f"rounding of the inputs explains {100.0 * share:.0f} % of the variance of the residual of {worst}"
-        return [f"{said}, and may hide a misfit: log them with more digits"] if share >= WORTH else []
+        said = "rounding of the inputs, or rows that are missing where they change, may explain"
+        much = f"{100.0 * share:.0f} % of the variance of the residual of {worst}, and hide a misfit"
+        return [f"{said} {much}: log every row, with more digits"] if share >= WORTH else []
 
     def _beyond_rest(self) -> list[str]:
         """Of the output that most surely leaves more in motion than at rest, in words; nothing where none does."""

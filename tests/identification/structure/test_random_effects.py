@@ -18,7 +18,7 @@ def test_rows_are_made_white_by_the_inverse_of_their_covariance():
 
 def test_effects_are_predicted_as_their_mean_beside_noise():
     values, covariance = RANDOM.normal(size=(40, 3)), np.eye(40) + Z @ Z.T
-    effects = RandomEffects.of(Z / 2.0).times(2.0)
+    effects = RandomEffects.of(Z / 2.0, 2.0)
     assert effects.predicted(values) / 2.0 == pytest.approx(Z.T @ np.linalg.solve(covariance, values))
     assert effects.open @ effects.open.T / 4.0 == pytest.approx(np.eye(7) - Z.T @ np.linalg.solve(covariance, Z))
 
@@ -31,6 +31,6 @@ def test_errors_tell_how_much_of_the_variance_there_is(true):
     found = []
     for _ in range(20):
         e = RANDOM.normal(size=700) + true**0.5 * np.concatenate([own @ RANDOM.normal(size=60) for own in z])
-        found.append(scaled(z, e - basis @ (basis.T @ e), basis)[0].size ** 2)
+        found.append(scaled(z, e - basis @ (basis.T @ e), basis)[0].size[0] ** 2)
     assert np.mean(np.array(found) >= true) >= 0.9
     assert np.mean(found) <= 1.6 * true + 0.05

@@ -26,6 +26,7 @@ from omnidyn.identification.structure.rounding import anew, of_rounding
 TINY = 1e-300
 SAME = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
 BARE = 0.32  # of a tick: rounding alone has 1/sqrt(12)
+SIMULATED = 0.3  # of what the first order is off by: what a motion that is simulated anew is
 Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 
 
@@ -35,7 +36,8 @@ class Rows:
 
     there: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
     column: of each piece (C,), which column of the problem it is. moves: of each piece (C, rows), see `moving_rows`.
-    rounding: of each piece (C, rows, M), what is shown by what its inputs were rounded by; none where they are not.
+    rounding: of each piece (C, rows, M), what is shown by what its inputs were rounded by, and last, in as many columns
+    as `losses` has of it, by what they did while rows are missing; none where there is neither.
     """
 
     problem: Problem
@@ -48,6 +50,7 @@ class Rows:
     column: list[list[int]]
     moves: list[BoolArray]
     rounding: list[FloatArray] = field(default_factory=list)
+    losses: list[int] = field(default_factory=list)
 
     @classmethod
     def of(cls, problem: Problem, point: Point, parts: Sequence[Parts]) -> Rows:
@@ -118,7 +121,7 @@ class Linear:
             return []
         e, j = self.plain.whole()
         shown = [self._without_start(k, values) for k, values in enumerate(self.rows.rounding)]
-        return scaled(shown, e - j @ solved(j, e), j @ root_of_covariance(j))
+        return scaled(shown, e - j @ solved(j, e), j @ root_of_covariance(j), self.rows.losses)
 
     @cached_property
     def rounded_square(self) -> float:
@@ -127,9 +130,10 @@ class Linear:
             return 0.0
         (e, j), (bare, slopes), first, found = self.whole(), self.plain.whole(), 0, 0.0
         left = bare - slopes @ solved(j, e)
-        for one in self.rounding:
+        for one, losses in zip(self.rounding, self.rows.losses, strict=True):
             own = slice(first, first := first + len(one.z))
-            found += float(((one.z @ one.predicted(left[own]) / max(one.size, TINY)) ** 2).sum())
+            trust = np.where(np.arange(len(one.size)) < len(one.size) - losses, 1.0, SIMULATED)[:, None]
+            found += float(((one.z @ (trust * one.likely(left[own]))) ** 2).sum())
         return found
 
     def white(self, shown: Shown) -> FloatArray:

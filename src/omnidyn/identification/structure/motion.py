@@ -55,6 +55,13 @@ class Motion:
             out[k + 1] = out[k] @ self.decay[k].T + pushed[k]
         return out
 
+    def under(self, voltage: FloatArray, dt: FloatArray, row: int) -> FloatArray:
+        """The twist of the fitted robot from a row on, other voltages (m, W) held for dt (m,). Shape (m + 1, 3)."""
+        pose = (0.0, 0.0, self.pose[row, YAW])
+        run = simulate(_ideal(self.robot), voltage, dt, twist=self.twist[row], pose=pose)
+        assert run.twist is not None
+        return run.twist
+
     def shown_by(self, force: FloatArray) -> FloatArray:
         """What the columns of the log show of such forces. Shapes (n, K, 3) -> (C, n, K)."""
         return self.shown(self.twist_by(force))

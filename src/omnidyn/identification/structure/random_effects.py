@@ -20,23 +20,20 @@ SURE = 2.0  # standard errors beyond what is seen of a share
 
 @dataclass(frozen=True, eq=False)
 class RandomEffects:
-    """z (N, M): what each effect shows, `size` times what was given. square (M,), ways (M, M): eigenvalues and vectors
-    of Z'Z."""
+    """z (N, M): what each effect shows, `size` (M,) times what was given. square (M,), ways (M, M): eigenvalues and
+    vectors of Z'Z."""
 
     z: FloatArray
     square: FloatArray
     ways: FloatArray
-    size: float = 1.0
+    size: FloatArray
 
     @classmethod
-    def of(cls, z: FloatArray) -> RandomEffects:
-        """Of variance 1."""
+    def of(cls, z: FloatArray, size: FloatArray | float = 1.0) -> RandomEffects:
+        """Of variance size^2."""
+        z, size = z * size, np.broadcast_to(size, z.shape[1])
         square, ways = np.linalg.eigh(z.T @ z)
-        return cls(z, np.maximum(square, 0.0), ways)
-
-    def times(self, size: float) -> RandomEffects:
-        """Effects that are larger."""
-        return RandomEffects(size * self.z, size**2 * self.square, self.ways, size * self.size)
+        return cls(z, np.maximum(square, 0.0), ways, size)
 
     def white(self, values: FloatArray) -> FloatArray:
         """(I + Z Z')^-1/2 times values (N, K)."""
@@ -44,14 +41,18 @@ class RandomEffects:
         factor = 1.0 / (root * (1.0 + root))  # (1 - 1/root)/square
         return values - self.z @ (self.ways @ (factor[:, None] * (self.ways.T @ (self.z.T @ values))))
 
+    def likely(self, values: FloatArray) -> FloatArray:
+        """E u of each of K series (N, K). Shape (M, K)."""
+        return self.ways @ ((self.ways.T @ (self.z.T @ values)) / (1.0 + self.square)[:, None])
+
     def predicted(self, values: FloatArray) -> FloatArray:
-        """E u of each of K series (N, K), times `size`. Shape (M, K)."""
-        return self.size * self.ways @ ((self.ways.T @ (self.z.T @ values)) / (1.0 + self.square)[:, None])
+        """The same times `size`."""
+        return self.size[:, None] * self.likely(values)
 
     @property
     def open(self) -> FloatArray:
         """A root of the covariance of what is predicted. Shape (M, M)."""
-        return self.size * self.ways / np.sqrt(1.0 + self.square)
+        return self.size[:, None] * self.ways / np.sqrt(1.0 + self.square)
 
 
 def share(seen: float, noise: float, apart: float, error: float) -> float:
@@ -59,15 +60,19 @@ def share(seen: float, noise: float, apart: float, error: float) -> float:
     return float(np.clip((seen - noise + SURE * error) / apart, 0.0, 1.0)) if apart > 0.0 else 0.0
 
 
-def scaled(shown: Sequence[FloatArray], left: FloatArray, fitted: FloatArray) -> list[RandomEffects]:
+def scaled(
+    shown: Sequence[FloatArray], left: FloatArray, fitted: FloatArray, sure: Sequence[int] | None = None
+) -> list[RandomEffects]:
     """Effects by as much of their variance as errors have: E |Z'e|^2 = tr S + s^2 tr S^2, S = Z'QZ, whose variance is
     2 tr (S + s^2 S^2)^2.
 
     shown: what those of each piece show in its own rows, one piece after the other. left (N,): the errors of all rows
-    without what parameters make of them; fitted (N, P'): an orthonormal basis of that, which Q takes out.
+    without what parameters make of them; fitted (N, P'): an orthonormal basis of that, which Q takes out. sure: how
+    many of each piece, its last, have all of their variance: of them the errors are not asked.
     """
+    asked = [z.shape[1] - own for z, own in zip(shown, sure or [0] * len(shown), strict=True)]
     seen, noise, apart, both, first = 0.0, 0.0, 0.0, np.zeros(2 * fitted.shape[1:]), 0
-    effects = [RandomEffects.of(z) for z in shown]
+    effects = [RandomEffects.of(z[:, :own]) for z, own in zip(shown, asked, strict=True)]
     for one in effects:
         own = slice(first, first := first + len(one.z))
         taken = one.z.T @ fitted[own]
@@ -80,4 +85,5 @@ def scaled(shown: Sequence[FloatArray], left: FloatArray, fitted: FloatArray) ->
     likely = share(seen, noise, apart, 0.0)
     error = 2.0 * (apart + 2.0 * likely * float((square**3).sum()) + likely**2 * float((square**4).sum()))
     part = share(seen, noise, apart, float(np.sqrt(max(error, 0.0))))
-    return [one.times(part**0.5) for one in effects]
+    sizes = [np.where(np.arange(z.shape[1]) < own, part**0.5, 1.0) for z, own in zip(shown, asked, strict=True)]
+    return [RandomEffects.of(z, size) for z, size in zip(shown, sizes, strict=True)]

@@ -12,8 +12,9 @@ steps that lost something, and none where the motors take just these steps:
 
 so that a log in which it would show by itself tells how much of it there is. Where it would not, all of it counts.
 
-In the tests of a fit all u are random effects, as many as there are stretches (`with_rounding`): what they may explain
-is a known cause, and no lack of fit. Inputs that are held for less than HELD leave what the memory of the noise knows.
+In the tests of a fit all u are random effects, as many as there are stretches (`with_rounding`), and so is what rows
+that are missing hide (lost_rows.py): what they may explain is a known cause, and no lack of fit. Inputs that are held
+for less than HELD leave what the memory of the noise knows.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.problem.input_steps import as_logged, input_steps
 from omnidyn.identification.output_error.problem.problem import Piece, Problem
 from omnidyn.identification.structure.linear import Rows, solved
+from omnidyn.identification.structure.lost_rows import losses, shown_by_losses
 from omnidyn.identification.structure.motion import Motion, motions
 from omnidyn.identification.structure.random_effects import share
 from omnidyn.identification.structure.rests_on import as_weighed, members_of
@@ -58,22 +60,23 @@ def moved_by_rounding(sure: Weighed) -> FloatArray:
 
 
 def with_rounding(rows: Rows, moved: Sequence[Motion]) -> Rows:
-    """The rows of a fit with what the rounding of inputs shows in them, where they are rounded."""
+    """The rows of a fit with what the rounding of inputs shows in them, where they are rounded; and what an input does
+    that changed while rows are missing."""
     every = [_stretches(motion.piece) for motion in moved]
-    if not any(every):
+    if not any(every) and not any(losses(motion.piece).size for motion in moved):
         return rows
-    shown = list[FloatArray]()
-    for motion, own in zip(moved, every, strict=True):
+    shown, lost = list[FloatArray](), [shown_by_losses(motion) for motion in moved]
+    for motion, own, more in zip(moved, every, lost, strict=True):
         volts = np.zeros((len(motion.t), len(own), motion.voltage.shape[1]))
         for k, (w, first, last, step) in enumerate(own):
             volts[first:last, k, w] = step / np.sqrt(12.0)
-        shown.append(np.nan_to_num(_shown(motion, volts)))
-    return replace(rows, rounding=shown)
+        shown.append(np.nan_to_num(np.concatenate([_shown(motion, volts), more], axis=2)))
+    return replace(rows, rounding=shown, losses=[each.shape[2] for each in lost])
 
 
 def rows_told(problem: Problem, most: int) -> int:
     """`most` rows, or fewer of a problem whose inputs are rounded more often than can be looked at."""
-    every = [(piece, len(_stretches(piece))) for piece in problem.pieces]
+    every = [(piece, len(_stretches(piece)) + 2 * len(losses(piece))) for piece in problem.pieces]
     rows = [piece.last + 1 - piece.first for piece, _ in every]
     numbers = sum(n * many * len(piece.record.columns) for n, (piece, many) in zip(rows, every, strict=True))
     share = min(MOST / max(1, *(many for _, many in every)), (MOST_NUMBERS / max(numbers, 1)) ** 0.5)
