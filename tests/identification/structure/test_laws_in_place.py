@@ -128,8 +128,8 @@ def test_a_right_law_is_kept(place):
 def test_laws_are_taken_in_their_place_log_after_log(place, law):
     """At 10 standard errors and more of every number of the law."""
     assert min(clear(place, law, 0)) >= 10.0
-    found = [climbed(place, law, seed, NOISE[place, law]) for seed in range(8)]
-    assert [[step.key for step in each.ladder.taken] for each in found] == [[f"friction.{place}.{NAMED[law]}"]] * 8
+    found = [climbed(place, law, seed, NOISE[place, law]) for seed in range(3)]
+    assert [[step.key for step in each.ladder.taken] for each in found] == [[f"friction.{place}.{NAMED[law]}"]] * 3
     assert np.mean([own for each in found for own in held(each, place, law)]) >= 0.9
 
 

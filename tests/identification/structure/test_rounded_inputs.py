@@ -114,7 +114,7 @@ def test_right_worlds_over_many_logs():
     """White noise and noise that remembers, voltages and duties."""
     found = [
         a_fit(seed, step, sensor=sensor, memory=memory, duties=bool(seed % 2)).lack_of_fit.found
-        for seed in range(8)
+        for seed in range(3)
         for step in (0.05, 0.1, 0.3)
         for sensor, memory in ((SPEEDS, 0.0), (AR, 0.9))
     ]

@@ -24,21 +24,20 @@ def losses(piece: Piece) -> IntArray:
     Rows of clocks of their own lack none, and every change has its time. A speed loop is not looked into.
     """
     record, rows = piece.record, slice(piece.first, piece.last + 1)
-    row = np.diff(record.t) / np.median(np.diff(record.t))
+    row = np.diff(record.t[rows]) / np.median(np.diff(record.t[rows]))
     if record.set_point is not None or np.mean(np.abs(row - np.round(row)) <= UNEVEN) < NEARLY:
         return np.zeros(0, dtype=int)
     voltage = np.nan_to_num(record.voltage[rows])
     jumps = (np.abs(np.diff(voltage, axis=0)) > JUMP * np.ptp(voltage, axis=0).max()).any(axis=1)
-    return np.flatnonzero(jumps & (row[piece.first : piece.last] > LOST))
+    return np.flatnonzero(jumps & (row > LOST))
 
 
 def shown_by_losses(motion: Motion) -> FloatArray:
     """What the columns show of each input that changed at once, and of one that did halfway, times the root of the mean
     square of u. (C, rows, 2 K)."""
-    at, piece, voltage = losses(motion.piece), motion.piece, motion.voltage.copy()
-    voltage[-1] += np.nan_to_num(
-        np.subtract(*piece.record.voltage[[piece.last, piece.last - 1]])
-    )  # drives no row itself
+    at, voltage = losses(motion.piece), motion.voltage.copy()
+    before, end = motion.piece.record.voltage[motion.piece.last - 1 : motion.piece.last + 1]
+    voltage[-1] += np.nan_to_num(end - before)  # it drives no row
     change = np.zeros((len(motion.t), 2 * len(at), N_AXES))
     for k, row in enumerate(at.tolist()):
         last = int(np.searchsorted(motion.t[:-1], motion.t[row + 1] + LASTS))
