@@ -143,8 +143,9 @@ def _looks(
         no_loop(n), tol,
     )  # fmt: skip
     turning = out.rims / robot.wheels.radii
-    middle = 0.5 * (turning[1:] + turning[:-1]) * given.dt[:, None]
-    turned = np.concatenate([np.zeros((1, n)), np.cumsum(middle, axis=0)])
+    with np.errstate(invalid="ignore"):  # a robot far from any that fits may run away: its residuals say so
+        middle = 0.5 * (turning[1:] + turning[:-1]) * given.dt[:, None]
+        turned = np.concatenate([np.zeros((1, n)), np.cumsum(middle, axis=0)])
     held_on = np.concatenate([given.voltage, given.voltage[-1:]])
     looks = []
     for each in seen:
