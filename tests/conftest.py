@@ -5,6 +5,7 @@ OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in e
 
 import os
 import signal
+import time
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -34,6 +35,9 @@ settings.register_profile("thorough", settings.get_profile("ci"), max_examples=3
 settings.load_profile(os.environ.get("OMNIDYN_HYPOTHESIS", "ci"))
 
 
+BEGUN, LAST_LONG = time.monotonic(), 45  # [min] from then on; on most machines all have ended by then
+
+
 def pytest_addoption(parser):
     parser.addoption("--long", action="store_true", help="run the long studies as well: those marked long")
 
@@ -44,6 +48,12 @@ def pytest_collection_modifyitems(config, items):
         long = [item for item in items if item.get_closest_marker("long")]
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if item not in long]
+
+
+def pytest_runtest_setup(item):
+    """No long study is begun late: a slow machine ends all other tests in time."""
+    if item.get_closest_marker("long") and time.monotonic() - BEGUN > 60 * LAST_LONG:
+        pytest.skip(f"a long study, and {LAST_LONG} minutes have passed: run it by itself")
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -346,3 +347,14 @@ def test_arguments_go_through(name, monkeypatch):
 def test_check_runs_every_step_and_returns_the_first_failure():
     steps = [[sys.executable, "-c", f"raise SystemExit({code})"] for code in (0, 4, 3)]
     assert dev.run_all(steps, dict(os.environ), None) == 4
+
+
+def test_no_long_study_is_begun_late(request, monkeypatch):
+    conftest = request.config.pluginmanager.get_plugin(str(ROOT / "tests" / "conftest.py"))
+    long, short = (SimpleNamespace(get_closest_marker=lambda name, own=own: own) for own in ("long", None))
+    monkeypatch.setattr(conftest, "BEGUN", time.monotonic())
+    conftest.pytest_runtest_setup(long)
+    monkeypatch.setattr(conftest, "BEGUN", time.monotonic() - 60.0 * conftest.LAST_LONG - 1.0)
+    conftest.pytest_runtest_setup(short)
+    with pytest.raises(pytest.skip.Exception, match="a long study, and 45 minutes have passed"):
+        conftest.pytest_runtest_setup(long)
