@@ -77,6 +77,19 @@ def test_what_lost_rows_explain_is_no_lack_of_fit(seed, sensor):
     assert any(WORDS in each and "log every row" in each for each in lack.statements())
 
 
+def test_losses_that_hid_nothing_say_nothing_of_the_one_that_did():
+    """Each has all of its variance: three changes that came as the log has them, and a last one that came sooner."""
+    case = right_case(98008).setup_but(sensor=TICKS, memory=0.0)
+    run = logged(case, 98008)
+    changed = 1 + np.flatnonzero((np.diff(run.voltage, axis=0) != 0.0).any(axis=1))
+    end = changed[-1] + 2
+    whole = Run(run.t[:end], voltage=run.voltage[:end], wheel_angle=run.wheel_angle[:end])
+    lost = without(whole, [*(changed[[5, 12, -3]] - 1), changed[-1]])
+    lack = fit_output_error(lost, robot_of(case.told), free="friction").lack_of_fit
+    assert not lack.found
+    assert max(lack.rounded.values()) > 0.3
+
+
 def test_a_misfit_is_found_beside_lost_rows():
     """A fading battery, its numbers 6.9 standard errors off."""
     case, seed, _ = drawn(by_name("fade"), 6)

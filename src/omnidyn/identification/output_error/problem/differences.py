@@ -31,7 +31,7 @@ JUMP = 0.05  # of the range of an input: after a greater change the acceleration
 LOST = 1.5  # rows of time between two rows, from which on a row is missing and its counts with it
 UNEVEN = 0.25  # of a row that stamps may be off
 NEARLY = 0.95  # of the rows are such
-SHORT = 20  # rows between two losses, on average: of shorter stretches little more than their starts is told
+SHORT = 20  # rows between two losses, on average; at 25 intervals still hold, and speeds as they are show a misfit
 WANDER = 0.618034  # a share that no small number of rows brings back to where it was
 
 
