@@ -110,6 +110,7 @@ def record(
         raise InsufficientDataError(
             "no stretch of the log has inputs throughout", got=f"{int(known.sum())} rows of {len(run)} with all inputs",
             expected=f"{SHORTEST} rows in a row", where=run.source,
+            remedy="log the voltage or the duty of every wheel in every row",
         )  # fmt: skip
     if not known.all():
         notes.append(f"{int((~known).sum())} rows lack an input: the log is split there")
