@@ -6,7 +6,7 @@ number, and smooth but where a wheel grips or stops a step sooner. The run itsel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -65,40 +65,42 @@ class SlipSample:
     @property
     def dtwist(self) -> FloatArray:
         """Shape (rows, K, 3)."""
-        return self._changes([each.twist for each in self.by])
+        return self._changes(lambda look: look.twist)
 
     def heading(self) -> Values:
         """Heading since the start [rad]."""
-        return self.seen.pose[:, 2:], self.seen.twist[:, 2:], self._changes([each.pose[:, 2:] for each in self.by])
+        return self.seen.pose[:, 2:], self.seen.twist[:, 2:], self._changes(lambda look: look.pose[:, 2:])
 
     def wheel_speeds(self) -> Values:
         """Speeds of the wheels themselves [rad/s]."""
         turning = self.seen.turning
-        return turning, self._pace("turning"), self._changes([each.turning for each in self.by])
+        return turning, self._pace("turning"), self._changes(lambda look: look.turning)
 
     def wheel_angles(self) -> Values:
         """What the wheels have turned by [rad]."""
-        return self.seen.turned, self.seen.turning, self._changes([each.turned for each in self.by])
+        return self.seen.turned, self.seen.turning, self._changes(lambda look: look.turned)
 
     def position(self, facing: float) -> Values:
         """Place since the start [m] of a robot that faced `facing` [rad] there."""
         turn = body_to_world(facing)[:2, :2].T
         pace = np.einsum("kij,kj->ki", body_to_world(facing + self.seen.pose[:, 2])[:, :2, :2], self.seen.twist[:, :2])
-        return self.seen.pose[:, :2] @ turn, pace, self._changes([each.pose[:, :2] @ turn for each in self.by])
+        return self.seen.pose[:, :2] @ turn, pace, self._changes(lambda look: look.pose[:, :2] @ turn)
 
     def currents(self) -> Values:
         """Currents of the motors [A]."""
         current = self.seen.current
-        return current, self._pace("current"), self._changes([each.current for each in self.by])
+        return current, self._pace("current"), self._changes(lambda look: look.current)
 
     def _pace(self, name: str) -> FloatArray:
         before, after = (getattr(each, name) for each in self.soon)
         return (after - before) / (2.0 * A_MOMENT)
 
-    def _changes(self, ends: Sequence[FloatArray]) -> FloatArray:
-        if not ends:
-            return np.zeros((len(self.seen.twist), 0, self.seen.twist.shape[1]))
-        return np.moveaxis(difference(np.array(ends)), 0, 1)
+    def _changes(self, values: Callable[[Look], FloatArray]) -> FloatArray:
+        """Derivatives (rows, K, m) of `values` (rows, m) along each direction; K may be 0."""
+        shape = values(self.seen).shape
+        if not self.by:
+            return np.zeros((shape[0], 0, shape[1]))
+        return np.moveaxis(difference(np.array([values(look) for look in self.by])), 0, 1)
 
 
 def slipping_samples(
