@@ -75,14 +75,19 @@ _ACTS = ("Cc", "Cf", "Cs", "Zl", "Zp")  # categories of control, format, surroga
 
 
 def printable(text: str) -> str:
-    """The text on one line, with an escape for each character on which a terminal may act: \\u001b, \\u202e.
+    """The text on one line, with an escape for what a terminal may act on, or no format holds: \\u001b, \\u202e, \\ufffe.
 
     Names of robots, columns, files and groups come from others: they are shown as what they are, and can neither
     colour, hide or turn around what stands beside them, nor begin a line of their own.
     """
     if text.isprintable():
         return text
-    return "".join(f"\\u{ord(c):04x}" if unicodedata.category(c) in _ACTS else c for c in text)
+    return "".join(f"\\u{ord(c):04x}" if unicodedata.category(c) in _ACTS or _is_none(ord(c)) else c for c in text)
+
+
+def _is_none(code: int) -> bool:
+    """Whether Unicode has no character of this code, and never will; XML and YAML refuse a file that holds one."""
+    return code & 0xFFFE == 0xFFFE or 0xFDD0 <= code <= 0xFDEF
 
 
 def _short(value: object, limit: int = 80) -> str:

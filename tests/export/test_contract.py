@@ -10,7 +10,7 @@ from omnidyn.errors import InputError
 from omnidyn.export.contract import Export
 from omnidyn.export.features import FEATURES, LEAVES_OUT, PARTLY, REFUSES, SAYS, TABLE
 from omnidyn.export.kinds import KINDS, maker, python_name
-from omnidyn.export.spelling import c_number, identifier, line_comment, number, xml_comment
+from omnidyn.export.spelling import c_comment, c_number, identifier, java_comment, number, xml_comment
 
 TWO = Export("c-model", "bot", {"a.h": "one\n", "b.c": "two\n"}, folder=True)
 
@@ -105,4 +105,5 @@ def test_names_become_identifiers_and_comments_stay_comments(name):
     inner = xml_comment([name])[4:-3]
     assert "--" not in inner
     assert not inner.endswith("-")
-    assert not line_comment([name], "//").rstrip("\n").endswith(("\\", "??/"))
+    assert "*/" not in c_comment([name])[:-2]
+    assert not java_comment([name]).replace("\\\\", "").count("\\")

@@ -16,7 +16,8 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings.floor import Floor
 from omnidyn.model.wheels import Wheels
 
-STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror")
+STRICT = ("-std=c99", "-O2", *WARNINGS)
 
 
 def exact_robot(seed: int) -> Robot:
@@ -68,7 +69,7 @@ class Stepper:
         self._step = ctypes.CDLL(str(folder / "step.so")).omnidyn_step
         self.states = 3 if robot.motor.electrical == DYNAMIC else 2
         self._step.argtypes = [ctypes.c_void_p, real, *[ctypes.c_void_p] * self.states]
-        self._step.restype = None
+        self._step.restype = ctypes.c_int
 
     def run(self, volts: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """(twist, pose) after each row, the start in row 0. Shape (rows + 1, 3) each."""
@@ -76,7 +77,7 @@ class Stepper:
         volts = np.ascontiguousarray(volts, self.real)
         out = np.zeros((len(volts) + 1, 2, 3))
         for k in range(len(volts)):
-            self._step(volts[k].ctypes.data, dt, *(state[i].ctypes.data for i in range(self.states)))
+            assert self._step(volts[k].ctypes.data, dt, *(state[i].ctypes.data for i in range(self.states))) == 0
             out[k + 1] = state[:2]
         return out[:, 0], out[:, 1]
 

@@ -1,8 +1,14 @@
-"""Numbers and names as the formats want them: escaped, or made into an identifier; a number keeps every bit."""
+"""Numbers and names as the languages of exports want them: one function for each place where text can stand.
+
+Names, notes and sources of a robot file are data in every language. `filled` puts text into a template, in one pass.
+C and C++: c_comment, c_number. Java: java_comment. Python: python_comment. YAML and CSV: hash_comment, yaml_number.
+XML: attribute, xml_comment. Names in programs and of files: identifier. TOML: model/robot_file.py. HTML:
+report/html.py.
+"""
 
 from __future__ import annotations
 
-import json
+import keyword
 import math
 import re
 from xml.sax.saxutils import quoteattr
@@ -11,15 +17,29 @@ from omnidyn.errors import InputError, printable
 
 SINGLE_MAX, SINGLE_MIN = 3.4028234663852886e38, 1.1754943508222875e-38  # of float32, normal numbers
 LONGEST = 60  # of an identifier
+_C = (
+    "alignas alignof asm auto bool break case catch char class concept const constexpr continue decltype default delete "
+    "do double else enum explicit export extern final float for friend goto if import inline int long module mutable "
+    "namespace new noexcept nullptr operator override private protected public register requires restrict return short "
+    "signed sizeof static struct switch template this throw try typedef typeid typename typeof union unsigned using "
+    "virtual void volatile while and bitand bitor compl not or xor true false null main"
+)
+_JAVA = (
+    "abstract assert boolean byte extends finally implements instanceof interface native package permits record sealed "
+    "strictfp super synchronized throws transient var yield"
+)
+_NOT_NAMES = "world base_link con prn aux nul"  # SDF has a frame of that name; Windows has such devices
 # Words that a language keeps for itself; an identifier made of a name always ends differently.
 _TAKEN = frozenset(
-    re.findall(
-        r"\w+",
-        "auto break case char const continue default do double else enum extern float for goto if inline int long "
-        "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while "
-        "class new public private protected this true false null and or not",
-    )
+    [*f"{_C} {_JAVA} {_NOT_NAMES}".split(), *map(str.lower, keyword.kwlist), *keyword.softkwlist]
+    + [f"{port}{n}" for port in ("com", "lpt") for n in range(10)]
 )
+_WORD = re.compile(r"@(\w+)@")
+
+
+def filled(template: str, **words: str) -> str:
+    """A template with each @NAME@ replaced by that word, in one pass: what was put in is never looked at again."""
+    return _WORD.sub(lambda found: words[found[1]], template)
 
 
 def number(value: float) -> str:
@@ -57,28 +77,43 @@ def identifier(name: str, fallback: str = "robot") -> str:
 
 
 def attribute(text: str) -> str:
-    """A text as a quoted attribute of XML; what XML cannot hold at all is shown as its escape."""
-    return quoteattr(_for_xml(text))
+    """A text as a quoted attribute of XML; what XML cannot hold at all is shown as an escape."""
+    return quoteattr(printable(text))
 
 
 def xml_comment(lines: list[str], indent: str = "  ") -> str:
     """Lines as one comment of XML: it holds no two dashes, and does not end with one."""
-    safe = [re.sub(r"-(?=-)", "- ", _for_xml(line)).rstrip() for line in lines]
+    safe = [re.sub(r"-(?=-)", "- ", printable(line)).rstrip() for line in lines]
     inner = "\n".join(f"{indent}{line}".rstrip() for line in safe)
     return f"<!--\n{inner}\n-->"
 
 
-def _for_xml(text: str) -> str:
-    """The text without what XML 1.0 forbids."""
-    return re.sub(r"[\ufffe\uffff]", "?", printable(text))
+def c_comment(lines: list[str]) -> str:
+    """Lines as one comment of C and C++. It ends where it shall, and no line of it runs on into the next one."""
+    text = "\n   ".join(_ended(printable(line)) for line in lines)
+    return f"/* {text.replace('*/', '* /').replace('/*', '/ *').replace('??/', '? ?/')} */"
 
 
-def line_comment(lines: list[str], sign: str) -> str:
-    """Lines as comments of a language whose comments end with the line: #, //."""
-    # A backslash at the end of a line would carry a C comment over to the next one; ??/ is one too.
-    return "".join(f"{sign} {printable(line)}".rstrip().rstrip("\\").replace("??/", "? ?/") + "\n" for line in lines)
+def _ended(line: str) -> str:
+    """The line without a backslash at its end, which would carry it over to the next line."""
+    line = line.strip()
+    return f"{line} ." if line.endswith("\\") else line
 
 
-def quoted(text: str) -> str:
-    """A text in double quotes, ASCII only: a string of C, Java, Python, YAML and JSON alike."""
-    return json.dumps(printable(text), ensure_ascii=True)
+def java_comment(lines: list[str]) -> str:
+    """Lines as comments of Java, which reads escapes such as \\u000a before all else, unless the backslash is doubled."""
+    return _lines(lines, "//").replace("\\", "\\\\")
+
+
+def python_comment(lines: list[str]) -> str:
+    """Lines as the comments that a Python file begins with. Python takes its encoding from the first that names one."""
+    return "# -*- coding: utf-8 -*-\n" + hash_comment(lines)
+
+
+def hash_comment(lines: list[str]) -> str:
+    """Lines as comments of YAML and CSV."""
+    return _lines(lines, "#")
+
+
+def _lines(lines: list[str], sign: str) -> str:
+    return "".join(f"{sign} {printable(line)}".rstrip() + "\n" for line in lines)

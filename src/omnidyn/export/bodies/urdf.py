@@ -8,7 +8,7 @@ from omnidyn.export.bodies.links import Links, Wheel, links
 from omnidyn.export.bodies.shape import height_of, several
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.spelling import number, xml_comment
+from omnidyn.export.spelling import attribute, number, xml_comment
 from omnidyn.model.robot import Robot
 
 NOTES = (
@@ -34,7 +34,7 @@ def description(name: str, parts: Links, missing: tuple[str, ...], outward: bool
         *(["Joints turn the other way than the wheels of omnidyn: their axes point outwards."] if outward else []),
     ]  # fmt: skip
     return "\n".join([
-        '<?xml version="1.0"?>', f'<robot name="{parts.name}">', xml_comment(about), *_base(parts),
+        '<?xml version="1.0"?>', f"<robot name={attribute(name)}>", xml_comment(about), *_base(parts),
         *(line for each in parts.wheels for line in _wheel(each, "1 0 0" if outward else "-1 0 0")), *control(parts),
         "</robot>\n",
     ])  # fmt: skip

@@ -18,7 +18,7 @@ from omnidyn.export.code.control_c import control_code
 from omnidyn.export.code.mpc.code import mpc_code, mpc_input, mpc_memory
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller
-from omnidyn.export.spelling import c_number, line_comment
+from omnidyn.export.spelling import c_comment, c_number, filled
 from omnidyn.model.robot import Robot
 
 KIND = "c-controller"
@@ -44,7 +44,7 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     predicts = isinstance(made, Mpc)
     code = mpc_code(made) if predicts else control_code(made)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{made.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in missing)]
-    head = _block(line_comment(about, "//"))
+    head = c_comment(about)
     files = {"omnidyn_control.h": _header(made, head), "omnidyn_control.c": f"{head}\n{_INCLUDES}\n{code}\n"}
     return Export(KIND, robot.name, files, missing, NOTES, folder=True)
 
@@ -56,22 +56,11 @@ def _header(made: Any, about: str) -> str:
         "WHEELS": str(made.robot.wheels.count), "DT": c_number(made.dt, True), "LATE": c_number(late, True),
     } | ({"HORIZON": str(made.horizon)} if predicts else {})  # fmt: skip
     defines = "\n".join(f"#define OMNIDYN_{name} {text}" for name, text in numbers.items())
-    words = {
-        "ABOUT": about, "DEFINES": defines, "UNITS": _UNITS[made.output],
-        "MEMORY": mpc_memory(made) if predicts else _MEMORY,
-        "INPUT": f"{mpc_input(made)}\n\n" if predicts else "", "AHEAD": _AHEAD if predicts else _NOW_AND_AHEAD,
-        "ROWS": "OMNIDYN_HORIZON + 1" if predicts else "3",
-    }  # fmt: skip
-    text = _HEADER
-    for word, own in words.items():
-        text = text.replace(word, own)
-    return text.lstrip()
-
-
-def _block(about: str) -> str:
-    """Lines that begin with // as one comment of C."""
-    lines = [line[2:].strip().replace("*/", "* /").replace("/*", "/ *") for line in about.splitlines()]
-    return "/* " + "\n   ".join(lines) + " */"
+    return filled(
+        _HEADER, ABOUT=about, DEFINES=defines, UNITS=_UNITS[made.output],
+        MEMORY=mpc_memory(made) if predicts else _MEMORY, INPUT=f"{mpc_input(made)}\n\n" if predicts else "",
+        AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD, ROWS="OMNIDYN_HORIZON + 1" if predicts else "3",
+    ).lstrip()  # fmt: skip
 
 
 _INCLUDES = '#include "omnidyn_control.h"\n\n#include <math.h>\n'
@@ -87,11 +76,11 @@ _AHEAD = """OMNIDYN_LATE [s] ahead, when
    the output acts, and OMNIDYN_HORIZON times OMNIDYN_DT later each"""
 
 _HEADER = """
-ABOUT
+@ABOUT@
 #ifndef OMNIDYN_CONTROL_H
 #define OMNIDYN_CONTROL_H
 
-DEFINES
+@DEFINES@
 
 #ifdef __cplusplus
 extern "C" {
@@ -103,9 +92,9 @@ typedef struct {
     float velocity[3];
 } omnidyn_motion;
 
-INPUT/* What is remembered from step to step. */
+@INPUT@/* What is remembered from step to step. */
 typedef struct {
-MEMORY
+@MEMORY@
 } omnidyn_control;
 
 /* What a step says of itself. Up to OMNIDYN_STILL the output is as wanted; from OMNIDYN_BACKWARDS on it is zeros. */
@@ -124,12 +113,12 @@ enum {
 /* Forget all steps; before the first one too. */
 void omnidyn_control_reset(omnidyn_control *self);
 
-/* What to send to the drive until the next step: UNITS, one a wheel; see the enum above for what it returns.
+/* What to send to the drive until the next step: @UNITS@, one a wheel; see the enum above for what it returns.
    elapsed [s]: since the step before, OMNIDYN_DT as a rule; 0 in the first. pose in the world, twist in the frame
-   of the body (vx, vy [m/s], omega [rad/s]), x forward, y left, counter-clockwise. path: AHEAD;
+   of the body (vx, vy [m/s], omega [rad/s]), x forward, y left, counter-clockwise. path: @AHEAD@;
    where it has ended its last pose, velocity 0. */
 int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[3], const float twist[3],
-                         const omnidyn_motion path[ROWS], float output[OMNIDYN_WHEELS]);
+                         const omnidyn_motion path[@ROWS@], float output[OMNIDYN_WHEELS]);
 
 #ifdef __cplusplus
 }

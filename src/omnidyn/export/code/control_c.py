@@ -19,7 +19,7 @@ from omnidyn.control.paths.motion import Motion, Path
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
 from omnidyn.export.code.trace import Traced, inputs, statements
-from omnidyn.export.spelling import c_number
+from omnidyn.export.spelling import c_number, filled
 from omnidyn.model.wheels import wheel_speed
 
 # Of the fastest element, in float32: slower is at rest. A sum of three products is off by a few 1e-7.
@@ -45,7 +45,7 @@ def control_code(controller: AnyOf) -> str:
     helpers = [text for name, text in _HELPERS if f"{name}(" in "".join(traced)]
     tables = {"LIMIT": controller.limit} if controller.output == WHEEL_SPEED else _limits(controller)
     constants = [f"static const float {name}[{len(each)}] = {{{_numbers(each)}}};" for name, each in tables.items()]
-    step = _STEP.replace("WANTED", textwrap.indent(wanted, "    ")).replace("FARTHEST", _c(FARTHEST))
+    step = filled(_STEP, WANTED=textwrap.indent(wanted, "    "), FARTHEST=_c(FARTHEST), LARGEST="3.0e38f")
     parts = ["\n".join(constants), "\n".join(helpers), *traced, *_within(controller), step.strip()]
     return "\n\n".join(part for part in parts if part)
 
@@ -64,13 +64,12 @@ def _within(controller: AnyOf) -> list[str]:
     current = bool(np.isfinite(controller.volts.current_limit).all())
     together = isinstance(controller, SpeedController)
     own = ("\n    float share = 1.0f;" if together else "") + ("" if current else "\n    (void)current;")
-    return [
-        _WITHIN.replace("CURRENT", " || fabsf(current[k]) > CURRENT_LIMIT[k]" if current else "")
-        .replace("OWN", own)
-        .replace("EACH", (_SHARE if together else _EACH).lstrip("\n"))
-        .replace("TOGETHER", _TOGETHER if together else "")
-        .replace("PER_VOLT", _c(_per_volt(controller))).strip()
-    ]  # fmt: skip
+    text = filled(
+        _WITHIN, CURRENT=" || fabsf(current[k]) > CURRENT_LIMIT[k]" if current else "", OWN=own,
+        EACH=(_SHARE if together else _EACH).lstrip("\n"), TOGETHER=_TOGETHER if together else "",
+        PER_VOLT=_c(_per_volt(controller)),
+    )  # fmt: skip
+    return [text.strip()]
 
 
 def _per_volt(controller: Safe) -> float:
@@ -152,7 +151,7 @@ def _speed(controller: SpeedController) -> tuple[list[str], str]:
 
 def _summed(controller: Pid | SpeedController, given: str) -> str:
     """The loop over sums of errors in C: given, the arguments of `effort` before the sum."""
-    return _SUMMED.replace("LONGEST", _c(MOST_STEPS * controller.dt)).replace("GIVEN", given).strip()
+    return filled(_SUMMED, LONGEST=_c(MOST_STEPS * controller.dt), GIVEN=given).strip()
 
 
 def _pid(controller: Pid) -> tuple[list[str], str]:
@@ -220,11 +219,11 @@ _WITHIN = """
 /* Keep the volts within the limits, and make them what the drive takes; whether a limit was met. */
 static int within(float volts[OMNIDYN_WHEELS], const float current[OMNIDYN_WHEELS])
 {
-    int k, met = 0;OWN
+    int k, met = 0;@OWN@
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
-        met |= fabsf(volts[k]) >= VOLTAGE_LIMIT[k]CURRENT;
-EACH        volts[k] *= PER_VOLT;
-    }TOGETHER
+        met |= fabsf(volts[k]) >= VOLTAGE_LIMIT[k]@CURRENT@;
+@EACH@        volts[k] *= @PER_VOLT@;
+    }@TOGETHER@
     return met;
 }
 """
@@ -241,14 +240,14 @@ _TOGETHER = """
     }"""
 
 _SUMMED = """
-elapsed = elapsed < LONGEST ? elapsed : LONGEST;
+elapsed = elapsed < @LONGEST@ ? elapsed : @LONGEST@;
 for (k = 0; k < 3; k++) {
     more[k] = self->sum[k] + off[k] * elapsed;
 }
-effort(GIVEN, more, output, current);
+effort(@GIVEN@, more, output, current);
 limited = within(output, current);
 if (limited) { /* at a limit, nothing is added to the sum */
-    effort(GIVEN, self->sum, output, current);
+    effort(@GIVEN@, self->sum, output, current);
     limited = within(output, current);
 } else {
     for (k = 0; k < 3; k++) {
@@ -263,7 +262,7 @@ static int sane(const float *values, int n)
 {
     int k;
     for (k = 0; k < n; k++) {
-        if (!(fabsf(values[k]) <= FARTHEST)) {
+        if (!(fabsf(values[k]) <= @FARTHEST@)) {
             return 0;
         }
     }
@@ -287,7 +286,7 @@ static int wanted(omnidyn_control *self, float elapsed, const float pose[3], con
     int k, limited = 0;
     (void)self, (void)pose, (void)twist;
     {
-WANTED
+@WANTED@
     }
     return limited;
 }
@@ -336,7 +335,7 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
     }
     limited = wanted(self, begun ? elapsed : 0.0f, pose, twist, path, output);
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
-        if (!(fabsf(output[k]) <= INFINITE)) {
+        if (!(fabsf(output[k]) <= @LARGEST@)) {
             return safe(self, output, OMNIDYN_FAILED);
         }
         output[k] = output[k] > LIMIT[k] ? LIMIT[k] : output[k];
@@ -345,4 +344,4 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
     }
     return limited ? OMNIDYN_LIMITED : OMNIDYN_OK;
 }
-""".replace("INFINITE", "3.0e38f")
+"""

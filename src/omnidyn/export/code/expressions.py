@@ -96,7 +96,7 @@ class Expressions:
 
     def number(self, value: float) -> str:
         """A literal."""
-        return "INFINITY" if value == math.inf else c_number(value, self.program.single)
+        return f"({self.program.real})INFINITY" if value == math.inf else c_number(value, self.program.single)
 
     def _constant(self, node: ast.Constant) -> Typed:
         return self.plain(node.value)

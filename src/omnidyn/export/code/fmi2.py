@@ -4,6 +4,7 @@ Written from the standard (FMI 2.0.4, modelica.org); no header of it is included
 """
 
 FMI2_C = r"""
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -36,6 +37,8 @@ typedef struct {
     void (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
     fmi2ComponentEnvironment componentEnvironment;
 } fmi2CallbackFunctions;
+
+@STATUS@
 
 @STEP@
 
@@ -125,8 +128,9 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference which[],
 {
     size_t k;
     for (k = 0; k < n; k++) {
-        const int output = which[k] >= WHEELS && which[k] < WHEELS + STATE;
-        if (which[k] >= VARIABLES || output || !isfinite(values[k])) {
+        const fmi2ValueReference v = which[k];
+        const double most = v < WHEELS ? DBL_MAX : v < WHEELS + STATE + 3 ? @TWIST@ : @POSE@;
+        if (v >= VARIABLES || (v >= WHEELS && v < WHEELS + STATE) || !all_within(values + k, 1, most)) {
             return fmi2Error;
         }
         ((Unit *)c)->values[which[k]] = values[k];
@@ -144,8 +148,9 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real length, fmi
     if (!(length >= 0.0) || !isfinite(length)) {
         return fmi2Error;
     }
-    if (length > 0.0) {
-        omnidyn_advance(unit->values, length, unit->values + WHEELS, unit->values + WHEELS + 3, @FORCE@&unit->lost);
+    if (length > 0.0 && omnidyn_advance(unit->values, length, unit->values + WHEELS, unit->values + WHEELS + 3,
+                                        @FORCE@&unit->lost) != OMNIDYN_STEP_OK) {
+        return fmi2Error;
     }
     unit->time = now + length;
     return fmi2OK;

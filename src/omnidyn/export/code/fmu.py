@@ -17,12 +17,13 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from omnidyn.export.code.fmi2 import FMI2_C
-from omnidyn.export.code.step_c import StepCode, step_code
+from omnidyn.export.code.step_c import STATUS, StepCode, step_code
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.spelling import attribute, identifier
+from omnidyn.export.spelling import attribute, c_number, filled, identifier
 from omnidyn.files import sha256
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.simulate import FARTHEST
 
 OUTPUTS = ("vx_m_s", "vy_m_s", "omega_rad_s", "x_m", "y_m", "heading_rad")
 _OUTPUT_UNITS = ("m/s", "m/s", "rad/s", "m", "m", "rad")
@@ -43,11 +44,10 @@ def fmu(robot: Robot, compiled: bool = True) -> Export:
     """
     refuse("fmu", robot)
     code, name, missing = step_code(robot), identifier(robot.name), left_out("fmu", robot)
-    source = _source(code)
-    description = _description(robot, name, code, sha256(source)[:32], missing)
+    guid = sha256(_source(code, ""))[:32]
     entries: dict[str, bytes] = {
-        "modelDescription.xml": description.encode("utf-8"),
-        f"sources/{name}.c": source.replace("@GUID@", sha256(source)[:32]).encode("utf-8"),
+        "modelDescription.xml": _description(robot, name, code, guid, missing).encode("utf-8"),
+        f"sources/{name}.c": _source(code, guid).encode("utf-8"),
     }
     library, why = _library(entries[f"sources/{name}.c"], name) if compiled else (None, "not asked for")
     notes = (
@@ -102,9 +102,11 @@ def _library(source: bytes, name: str) -> tuple[bytes | None, str]:
         return out.read_bytes(), ""
 
 
-def _source(code: StepCode) -> str:
-    force = "unit->force, " if code.inductance else ""
-    return FMI2_C.replace("@STEP@", code.text).replace("@WHEELS@", str(code.wheels)).replace("@FORCE@", force).lstrip()
+def _source(code: StepCode, guid: str) -> str:
+    return filled(
+        FMI2_C, STATUS=STATUS, STEP=code.text, WHEELS=str(code.wheels), GUID=guid, TWIST=c_number(FARTHEST["twist"]),
+        POSE=c_number(FARTHEST["pose"]), FORCE="unit->force, " if code.inductance else "",
+    ).lstrip()  # fmt: skip
 
 
 def _variables(wheels: int) -> list[str]:

@@ -2,10 +2,12 @@
 
 What joins them holds no formula: volts are clipped and summed into the drive of each axis, each axis is stepped by
 `exact_step` (with winding inductance by `step_by_segments`), the way by `travel`, the pose by `put_next_pose`.
+What `simulate` refuses is refused, and loops have a last turn: a step takes milliseconds at the most.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,19 +15,34 @@ import numpy as np
 from omnidyn.export.code import sources
 from omnidyn.export.code.translate import Program
 from omnidyn.export.code.types import INT, REAL, Array, Type
-from omnidyn.export.spelling import c_number
+from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
 from omnidyn.model.actuation import Driver
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import per_wheel
-from omnidyn.simulation.exact.inductance import axis_laws
+from omnidyn.simulation.commands import MAX_DT
+from omnidyn.simulation.exact.inductance import axis_laws, current_gain
 from omnidyn.simulation.exact.inductance_position import COUNT, GAUSS, Axes, Nodes
 from omnidyn.simulation.exact.inductance_step import AxisLaw
 from omnidyn.simulation.exact.march import NODES, WEIGHTS, axis_levels
+from omnidyn.simulation.simulate import FARTHEST
 
 MARCH, PLACE = "omnidyn.simulation.exact.march", "omnidyn.simulation.exact.inductance_position"
 AXES = Array((3,))
+# Of one while loop: pieces of a way, events of an axis. A step of 1 s at 1000 rad/s takes 4000 and 200.
+MOST_TURNS, MOST_TURNS_WITH_INDUCTANCE = 10_000, 1_000
+
+STATUS = """/* What a step returns: that it was made, or why not; then twist and pose are what they were. */
+enum {
+    OMNIDYN_STEP_OK,
+    OMNIDYN_STEP_BAD_VOLTS, /* not finite */
+    OMNIDYN_STEP_BAD_TIME,  /* not above 0 and at most 3600 s */
+    OMNIDYN_STEP_BAD_TWIST, /* not finite, or beyond 1000 m/s or rad/s */
+    OMNIDYN_STEP_BAD_POSE,  /* not finite, or beyond 1e9 m or rad */
+    OMNIDYN_STEP_BAD_FORCE, /* not finite, or beyond what 1e6 A do */
+    OMNIDYN_STEP_TOO_LONG   /* too much happens in it: make it shorter */
+};"""
 
 
 @dataclass(frozen=True)
@@ -42,7 +59,8 @@ class StepCode:
 
 def step_code(robot: Robot, single: bool = False) -> StepCode:
     """The step of a robot for which there is an exact one; `omnidyn_advance` is its entry."""
-    program, dynamic = Program(single), robot.motor.electrical == DYNAMIC
+    dynamic = robot.motor.electrical == DYNAMIC
+    program = Program(single, MOST_TURNS_WITH_INDUCTANCE if dynamic else MOST_TURNS)
     kernels = _with_inductance(program) if dynamic else _settled(program)
     if robot.drive.dead_band:
         _function(program, "omnidyn.model.actuation", "at_motor", REAL, REAL, program.struct(Driver))
@@ -55,7 +73,7 @@ def step_code(robot: Robot, single: bool = False) -> StepCode:
             "\n".join(_table(program, name, values) for name, values in tables.items()),
             program.text(),
             _drive(program, robot),
-            (_ADVANCE_WITH_INDUCTANCE if dynamic else _ADVANCE).replace("real", program.real).strip(),
+            _advance(program, robot),
         ]
     )
     return StepCode(text, robot.wheels.count, dynamic)
@@ -108,7 +126,8 @@ def _tables(robot: Robot) -> dict[str, np.ndarray]:
 
 def _tables_with_inductance(robot: Robot) -> dict[str, np.ndarray]:
     laws = axis_laws(robot)
-    return {"LAWS": laws, "RATES": np.array(_rates(laws)), "GAUSS": GAUSS}
+    most = FARTHEST["current"] * np.abs(current_gain(robot)).sum(axis=1)
+    return {"LAWS": laws, "RATES": np.array(_rates(laws)), "GAUSS": GAUSS, "MOST_FORCE": most}
 
 
 def _rates(laws: np.ndarray) -> np.ndarray:
@@ -133,6 +152,22 @@ def _drive(program: Program, robot: Robot) -> str:
     ).strip()  # fmt: skip
 
 
+def _advance(program: Program, robot: Robot) -> str:
+    """The step with what it checks before and after."""
+    dynamic, single = robot.motor.electrical == DYNAMIC, program.single
+    largest = SINGLE_MAX if single else sys.float_info.max
+    numbers = {
+        "LARGEST": largest, "LONGEST": MAX_DT, "TWIST": FARTHEST["twist"], "POSE": FARTHEST["pose"],
+    }  # fmt: skip
+    words = {name: c_number(value, single) for name, value in numbers.items()}
+    text = filled(_CHECKED, ABS="fabsf" if single else "fabs", REAL=program.real)
+    text += filled(
+        _ADVANCE_WITH_INDUCTANCE if dynamic else _ADVANCE, REAL=program.real,
+        REFUSE=filled(_REFUSE, WHEELS=str(robot.wheels.count), **words).strip("\n"), LARGEST=words["LARGEST"],
+    )  # fmt: skip
+    return text.strip()
+
+
 _DRIVE = """
 /* What the motors give each axis, divided by mass or inertia, of volts kept within their limits. */
 static void drive_of(const {real} u[{wheels}], {real} drive[3])
@@ -149,15 +184,45 @@ static void drive_of(const {real} u[{wheels}], {real} drive[3])
 }}
 """
 
-_ADVANCE = """
-/* Move the state by h [s]; what rounding takes from the heading comes back in *lost. */
-static void omnidyn_advance(const real u[], real h, real twist[3], real pose[3], real *lost)
+_CHECKED = """
+/* Whether all of n numbers are numbers, none of them beyond `most`. */
+static int all_within(const @REAL@ values[], int n, @REAL@ most)
 {
-    real drive[3], next[3], event[3], before[3], after[3], poses[2][3];
+    int k;
+    for (k = 0; k < n; k++) {
+        if (!(@ABS@(values[k]) <= most)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+"""
+
+_REFUSE = """
+    if (!all_within(u, @WHEELS@, @LARGEST@)) {
+        return OMNIDYN_STEP_BAD_VOLTS;
+    }
+    if (!(h > 0 && h <= @LONGEST@)) {
+        return OMNIDYN_STEP_BAD_TIME;
+    }
+    if (!all_within(twist, 3, @TWIST@)) {
+        return OMNIDYN_STEP_BAD_TWIST;
+    }
+    if (!all_within(pose, 3, @POSE@)) {
+        return OMNIDYN_STEP_BAD_POSE;
+    }
+"""
+
+_ADVANCE = """
+/* Move the state by h [s], or say why not; what rounding takes from the heading comes back in *lost. */
+static int omnidyn_advance(const @REAL@ u[], @REAL@ h, @REAL@ twist[3], @REAL@ pose[3], @REAL@ *lost)
+{
+    @REAL@ drive[3], next[3], event[3], before[3], after[3], poses[2][3];
     int axis, moving = 0;
+@REFUSE@
     drive_of(u, drive);
     for (axis = 0; axis < 3; axis++) {
-        const real phi = held(RATE[axis], h), a = RATE[axis], c = COULOMB[axis], s = BREAKAWAY[axis];
+        const @REAL@ phi = held(RATE[axis], h), a = RATE[axis], c = COULOMB[axis], s = BREAKAWAY[axis];
         const many_rrr parts = pieces(twist[axis], drive[axis], c, s, a, phi, h);
         next[axis] = exact_step(twist[axis], drive[axis], c, s, a, phi, 0);
         event[axis] = parts.a0;
@@ -168,24 +233,35 @@ static void omnidyn_advance(const real u[], real h, real twist[3], real pose[3],
     }
     if (moving) {
         const many_rr way = travel_of(twist, next, event, before, after, RATE, h, NODES, WEIGHTS);
-        const real turn = turned_within(h, twist[2], next[2], event[2], before[2], after[2], RATE[2]);
-        *lost = put_next_pose(poses, 0, way.a0, way.a1, turn, *lost);
+        const @REAL@ turn = turned_within(h, twist[2], next[2], event[2], before[2], after[2], RATE[2]);
+        const @REAL@ left = put_next_pose(poses, 0, way.a0, way.a1, turn, *lost);
+        if (!all_within(next, 3, @LARGEST@) || !all_within(poses[1], 3, @LARGEST@)) {
+            return OMNIDYN_STEP_TOO_LONG;
+        }
+        *lost = left;
         for (axis = 0; axis < 3; axis++) {
             twist[axis] = next[axis];
             pose[axis] = poses[1][axis];
         }
     }
+    return OMNIDYN_STEP_OK;
 }
 """
 
 _ADVANCE_WITH_INDUCTANCE = """
-/* Move the state by h [s]; force: what the currents do to each axis, divided by mass or inertia. */
-static void omnidyn_advance(const real u[], real h, real twist[3], real pose[3], real force[3], real *lost)
+/* Move the state by h [s], or say why not; force: what the currents do to each axis, divided by mass or inertia. */
+static int omnidyn_advance(const @REAL@ u[], @REAL@ h, @REAL@ twist[3], @REAL@ pose[3], @REAL@ force[3], @REAL@ *lost)
 {
-    real drive[3], next[3], next_force[3], poses[2][3], spin;
+    @REAL@ drive[3], next[3], next_force[3], poses[2][3], spin, left = *lost;
     int axis, moving = 0;
     Nodes nodes = {0};
     Axes axes = {0};
+@REFUSE@
+    for (axis = 0; axis < 3; axis++) {
+        if (!all_within(force + axis, 1, MOST_FORCE[axis])) {
+            return OMNIDYN_STEP_BAD_FORCE;
+        }
+    }
     drive_of(u, drive);
     for (axis = 0; axis < 3; axis++) {
         const many_rri end = step_by_segments(twist[axis], force[axis], drive[axis], h, law_of(LAWS, axis));
@@ -194,15 +270,23 @@ static void omnidyn_advance(const real u[], real h, real twist[3], real pose[3],
         moving |= (twist[axis] != 0) | (next[axis] != 0) | (end.a2 > 0);
         poses[0][axis] = pose[axis];
     }
+    if (!all_within(next, 3, @LARGEST@) || !all_within(next_force, 3, @LARGEST@)) {
+        return OMNIDYN_STEP_TOO_LONG;
+    }
     if (moving) {
         spin = max_of(twist[2] < 0 ? -twist[2] : twist[2], next[2] < 0 ? -next[2] : next[2]);
         const many_rrr way = travel(&nodes, twist, force, drive, h, spin, &axes, LAWS, RATES, GAUSS);
-        *lost = put_next_pose(poses, 0, way.a0, way.a1, way.a2, *lost);
+        left = put_next_pose(poses, 0, way.a0, way.a1, way.a2, *lost);
+        if (!all_within(poses[1], 3, @LARGEST@)) {
+            return OMNIDYN_STEP_TOO_LONG;
+        }
     }
+    *lost = left;
     for (axis = 0; axis < 3; axis++) {
         twist[axis] = next[axis];
         force[axis] = next_force[axis];
         pose[axis] = moving ? poses[1][axis] : pose[axis];
     }
+    return OMNIDYN_STEP_OK;
 }
 """

@@ -43,9 +43,13 @@ class Function:
 
 @dataclass
 class Program:
-    """Translated functions and what they need, in an order that C can read. single: in float, not double."""
+    """Translated functions and what they need, in an order that C can read. single: in float, not double.
+
+    most_turns: of a while loop. One that is cut short makes its function return no number: NAN.
+    """
 
     single: bool = False
+    most_turns: int = 10_000
     structs: dict[str, str] = field(default_factory=dict)
     tables: dict[str, str] = field(default_factory=dict)
     functions: dict[tuple[str, str, tuple[Type, ...]], Function] = field(default_factory=dict)
@@ -137,15 +141,16 @@ class Body:
         self.written: set[int] = set()
         self.expressions = Expressions(self)
         self._found: Type | None = None
+        self._ends: Type | None = None  # what the function returned in the pass before
         self._held: list[str] = []
 
     def text(self) -> str:
         """The function in C."""
         lines: list[str] = []
         for _ in range(PASSES):
-            before, self._found, self._held = dict(self.types), None, []
+            before, self._ends, self._found, self._held = dict(self.types), self._found, None, []
             lines = self._block(self.source.statements, 1)
-            if before == self.types:
+            if before == self.types and self._ends == self._found:
                 break
         self.returns = self._found or INT
         kind = "void" if self._found is None else self.program.declared(self.returns, "").rstrip()
@@ -236,7 +241,16 @@ class Body:
         return [*lines, "}"]
 
     def _while(self, node: ast.While, depth: int) -> list[str]:
-        return [f"while ({_bare(self.expressions.of(node.test)[0])}) {{", *self._nest(node.body), "}"]
+        turns = self._temporary(INT)
+        cut = [f"    if (++{turns} > {self.program.most_turns}) {{", f"        return{self._no_number()};", "    }"]
+        return [f"while ({_bare(self.expressions.of(node.test)[0])}) {{", *cut, *self._nest(node.body), "}"]
+
+    def _no_number(self) -> str:
+        """What a function returns that did not come to its end."""
+        none, kind = f"({self.program.real})NAN", self._ends
+        if isinstance(kind, Many):
+            return f" {self.program.packed(kind, [none if each == REAL else '0' for each in kind.items])}"
+        return "" if kind is None else f" {none if kind == REAL else '0'}"
 
     def _for(self, node: ast.For, depth: int) -> list[str]:
         assert isinstance(node.target, ast.Name)

@@ -10,7 +10,7 @@ from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import AXES, NAMES, rows
 from omnidyn.export.feedforward.table import spread
-from omnidyn.export.spelling import line_comment, number
+from omnidyn.export.spelling import java_comment, number
 from omnidyn.model.robot import Robot
 
 INCH = 0.0254  # [m]
@@ -29,9 +29,9 @@ def road_runner(robot: Robot) -> Export:
             own = row._replace(value=row.value * inches, std=row.std * inches, unit=_unit(row.unit, inches))
             name = f"{NAMED[row.place]}{row.name.upper()}" if row.place != "x" else row.name
             lines.append(f"public double {name} = {number(own.value)}; // {spread(own)}")
-    about = line_comment(
-        [f"{robot.name}: feed-forward gains by omnidyn, volts and inches.", *NOTES, *_not_in_it(missing)], "//"
-    )  # fmt: skip
+    about = java_comment(
+        [f"{robot.name}: feed-forward gains by omnidyn, volts and inches.", *NOTES, *_not_in_it(missing)]
+    )
     return Export("road-runner", robot.name, {"gains.java": about + "\n".join(lines) + "\n"}, missing, NOTES)
 
 

@@ -7,7 +7,7 @@ import math
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import Row, rows
-from omnidyn.export.spelling import line_comment, number
+from omnidyn.export.spelling import hash_comment, number
 from omnidyn.model.robot import Robot
 
 
@@ -17,8 +17,8 @@ def gains_csv(robot: Robot) -> Export:
     missing = left_out("gains", robot)
     lines = ["place,gain,value,std,unit"]
     lines += [f"{row.place},{row.name},{number(row.value)},{_std(row)},{row.unit}" for row in rows(robot)]
-    head = line_comment([f"{robot.name}: volts of the most loaded motor, by omnidyn",
-                         *(f"not in it: {words}" for words in missing)], "#")  # fmt: skip
+    head = hash_comment([f"{robot.name}: volts of the most loaded motor, by omnidyn",
+                         *(f"not in it: {words}" for words in missing)])  # fmt: skip
     return Export("gains", robot.name, {"gains.csv": head + "\n".join(lines) + "\n"}, missing)
 
 

@@ -14,7 +14,7 @@ from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import AXES, Row, gains, rows
 from omnidyn.export.feedforward.table import spread
-from omnidyn.export.spelling import line_comment, number
+from omnidyn.export.spelling import c_comment, java_comment, number, python_comment
 from omnidyn.model.robot import Robot
 
 NOTES = (
@@ -51,7 +51,7 @@ def _java(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -
     lines = [f"  public static final double {name} = {number(row.value)}; // {spread(row)}" for name, row in every]
     table = ",\n".join(f"    {{{', '.join(map(number, each))}}}" for each in pattern.tolist())
     return (
-        line_comment(about, "//") + "public final class RobotGains {\n  private RobotGains() {}\n\n" + "\n".join(lines)
+        java_comment(about) + "public final class RobotGains {\n  private RobotGains() {}\n\n" + "\n".join(lines)
         + f"\n\n  public static final double[][] PATTERN = {{\n{table}\n  }};\n}}\n"
     )  # fmt: skip
 
@@ -61,7 +61,7 @@ def _cpp(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) ->
     table = ",\n".join(f"    {{{', '.join(map(number, each))}}}" for each in pattern.tolist())
     count = pattern.shape[1]
     return (
-        line_comment(about, "//") + "#pragma once\n\nnamespace robot_gains {\n" + "\n".join(lines)
+        c_comment(about) + "\n#pragma once\n\nnamespace robot_gains {\n" + "\n".join(lines)
         + f"\n\ninline constexpr double PATTERN[{len(AXES)}][{count}] = {{\n{table}}};\n}}  // namespace robot_gains\n"
     )  # fmt: skip
 
@@ -70,4 +70,4 @@ def _python(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray)
     lines = [f"{name} = {number(row.value)}  # {spread(row)}" for name, row in every]
     table = ",\n".join(f"    ({', '.join(map(number, each))})" for each in pattern.tolist())
     assert all(math.isfinite(row.value) for _, row in every)
-    return line_comment(about, "#") + "\n" + "\n".join(lines) + f"\n\nPATTERN = (\n{table},\n)\n"
+    return python_comment(about) + "\n" + "\n".join(lines) + f"\n\nPATTERN = (\n{table},\n)\n"

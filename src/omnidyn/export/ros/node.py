@@ -18,7 +18,7 @@ from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import gains
 from omnidyn.export.ros.follower import BUILD, NODE_END, follower
 from omnidyn.export.ros.ros2_control import limits
-from omnidyn.export.spelling import line_comment, number
+from omnidyn.export.spelling import number, python_comment
 from omnidyn.model.deadzone import HIGHEST, axis_patterns, breakaway_voltage
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
@@ -50,8 +50,8 @@ def ros2_node(
     own = "c-controller" if controller else KIND
     refuse(own, robot)
     missing = left_out(own, robot)
-    about = line_comment([f"{robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in missing),
-                          "Checked without ROS, see docs/exports.md: try it on blocks first."], "#")  # fmt: skip
+    about = python_comment([f"{robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in missing),
+                          "Checked without ROS, see docs/exports.md: try it on blocks first."])  # fmt: skip
     if controller:
         files = follower(robot, controller, dt, timeout, about)
         return Export(KIND, robot.name, files, missing, (*NOTES, BUILD), folder=True)

@@ -19,7 +19,7 @@ from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import axis_gains
 from omnidyn.export.ros.covariance import Covariance, covariance
-from omnidyn.export.spelling import line_comment, yaml_number
+from omnidyn.export.spelling import hash_comment, python_comment, yaml_number
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 
@@ -47,10 +47,10 @@ def ros2_control(
     about = [f"{robot.name}, by omnidyn.", *(f"Not in it: {words}" for words in missing), *NOTES]
     parts = links(robot, height_of(robot, height))
     files = {
-        "controllers.yaml": line_comment(about, "#") + _controllers(robot, found, horizon),
-        "velocity_smoother.yaml": line_comment(about[:1], "#") + _smoother(robot),
+        "controllers.yaml": hash_comment(about) + _controllers(robot, found, horizon),
+        "velocity_smoother.yaml": hash_comment(about[:1]) + _smoother(robot),
         "robot.urdf": description(robot.name, parts, missing, outward=True),
-        "bringup.launch.py": line_comment(about[:1], "#") + _LAUNCH,
+        "bringup.launch.py": python_comment(about[:1]) + _LAUNCH,
     }
     return Export("ros2-control", robot.name, files, missing, (f"covariances: {found.words}", *NOTES), folder=True)
 
@@ -139,12 +139,14 @@ from pathlib import Path
 
 from launch import LaunchDescription
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 HERE = Path(__file__).resolve().parent
 
 
 def generate_launch_description():
-    description = {"robot_description": (HERE / "robot.urdf").read_text()}
+    text = (HERE / "robot.urdf").read_text("utf-8")
+    description = {"robot_description": ParameterValue(text, value_type=str)}
     controllers = str(HERE / "controllers.yaml")
     return LaunchDescription([
         Node(package="robot_state_publisher", executable="robot_state_publisher", parameters=[description]),

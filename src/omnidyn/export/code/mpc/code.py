@@ -25,7 +25,7 @@ from omnidyn.control.mpc.model import (
 )
 from omnidyn.control.mpc.settings import Settings
 from omnidyn.errors import UnsupportedError
-from omnidyn.export.spelling import c_number
+from omnidyn.export.spelling import c_number, filled
 from omnidyn.model.wheels import wheel_speed
 
 FOLDER = files("omnidyn.export.code.mpc")
@@ -38,7 +38,7 @@ TIGHT, CENTRE, MOST, LEAST = 1e-4, 0.1, 30, 2e-6
 
 _INPUT = """/* An input of the horizon: its volts, and room to find them. */
 typedef struct {
-    float volts, wanted, next, OWN hold[2], push[2];
+    float volts, wanted, next,@OWN@ hold[2], push[2];
     int active;
 } omnidyn_input;"""
 
@@ -58,7 +58,7 @@ def mpc_code(controller: Mpc) -> str:
 def mpc_input(controller: Mpc) -> str:
     """The type of what is known of one input of the horizon."""
     own = " bound[2]," if _bounded(controller) else ""
-    return _INPUT.replace(" OWN", own)
+    return filled(_INPUT, OWN=own)
 
 
 def mpc_memory(controller: Mpc) -> str:

@@ -324,7 +324,9 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
     }
     c->begun |= says != OMNIDYN_BAD_TIME;
     c->known = says == OMNIDYN_OK;
+#if LATE_STEPS
     memmove(c->sent[0], c->sent[1], sizeof(c->sent) - sizeof(c->sent[0]));
+#endif
     memset(c->sent[LATE_STEPS], 0, sizeof(c->sent[0]));
     if (!c->known) { /* zeros, and why */
         memset(c->sent, 0, sizeof(c->sent));
