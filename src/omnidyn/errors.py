@@ -75,7 +75,7 @@ _ACTS = ("Cc", "Cf", "Cs", "Zl", "Zp")  # categories of control, format, surroga
 
 
 def printable(text: str) -> str:
-    """The text on one line, with an escape for what a terminal may act on, or no format holds: \\u001b, \\u202e, \\ufffe.
+    """The text on one line, with an escape for what a terminal acts on, or no file may hold: \\u001b, \\u202e, \\ufffe.
 
     Names of robots, columns, files and groups come from others: they are shown as what they are, and can neither
     colour, hide or turn around what stands beside them, nor begin a line of their own.

@@ -49,6 +49,9 @@ from typing import Any
 
 import numpy as np
 
+SUPPLIES = 1e-3, 1e5  # [V] that a battery may have
+STOPPED, BAD_SUPPLY = -1, -2  # what a step says of itself, beside what the controller says: see omnidyn_control.h
+FARTHEST = 1e9  # of any number: what is beyond is none
 WHEELS = {robot.wheels.count}
 DT = {number(dt)}  # [s] between two steps
 TIMEOUT = {number(timeout)}  # [s] without a pose, or without a command, after which the robot stops
@@ -57,9 +60,26 @@ IN_VOLTS = {made.output == "voltage"}  # what the controller gives; else duties
 # [s] from now: when it wants to know the path.
 AHEAD = ({", ".join(number(each) for each in ahead)})
 '''
-    return {**code.files, "control_shared.c": _SHARED, "path_loop.py": about + constants + _LOOP,
+    return {**code.files, "control_shared.c": _SHARED, "path_loop.py": about + constants + NUMBERS + _LOOP,
             "omnidyn_node.py": about + _NODE + NODE_END}  # fmt: skip
 
+
+# What both loops ask of numbers from outside.
+NUMBERS = '''
+
+def numbers(values, count):
+    """The values as `count` numbers of a size that robots have; None where they are not."""
+    try:
+        found = [math.nan if isinstance(each, str) else float(each) for each in values]
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return found if len(found) == count and all(abs(each) <= FARTHEST for each in found) else None
+
+
+def is_usable(value, least, most):
+    """Whether a supply or a time step is a number in a range that batteries and clocks have."""
+    return numbers([value], 1) is not None and least <= value <= most
+'''
 
 # How every node ends: its step, its last word, its loop. rclpy imports are at the top of the text before it.
 NODE_END = '''    def on_timer(self):
@@ -114,11 +134,6 @@ _LOOP = '''LEAD = (0.05, 0.05, 0.2)  # [m, m, rad] by which what is asked for ma
 LIBRARY = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libomnidyn_control.so")
 
 
-def finite(values):
-    """Whether all are numbers."""
-    return all(isinstance(each, (int, float)) and math.isfinite(each) for each in values)
-
-
 def nearest_turn(angle, to):
     """The same angle, full turns added so that it is nearest to another."""
     return angle + 2.0 * math.pi * round((to - angle) / (2.0 * math.pi))
@@ -166,7 +181,7 @@ class PathLoop:
     """Call `follow` with a path or `command` with a twist, `measured` when a pose is known, `step` every DT.
 
     Times are seconds of any clock that does not go back. The last of `follow` and `command` counts. `status` is what
-    the controller said of its last step: see omnidyn_control.h; -1 where the robot is stopped.
+    the controller said of its last step: see omnidyn_control.h. Where it is STOPPED or BAD_SUPPLY all duties are 0.
     """
 
     def __init__(self, library=LIBRARY):
@@ -174,36 +189,37 @@ class PathLoop:
         self.code.control_step.argtypes = [ctypes.c_float, *[ctypes.c_void_p] * 4]
         self.code.control_reset()
         self.course = self.until = self.pose = self.told_at = self.stepped_at = None
-        self.twist, self.status = [0.0, 0.0, 0.0], -1
+        self.twist, self.status = [0.0, 0.0, 0.0], STOPPED
 
     def follow(self, now, rows):
         """Rows (t, x, y, heading), t in seconds from now; no rows, or what is no path, stops the robot."""
-        rows = [tuple(row) for row in rows]
-        good = all(len(row) == 4 and finite(row) for row in rows)
+        rows = [numbers(row, 4) for row in rows]
         self.course = None
-        if rows and good and all(a[0] < b[0] for a, b in zip(rows, rows[1:])):
+        if rows and all(rows) and all(a[0] < b[0] for a, b in zip(rows, rows[1:])):
             near = self.pose[2] if self.pose is not None else 0.0
             first = nearest_turn(rows[0][3], near)
-            rows[0] = (*rows[0][:3], first)
+            rows[0][3] = first
             self.course = Course([(now + t, x, y, heading) for t, x, y, heading in rows])
             self.until = now + rows[-1][0] + TIMEOUT
 
     def command(self, now, twist):
         """A twist (vx, vy, omega) of the body; what is no number is no command."""
-        if len(twist) != 3 or not finite(twist) or self.pose is None:
+        twist = numbers(twist, 3)
+        if twist is None or self.pose is None:
             return
         start = self.pose
         if isinstance(self.course, Ahead) and now <= self.until:
             start = self.course.at(now)[0]
             start = [p + max(-most, min(most, s - p)) for s, p, most in zip(start, self.pose, LEAD)]
-        self.course, self.until = Ahead(now, start, tuple(twist)), now + TIMEOUT
+        self.course, self.until = Ahead(now, start, twist), now + TIMEOUT
 
     def measured(self, now, pose, twist):
         """The pose in the world and the twist of the body; others are left out."""
-        if len(pose) != 3 or len(twist) != 3 or not finite(pose) or not finite(twist):
+        pose, twist = numbers(pose, 3), numbers(twist, 3)
+        if pose is None or twist is None:
             return
         heading = pose[2] if self.pose is None else nearest_turn(pose[2], self.pose[2])
-        self.pose, self.twist, self.told_at = [pose[0], pose[1], heading], list(twist), now
+        self.pose, self.twist, self.told_at = [pose[0], pose[1], heading], twist, now
 
     def alive(self, now):
         """Whether there is something to follow, and it is known where the robot is."""
@@ -211,10 +227,12 @@ class PathLoop:
         return known and self.course is not None and now <= self.until
 
     def step(self, now, supply=SUPPLY):
-        """Duties of the motors, -1 to 1. All 0 where there is nothing to follow: the dead-man stop."""
+        """Duties of the motors, -1 to 1. All 0 where `status` is below 0: the dead-man stop is STOPPED."""
+        self.status = 0 if is_usable(supply, *SUPPLIES) else BAD_SUPPLY
         if not self.alive(now):
-            self.course = self.stepped_at = None
-            self.status = -1
+            self.course, self.status = None, STOPPED
+        if self.status < 0:
+            self.stepped_at = None
             self.code.control_reset()
             return [0.0] * WHEELS
         elapsed = 0.0 if self.stepped_at is None else now - self.stepped_at
@@ -251,7 +269,8 @@ class OmnidynNode(Node):
         super().__init__("omnidyn_node")
         self.loop = PathLoop()
         self.supply = float(self.declare_parameter("supply_V", SUPPLY).value)
-        self.speed = float(self.declare_parameter("speed_m_s", 0.2).value)
+        speed = float(self.declare_parameter("speed_m_s", 0.2).value)
+        self.speed = speed if speed > 1e-3 else 0.2
         stamped = bool(self.declare_parameter("stamped", True).value)
         self.duty = self.create_publisher(Float64MultiArray, "duty", 10)
         self.create_subscription(TwistStamped if stamped else Twist, "cmd_vel", self.on_command, 10)

@@ -16,7 +16,7 @@ from omnidyn.errors import InputError
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import gains
-from omnidyn.export.ros.follower import BUILD, NODE_END, follower
+from omnidyn.export.ros.follower import BUILD, NODE_END, NUMBERS, follower
 from omnidyn.export.ros.ros2_control import limits
 from omnidyn.export.spelling import number, python_comment
 from omnidyn.model.deadzone import HIGHEST, axis_patterns, breakaway_voltage
@@ -56,7 +56,7 @@ def ros2_node(
         files = follower(robot, controller, dt, timeout, about)
         return Export(KIND, robot.name, files, missing, (*NOTES, BUILD), folder=True)
     files = {
-        "drive_loop.py": about + _constants(robot, 1.0 / dt, timeout) + _LOOP,
+        "drive_loop.py": about + _constants(robot, 1.0 / dt, timeout) + NUMBERS + _LOOP,
         "omnidyn_node.py": about + _NODE + NODE_END,
     }
     return Export(KIND, robot.name, files, missing, NOTES, folder=True)
@@ -72,6 +72,9 @@ def _constants(robot: Robot, rate: float, timeout: float) -> str:
 
 import math
 
+OK, LIMITED, STOPPED, BAD_SUPPLY, BAD_TIME = 0, 1, -1, -2, -3  # what a step says of itself
+SUPPLIES, STEPS = (1e-3, 1e5), (1e-9, 3600.0)  # [V] that a battery may have, [s] from step to step
+FARTHEST = 1e9  # of any number: what is beyond is none
 WHEELS = {robot.wheels.count}
 RATE = {number(rate)}  # [Hz]
 TIMEOUT = {number(timeout)}  # [s] without a command, after which the robot stops
@@ -97,16 +100,11 @@ def _table(values: np.ndarray) -> str:
 
 
 _LOOP = '''
-
-def finite(values):
-    """Whether all are numbers."""
-    return all(isinstance(each, (int, float)) and math.isfinite(each) for each in values)
-
-
 class DriveLoop:
     """Call `command` when a twist is asked for, `measured` when wheels tell their speeds, `step` RATE times a second.
 
-    Times are seconds of any clock that does not go back.
+    Times are seconds of any clock that does not go back. `status` says of the last step: OK, LIMITED where a motor is
+    at its limit; STOPPED where nobody asks for anything, BAD_SUPPLY, BAD_TIME: then all duties are 0.
     """
 
     def __init__(self):
@@ -115,15 +113,18 @@ class DriveLoop:
         self.set_point = [0.0, 0.0, 0.0]
         self.twist = None
         self.told_at = None
+        self.status = STOPPED
 
     def command(self, now, twist):
         """A twist (vx, vy, omega); what is no number is no command."""
-        if len(twist) == 3 and finite(twist):
-            self.goal, self.asked_at = list(twist), now
+        twist = numbers(twist, 3)
+        if twist is not None:
+            self.goal, self.asked_at = twist, now
 
     def measured(self, now, speeds):
         """Speeds of all wheels [rad/s], all forward turn the robot counter-clockwise; others are left out."""
-        if len(speeds) == WHEELS and finite(speeds):
+        speeds = numbers(speeds, WHEELS)
+        if speeds is not None:
             self.twist = [sum(a * b for a, b in zip(row, speeds)) for row in TO_TWIST]
             self.told_at = now
 
@@ -132,8 +133,13 @@ class DriveLoop:
         return self.asked_at is not None and 0.0 <= now - self.asked_at <= TIMEOUT
 
     def step(self, now, dt=1.0 / RATE, supply=SUPPLY):
-        """Duties of the motors, -1 to 1. All 0 where nobody asks for anything: the dead-man stop."""
+        """Duties of the motors, -1 to 1. All 0 where `status` is below 0: the dead-man stop is STOPPED."""
+        self.status = OK if is_usable(supply, *SUPPLIES) else BAD_SUPPLY
+        if not is_usable(dt, *STEPS):
+            self.status = BAD_TIME
         if not self.alive(now):
+            self.status = STOPPED
+        if self.status < 0:
             self.set_point = [0.0, 0.0, 0.0]
             return [0.0] * WHEELS
         volts = [0.0] * WHEELS
@@ -153,6 +159,7 @@ class DriveLoop:
                 volts[motor] += PATTERN[axis][motor] * u
         largest = max(abs(each) for each in volts)
         share = LIMIT / largest if largest > LIMIT else 1.0  # all by the same share: the direction stays
+        self.status = LIMITED if largest > min(LIMIT, supply) else OK
         return [max(-1.0, min(1.0, share * each / supply)) for each in volts]
 '''
 
