@@ -151,7 +151,8 @@ def test_a_mujoco_model_of_somebody_else():
     "text, words",
     [
         ("<robot/>", "not a MuJoCo model"),
-        ("<mujoco><worldbody><nothing/></worldbody></mujoco>", "MuJoCo does not compile it"),
+        ("<mujoco><worldbody><nothing/></worldbody></mujoco>", "this element is not read; got <nothing>"),
+        ("<mujoco><worldbody><body pos='a'/></worldbody></mujoco>", "MuJoCo does not compile it"),
         ('<mujoco><include file="/etc/hosts"/></mujoco>', "takes from other files; got /etc/hosts"),
         (model_wheels("part"), "cannot tell the wheels"),
         ("<mujoco/>", "nothing in it has a mass"),

@@ -1,4 +1,4 @@
-"""import mjcf: masses, inertias and wheels of a MuJoCo model, as MuJoCo itself compiles it.
+"""import mjcf: masses, inertias and wheels of a MuJoCo model, as MuJoCo itself compiles what is read (mjcf_parts).
 
 A wheel is a geom that is a cylinder, sphere or ellipsoid, with "wheel" in its own name or that of its body; one a body,
 or several of one body as `export mjcf` draws them. Its axle is the hinge of its body, else the axis of the cylinder.
@@ -7,12 +7,12 @@ or several of one body as `export mjcf` draws them. Its axle is the hinge of its
 from __future__ import annotations
 
 import importlib
-import xml.etree.ElementTree as ET
 from typing import Any
 
 import numpy as np
 
 from omnidyn.errors import InputError, MissingExtraError
+from omnidyn.interop.mjcf_parts import read_parts
 from omnidyn.interop.parts import Axle, Lump, robot_of_parts
 from omnidyn.interop.urdf import LEVEL, parsed
 from omnidyn.model.robot import Robot
@@ -26,17 +26,7 @@ def robot_of_mjcf(text: str, where: str = "robot.xml", other: Robot | None = Non
     root = parsed(text, where)
     if root.tag != "mujoco":
         raise InputError("not a MuJoCo model", got=f"<{root.tag}>", expected="<mujoco>", where=where)
-    _refuse_other_files(root, where)
-    try:
-        mujoco: Any = importlib.import_module("mujoco")
-    except ImportError:
-        raise MissingExtraError("a MuJoCo model is read by mujoco", remedy="pip install mujoco") from None
-    try:
-        model = mujoco.MjModel.from_xml_string(text)
-    except ValueError as error:
-        raise InputError("MuJoCo does not compile it", got=str(error).splitlines()[0], where=where) from None
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    mujoco, model, data = _compiled(read_parts(root, where), where)
     found = _wheels(mujoco, model, data)
     base = int(model.body_rootid[found[0][0]]) if found else 1
     lumps = [
@@ -46,14 +36,24 @@ def robot_of_mjcf(text: str, where: str = "robot.xml", other: Robot | None = Non
     return robot_of_parts(root.get("model") or "robot", lumps, axles, where, other)
 
 
-def _refuse_other_files(root: ET.Element, where: str) -> None:
-    """A model is read from the one file that was named."""
-    for node in root.iter():
-        if node.tag == "include" or node.get("file") is not None:
-            raise InputError(
-                "the model takes from other files", got=node.get("file") or f"<{node.tag}>", expected="one file",
-                remedy="save the compiled model: mj_saveLastXML", where=where,
-            )  # fmt: skip
+def _compiled(text: str, where: str) -> tuple[Any, Any, Any]:
+    """(mujoco, model, data): where all parts stand, by MuJoCo. Nothing moves and nothing touches: no forces."""
+    try:
+        mujoco: Any = importlib.import_module("mujoco")
+    except ImportError:
+        raise MissingExtraError("a MuJoCo model is read by mujoco", remedy="pip install mujoco") from None
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda words: None)  # it would write them into a file where the user stands
+    try:
+        model = mujoco.MjModel.from_xml_string(text)
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+    except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
+        got = next(iter(str(error).splitlines()), "")
+        raise InputError("MuJoCo does not compile it", got=got, where=where) from None
+    finally:
+        mujoco.set_mju_user_warning(before)
+    return mujoco, model, data
 
 
 def _lump(model: Any, data: Any, body: int) -> Lump:

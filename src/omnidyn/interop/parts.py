@@ -25,6 +25,7 @@ RADIAL = math.radians(1.0)  # by which an axle may miss the centre
 NEGLIGIBLE = 1e-3  # of the distance of the wheels: files give angles as 1.57 and the like
 NEAR = 1e-9  # relative: numbers that differ by less are one number
 LONGEST_NAMES = 150
+LARGEST = 1e9  # of any number of a part, in SI units
 
 
 class Lump(NamedTuple):
@@ -61,9 +62,27 @@ def whole(lumps: Sequence[Lump]) -> tuple[float, float, FloatArray]:
 def robot_of_parts(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, other: Robot | None) -> Robot:
     """The robot of these parts; what they do not say comes from another robot, or is guessed. Raises InputError."""
     try:
+        _refuse_impossible(lumps, axles)
         return _robot(name, lumps, axles, where, other)
     except InputError as error:
         raise error.at(where) from None
+
+
+def _refuse_impossible(lumps: Sequence[Lump], axles: Sequence[Axle]) -> None:
+    """Raises InputError for a mass or inertia that no body has, and for numbers that are too large to add up."""
+    for lump in lumps:
+        sizes = np.concatenate([[lump.mass], lump.centre, lump.inertia.ravel()])
+        if not np.all(np.abs(sizes) <= LARGEST):
+            raise InputError("a part beyond all robots", got=float(np.max(np.abs(sizes))), expected=f"below {LARGEST:g}")
+        least = float(np.linalg.eigvalsh(lump.inertia)[0])
+        if lump.mass < 0.0 or least < -NEAR * float(np.abs(lump.inertia).max()):
+            raise InputError(
+                "no body has a negative mass or inertia", got=f"{lump.mass:g} kg, {least:g} kg m^2 about one axis",
+                expected="0 or more", remedy="correct the signs of its inertial part",
+            )  # fmt: skip
+    for axle in axles:
+        if not np.all(np.abs([*axle.centre, *axle.axis, axle.radius, axle.inertia]) <= LARGEST):
+            raise InputError("a part beyond all robots", got=axle.name, expected=f"numbers below {LARGEST:g}")
 
 
 def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, other: Robot | None) -> Robot:

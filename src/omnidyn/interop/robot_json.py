@@ -54,8 +54,8 @@ def _parsed(text: str, where: str) -> Any:
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         found = dict(pairs)
         if len(found) < len(pairs):
-            keys = [key for key, _ in pairs]
-            twice = next(key for key in found if keys.count(key) > 1)
+            seen = set[str]()
+            twice = next(key for key, _ in pairs if key in seen or seen.add(key))
             raise InputError("a key stands twice", got=twice, expected="once", where=where)
         return found
 

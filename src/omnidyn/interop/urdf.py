@@ -42,7 +42,7 @@ def parsed(text: str, where: str) -> ET.Element:
         raise InputError("a file that declares entities is not read", got="<!DOCTYPE>", expected="plain XML",
                          remedy="remove it", where=where)  # fmt: skip
     try:
-        return ET.fromstring(text.encode("utf-8", "replace") if "encoding=" in text[:200] else text)
+        return ET.fromstring(text)
     except (ET.ParseError, ValueError, LookupError) as error:
         raise InputError(
             "not valid XML", got=str(error), expected="a whole file, each tag closed",
@@ -58,6 +58,8 @@ def _parts(root: ET.Element) -> tuple[list[Lump], list[Axle]]:
     if len(links) > MOST_LINKS:
         raise InputError("too many links", got=len(links), expected=f"at most {MOST_LINKS}")
     joints = [joint for joint in root.findall("joint") if joint.find("child") is not None]
+    if len(joints) > MOST_LINKS:
+        raise InputError("too many joints", got=len(joints), expected=f"at most {MOST_LINKS}")
     frames = _frames(links, joints)
     lumps = [lump for name, frame in frames.items() for lump in _lump(links[name], frame)]
     turning = [joint for joint in joints if joint.get("type") == "continuous" and _child(joint) in frames]
