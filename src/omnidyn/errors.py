@@ -71,6 +71,12 @@ class MissingExtraError(OmnidynError):
     exit_code = 6
 
 
+class Terminated(BaseException):
+    """SIGTERM arrived: unwind, so that nothing half-written stays behind."""
+
+
+INTERRUPTS = (KeyboardInterrupt, Terminated)  # a user or a system that wants the work to end
+
 _ACTS = ("Cc", "Cf", "Cs", "Zl", "Zp")  # categories of control, format, surrogate and line separators
 
 

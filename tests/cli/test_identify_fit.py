@@ -331,7 +331,7 @@ def test_an_interrupt_while_free_runs_are_compared_keeps_the_fit(call, tmp_path,
     out = tmp_path / "fit.toml"
     code, text, err = call("smooth0.csv", "--robot", "axebot", "-o", str(out), "--report", str(tmp_path / "r.html"))
     assert code == 130
-    assert "those of the whole fit, but nothing was compared" in err
+    assert "not made: the comparison with the logs: interrupted" in err
     assert COULOMB in text
     assert load_robot(out).priors[COULOMB].std
     assert not (tmp_path / "r.html").exists()

@@ -20,8 +20,6 @@ from omnidyn.cli.terminal.telling import end_failed
 from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.identification.question import options as fields_of_question
 
-INTERRUPTED = 130
-
 
 def _asks(command: Callable[..., None]) -> Callable[..., None]:
     """The command with an option for every field of a Question that has a flag, after --robot, --out and --report."""
@@ -118,7 +116,7 @@ def _question(asked: dict[str, Any]) -> Question:
 def _identify(arguments: list[str], robot: str, question: Question, reading: Any, to: Any) -> None:
     """Read, choose the method, identify, tell."""
     from omnidyn.cli.identify_logs import load_runs
-    from omnidyn.cli.identify_show import load_meanwhile, tell
+    from omnidyn.cli.identify_show import load_meanwhile, outputs, tell
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.identification.first_runs import shared_out
     from omnidyn.identification.identify import Identification, settle_method
@@ -130,7 +128,6 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
     with progress("reading") as now:
         start = load_robot(robot) if robot else None
         loaded = load_runs(arguments, question, start, reading, now)
-        now("identifying")
         record = provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
         if question.what == MOTORS:
             from omnidyn.cli.identify_motors import run_motors
@@ -143,13 +140,16 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
             question = replace(question, group=loaded.folders)
         elif loaded.folders:
             told("all folders are fitted together; `per` NAME=GLOB makes groups of them")
-        load_meanwhile(to)
+        if groups := [each.partition("=")[0] for each in question.per or question.group]:
+            outputs(to, list(dict.fromkeys(groups)), record["inputs"])  # refused before any work
+        load_meanwhile(to, question.quick)
         with shared_out(start) if question.method == OUTPUT_ERROR else nullcontext():
-            found = Identification.of(loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True)
-        now("writing")
-        tell(found, record, to)
-    if found.interrupted:
-        told(f"interrupted: {found.interrupted}")
-        raise typer.Exit(INTERRUPTED)
+            found = Identification.of(
+                loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True,
+                save=lambda fits: to.save({name: fit.robot for name, fit in fits.items()}, record["inputs"]),
+            )  # fmt: skip
+        if found.interrupted:
+            told(f"interrupted: {found.interrupted}")
+        tell(found, record, to, now)
     if found.failures:
         end_failed(found.verdict)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.cli.identify_logs import Loaded
@@ -28,8 +29,7 @@ def run_motors(
         say(f"omnidyn: {words}")
 
     study = identify_motors(loaded.runs, robot, question=question, logs=loaded.logs, now=now, tell=told)
-    now("writing")
-    _tell(study, robot, record, to)
+    _tell(study, robot, record, to, now)
 
 
 def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> None:
@@ -42,19 +42,28 @@ def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> Non
     start, data = load_robot(robot) if robot else None, read_motor_table(table)
     study = identify_motors(data, start, question=question)
     inputs = [{"role": "data", "name": table, "sha256": data.sha256}]
-    _tell(study, start, provenance([*([robot_input(robot)] if robot else []), *inputs]), to)
+    _tell(study, start, provenance([*([robot_input(robot)] if robot else []), *inputs]), to, lambda _: None)
 
 
-def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out) -> None:
-    told, numbers = study.document(), _into_file(study, robot, to)
+def _tell(
+    study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, now: Callable[[str], object]
+) -> None:  # fmt: skip
+    from omnidyn.identification.attempts import Attempts, missing_words
+
+    attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
+    told = study.document()
     if numbers is not None:
         told = replace(told, parts=apart(told.parts, numbers.parts()))
-    report = to.write_report(lambda: _page(study, record)) if to.report else ""
-    output = to.out if numbers is not None and numbers.value else ""
-    own = numbers.to_dict() if numbers is not None else None
-    tell(told, to.json, record, robot=own, output=output or None, report=report or None)
-    say_written([output, report])
-    to.finish()
+    if to.report:
+        now("drawing")
+        report = to.write_report(attempts, lambda: _page(study, record))
+    now("writing")
+    verdict = " ".join([told.verdict, *missing_words(attempts.missing)])
+    told = replace(told, verdict=verdict, data={**told.data, "verdict": verdict})
+    own, missing = numbers.to_dict() if numbers is not None else None, [*map(asdict, attempts.missing)]
+    tell(told, to.json, record, robot=own, output=to.files.get(""), report=report or None, missing=missing)
+    say_written([*to.files.values(), report])
+    to.finish(attempts)
     if study.failed:
         end_failed(study.verdict)
 
@@ -65,10 +74,9 @@ def _page(study: MotorStudy, record: dict[str, Any]) -> str:
     return render_motors(study, record)
 
 
-def _into_file(study: MotorStudy, robot: Robot | None, to: Out) -> MotorNumbers | None:
+def _into_file(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out) -> MotorNumbers | None:
     """Write the robot file where one is asked for, and the logs determine a number of it."""
     from omnidyn.identification.motors.into_robot import motors_into_robot
-    from omnidyn.model.robot_file import save_robot
 
     if not to.out:
         return None
@@ -77,7 +85,7 @@ def _into_file(study: MotorStudy, robot: Robot | None, to: Out) -> MotorNumbers 
         return None
     numbers = motors_into_robot(study, robot)
     if numbers.value:
-        save_robot(numbers.robot, to.out, to.force)
+        to.save({"": numbers.robot}, record["inputs"])
     else:
         say("omnidyn: the logs determine no number of a robot file; -o is not used")
     return numbers

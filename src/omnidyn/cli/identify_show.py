@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,48 +17,65 @@ from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.identification.question import OUTPUT_ERROR, Question
 
+PAGE = "page"
+
 if TYPE_CHECKING:
-    from omnidyn.identification.estimate import Estimate
+    from omnidyn.identification.attempts import Attempts
     from omnidyn.identification.identify import Identification
+    from omnidyn.model.robot import Robot
 
 
 @dataclass(frozen=True)
 class Out:
-    """Where results go."""
+    """Where results go. files: name of the robot -> file that holds it now. refused: why a robot file could not be
+    written."""
 
     report: str
     out: str
     force: bool
     json: bool
-    failed: list[Exception] = field(default_factory=list)
+    files: dict[str, str] = field(default_factory=dict)
+    refused: list[Exception] = field(default_factory=list)
 
-    def write_report(self, render: Callable[[], str]) -> str:
-        """Draw and write the report, with options as the command line writes them: its name where that worked.
-
-        All else is written and shown whatever becomes of the page: `finish` raises what happened.
-        """
-        from omnidyn.files import write_atomic
+    def save(self, robots: Mapping[str, Robot], inputs: Sequence[Mapping[str, str]]) -> None:
+        """Write the robot of each group, or replace what was written before; `finish` raises what kept it from that."""
+        from omnidyn.model.robot_file import save_robot
 
         try:
-            write_atomic(self.report, with_flags(render()), self.force)
+            for group, path in outputs(self, list(robots), inputs).items():
+                save_robot(robots[group], path, self.force or group in self.files)
+                self.files[group] = path
         except Exception as error:
-            self.failed.append(error)
-            return ""
-        return self.report
+            self.refused.append(error)
 
-    def finish(self) -> None:
-        """Raise what kept the report from being written."""
-        for error in self.failed:
-            say("omnidyn: the report could not be made; everything else is written")
+    def write_report(self, attempts: Attempts, render: Callable[[], str]) -> str:
+        """Draw and write the report, with options as the command line writes them: its name where that worked."""
+        from omnidyn.files import write_atomic
+
+        def make() -> str:
+            write_atomic(self.report, with_flags(render()), self.force)
+            return self.report
+
+        return attempts.make(PAGE, make) or ""
+
+    def finish(self, attempts: Attempts) -> None:
+        """Name what is missing; raise what kept a robot file from being written, or the interrupt."""
+        for each in attempts.missing:
+            say(f"omnidyn: not made: the {each.part}: {each.reason}")
+        for error in self.refused:
+            say("omnidyn: the robot file could not be written; the result is on stdout")
             raise error
+        if attempts.interrupt is not None:
+            raise attempts.interrupt
 
 
-def load_meanwhile(to: Out) -> None:
+def load_meanwhile(to: Out, quick: bool) -> None:
     """Load what comes after a fit while it simulates, which leaves the interpreter free. What fails is told later."""
 
     def load() -> None:
         with contextlib.suppress(Exception):
-            import omnidyn.identification.structure.diagnosis
+            if not quick:
+                import omnidyn.identification.structure.diagnosis
 
             if to.report:
                 import omnidyn.report.fit_page  # noqa: F401
@@ -66,21 +83,26 @@ def load_meanwhile(to: Out) -> None:
     threading.Thread(target=load).start()
 
 
-def tell(found: Identification, record: dict[str, Any], to: Out) -> None:
-    """Write and show an identification."""
-    files = _outputs(to, found.estimates, record)
-    _save(found.estimates, files, to.force)
-    report = to.write_report(lambda: _page(found, record)) if to.report and _has_page(found) else ""
-    tell_document(found.document(), to.json, record, output=files or None, report=report or None)
-    say_written([*files.values(), report])
-    to.finish()
+def tell(found: Identification, record: dict[str, Any], to: Out, now: Callable[[str], object]) -> None:
+    """Draw the page of an identification, and show the result."""
+    from omnidyn.identification.attempts import Attempts
+
+    attempts, report = Attempts([*found.missing], found.interrupt), ""
+    if to.report and _has_page(found):
+        now("drawing")
+        report = to.write_report(attempts, lambda: _page(found, record))
+    now("writing")
+    found = replace(found, missing=tuple(attempts.missing), interrupt=attempts.interrupt)
+    tell_document(found.document(), to.json, record, output=to.files or None, report=report or None)
+    say_written([*to.files.values(), report])
+    to.finish(attempts)
 
 
 def _has_page(found: Identification) -> bool:
     """Whether there is a report to write."""
     if found.study is None and found.method != OUTPUT_ERROR:
         say("omnidyn: --shape line has no page; --report is not used")
-    return found.study is not None or bool(found.validations)
+    return found.study is not None or found.method == OUTPUT_ERROR
 
 
 def _page(found: Identification, record: dict[str, Any]) -> str:
@@ -98,6 +120,7 @@ def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
     """The paper's way, from a table of steady points; what the reader had to decide joins the warnings."""
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.errors import InputError
+    from omnidyn.identification.attempts import Attempts
     from omnidyn.identification.steady.steady_state import fit_steady_state
     from omnidyn.logs.steady_table import read_steady_table
     from omnidyn.model.robot_file import load_robot
@@ -112,36 +135,30 @@ def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
         estimate = fit_steady_state(start, data, rest=question.rest)
         estimate = replace(estimate, warnings=(*data.notes, *estimate.warnings))
         record = provenance([robot_input(robot), {"role": "data", "name": table, "sha256": data.sha256}])
-    if to.out:
-        _save({"": estimate}, {"": to.out}, to.force)
-    tell_document(estimate.document(), to.json, record, output=to.out or None)
-    say_written([to.out])
+    to.save({"": estimate.robot}, record["inputs"])
+    tell_document(estimate.document(), to.json, record, output=to.files.get(""))
+    say_written(to.files.values())
+    to.finish(Attempts())
 
 
-def _outputs(to: Out, groups: Iterable[str], record: Mapping[str, Any]) -> dict[str, str]:
+def outputs(to: Out, names: Sequence[str], inputs: Sequence[Mapping[str, str]] = ()) -> dict[str, str]:
     """Group -> file to write: the name given where there is one group, NAME-GROUP.toml where there are several.
 
-    Raises InputError for a file that is there, unless `force`, for one file of two groups, and for one that was read.
+    inputs: the record of what was read. Raises InputError for a file that is there, unless `force` or written here,
+    for one file of two groups, and for one that was read.
     """
     from omnidyn.files import check_output, keep_apart
 
     if not to.out:
         return {}
-    names, path = list(groups), Path(to.out)
+    path = Path(to.out)
     plain = ["".join(c if c.isalnum() or c in "-_." else "-" for c in group) for group in names]
     several = [str(path.with_name(f"{path.stem}-{word}{path.suffix}")) for word in plain]
     files = dict(zip(names, [to.out] if len(names) == 1 else several, strict=True))
-    keep_apart([*files.values(), to.report], [each["name"] for each in record["inputs"]])
-    for each in files.values():
-        check_output(each, to.force)
+    keep_apart([*files.values(), to.report], [each["name"] for each in inputs])
+    for group, each in files.items():
+        check_output(each, to.force or group in to.files)
     return files
-
-
-def _save(estimates: Mapping[str, Estimate], files: Mapping[str, str], force: bool) -> None:
-    from omnidyn.model.robot_file import save_robot
-
-    for group, path in files.items():
-        save_robot(estimates[group].robot, path, force)
 
 
 def say_written(paths: Iterable[str]) -> None:

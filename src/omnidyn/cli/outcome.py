@@ -14,13 +14,9 @@ import typer
 from omnidyn.cli.terminal import session
 from omnidyn.cli.terminal.flags import of_place
 from omnidyn.cli.terminal.streams import prepare, say, say_trace, silence
-from omnidyn.errors import OmnidynError, printable
+from omnidyn.errors import OmnidynError, Terminated, printable
 
 BUG, USAGE, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
-
-
-class Terminated(BaseException):
-    """SIGTERM arrived: unwind, so that nothing half-written stays behind."""
 
 
 def run_guarded(arguments: list[str]) -> int:

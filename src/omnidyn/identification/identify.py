@@ -3,19 +3,21 @@ fitted, validated, with advice."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.document import Document, Points, apart, sentence
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import INTERRUPTS, InputError, UnsupportedError
 from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import STEADY as STEADY_USE
 from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.advice import advice
+from omnidyn.identification.attempts import COMPARISON, DIAGNOSIS, LADDER, QUICK, Attempts, Missing, missing_words
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
@@ -29,7 +31,7 @@ from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STE
 from omnidyn.identification.recordings import fingerprint
 from omnidyn.identification.steady.axis_lines import identify_lines
 from omnidyn.identification.steady.settling import why_no_transient
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.steady.study import diagnosed, fit_steady, identify_steady, undiagnosed
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.validation import Validation, validate
@@ -45,10 +47,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Tell = Callable[[str], object]
+Save = Callable[[Mapping[str, Estimate]], object]
 
 LINE = "line"  # a shape: the paper's line on each axis
 CUT_SHORT = "the numbers are the best so far, not the best there are"
-NOT_COMPARED = "the numbers are those of the whole fit, but nothing was compared with them"
 
 
 @shows_options(FIT, STEADY)
@@ -129,7 +131,7 @@ class Identification(Shown):
     method: that was taken. estimates: group -> Estimate; one, "all", where there are no groups. validations: group ->
     Validation, by output error. study: by steady state, but for the shape "line". verdicts: of `check` on each log.
     advice: what to mend, to measure or to ask for next, gravest first. interrupted: what an interrupt cut off, in
-    words; "" without one.
+    words; "" without one. missing: parts that were not made, and why. interrupt: the interrupt that ended it.
     """
 
     question: Question
@@ -141,31 +143,35 @@ class Identification(Shown):
     verdicts: tuple[Verdict, ...] = ()
     advice: tuple[str, ...] = ()
     interrupted: str = ""
+    missing: tuple[Missing, ...] = ()
+    interrupt: BaseException | None = None
 
     @classmethod
     @shows_options(FIT, STEADY)
     def of(
         cls, runs: Run | Sequence[Run], robot: Robot, question: Question | None = None, *, logs: Sequence[Log] = (),
-        progress: Tell | None = None, tell: Tell | None = None, keep_best: bool = False,
+        progress: Tell | None = None, tell: Tell | None = None, keep_best: bool = False, save: Save | None = None,
         **options: Unpack[Options],
     ) -> Identification:  # fmt: skip
         """Choose the method; check, fit, validate and advise.
 
         question, options: see `Question`; the sources of the runs tell their groups, and which are held out. logs:
         where the runs come from, to be checked as well. progress: is called with what is being done. tell: with what a
-        user must know at once. keep_best: an interrupt leaves the best so far, instead of being raised.
+        user must know at once. keep_best: an interrupt leaves the best so far, instead of being raised. save: is called
+        with the estimates of all groups as soon as they are there, and again where a later step changes them.
+        What follows the fit may fail: `missing` names it then, with the reason.
         Errors: as `identify` raises.
         """
         check_order("Identification.of(runs, robot)", (runs, Run), (robot, Robot))
         every = as_list(runs)
         robot = as_driven(robot, every)
         asked = (question or Question()).but(options)
-        heard = _Heard(progress or _silent, tell or _silent, keep_best)
+        heard = _Heard(progress or _discard, tell or _discard, save or _discard, Attempts(keep=keep_best))
         if asked.what == MOTORS:
             raise UnsupportedError("motors have functions of their own", got=MOTORS, where="what")
         asked = settle_method(every, robot, asked, heard.tell)
         if asked.method == STEADY_STATE:
-            return _steady(every, robot, asked, log_verdicts(logs, robot, heard.now, heard.tell))
+            return _steady(every, robot, asked, log_verdicts(logs, robot, heard.now, heard.tell), heard)
         why = why_not_output_error(every, robot) if robot.drive.kind == SPEED else ""
         if why:
             heard.tell(f"{why}; `method` {STEADY_STATE} (`group` instead of `per`) answers in seconds")
@@ -196,7 +202,11 @@ class Identification(Shown):
 
     @property
     def verdict(self) -> str:
-        """What it came to, in a sentence, failures first: whether the model follows, how well its numbers are known."""
+        """What it came to, failures first: whether the model follows, how well its numbers are known, and which parts
+        of the result were not made."""
+        return " ".join([self._outcome(), *missing_words(self.missing)])
+
+    def _outcome(self) -> str:
         if self.failures and not self.interrupted:
             return sentence(f"failed: {'; '.join(self.failures)}: the numbers mean nothing until that is mended")
         if self.study is not None:
@@ -207,7 +217,8 @@ class Identification(Shown):
 
     def document(self) -> Document:
         """All of it, as text, page and machines have it."""
-        return replace(self._told(), verdict=self.verdict)
+        told = self._told()
+        return replace(told, verdict=self.verdict, data={**told.data, "missing": [*map(asdict, self.missing)]})
 
     def _told(self) -> Document:
         if self.study is not None:
@@ -232,32 +243,44 @@ class Identification(Shown):
 
 @dataclass(frozen=True)
 class _Heard:
-    """Who hears of an identification: of what is done, and of what must be known at once."""
+    """Who hears what is done, what must be known at once, and estimates that are done; what was not made."""
 
     now: Tell
     tell: Tell
-    keep_best: bool
+    save: Save
+    attempts: Attempts
 
 
-def _silent(words: str) -> None:
-    """Nobody hears."""
+def _discard(told: object) -> None:
+    """Discards what is told."""
 
 
-def _steady(runs: Sequence[Run], robot: Robot, asked: Question, verdicts: tuple[Verdict, ...] = ()) -> Identification:
+def _steady(
+    runs: Sequence[Run], robot: Robot, asked: Question, verdicts: tuple[Verdict, ...], heard: _Heard
+) -> Identification:  # fmt: skip
     names = group_names([run.source for run in runs], asked.group, "group") if asked.group else None
     used = runs if names is None else [run for run, name in zip(runs, names, strict=True) if name]
     groups = None if names is None else [name for name in names if name]
     plain = replace(asked, group=())
     mend = tuple(verdict_advice(verdicts))
+    heard.now("fitting")
     if asked.shape == LINE:
         lines = identify_lines(used, robot, groups=groups, question=plain)
+        heard.save(lines)
         return Identification(asked, STEADY_STATE, lines, verdicts=verdicts, advice=mend)
     with told_why(verdicts, STEADY_USE):
-        study = identify_steady(used, robot, groups=groups, question=plain)
+        fit = fit_steady(used, robot, groups=groups, question=plain)
+    heard.save(fit.estimates)
+    heard.now("diagnosing")
+    if asked.quick:
+        heard.attempts.leave_out(DIAGNOSIS, QUICK)
+    found = None if asked.quick else heard.attempts.make(DIAGNOSIS, partial(diagnosed, fit))
+    study = found or undiagnosed(fit)
     study = replace(study, advice=(*mend, *study.advice))
     return Identification(
-        asked, STEADY_STATE, study.estimates, study.differences, study=study, verdicts=verdicts, advice=study.advice
-    )
+        asked, STEADY_STATE, study.estimates, study.differences, study=study, verdicts=verdicts, advice=study.advice,
+        missing=tuple(heard.attempts.missing), interrupt=heard.attempts.interrupt,
+    )  # fmt: skip
 
 
 def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[Log], heard: _Heard) -> Identification:
@@ -274,30 +297,50 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
     answer, cut = _answered(
         [run for run, _ in chosen], robot, plain, [g for _, g in chosen] if asked.per else None, heard
     )
-    validations: dict[str, Validation] = {}
     aside = {
         name: [run for run, own, out in zip(runs, groups, held, strict=True) if out and own == name]
         for name in answer.estimates
     }
     answer = replace(answer, estimates={name: fit.beside(aside[name]) for name, fit in answer.estimates.items()})
-    try:
-        for group, fit in answer.estimates.items() if not cut else ():
-            beside = aside[group]
-            validations[group] = validate(fit, [run for run, own in chosen if own == group], beside, heard.now)
-    except KeyboardInterrupt:  # what is fitted stays
-        if not heard.keep_best:
-            raise
-        validations, cut = {}, NOT_COMPARED
-    for group, fit in answer.estimates.items() if not cut else ():
-        heard.now(f"looking for what the model leaves out{f' in {group}' if len(answer.estimates) > 1 else ''}")
-        _ = fit.diagnosis  # made now, and told below
+    heard.save(answer.estimates)
+    answer = replace(answer, estimates=_diagnosed(answer.estimates, asked, heard))
+    own = {name: [run for run, group in chosen if group == name] for name in answer.estimates}
+    compared = {
+        name: heard.attempts.make(
+            f"{COMPARISON}{_of_group(name, own)}", partial(validate, fit, own[name], aside[name], heard.now)
+        )
+        for name, fit in answer.estimates.items()
+    }
+    validations = {name: found for name, found in compared.items() if found is not None}
     words = [*verdict_advice(verdicts), *_not_independent(runs, held)]
     for group, fit in answer.estimates.items():
-        own = advice(fit, validations.get(group))
-        words += own if len(answer.estimates) == 1 else [f"{group}: {each}" for each in own]
+        next_steps = advice(fit, validations.get(group))
+        words += next_steps if len(answer.estimates) == 1 else [f"{group}: {each}" for each in next_steps]
     return Identification(
-        asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, verdicts, tuple(words), cut
-    )
+        asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, verdicts, tuple(words), cut,
+        tuple(heard.attempts.missing), heard.attempts.interrupt,
+    )  # fmt: skip
+
+
+def _diagnosed(
+    fits: Mapping[str, OutputErrorEstimate], asked: Question, heard: _Heard
+) -> dict[str, OutputErrorEstimate]:
+    """The fits with their diagnosis; without one where it fails, or is not asked for."""
+    if asked.quick:
+        heard.attempts.leave_out(DIAGNOSIS, QUICK)
+        return dict(fits)
+    found = {}
+    for name, fit in fits.items():
+        of = _of_group(name, fits)
+        heard.now(f"diagnosing{of}")
+        made = heard.attempts.make(f"{DIAGNOSIS}{of}", lambda fit=fit: fit.diagnosis)
+        found[name] = fit if made is not None else replace(fit, study=None)
+    return found
+
+
+def _of_group(name: str, groups: Collection[str]) -> str:
+    """The words " of NAME" where there are several groups."""
+    return f" of {name}" if len(groups) > 1 else ""
 
 
 def _not_independent(runs: Sequence[Run], held: Sequence[bool]) -> list[str]:
@@ -321,13 +364,23 @@ def _answered(
         steps += 1
         heard.now(f"fitting, step {steps}, -log likelihood {state.objective:.6g}")
 
+    plain: list[Answer] = []
+
+    def keep(answer: Answer) -> None:
+        plain.append(answer)
+        heard.save(answer.estimates)
+
     progress = Progress(better, lambda words: heard.now(f"fitting: {words}"))
     fit = Fit.of(runs, robot, asked, groups, progress)
     try:
-        return solved(fit, runs, progress, groups), ""
-    except KeyboardInterrupt:
-        if not heard.keep_best or progress.best is None:
+        return solved(fit, runs, progress, groups, keep), ""
+    except (*INTERRUPTS, Exception) as error:
+        if plain and (heard.attempts.keep or isinstance(error, Exception)):
+            heard.attempts.give_up(LADDER, error)
+            return plain[0], ""
+        if isinstance(error, Exception) or not heard.attempts.keep or progress.best is None:
             raise
+        heard.attempts.interrupt = error
         heard.now("finishing with the best so far")
         heard.tell("interrupted: finishing with the best so far (again: give up)")
         return fit.answer(progress.best), CUT_SHORT

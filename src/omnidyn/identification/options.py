@@ -29,6 +29,7 @@ class Options(TypedDict, total=False):
     profile: Names
     bootstrap: int
     ladder: bool
+    quick: bool
     start: Literal["auto", "rest", "free"]
     between: str
     what: Literal["friction", "motors"]

@@ -109,6 +109,10 @@ class Question:
         "`Estimate.ladder` has all that was tried.",
         of=(FIT,),
     )  # fmt: skip
+    quick: bool = _option(
+        False, "Leave out the diagnosis: what the model misses and what the numbers rest on.",
+        "The result says so. `ladder` needs the diagnosis.", of=(FIT, STEADY),
+    )  # fmt: skip
     start: str = _option(
         AUTO, "How logs begin: rest, free, or auto: at rest where that shows.", of=(FIT,), choices=(AUTO, REST, FREE)
     )
@@ -180,6 +184,11 @@ class Question:
                 raise InputError(words, got=value, expected=expected, where=each.name)
         object.__setattr__(self, "nuisances", _nuisances(self.nuisances))
         object.__setattr__(self, "window", _shares(self.window))
+        if self.quick and self.ladder:
+            raise InputError(
+                "the ladder climbs by the diagnosis, which `quick` leaves out", got="`quick` and `ladder`",
+                remedy="leave out one of them",
+            )  # fmt: skip
 
     @classmethod
     def for_method(cls, method: str, question: Self | None, options: Mapping[str, Any]) -> Self:

@@ -20,6 +20,7 @@ from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import counts_from_start, unit
 from omnidyn.comparison.verdict import is_missed
 from omnidyn.document import Document, Table, cell, chance_cell
+from omnidyn.identification.lack_of_fit import LackOfFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
 from omnidyn.run import Run, as_list
@@ -158,19 +159,25 @@ def validate(
 ) -> Validation:  # fmt: skip
     """Run the fitted robot freely beside the logs it was fitted to and beside those held out, nuisances included.
 
+    What the diagnosis says of the noise counts in chi2; it is made first, unless the fit has none.
+
     Raises InputError and InsufficientDataError as `compare` does.
     """
     runs, held_out = as_list(runs), as_list(held_out)
     check_order("validate(fit, runs)", (fit, OutputErrorEstimate), (runs, Run), (held_out, Run))
+    if progress is not None and fit.study is not None:
+        progress("diagnosing")
+    lack = fit.lack_of_fit
     fitted = _compared(fit, runs, progress)
     other = _compared(fit, held_out, progress) if held_out else None
-    scores = {FITTED: _scores(fit, fitted, runs)} | ({HELD_OUT: _scores(fit, other, held_out)} if other else {})
-    return Validation(fitted, other, scores, _misfit(fit, scores[FITTED]))
+    scores = {FITTED: _scores(fit, lack, fitted, runs)}
+    if other is not None:
+        scores[HELD_OUT] = _scores(fit, lack, other, held_out)
+    return Validation(fitted, other, scores, _misfit(lack, scores[FITTED]))
 
 
-def _misfit(fit: OutputErrorEstimate, components: Collection[str]) -> dict[str, float] | None:
+def _misfit(lack: LackOfFit | None, components: Collection[str]) -> dict[str, float] | None:
     """Component -> share of what the fit left there that is no noise."""
-    lack = fit.lack_of_fit
     if lack is None:
         return None
     return {name: lack.channels.get(output_name(name), 0.0) for name in components} if lack.found else {}
@@ -180,7 +187,9 @@ def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[
     return compare(fit.robot, list(runs), progress=progress, log=fit.robot.log)
 
 
-def _scores(fit: OutputErrorEstimate, found: Comparison, logged: Sequence[Run]) -> dict[str, Score]:
+def _scores(
+    fit: OutputErrorEstimate, lack: LackOfFit | None, found: Comparison, logged: Sequence[Run]
+) -> dict[str, Score]:  # fmt: skip
     """The score of each component. What was not fitted has no noise, and no chi2.
 
     An encoder at rest repeats what it rounds off: of a counted angle nothing tells whether errors are white.
@@ -188,7 +197,7 @@ def _scores(fit: OutputErrorEstimate, found: Comparison, logged: Sequence[Run]) 
     scores = {}
     for name, each in found.overall[found.robots[0]].items():
         tick = _tick(logged, name)
-        chi2, white = _chi2(fit, found, name, tick), None if tick else each.whiteness
+        chi2, white = _chi2(fit, lack, found, name, tick), None if tick else each.whiteness
         scores[name] = Score(each.samples, each.rmse, each.fit_percent, chi2, white, each.lag)
     return scores
 
@@ -217,8 +226,10 @@ def _tick(logged: Sequence[Run], name: str) -> float:
     return max((find_tick(angle[:, column]) for angle in angles), default=0.0)
 
 
-def _chi2(fit: OutputErrorEstimate, found: Comparison, name: str, tick: float) -> float | None:
-    output, lack = output_name(name), fit.lack_of_fit
+def _chi2(
+    fit: OutputErrorEstimate, lack: LackOfFit | None, found: Comparison, name: str, tick: float
+) -> float | None:  # fmt: skip
+    output = output_name(name)
     noise = fit.noise.get(output)
     if not noise:
         return None

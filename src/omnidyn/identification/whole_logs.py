@@ -61,13 +61,22 @@ def identify_groups(
     return solved(fit, runs, progress, groups)
 
 
-def solved(fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[str] | None = None) -> Answer:
-    """The answer of a fit of some runs, with the ladder where that is asked for. groups: name of each run's group."""
-    if not fit.question.ladder:
-        return answered(fit, fit.solve(progress, _unearned), progress)
-    from omnidyn.identification.structure.ladder.climb import climb  # here, for it takes time to load
+def solved(
+    fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[str] | None = None,
+    without_ladder: Callable[[Answer], object] | None = None,
+) -> Answer:  # fmt: skip
+    """The answer of a fit of some runs, with the ladder where that is asked for. groups: name of each run's group.
 
-    best, solution, ladder = climb(fit, fit.solve(progress, _unearned), runs, progress, groups)
+    without_ladder: is called with the answer of the fit from which a ladder begins, before it does.
+    """
+    first = fit.solve(progress, _unearned)
+    if not fit.question.ladder:
+        return answered(fit, first, progress)
+    from omnidyn.identification.structure.ladder.climb import climb  # imported lazily: slow to load
+
+    if without_ladder is not None:
+        without_ladder(answered(fit, first, progress))
+    best, solution, ladder = climb(fit, first, runs, progress, groups)
     answer = answered(best, solution, progress)
     estimates = {
         name: replace(own, ladder=ladder, warnings=(*own.warnings, *ladder.warnings()))
@@ -77,7 +86,8 @@ def solved(fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[s
 
 
 def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
-    """What a solution says, each estimate with its diagnosis, which is made when it is first asked for."""
+    """What a solution says, each estimate with its diagnosis, which is made when it is first asked for; `quick` leaves
+    it out."""
     if not solution.converged:
         solution = fit.with_latencies_only(solution, progress) or solution
     try:
@@ -87,6 +97,8 @@ def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
         if plainer is None:
             raise
         answer = fit.answer(plainer, progress, _MOVED_BY)
+    if fit.question.quick:
+        return answer
     found = {
         group: replace(estimate, study=_study(seen))
         for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)

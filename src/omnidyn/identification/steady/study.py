@@ -7,7 +7,7 @@ levels   of each group, with 95 % intervals; what differs between groups, and wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -45,6 +45,7 @@ from omnidyn.model.robot import GUESS, Prior, Robot
 from omnidyn.run import Run, as_list
 from omnidyn.statistics import t_quantile
 
+LASTING = Stability({}, ())  # whether levels last, `moments` says
 MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
 
 
@@ -62,39 +63,86 @@ def identify_steady(
     Raises InsufficientDataError when nothing is steady, nothing moves, or no shape is determined; InputError for a run
     without the channels needed, or for a wrong option.
     """
+    fit = fit_steady(runs, robot, groups=groups, question=Question.for_method(STEADY_STATE, question, options))
+    return undiagnosed(fit) if fit.asked.quick else diagnosed(fit)
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyFit:
+    """The levels of friction before their diagnosis. parts: group -> its points; anew: group -> its levels were the
+    robot another one. The rest as in SteadyStudy."""
+
+    runs: Sequence[Run]
+    robot: Robot
+    asked: Question
+    windows: SteadyWindows
+    points: ForcePoints
+    choice: ShapeChoice
+    parts: Mapping[str, ForcePoints]
+    anew: Mapping[str, Callable[[Robot], dict[str, float]]]
+    estimates: Mapping[str, Estimate]
+
+
+def fit_steady(
+    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question
+) -> SteadyFit:  # fmt: skip
+    """The levels of friction of each group. Arguments and errors as of `identify_steady`."""
     check_order("identify_steady(runs, robot)", (runs, Run), (robot, Robot))
-    runs = as_list(runs)
-    asked = Question.for_method(STEADY_STATE, question, options)
-    robust = asked.robust
+    runs, asked = as_list(runs), question
     windows = steady_windows(
         runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
     )
     points = windows.points(robot)
-    choice = choose_shape(robot, points, shape=asked.shape, robust=robust)
+    choice = choose_shape(robot, points, shape=asked.shape, robust=asked.robust)
     if not SHAPES[choice.chosen].in_model:
         raise InsufficientDataError(
             "a robot file cannot hold this shape: it is for comparison only", got=choice.chosen,
             expected=", ".join(name for name, each in SHAPES.items() if each.in_model), where="shape",
         )  # fmt: skip
     parts = {group: points.chosen(np.array([name == group for name in points.group])) for group in points.groups}
-    travel = {group: _travel(own) for group, own in parts.items()}
-    viscous = {
-        group: _viscous(robot, windows, choice, group, own, travel[group], robust) for group, own in parts.items()
-    }
-    anew = {group: partial(_levels, windows, choice.of(group), group, robust) for group in parts}
-    estimates = {group: _estimate(robot, own, choice, group, robust, anew[group]) for group, own in parts.items()}
-    differences = _differences(choice)
-    internal = {group: _internal(robot, own) for group, own in parts.items()} if robot.wheels.count > 3 else {}
-    changed = moments(runs, robot, points.speed_from, points.force_from, asked.window)
-    sources = {number: run.source for number, run, _ in windows.found}
+    anew = {group: partial(_levels, windows, choice.of(group), group, asked.robust) for group in parts}
+    estimates = {group: _estimate(robot, own, choice, group, asked.robust, anew[group]) for group, own in parts.items()}
+    return SteadyFit(runs, robot, asked, windows, points, choice, parts, anew, estimates)
+
+
+def undiagnosed(fit: SteadyFit) -> SteadyStudy:
+    """The study of a fit of which nothing is asked beyond its numbers."""
+    return _study(fit, (), {}, set())
+
+
+def diagnosed(fit: SteadyFit) -> SteadyStudy:
+    """The study of a fit: what its shape leaves out, what changes inside a run, and what its levels rest on."""
+    points, choice, robot = fit.points, fit.choice, fit.robot
+    changed = moments(fit.runs, robot, points.speed_from, points.force_from, fit.asked.window)
+    sources = {number: run.source for number, run, _ in fit.windows.found}
     changed += moments_by_shape(robot, points, choice.fit, sources, changed)
-    lack = {group: _lack(robot, own, choice, group, changed, sources, robust) for group, own in parts.items()}
-    within = {group for group, own in parts.items() if _changed(own, changed, sources)}
-    turning = any(is_turning(robot, own) for own in parts.values())
-    for group, each in estimates.items():
-        estimates[group] = replace(each, study=partial(_examined, robot, lack[group], each.value, anew[group]))
+    lack = {
+        group: _lack(robot, own, choice, group, changed, sources, fit.asked.robust) for group, own in fit.parts.items()
+    }
+    within = {group for group, own in fit.parts.items() if _changed(own, changed, sources)}
+    known = {
+        group: Diagnosis(lack[group].as_of_whole_logs(), rests_on(robot, each.value, fit.anew[group]), LASTING)
+        for group, each in fit.estimates.items()
+    }  # whether the levels last, `moments` says
+    estimates = {group: replace(each, study=partial(known.__getitem__, group)) for group, each in fit.estimates.items()}
+    return _study(replace(fit, estimates=estimates), changed, lack, within)
+
+
+def _study(
+    fit: SteadyFit, changed: Sequence[Moment], lack: Mapping[str, LackOfFit], within: Container[str]
+) -> SteadyStudy:  # fmt: skip
+    """The study. changed: inside a run; lack: group -> what its shape leaves out; within: groups with such a change."""
+    robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.asked.robust
+    travel = {group: _travel(own) for group, own in fit.parts.items()}
+    viscous = {
+        group: _viscous(robot, fit.windows, choice, group, own, travel[group], robust)
+        for group, own in fit.parts.items()
+    }
+    differences = _differences(choice)
+    internal = {group: _internal(robot, own) for group, own in fit.parts.items()} if robot.wheels.count > 3 else {}
+    turning = any(is_turning(robot, own) for own in fit.parts.values())
     return SteadyStudy(
-        robot=robot, points=points, choice=choice, estimates=estimates, travel=travel, viscous=viscous,
+        robot=robot, points=points, choice=choice, estimates=fit.estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
         lack_of_fit=lack,
         statements=(
@@ -105,7 +153,7 @@ def identify_steady(
             *points.notes, *words.about_points(points, choice, turning), *(each.words() for each in changed),
             *words.about_lack_of_fit(lack, choice, within),
         ),
-        moments=changed,
+        moments=tuple(changed),
         advice=words.lack_advice(lack) + words.advice(choice, viscous, turning, points.force_from),
     )  # fmt: skip
 
@@ -141,13 +189,6 @@ def _levels(windows: SteadyWindows, shape: str, group: str, robust: bool, robot:
 def _free(fit: ShapeFit) -> dict[str, float]:
     """The levels of a fit without their bound at 0."""
     return dict(zip(fit.keys, fit.free.tolist(), strict=True))
-
-
-def _examined(
-    robot: Robot, lack: LackOfFit, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
-) -> Diagnosis:
-    """What the shape of a group leaves out, and what its levels rest on; whether they last, `moments` says."""
-    return Diagnosis(lack.as_of_whole_logs(), rests_on(robot, value, again), Stability({}, ()))
 
 
 def _travel(points: ForcePoints) -> Travel:

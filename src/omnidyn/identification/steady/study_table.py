@@ -64,8 +64,10 @@ class SteadyStudy(Shown):
         return make(FIGURE, self)
 
 
-def _lack(lack: LackOfFit) -> dict[str, Any]:
+def _lack(lack: LackOfFit | None) -> dict[str, Any] | None:
     """As every method tells it, each remedy with its forces beside."""
+    if lack is None:
+        return None
     told = lack.as_of_whole_logs().to_dict()
     own = [
         {"size_N": each.size, "error_N": each.error, "error_before_N": each.error_before, "chance": each.probability}
@@ -159,13 +161,13 @@ def _data(study: SteadyStudy) -> dict[str, Any]:
                 "shape": study.choice.of(group),
                 "along_travel": asdict(study.travel[group]),
                 "viscous": [asdict(each) for each in study.viscous[group]],
-                "lack_of_fit": _lack(study.lack_of_fit[group]),
+                "lack_of_fit": _lack(study.lack_of_fit.get(group)),
                 "rests_on": study.estimates[group].rests_on,
                 "internal_force_N": study.internal.get(group),
             }
             for group in study.estimates
         },
-        "lack_of_fit": _lack(next(iter(study.lack_of_fit.values()))),
+        "lack_of_fit": _lack(next(iter(study.lack_of_fit.values()), None)),
         "moments": [asdict(each) for each in study.moments],
         "differences": [{**asdict(each), "differs": each.differs} for each in study.differences],
         "statements": list(study.statements),
