@@ -129,10 +129,10 @@ def test_a_command_that_is_out_for_long_is_not_held(tmp_path):
 
 
 def test_a_command_on_change_is_held_however_long(tmp_path):
-    rows = [f"{0.1 * k:.1f},{k if k % 3 == 0 and not 40 <= k < 80 else ''},{k}" for k in range(121)]
+    rows = [f"{0.1 * k:.1f},{k / 10 if k % 3 == 0 and not 40 <= k < 80 else ''},{k}" for k in range(121)]
     run = read_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows)))
     assert any("u1 is recorded on change (77% of its cells are blank): held" in words for words in run.warnings)
-    np.testing.assert_array_equal(run.voltage[39:82, 0], [39.0] * 42 + [81.0])
+    np.testing.assert_array_equal(run.voltage[39:82, 0], [3.9] * 42 + [8.1])
 
 
 def test_a_log_on_change_has_gaps_too(tmp_path):

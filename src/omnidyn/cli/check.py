@@ -50,6 +50,7 @@ def check(
     latency: list[str] = log_options.LATENCY,
     save_map: str = log_options.SAVE_MAP,
     no_header: bool = log_options.NO_HEADER,
+    rate: float | None = log_options.RATE,
     skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
     max_bytes: int = log_options.MAX_BYTES,
     var: list[str] = log_options.VARIABLE,
@@ -70,7 +71,7 @@ def check(
     if len(log) == 1:
         log_options.refuse_missing(log)
     options = log_options.log_options(
-        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var
+        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var, rate
     )
     maps = log_options.Maps(save_map, force)
     with progress("reading") as now:

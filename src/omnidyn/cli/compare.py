@@ -41,6 +41,7 @@ def compare(
     save_map: str = log_options.SAVE_MAP,
     sort: bool = log_options.SORT,
     no_header: bool = log_options.NO_HEADER,
+    rate: float | None = log_options.RATE,
     skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
     max_bytes: int = log_options.MAX_BYTES,
     var: list[str] = log_options.VARIABLE,
@@ -62,7 +63,7 @@ def compare(
     from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
 
     rules = [parse_threshold(text) for text in fail_if]
-    how = (map_file, column, assume, latency, no_header, skip_bad_rows, False, max_bytes, var)
+    how = (map_file, column, assume, latency, no_header, skip_bad_rows, False, max_bytes, var, rate)
     options = log_options.log_options(*how)
     maps = log_options.Maps(save_map, force)
     with progress("reading") as now:

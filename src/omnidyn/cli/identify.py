@@ -61,6 +61,7 @@ def identify(
     save_map: str = options.SAVE_MAP,
     sort: bool = options.SORT,
     no_header: bool = options.NO_HEADER,
+    rate: float | None = options.RATE,
     skip_bad_rows: bool = options.SKIP_BAD_ROWS,
     max_bytes: int = options.MAX_BYTES,
     var: list[str] = options.VARIABLE,
@@ -92,13 +93,13 @@ def identify(
     if question.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
         tell_table(logs[0], robot, question, to)
         return
-    if question.what == MOTORS and len(logs) == 1 and is_motor_table(logs[0]):
+    if question.what == MOTORS and len(logs) == 1 and rate is None and is_motor_table(logs[0]):
         from omnidyn.cli.identify_motors import tell_motor_table
 
         tell_motor_table(logs[0], robot, question, to)
         return
     how = options.log_options(
-        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var
+        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var, rate
     )
     _identify(logs, robot, question, Reading(how, sort, options.Maps(save_map, force)), to)
 

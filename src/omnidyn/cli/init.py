@@ -56,6 +56,7 @@ def init(
     column: list[str] = log_options.COLUMN,
     assume: list[str] = log_options.ASSUME,
     no_header: bool = log_options.NO_HEADER,
+    rate: float | None = log_options.RATE,
     max_bytes: int = log_options.MAX_BYTES,
     var: list[str] = log_options.VARIABLE,
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File to write instead; - is stdout."),
@@ -79,9 +80,9 @@ def init(
     log_options.refuse_missing(log)
     preset = _preset(like)
     told = {key for key, value in given.items() if value is not None}
-    how = (map_file, column, assume, (), no_header, False, False, max_bytes, var)
+    how = (map_file, column, assume, (), no_header, False, False, max_bytes, var, rate)
     if not log and any(how):
-        raise typer.BadParameter("--map, --column, --assume, --no-header, --max-bytes and --var are for --log.")
+        raise typer.BadParameter("--map, --column, --assume, --no-header, --rate, --max-bytes and --var are for --log.")
     seen = from_logs(given, log, log_options.log_options(*how), mecanum) if log else None
     found = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
     answers = complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)

@@ -48,6 +48,9 @@ SORT = typer.Option(
 NO_HEADER = typer.Option(
     False, "--no-header", help="The file has no header: columns are c1, c2, ...", rich_help_panel=MORE
 )
+RATE = typer.Option(
+    None, "--rate", metavar="HZ", help="The file has no time: so many rows a second.", rich_help_panel=MORE
+)
 SKIP_BAD_ROWS = typer.Option(
     False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.", rich_help_panel=MORE
 )
@@ -80,6 +83,7 @@ def log_options(
     current_unsigned: bool = False,
     max_bytes: int = 0,
     variables: Sequence[str] = (),
+    rate: float | None = None,
 ) -> LogOptions:
     """The options as the readers take them. Raises InputError for what cannot be read."""
     from omnidyn.logs.columns.mapping import load_map
@@ -95,6 +99,7 @@ def log_options(
         current_unsigned=current_unsigned,
         max_bytes=max_bytes or None,
         variables=tuple(variables),
+        rate=rate,
     )
 
 

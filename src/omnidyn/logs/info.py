@@ -16,6 +16,7 @@ from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes
 from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import Clock
+from omnidyn.logs.clock.rate import timed
 from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.read_log import LogOptions, map_columns
@@ -163,7 +164,8 @@ def _of_columns(
 
 
 def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress | None) -> Iterator[Table]:
-    return map(with_joined_stamp, iter_tables(path, PIECE, progress=progress, **options.of_tables))
+    tables = map(with_joined_stamp, iter_tables(path, PIECE, progress=progress, **options.of_tables))
+    return timed(tables, options.rate, options.skip_bad_rows)
 
 
 def _topic(name: str, seen: _Seen, table: Table, taken: bool) -> Topic:

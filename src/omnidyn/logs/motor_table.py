@@ -35,6 +35,8 @@ _UNITS = {"V": "input_v", "%": "input_%", "A": "input_a", "duty": "input_duty"}
 _SPEED_UNITS = {"rad/s": 1.0, "SI": 1.0, "rpm": _RPM}
 MOTOR = "motor"
 MOST_DUTY = 1.0
+LOG_ROWS, LOG_STEP = 200, 0.05  # more rows, closer to each other (of the spread of all), are samples in time ..
+SWEEPS = 2  # .. where the input turns more often than up and down once
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,23 @@ def read_motor_table(path: str | os.PathLike) -> MotorTable:
     fast = next(name for name in found if name in _SPEEDS)
     speed = table.numbers(found[fast]) * _speed_size(table, found[fast], fast)
     motor = _motors(table, found[MOTOR]) if MOTOR in found else np.zeros(len(speed), dtype=np.int64)
+    _refuse_log(put_in, speed, motor, table.source)
+    rows = f"{len(speed)} rows without a time are taken as points at steady speed; of a log, give its `rate`"
+    notes = (*notes, rows)
     return MotorTable(put_in, speed, motor, kind, unit, source=table.source, sha256=table.sha256, notes=notes)
+
+
+def _refuse_log(put_in: FloatArray, speed: FloatArray, motor: IntArray, source: str) -> None:
+    """Raises InputError where rows follow each other as samples in time do: many, close, under an input that swings."""
+    steps, spread = np.abs(np.diff(speed)), float(np.std(speed))
+    turns = np.diff(put_in)
+    swings = int((np.diff(np.sign(turns[turns != 0.0])) != 0.0).sum())
+    close = len(speed) >= LOG_ROWS and float(np.median(steps)) < LOG_STEP * spread
+    if close and swings > SWEEPS and not motor.any():
+        raise InputError(
+            "a log without a time, and no table of steady points", got=f"{len(speed)} rows that follow each other",
+            expected="a row for each steady point", remedy="say how many rows a second: `rate` HZ", where=source,
+        )  # fmt: skip
 
 
 def _speed_size(table: Table, name: str, bare: str) -> float:

@@ -16,9 +16,11 @@ from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock.clock import Clock
 from omnidyn.logs.clock.counters import unrolled
+from omnidyn.logs.clock.rate import timed
 from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.column import MOTOR_SIDE, Column
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
+from omnidyn.logs.columns.guess_time import refuse_second_time
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, load_map, parse_column
 from omnidyn.logs.log import Log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
@@ -43,7 +45,8 @@ class LogOptions:
     how late it was recorded [s]. header: whether there is one. skip_bad_rows: leave out rows that cannot be read.
     current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage. max_bytes: of what
     is held at once; None: a quarter of the memory. variables: of a MATLAB file, those to read; none: all.
-    beside: other files of the same experiment, of one clock: joined by their stamps.
+    beside: other files of the same experiment, of one clock: joined by their stamps. rate: rows per second [1/s] of a
+    file that has no time.
     """
 
     columns: ColumnMap | None = None
@@ -56,6 +59,7 @@ class LogOptions:
     max_bytes: int | None = None
     variables: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
+    rate: float | None = None
 
     @property
     def of_tables(self) -> dict[str, Any]:
@@ -80,6 +84,7 @@ def read_log(
     max_bytes: int | None = None,
     variables: Sequence[str] = (),
     beside: Sequence[str | os.PathLike] = (),
+    rate: float | None = None,
 ) -> Run:
     """Read a log as a Run, to fit, simulate and compare with; `load_log` reads it as recorded, faults and all.
 
@@ -93,6 +98,7 @@ def read_log(
     cannot be read. current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage.
     max_bytes: of what is held at once; None: a quarter of the memory. variables: of a MATLAB file, those to read.
     beside: other files of the same experiment, stamped by one clock: their topics and columns are joined by time.
+    rate: rows per second [1/s] of a file that has no time.
     Raises InputError for what cannot be read or is doubtful, with file, line and remedy.
     """
     given = columns if isinstance(columns, ColumnMap) else None
@@ -103,7 +109,7 @@ def read_log(
         given = load_map(columns)  # type: ignore[arg-type]
     options = LogOptions(
         given, overrides, assume or {}, latency or {}, header, skip_bad_rows, current_unsigned, max_bytes,
-        tuple(variables), tuple(str(each) for each in beside),
+        tuple(variables), tuple(str(each) for each in beside), rate,
     )  # fmt: skip
     log = load_log(path, robot, options)
     run = log.to_run(sort=sort)
@@ -117,18 +123,23 @@ def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOp
     """
     check_order("read_log(path, robot)", (path, (str, os.PathLike)), (robot, (Robot, type(None))))
     options = options or LogOptions()
+    if options.beside and options.rate is not None:
+        raise InputError("files without time cannot be joined by time", got="`rate` with files beside", expected="one")
     if options.beside:
         how = Options(options.header, options.skip_bad_rows, options.max_bytes, None, options.variables)
         alone = replace(options, overrides=())  # columns of the whole, which one file alone need not have
         table = joined_table([path, *options.beside], how, lambda part: map_columns(part, None, alone))
     else:
-        table = with_joined_stamp(read_table(path, **options.of_tables))
+        table = read_table(path, **options.of_tables)
+        table = next(timed([with_joined_stamp(table)], options.rate, options.skip_bad_rows))
     return log_from_table(table, map_columns(table, robot, options), robot, options)
 
 
 def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> ColumnMap:
     """The map of a table: given or guessed, with the overrides on top. Raises InputError for a column it lacks."""
     columns, more = options.columns, dict(parse_column(text, table.names) for text in options.overrides)
+    if options.rate is not None:
+        refuse_second_time(table, options.assume, columns, more)
     if columns is None:
         columns = guess_columns(table, robot, options.assume, {column.name: key for key, column in more.items()})
     else:
@@ -262,6 +273,7 @@ def iter_logs(
     progress(bytes_done, bytes_total) is called now and then. Time counts from the first block. Raises InputError.
     """
     options, columns, clock = options or LogOptions(), None, Clock()
-    for table in map(with_joined_stamp, iter_tables(path, rows, progress=progress, **options.of_tables)):
+    tables = map(with_joined_stamp, iter_tables(path, rows, progress=progress, **options.of_tables))
+    for table in timed(tables, options.rate, options.skip_bad_rows):
         columns = columns or map_columns(table, robot, options)
         yield log_from_table(table, columns, robot, options, clock)

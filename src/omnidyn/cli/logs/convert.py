@@ -20,6 +20,7 @@ def convert(
     save_map: str = log_options.SAVE_MAP,
     sort: bool = log_options.SORT,
     no_header: bool = log_options.NO_HEADER,
+    rate: float | None = log_options.RATE,
     skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
     current_unsigned: bool = log_options.CURRENT_UNSIGNED,
     beside: list[str] = typer.Option(
@@ -45,7 +46,7 @@ def convert(
 
     check_format(out)
     options = log_options.log_options(
-        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var
+        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var, rate
     )
     options = replace(options, beside=tuple(beside))
     maps = log_options.Maps(save_map, force)

@@ -19,6 +19,7 @@ def info(
     column: list[str] = log_options.COLUMN,
     assume: list[str] = log_options.ASSUME,
     no_header: bool = log_options.NO_HEADER,
+    rate: float | None = log_options.RATE,
     skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
     max_bytes: int = log_options.MAX_BYTES,
     var: list[str] = log_options.VARIABLE,
@@ -36,7 +37,9 @@ def info(
 
     if file.lower().endswith(".toml"):
         return tell(load_robot(file).document(), json, provenance([robot_input(file)]), width=width())
-    options = log_options.log_options(map_file, column, assume, (), no_header, skip_bad_rows, False, max_bytes, var)
+    options = log_options.log_options(
+        map_file, column, assume, (), no_header, skip_bad_rows, False, max_bytes, var, rate
+    )
     with progress("reading") as now:
 
         def said(count: int, total: int) -> None:

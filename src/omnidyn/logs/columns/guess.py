@@ -12,36 +12,32 @@ from omnidyn.errors import InputError, shortened
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns import names as words
+from omnidyn.logs.columns.component import (
+    BY_UNIT,
+    DRIVES,
+    component_of,
+    component_of_parts,
+    numbered_kind,
+)  # fmt: skip
 from omnidyn.logs.columns.guess_side import settle_side, take_sides
 from omnidyn.logs.columns.guess_time import take_time
-from omnidyn.logs.columns.guess_unit import unit_of
-from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, is_numeric, letter_of
+from omnidyn.logs.columns.guess_unit import implausible, unit_of
+from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, floats, is_numeric, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
-from omnidyn.logs.columns.names import NameParts, read_name
+from omnidyn.logs.columns.names import BRACKETS, NameParts, read_name
 from omnidyn.logs.columns.propose import proposed_wheels
+from omnidyn.logs.columns.wheel_numbers import wheel_numbers
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import MAX_WHEELS
-from omnidyn.units import COUNT, Unit, known_unit, parse_unit
-from omnidyn.units import CURRENT as CURRENT_UNIT
+from omnidyn.units import COUNT, COUNT_RATE, Unit, known_unit, parse_unit
 from omnidyn.units import DUTY as DUTY_UNIT
 from omnidyn.units import SPEED as SPEED_UNIT
-from omnidyn.units import TURN_RATE as TURN_RATE_UNIT
+from omnidyn.units import TIME as TIME_UNIT
 from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
 
-Numbers = Mapping[tuple[str, int], int]  # (letter of a component, number in the file) -> number of the wheel from 1
-
 _LETTER = re.compile(r"([a-z])\d{1,3}")
-_BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
 
-# Kinds of columns that have a number: role -> letter of the component. The first that fits counts.
-_NUMBERED = (
-    (words.CURRENT, "i"), (words.DUTY, "d"), (words.VOLTAGE, "u"), (words.RATE, "w"), (words.ANGLE, "a"),
-)  # fmt: skip
-_OF_A_RIM = {words.LINEAR, words.RATE, words.WHEEL, words.MOTOR, words.COMMAND, words.MEASURED}
-_BY_UNIT = {VOLTAGE_UNIT: "u", CURRENT_UNIT: "i", DUTY_UNIT: "d", TURN_RATE_UNIT: "w", "angle": "a", COUNT: "a"}
 NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPLY, words.TIME})
-_BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
 
 
 def guess_columns(
@@ -62,12 +58,13 @@ def guess_columns(
     assumed = {name: unit.text for name, (unit, _) in told.items()}
     found = Guess(robot=robot)
     names = [name for name in table.names if is_numeric(table.columns[name]) and name not in table.says]
+    names = _without_measured_power(names)
     table = replace(table, units={**_units_of_letters(names, assumed, table.units), **table.units})
     _take_said(table, found)
-    numbers = _wheel_numbers(table, names, found)
+    numbers = wheel_numbers(table, names, found)
     for name in names:
         _take(table, name, numbers, assumed, robot, found)
-    _doubt_words(table, _wheel_numbers(table, table.names, Guess()), found)
+    _doubt_words(table, wheel_numbers(table, table.names, Guess()), found)
     _doubt_letters(names, found)
     if TIME not in found.columns:
         take_time(table, assumed, found)
@@ -87,6 +84,17 @@ def guess_columns(
         )
     )
     return ColumnMap(ordered, unused, (*found.doubt_words(), *idle), found.note_words(), found.doubted())
+
+
+def _without_measured_power(names: list[str]) -> list[str]:
+    """The names without those of a power, where others say what drives the motors; alone, a power is a duty (FTC)."""
+    powers = [name for name in names if re.search("power", name, re.IGNORECASE)]
+    drives = {words.DUTY, words.VOLTAGE}
+    others = any(
+        read_name(name).roles & drives and words.SUPPLY not in read_name(name).roles
+        for name in names if name not in powers
+    )  # fmt: skip
+    return [name for name in names if not (others and name in powers)]
 
 
 def _take_said(table: Table, found: Guess) -> None:
@@ -120,7 +128,7 @@ def _units_of_letters(names: Sequence[str], assumed: Mapping[str, str], units: M
         match = _LETTER.fullmatch(name)
         text = assumed.get(match[1], "") if match and name not in units and name not in assumed else ""
         unit = known_unit(text) if text else None
-        if match and unit is not None and _BY_UNIT.get(unit.quantity) == match[1]:
+        if match and unit is not None and BY_UNIT.get(unit.quantity) == match[1]:
             found[name] = text
     return found
 
@@ -130,51 +138,14 @@ def _order(component: str) -> tuple[int, str, int]:
     return (0, "", 0) if found is None else (1, found[0], found[1])
 
 
-def _wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> Numbers:
-    """(letter, number in a name) -> number of the wheel from 1; a log that counts from 0 is shifted.
-
-    A letter that does not count from 0 itself is shifted too (the current of wheel 0 may not be logged), unless it
-    counts farther than wheels that are counted from 0 can: u0 u1 u2 beside w1 w2 w3.
-    """
-    seen: dict[str, set[int]] = {}
-    for name in names:
-        parts = read_name(name)
-        letter = _numbered_kind(parts, known_unit(table.units.get(name, "")))
-        if letter is not None and parts.number is not None:
-            seen.setdefault(letter, set()).add(parts.number)
-    count = max((max(mine) + 1 for mine in seen.values() if 0 in mine), default=0)
-    shifted = [letter for letter, mine in seen.items() if 0 in mine or max(mine) < count]
-    if shifted:
-        others = ", ".join(letter for letter in seen if letter not in shifted)
-        but = f" ({others} from 1)" if others else ""
-        found.notes.append(f"wheels are numbered from 0 in the file: 0 is wheel 1{but}")
-    numbers = {(letter, number): number + (letter in shifted) for letter, mine in seen.items() for number in mine}
-    return {key: number for key, number in numbers.items() if 0 < number <= MAX_WHEELS}
-
-
-def _numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
-    """The letter of a component of a wheel, None where the words do not say. A unit outweighs a word."""
-    if name.number is None:
-        return None
-    unit = unit or name.unit
-    if unit is not None and unit.quantity in _BY_UNIT:
-        by_word = any(role in name.roles for role, _ in _NUMBERED)
-        volts = unit.quantity == VOLTAGE_UNIT and name.roles == {words.LINEAR}  # V1 [V]
-        if by_word or volts or name.roles & {words.MOTOR, words.WHEEL} or not name.roles - {words.OTHER}:
-            return _BY_UNIT[unit.quantity]
-    if unit is not None and unit.quantity == SPEED_UNIT and words.LINEAR in name.roles and name.roles <= _OF_A_RIM:
-        return "w"  # v1_m_s: of the rim of wheel 1
-    return next((letter for role, letter in _NUMBERED if role in name.roles), None)
-
-
 def _take(
-    table: Table, name: str, numbers: Numbers, assumed: Mapping[str, str], robot: Robot | None, found: Guess
+    table: Table, name: str, numbers: Mapping[str, int], assumed: Mapping[str, str], robot: Robot | None, found: Guess
 ) -> None:
     """One column: which component it is, in which unit; or a doubt."""
     given = table.units.get(name, "")
     unit = known_unit(assumed[name]) if name in assumed else known_unit(given) if given else None
     parts = read_name(name)
-    component = _component_of(name, unit, numbers)
+    component = component_of(name, unit, numbers.get(name))
     if component is None:
         _doubt_brackets(name, numbers, found)
         return
@@ -191,22 +162,22 @@ def _take(
     if unit is None:
         unit = unit_of(table, name, component, robot, found)
     if unit is not None:
-        _enter(name, component, unit, parts, found)
+        _enter(table, name, component, unit, name in assumed or assumption is not None, found)
 
 
-def _doubt_words(table: Table, numbers: Numbers, found: Guess) -> None:
+def _doubt_words(table: Table, numbers: Mapping[str, int], found: Guess) -> None:
     """Columns that are called like a component, and whose cells begin like numbers but are none: 5.0V, 1.250.000."""
     for name in table.names:
         cells = table.columns[name]
-        component = None if is_numeric(cells) else _component_of(name, None, numbers)
+        component = None if is_numeric(cells) else component_of(name, None, numbers.get(name))
         if component is not None and (cell := first_word(cells)).lstrip("+-.")[:1].isdigit():
             found.doubts.append(Doubt(name, component, f"but cells such as {cell} are no numbers", ()))
 
 
-def _doubt_brackets(name: str, numbers: Numbers, found: Guess) -> None:
+def _doubt_brackets(name: str, numbers: Mapping[str, int], found: Guess) -> None:
     """A column that is called like a component, with an unknown unit in brackets behind: speed1 [pix/s]."""
-    match = _BRACKETS.fullmatch(name)
-    component = _component(read_name(match[1]), None, numbers) if match else None
+    match = BRACKETS.fullmatch(name)
+    component = component_of_parts(read_name(match[1]), None, numbers.get(name)) if match else None
     if match and component is not None:
         found.doubts.append(Doubt(name, component, f"the unit {match[2]} is unknown"))
 
@@ -224,83 +195,34 @@ def _is_letter_v(name: NameParts) -> bool:
     return name.number is not None and name.unit is None and name.roles == {words.LINEAR}
 
 
-def _exact(name: str) -> str | None:
-    """The component of a column named as in a run file, such as w1_cmd_rad_s."""
-    for size in (1, 2):
-        component, suffix = "_".join(name.split("_")[:-size]), "_".join(name.split("_")[-size:])
-        if component and (place(component) or component == TIME) and si_suffix(component) == suffix:
-            return component
-    return None
+def _enter(table: Table, name: str, component: str, unit: Unit, said: bool, found: Guess) -> None:
+    """Take a column, where its unit measures what the component is and its values may be so many of it.
 
-
-def _component_of(name: str, unit: Unit | None, numbers: Numbers) -> str | None:
-    """The component that a column is called, as in a run file or in other words."""
-    exact, parts = _exact(name), read_name(name)
-    number = parts.number
-    if exact is not None and number is not None and numbers.get((exact[0], number), number) != number:
-        exact = None  # a run file counts from 1, this one does not
-    return exact or _component(parts, unit, numbers)
-
-
-def _component(name: NameParts, unit: Unit | None, numbers: Numbers) -> str | None:
-    """The component that the words of a name say, None where they say none or too many."""
-    if words.OTHER in name.roles and not (name.number is not None and (unit or name.unit)):
-        return None
-    command = "_cmd" if words.COMMAND in name.roles else ""
-    letter = _numbered_kind(name, unit)
-    if name.number is not None:
-        wheel = numbers.get((letter or "", name.number))
-        if wheel is None or (command and letter in ("i", "a")):
-            return None
-        return f"{letter}{wheel}{command if letter == 'w' else ''}"
-    if words.SUPPLY in name.roles:
-        return None if words.CURRENT in name.roles else "supply"
-    return _body_component(name, unit or name.unit, command)
-
-
-def _body_component(name: NameParts, unit: Unit | None, command: str) -> str | None:
-    roles = name.roles
-    if roles & {words.CURRENT, words.VOLTAGE, words.DUTY, words.TIME, words.MOTOR}:
-        return None
-    rate = bool(roles & {words.RATE, words.ANGULAR})
-    turning = unit is None or unit.quantity == TURN_RATE_UNIT
-    if words.ANGULAR in roles and roles & {words.X, words.Y}:
-        return None  # roll and pitch
-    if words.LINEAR in roles and words.YAW in roles:  # linear.z goes up; v_theta turns
-        return "omega" + command if unit is not None and turning else None
-    for letter, (speed, position) in _BODY.items():
-        if speed in roles or (letter in roles and roles & {words.RATE, words.LINEAR}):
-            return speed + command
-        if letter in roles and not command:
-            return position
-    if rate and turning and (words.YAW in roles or words.BODY in roles or command):
-        return "omega" + command
-    if words.YAW in roles and not rate and not command:
-        return "heading"
-    if words.LINEAR in roles and not rate:
-        return "vx" + command  # the paper's v
-    if rate and not command and turning and words.ANGLE not in roles:
-        return "omega"
-    return "heading" if roles == {words.ANGLE} and unit is not None and unit.quantity == "angle" else None
-
-
-def _enter(name: str, component: str, unit: Unit, parts: NameParts, found: Guess) -> None:
-    """Take a column, where its unit measures what the component is."""
-    wanted = quantity_of(component)
+    said: whether the user said the unit.
+    """
+    wanted, called = quantity_of(component), component
     if unit.quantity == DUTY_UNIT and wanted == VOLTAGE_UNIT and component != "supply":
         component = "d" + component[1:]
     elif unit.quantity == VOLTAGE_UNIT and wanted == DUTY_UNIT:
         component = "u" + component[1:]
-    elif unit.quantity == COUNT:
-        found.doubts.append(Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
+    elif unit.quantity in (COUNT, COUNT_RATE):
+        divided = "ticks/COUNTS_PER_TURN" + ("/s" if unit.quantity == COUNT_RATE else "")
+        found.doubts.append(Doubt(name, component, "counts per turn are not known", (divided,)))
         return
     elif unit.quantity == SPEED_UNIT and is_of_rim(component, unit):
         _enter_rim(name, component, unit, found)
         return
     elif unit.quantity != wanted:
-        found.doubts.append(Doubt(name, component, f"{unit.text} is no unit of a {wanted}"))
+        if unit.quantity != TIME_UNIT or component not in ("x", "y", "heading"):  # x [s] is the axis of a picture
+            article = "an" if wanted[0] in "aeiou" else "a"
+            found.doubts.append(Doubt(name, component, f"{unit.text} is no unit of {article} {wanted}"))
         return
-    side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in parts.roles else WHEEL_SIDE
+    doubt = implausible(component, unit, floats(table.columns[name]), said, found.robot)
+    if doubt is not None:
+        found.doubts.append(Doubt(name, called, *doubt))
+        return
+    roles = read_name(name).roles
+    side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in roles else WHEEL_SIDE
     found.columns[component] = Column(name, unit.text, side)
 
 
@@ -328,6 +250,7 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
         component = _bench_component(table, name)
         if component and name not in turning:
             alike.setdefault(component, []).append(name)
+    _drop_unspoken(alike)
     for component, mine in alike.items():
         if len(mine) > 1:
             _forget(mine, found)
@@ -335,17 +258,25 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
             say = f"the motion says `column` {order}" if order else f"say `column` {component}={mine[0]} and so on"
             why = f"but no number says which wheel each is ({say})"
             found.doubts += [Doubt(name, component, why, ()) for name in mine]
-        elif not body:
+        elif mine and not body:
             _forget(mine, found)
             _take_single(table, mine[0], component, assumed, found)
     if any(place(component) and component.endswith(("1", "1_cmd")) for component in found.columns):
         found.notes.append("no wheel has a number: taken as a log of one motor")
 
 
+def _drop_unspoken(alike: dict[str, list[str]]) -> None:
+    """Leave out voltages of what no word says to be a motor (logic_V), where a word says what drives it."""
+    spoken = [name for key in ("u1", "d1") for name in alike.get(key, []) if read_name(name).roles & DRIVES]
+    if spoken:
+        for key in ("u1", "d1"):
+            alike[key] = [name for name in alike.get(key, []) if name in spoken]
+
+
 def _bench_component(table: Table, name: str) -> str:
     """The component of a motor that a name without a number says, "" where it says none."""
     parts = read_name(name)
-    letter = _numbered_kind(parts._replace(number=1), known_unit(table.units.get(name, "")))
+    letter = numbered_kind(parts._replace(number=1), known_unit(table.units.get(name, "")))
     command = words.COMMAND in parts.roles
     if letter is None or parts.number is not None or parts.roles & NOT_OF_A_MOTOR or (command and letter in "ia"):
         return ""
@@ -366,7 +297,8 @@ def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, 
     text = assumed.get(name) or assumed.get(letter_of(component)) or table.units.get(name, "")
     unit = known_unit(text) or parts.unit or unit_of(table, name, component, None, found)
     if unit is not None:
-        _enter(name, component, unit, parts._replace(number=1), found)
+        said = name in assumed or letter_of(component) in assumed
+        _enter(table, name, component, unit, said, found)
 
 
 def refuse_doubtful(columns: ColumnMap, where: str) -> None:
@@ -375,6 +307,7 @@ def refuse_doubtful(columns: ColumnMap, where: str) -> None:
         doubt = next((doubt for doubt in columns.doubts if f" {TIME}, " in doubt), "")
         settled = doubt.rpartition("; ")[2] if "; " in doubt else ""
         written = "write seconds, or dates such as 2026-11-20T10:00:00.125" if doubt else ""
-        remedy = settled or written or "say which column it is: `column` t=COLUMN:s"
+        either = "say which column it is (`column` t=COLUMN:s), or how many rows a second: `rate` HZ"
+        remedy = settled or written or either
         why = shortened(doubt.partition(": not taken")[0] or "no column looks like a time", 300)
         raise InputError(f"cannot tell the time of the rows: {why}", remedy=remedy, where=where)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import are_steps, is_dates
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, floats, is_numeric
+from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.table.table import Table
 from omnidyn.units import TIME as TIME_UNIT
@@ -27,7 +31,9 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
     dates = [name for name in candidates if is_dates(table.columns[name])]
     wordy = [name for name in candidates if not is_numeric(table.columns[name]) and name not in dates]
     candidates = [name for name in candidates if is_numeric(table.columns[name])]
+    mixed = [name for name in candidates if _increases(table.columns[name]) and not _is_span(name)]
     candidates = [name for name in candidates if not read_name(name).roles - {words.TIME, words.BODY, words.MEASURED}]
+    candidates = candidates or mixed[:1]  # t_now, motor_time_ms
     if not candidates and not wordy:  # in any language: the one column with a unit of time
         timed = [name for name in table.names if _has_unit(table, name, assumed) and _increases(table.columns[name])]
         candidates = timed if len(timed) == 1 else []
@@ -58,6 +64,11 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
         found.columns[TIME] = Column(name, unit.text)
     elif unit is not None:
         found.doubts.append(Doubt(name, TIME, f"{unit.text} is no unit of time"))
+
+
+def _is_span(name: str) -> bool:
+    """Whether a name says a difference of times, or how long something takes: dt, period, time step."""
+    return bool(re.search(r"(?:^|[\W_])(?:d|dt|delta|diff|step|period|cycle|remaining|left)(?:$|[\W_])", name.lower()))
 
 
 def _are_steps(table: Table, name: str) -> bool:
@@ -106,3 +117,21 @@ def _plausible_time(values: FloatArray, name: str, given: str, found: Guess) -> 
         f"{name} has no unit: taken as {possible[0].text}, rows are {step * possible[0].size:.4g} s apart"
     )
     return possible[0]
+
+
+def refuse_second_time(
+    table: Table, assumed: Mapping[str, str], given: ColumnMap | None, more: Mapping[str, Column]
+) -> None:
+    """Raises InputError where a table whose time was made of a rate has a time of its own, or one is named."""
+    made = next(name for name, said in table.says.items() if said.component == TIME)
+    named = more.get(TIME) or (given.columns.get(TIME) if given is not None else None)
+    if named is None:
+        found, others = Guess(), {name: said for name, said in table.says.items() if name != made}
+        own = next((name for name, said in others.items() if said.component == TIME), "")
+        take_time(replace(table, names=table.names[1:], says=others), assumed, found)
+        named = Column(own, "s") if own else found.columns.get(TIME)
+    if named is not None and named.name != made:
+        raise InputError(
+            "the log has a time already", got=f"the column {named.name}, and `rate`", expected="one of the two",
+            remedy="leave `rate` out", where=table.source,
+        )  # fmt: skip

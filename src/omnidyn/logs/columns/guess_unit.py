@@ -9,12 +9,19 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import si_suffix
 from omnidyn.logs.columns.guessed import Doubt, Guess, floats
+from omnidyn.logs.columns.mapping import quantity_of
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-from omnidyn.units import Unit, parse_unit
+from omnidyn.units import ANGLE, Unit, parse_unit
 
 MOST_VOLTS = 100.0  # [V] of a motor's driver; more are steps of a converter
+MOST_DUTY = 4.0  # what a sum of sticks asks for is clipped by the driver; more is no duty
+PERCENT, MOST_PERCENT = ("%", "pct", "percent"), 105.0
+FAR_BEYOND = 4.0  # times the limit of a robot: more are no volts
+FULL_SCALES = (255, 1000, 1023, 4095, 10_000, 16_383, 32_767, 65_535)  # of a PWM: so many are full duty
+SERVO = (800.0, 2200.0)  # [us] widths of pulses
+NEAR_A_TURN = 300.0  # [deg] an angle that starts over after a turn comes as near to it
 FEW_VALUES = 10  # whole numbers beyond so many different ones are counts
 FASTEST_TURN = 35.0  # [rad/s] of a body: the 2000 deg/s at which gyroscopes end
 SI = {"rad_s": "rad/s", "m_s": "m/s"}
@@ -23,7 +30,7 @@ SI = {"rad_s": "rad/s", "m_s": "m/s"}
 def unit_of(table: Table, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:
     """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
     suffix = si_suffix(component)
-    if component == "heading" and _turns_in_degrees(floats(table.columns[name])):
+    if suffix == "rad" and _turns_in_degrees(floats(table.columns[name])):
         found.doubts.append(Doubt(name, component, "no unit is given, and it jumps by 360 as degrees do", ("deg",)))
         return None
     if suffix in ("V", "duty") and component != "supply":
@@ -39,16 +46,56 @@ def unit_of(table: Table, name: str, component: str, robot: Robot | None, found:
     return parse_unit(found.si[name])
 
 
+def implausible(
+    component: str, unit: Unit, values: FloatArray, said: bool, robot: Robot | None
+) -> tuple[str, tuple[str, ...]] | None:
+    """Why values cannot be in their unit, and the units in which they can; None where they can.
+
+    said: whether the user said the unit: what is only unlikely is then believed.
+    """
+    if quantity_of(component) == ANGLE and unit == parse_unit("rad") and not said and _turns_in_degrees(values):
+        return "it jumps by 360 as degrees do, not radians", ("deg",)
+    if component[0] not in "ud" or not component[1:].isdigit():
+        return None
+    largest = _largest(values)
+    if component[0] == "u":
+        most = _most_volts(robot)
+        why = f"up to {largest:.3g} {unit.text} cannot be: a motor gets {most:.3g} V at the most"
+    else:
+        most = 1.0 if unit.text in PERCENT and largest > MOST_PERCENT and _are_whole(values) else MOST_DUTY
+        why = f"up to {largest:.3g} {unit.text if unit.text in PERCENT else 'as a duty'} cannot be: a full duty is 1"
+    return (why, _scales(largest)) if largest * unit.size > most else None
+
+
+def _most_volts(robot: Robot | None) -> float:
+    """The most that can be volts of a motor: far beyond the limit of the robot, where there is one."""
+    return MOST_VOLTS if robot is None else min(MOST_VOLTS, FAR_BEYOND * _limit(robot))
+
+
+def _scales(largest: float) -> tuple[str, ...]:
+    """The units of a duty that numbers up to so large may have."""
+    full = next((each for each in FULL_SCALES if largest <= each), 0)
+    scale = (f"duty/{full:g}",) if full else ("duty/FULL_SCALE",)
+    return ("duty",) * (largest <= MOST_DUTY) + ("%",) * (1.0 < largest <= MOST_PERCENT) + scale * (largest > 1.0)
+
+
 def _turns_in_degrees(values: FloatArray) -> bool:
-    """Whether a heading without a unit stays within a turn of 360 and jumps by about as much."""
+    """Whether an angle without a unit stays within a turn of 360 and jumps back or forth by more than half of it."""
     known = values[np.isfinite(values)]
-    return len(known) > 1 and float(np.ptp(known)) <= 361.0 and float(np.abs(np.diff(known)).max()) > 300.0
+    if len(known) < 2:
+        return False
+    width, jump = float(np.ptp(known)), float(np.abs(np.diff(known)).max())
+    return NEAR_A_TURN < width <= 361.0 and jump > 180.0
 
 
 def _are_counts(values: FloatArray) -> bool:
     """Whether all values are whole numbers, and many: counts of an encoder, no angles in rad."""
+    return _are_whole(values) and len(np.unique(values[np.isfinite(values)])) > FEW_VALUES
+
+
+def _are_whole(values: FloatArray) -> bool:
     finite = values[np.isfinite(values)]
-    return bool((finite == np.round(finite)).all()) and len(np.unique(finite)) > FEW_VALUES
+    return bool((finite == np.round(finite)).all())
 
 
 def _usual_size(values: FloatArray) -> float:
@@ -77,9 +124,15 @@ def _command_unit(table: Table, name: str, component: str, robot: Robot | None, 
         return parse_unit("V")
     alike = [other for other in table.names if re.sub(r"\d+", "", other) == re.sub(r"\d+", "", name)]
     largest = max(_largest(floats(table.columns[other])) for other in alike)  # of all wheels: one sentence for all
-    looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else "a PWM value of 0..255"
-    why = f"no unit is given, and up to {largest:.3g} may be volts or {looks}"
-    found.doubts.append(Doubt(name, component, why, ("V", "duty", "%", "duty/255")))
+    least = min(float(np.nanmin(floats(table.columns[other]), initial=np.inf)) for other in alike)
+    if SERVO[0] <= least and largest <= SERVO[1]:
+        why = f"{least:.4g} to {largest:.4g} look like widths of servo pulses: log (width - 1500) / 500, a duty"
+        found.doubts.append(Doubt(name, component, f"but {why}", ()))
+        return None
+    looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else f"a PWM value ({_scales(largest)[-1]})"
+    volts = largest <= _most_volts(robot)
+    why = f"no unit is given, and up to {largest:.3g} {f'may be volts or {looks}' if volts else f'looks like {looks}'}"
+    found.doubts.append(Doubt(name, component, why, ("V" if volts else "", *_scales(largest))[not volts :]))
     return None
 
 

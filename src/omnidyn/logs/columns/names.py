@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -10,23 +11,24 @@ from omnidyn.units import Unit, known_unit
 
 (
     TIME, SUPPLY, VOLTAGE, CURRENT, DUTY, RATE, ANGLE, COMMAND, MOTOR, WHEEL, BODY, X, Y, YAW, LINEAR, ANGULAR, OTHER,
-    MEASURED,
+    MEASURED, SENSOR, CHANNEL,
 ) = (
     "time", "supply", "voltage", "current", "duty", "rate", "angle", "command", "motor", "wheel", "body", "x", "y",
-    "yaw", "linear", "angular", "other", "measured",
+    "yaw", "linear", "angular", "other", "measured", "sensor", "channel",
 )  # fmt: skip
 
 _WORDS = {
-    TIME: "t time stamp timestamp clock zeit uhrzeit millis micros",
-    SUPPLY: "bat batt battery supply vbat vbatt vcc vin vbus bus akku",
-    VOLTAGE: "u volt volts voltage voltages ua va spannung",
-    CURRENT: "i cur curr current currents amp amps ia strom",
-    DUTY: "duty pwm throttle",
-    RATE: "w omega vel velocity velocities speed speeds spd rpm rate dps qd gyro twist drehzahl",
-    ANGLE: "pos position positions angle angles ang enc encoder tick ticks count counts pulses q winkel",
-    COMMAND: "set sp setpoint cmd command commanded ref reference desired des target goal req soll",
-    MOTOR: "m motor motors mot mtr",
-    WHEEL: "wheel wheels whl rad",
+    TIME: "t time stamp timestamp clock zeit uhrzeit millis micros elapsed uptime epoch temps tiempo tempo",
+    SUPPLY: "bat batt battery supply vbat vbatt vcc vin vbus bus akku batterie bateria",
+    VOLTAGE: "u volt volts voltage voltages ua va spannung tension voltaje",
+    CURRENT: "i cur curr current currents amp amps ia strom courant corriente",
+    DUTY: "duty pwm throttle power tastgrad",
+    RATE: """w omega vel velocity velocities speed speeds spd rpm rate dps qd gyro twist drehzahl vitesse velocidad
+        geschwindigkeit""",
+    ANGLE: """pos position positions angle angles ang enc encoder tick ticks count counts pulses q winkel angulo""",
+    COMMAND: "set sp setpoint cmd command commanded ref reference desired des target goal req soll consigne consigna",
+    MOTOR: "m motor motors mot mtr moteur",
+    WHEEL: "wheel wheels whl rad roue rueda",
     BODY: "b body base robot chassis odom odometry pose ground cam camera imu world global",
     X: "x vx",
     Y: "y vy vn",
@@ -34,68 +36,124 @@ _WORDS = {
     LINEAR: "v lin linear",
     ANGULAR: "angular",
     # Words that change nothing: joint_states/wheel_1_joint/velocity is the speed of wheel 1.
-    MEASURED: "meas measured act actual fb feedback ist est filt filtered raw joint joints states field data msg",
+    MEASURED: "meas measured act actual fb feedback ist est filt filtered raw joint joints states field data msg value",
+    # What puts out volts of its own, which are none of a motor.
+    SENSOR: """sensor sensors sense enc encoder resolver ntc ptc pot poti potentiometer hall thermistor thermo adc ain
+        analog photo ldr shunt strain loadcell tacho probe trigger trig sync""",
+    # Of an oscilloscope or a recorder: its number is none of a wheel.
+    CHANNEL: "ch chan channel kanal canal voie trace",
     # Quantities that a log may hold and a Run does not, and differences from row to row.
-    OTHER: """ax ay az acc accel acceleration torque tau temp temperature power force f d dx dy dz dang dt delta error
+    OTHER: """ax ay az acc accel acceleration torque tau temp temperature force f d dx dy dz dang dt delta error
         err state mode id index row mag roll pitch integral index seq frame std var cov step timestep sample""",
 }  # fmt: skip
-_ROLE = {word: role for role, words in _WORDS.items() for word in words.split()}
+_ROLE = {word: role for role, words in _WORDS.items() if role != SENSOR for word in words.split()}
+_SENSORS = frozenset(_WORDS[SENSOR].split())
+_ROLE |= dict.fromkeys(_SENSORS - _ROLE.keys(), SENSOR)  # an encoder tells an angle too
 _ROLE |= {"vx": "vx", "vy": "vy", "vn": "vy"}
 _SHORT = ("x", "y", "z", "v", "b", "w", "m", "u", "i")  # single letters that compounds such as "vbx" are made of
 
 
 class NameParts(NamedTuple):
-    """A name taken apart: roles of its words, the number of the wheel or None, the unit in it or None."""
+    """A name taken apart: roles of its words, the number of the wheel or None, the unit in it or None.
+
+    before: what stands before the number, in small letters, without the unit.
+    """
 
     roles: frozenset[str]
     number: int | None
     unit: Unit | None
+    before: str = ""
 
 
 @lru_cache(4096)
 def read_name(name: str) -> NameParts:
     """The words of a column's name. A word that is not known counts as "other"."""
-    stem, unit = _split_unit(name.strip().replace("v_n", "vn"))
-    stem, unit = (stem, unit) if unit is not None else _unit_inside(stem)
+    plain = _AGAIN.sub("", _without_accents(name.strip()))
+    plain = re.sub(r"duty[ _-]?cycle", "duty", plain.replace("v_n", "vn"), flags=re.IGNORECASE)
+    stem, unit = _without_unit(plain)
     spread = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower()
     words = re.findall(r"[^\W\d_]+", spread)
     unit = unit or next((known_unit(part) for word in words for part in _parts(word) if part in _SAYS_ITS_UNIT), None)
     roles = {role for word in words for role in _roles(word)}
-    return NameParts(frozenset(roles), _number(spread), unit)
+    number, before = (None, "") if roles <= {CHANNEL} else _number(spread)
+    return NameParts(frozenset(roles), number, unit, before)
 
 
+def _without_accents(name: str) -> str:
+    """Spannung and tensión in plain letters; signs of units such as ° and µ stay."""
+    letters = unicodedata.normalize("NFD", name)
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
+
+
+def _without_unit(name: str) -> tuple[str, Unit | None]:
+    """A name without the unit in it, and the unit; the last part of a topic counts first, "data" and "value" not."""
+    stem, unit = _split_unit(name)
+    if unit is not None:
+        return stem, unit
+    parts = re.split(r"([/.])", name)
+    last = next((k for k in range(len(parts) - 1, -1, -2) if _bare(parts[k]).lower() not in _LAST), -1)
+    for k in range(last, -1, -2):
+        part = _bare(parts[k])
+        stem, unit = _split_unit(part)
+        if unit is None:
+            stem, unit = _split_unit(_spread(part))  # DriveVelocityRadPerSec
+        if unit is None or (k < last and len(unit.text) < 2):  # /robot_A/wheel1
+            stem, unit = _unit_inside(part)
+        if unit is not None:
+            return "".join([*parts[:k], stem + parts[k][len(part) :], *parts[k + 1 :]]), unit
+    return name, None
+
+
+def _bare(part: str) -> str:
+    """A part of a topic without the place in an array: currents_A of currents_A[3]."""
+    return re.sub(r"\[\d+\]$", "", part)
+
+
+def _spread(part: str) -> str:
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", part)
+
+
+BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
+_AGAIN = re.compile(r"~\d+$")  # the second column of one name is called NAME~2
+_LAST = ("", "data", "value", "values")
 _SAYS_ITS_UNIT = ("rpm", "dps", "millis", "micros")  # a quantity and its unit in one word: rpm1, motor2Rpm, millis
-_NO_UNIT_INSIDE = {"turn", "turns", "rev", "min", "sec"}  # in the middle of a name: a turn rate, a minimum, a section
+# In the middle of a name: a turn rate, a minimum, a section, what goes in.
+_NO_UNIT_INSIDE = {"turn", "turns", "rev", "min", "sec", "in", "ft", "per"}
 _OF_A_WHEEL = {MOTOR, WHEEL, VOLTAGE, CURRENT, DUTY, RATE, ANGLE}
 _OF_NO_WHEEL = {BODY, SUPPLY, TIME}
 
 
-def _number(text: str) -> int | None:
-    """The number of the wheel: the one behind a word of wheels, as in robot2/wheel1/speed, else the first.
+def _number(text: str) -> tuple[int | None, str]:
+    """The number of the wheel, and what stands before it: the one behind a word of wheels, as in robot2/wheel1/speed,
+    else the first.
 
     That of an imu0 or a robot2 is none.
     """
-    numbers = re.findall(r"([^\W\d_]*)[\W_]*(\d+)", text)
-    roles = [(set(_roles(word)) if word else set(), digits) for word, digits in numbers]
-    behind = [digits for each, digits in roles if each & _OF_A_WHEEL]
-    chosen = next(iter([*behind, *(digits for each, digits in roles if not each & _OF_NO_WHEEL)]), "")
-    return int(chosen) if 0 < len(chosen) <= 2 else None
+    numbers = [(found[1], found) for found in re.finditer(r"([^\W\d_]*)[\W_]*(\d+)", text)]
+    roles = [(set(_roles(word)) if word else set(), found) for word, found in numbers]
+    behind = [found for each, found in roles if each & _OF_A_WHEEL]
+    chosen = next(iter([*behind, *(found for each, found in roles if not each & _OF_NO_WHEEL)]), None)
+    if chosen is None or len(chosen[2]) > 2:
+        return None, ""
+    return int(chosen[2]), text[: chosen.start(2)]
 
 
 def _split_unit(name: str) -> tuple[str, Unit | None]:
-    """A unit at the end of a name, as in w1_rad_s, i1_mA or motor_1_rpm; the longest that is one."""
+    """A unit at the end of a name, as in w1_rad_s, i1_mA, motor_1_rpm or ticks_per_s; the longest that is one."""
     parts = re.split(r"_", name)
     for first in range(1, len(parts)):
         tail = "_".join(parts[first:])
         if re.search(r"(^|\D)\d\d?$", tail):  # the 2 of current_mA_2 is a wheel, no divisor
             continue
-        low = tail.lower() if tail.isupper() and len(tail) > 2 else tail  # W1_RAD_S, but mA and MA are two
-        for text in (tail, tail.replace("_", "/"), low, low.replace("_", "/")):
+        for text in (tail, tail.replace("_", "/")):
             metre = text == "m" and not any(map(str.isdigit, name))  # x_m, but not 1_m
-            unit = known_unit(text) if len(text) > 1 or text in "sVAh%" or metre else None
-            if unit is not None:
+            unit = known_unit(text) if len(text) > 1 or text in "sVAWh%" or metre else None
+            if unit is not None and (text.lower() != "in" or _IS_PLACE.search("_".join(parts[:first]))):
                 return "_".join(parts[:first]), unit
     return name, None
+
+
+_IS_PLACE = re.compile(r"(?:^|[\W_])(?:x|y|pos|position)$", re.IGNORECASE)  # x_in, but not voltage_in
 
 
 def _unit_inside(name: str) -> tuple[str, Unit | None]:
@@ -116,8 +174,9 @@ def _parts(word: str) -> tuple[str, ...]:
 
 
 def _roles(word: str) -> list[str]:
-    """Roles of a word, or of its parts."""
-    return [_ROLE[part] for part in _parts(word)] or [OTHER]
+    """Roles of a word, or of its parts; an encoder tells an angle, and is a sensor too."""
+    parts = _parts(word)
+    return [_ROLE[part] for part in parts] + [SENSOR] * any(part in _SENSORS for part in parts) or [OTHER]
 
 
 @lru_cache(4096)

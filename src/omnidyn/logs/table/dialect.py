@@ -30,9 +30,7 @@ WHOLE = re.compile(r"[+-]?\d{1,3}", re.ASCII)
 # A spreadsheet's error values begin like a comment; to skip such a row would lose it in silence.
 _SPREADSHEET_ERROR = re.compile(r"#(?:N/A|REF!|VALUE!|NAME\?|NUM!|NULL!|DIV/0!)", re.IGNORECASE)
 
-# Words of units that units.py has no size for, or writes otherwise.
-_UNIT_WORDS = "N mN kN N·m N⋅m N*m Nm mNm N.m W kg g % - SI # pix pixel px m/s2 m/s^2 m/s² rad/s2 rad/s^2 rad/s² °C"
-_UNITS = frozenset([*_UNIT_WORDS.split(), "N m"])
+_UNITS = frozenset(["-", "SI", "#", "pix", "pixel", "px"])  # words in the place of a unit that units.py has no size for
 _NAME_AND_UNIT = re.compile(r"(.*[^\s\[(])\s*(?:\[\s*([^\[\]]+?)\s*\]|\(\s*([^()]+?)\s*\))")
 
 

@@ -1,0 +1,127 @@
+"""Which component a name and its unit say: "m1vel" is w1, "phi_deg" is the heading, "ntc_V" is none."""
+
+from __future__ import annotations
+
+from omnidyn.logs.channels import TIME, place, si_suffix
+from omnidyn.logs.columns import names as words
+from omnidyn.logs.columns.names import NameParts, read_name
+from omnidyn.units import (
+    ANGLE,
+    COUNT,
+    COUNT_RATE,
+    CURRENT,
+    DUTY,
+    LENGTH,
+    SPEED,
+    TURN_RATE,
+    VOLTAGE,
+    Unit,
+)  # fmt: skip
+from omnidyn.units import TIME as TIME_UNIT
+
+# Kinds of columns that have a number: role -> letter of the component. The first that fits counts.
+_NUMBERED = (
+    (words.CURRENT, "i"), (words.DUTY, "d"), (words.VOLTAGE, "u"), (words.RATE, "w"), (words.ANGLE, "a"),
+)  # fmt: skip
+_OF_A_RIM = {words.LINEAR, words.RATE, words.WHEEL, words.MOTOR, words.COMMAND, words.MEASURED}
+BY_UNIT = {VOLTAGE: "u", CURRENT: "i", DUTY: "d", TURN_RATE: "w", COUNT_RATE: "w", ANGLE: "a", COUNT: "a"}
+_KIN = {"u": "ud", "d": "ud", "i": "i", "w": "wa", "a": "wa"}  # what a word may say beside a unit of the first
+_HELD = {*BY_UNIT, SPEED, LENGTH, TIME_UNIT}  # quantities of the channels of a log
+DRIVES = frozenset({words.VOLTAGE, words.DUTY, words.MOTOR, words.WHEEL, words.COMMAND})  # words of what drives a motor
+_BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
+
+
+def exact_component(name: str) -> str | None:
+    """The component of a column named as in a run file, such as w1_cmd_rad_s."""
+    for size in (1, 2):
+        component, suffix = "_".join(name.split("_")[:-size]), "_".join(name.split("_")[-size:])
+        if component and (place(component) or component == TIME) and si_suffix(component) == suffix:
+            return component
+    return None
+
+
+def component_of(name: str, unit: Unit | None, wheel: int | None) -> str | None:
+    """The component that a column is called, as in a run file or in other words.
+
+    wheel: the number of the wheel, from 1, that the number in its name means.
+    """
+    exact, parts = exact_component(name), read_name(name)
+    if exact is not None and wheel is not None and parts.number != wheel:
+        exact = None  # a run file counts from 1, this one does not
+    return exact or component_of_parts(parts, unit, wheel)
+
+
+def is_other(name: NameParts) -> bool:
+    """Whether a name has a word that is none of a channel of a log."""
+    sensor = words.SENSOR in name.roles and words.ANGLE not in name.roles
+    return sensor or bool(name.roles & {words.OTHER, words.CHANNEL})
+
+
+def component_of_parts(name: NameParts, unit: Unit | None, wheel: int | None) -> str | None:
+    """The component that the words of a name say, None where they say none or too many."""
+    unit = unit or name.unit
+    if is_other(name) and not (name.number is not None and unit):
+        return None
+    if unit is not None and unit.quantity not in _HELD:
+        return None
+    command = "_cmd" if words.COMMAND in name.roles else ""
+    letter = numbered_kind(name, unit)
+    if name.number is not None:
+        if wheel is None or letter is None or (command and letter in ("i", "a")):
+            return None
+        return f"{letter}{wheel}{command if letter == 'w' else ''}"
+    if words.SUPPLY in name.roles:
+        says_less = not name.roles & {words.CURRENT, words.DUTY} and (unit is None or unit.quantity == VOLTAGE)
+        return "supply" if says_less else None
+    return _body_component(name, unit, command)
+
+
+def numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
+    """The letter of a component of a wheel, None where the words do not say.
+
+    A unit outweighs a word of its kin and no word (motor_1_V); volts of an encoder are no voltage of a motor.
+    """
+    if name.number is None:
+        return None
+    unit, roles = unit or name.unit, name.roles
+    if unit is not None and unit.quantity not in _HELD:
+        return None
+    if unit is not None and unit.quantity == SPEED and words.LINEAR in roles and roles <= _OF_A_RIM:
+        return "w"  # v1_m_s: of the rim of wheel 1
+    said = [letter for role, letter in _NUMBERED if role in roles]
+    letter = said[0] if said else None
+    by_unit = BY_UNIT.get(unit.quantity) if unit is not None else None
+    if by_unit is not None:
+        volts = by_unit == "u" and roles == {words.LINEAR}  # V1 [V]
+        no_word = volts or roles & {words.MOTOR, words.WHEEL} or not roles - {words.OTHER, words.CHANNEL}
+        kin = _KIN[by_unit] + ("w" if by_unit == "d" and words.COMMAND in roles else "")  # a speed is set in percent
+        if (set(said) & set(kin)) if said else no_word:
+            letter = by_unit
+    return None if letter in ("u", "d") and words.SENSOR in roles else letter
+
+
+def _body_component(name: NameParts, unit: Unit | None, command: str) -> str | None:
+    roles = name.roles
+    if roles & {words.CURRENT, words.VOLTAGE, words.DUTY, words.TIME, words.MOTOR}:
+        return None
+    rate = bool(roles & {words.RATE, words.ANGULAR})
+    turning = unit is None or unit.quantity == TURN_RATE
+    if words.ANGULAR in roles and roles & {words.X, words.Y}:
+        return None  # roll and pitch
+    if words.LINEAR in roles and words.YAW in roles:  # linear.z goes up; v_theta turns
+        return "omega" + command if unit is not None and turning else None
+    for letter, (speed, position) in _BODY.items():
+        if speed in roles or (letter in roles and roles & {words.RATE, words.LINEAR}):
+            return speed + command
+        if letter in roles and not command:
+            return position
+    if rate and turning and (words.YAW in roles or words.BODY in roles or command):
+        return "omega" + command
+    if words.YAW in roles and not rate and not command:
+        return "heading"
+    if words.LINEAR in roles and not rate:
+        return "vx" + command  # the paper's v
+    if rate and not command and turning and words.ANGLE not in roles:
+        return "omega"
+    angle = roles - {words.SENSOR} == {words.ANGLE}
+    return "heading" if angle and unit is not None and unit.quantity == ANGLE else None

@@ -1,0 +1,76 @@
+"""Which wheel the number in a name means: files count from 1 or from 0, each family of names in its own way."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from omnidyn.logs.columns import names as words
+from omnidyn.logs.columns.component import component_of_parts, numbered_kind
+from omnidyn.logs.columns.guessed import Doubt, Guess
+from omnidyn.logs.columns.names import BRACKETS, read_name
+from omnidyn.logs.table.table import Table
+from omnidyn.model.wheels import MAX_WHEELS
+from omnidyn.units import known_unit
+
+BOARD = 2  # so many times the motors are the places of a board that measures all currents of a robot
+
+
+class Family(NamedTuple):
+    """Names that differ by their number alone: the letter of their component, whether commands, the text before it."""
+
+    letter: str
+    command: bool
+    before: str
+
+    @property
+    def style(self) -> tuple[str, bool, str]:
+        """Where the number stands: the path before, whether in brackets, and the word of a motor or wheel before it.
+
+        Families of one style count alike: u0 u1 u2 beside i1 i2, but not /motor1 beside currents[0].
+        """
+        path, word = re.fullmatch(r"(.*[/.])?(.*)", self.before, re.DOTALL).groups()  # type: ignore[union-attr]
+        of_motor = words.MOTOR in (roles := read_name(word).roles) or words.WHEEL in roles
+        return path or "", word.endswith("["), word if of_motor else ""
+
+
+def wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> dict[str, int]:
+    """Name -> number of the wheel from 1, of the names that have a number; a family that counts from 0 is shifted.
+
+    A family that does not count from 0 itself is shifted with one of its style that does (the current of wheel 0 may
+    not be logged), unless it counts farther than wheels that are counted from 0 can: u0 u1 u2 beside w1 w2 w3.
+    """
+    families: dict[Family, dict[str, int]] = {}
+    for name in names:
+        bare = BRACKETS.fullmatch(name)  # speed1 [pix/s]: what is known without its unit
+        parts, unit = read_name(bare[1] if bare else name), known_unit(table.units.get(name, ""))
+        letter = numbered_kind(parts, unit)
+        if letter is not None and parts.number is not None and component_of_parts(parts, unit, 1) is not None:
+            family = Family(letter, words.COMMAND in parts.roles, parts.before)
+            families.setdefault(family, {})[name] = parts.number
+    _leave_out_boards(families, found)
+    ends: dict[tuple[str, bool, str], int] = {}
+    for family, mine in families.items():
+        if 0 in mine.values():
+            ends[family.style] = max(ends.get(family.style, 0), *mine.values())
+    shifted = [
+        family for family, mine in families.items()
+        if 0 in mine.values() or max(mine.values()) <= ends.get(family.style, -1)
+    ]  # fmt: skip
+    if shifted:
+        others = sorted({family.letter for family in families if family not in shifted})
+        but = f" ({', '.join(others)} from 1)" if others else ""
+        found.notes.append(f"wheels are numbered from 0 in the file: 0 is wheel 1{but}")
+    numbers = {name: number + (family in shifted) for family, mine in families.items() for name, number in mine.items()}
+    return {name: number for name, number in numbers.items() if 0 < number <= MAX_WHEELS}
+
+
+def _leave_out_boards(families: dict[Family, dict[str, int]], found: Guess) -> None:
+    """Doubt currents of many more places than there are motors, as of a board: nobody knows which are the motors'."""
+    motors = max((len(mine) for family, mine in families.items() if family.letter != "i"), default=0)
+    boards = [family for family, mine in families.items() if family.letter == "i" and len(mine) >= BOARD * motors > 0]
+    for family in boards:
+        mine = list(families.pop(family))
+        why = f"but there are {len(mine)} beside {motors} motors (say `column` i1={mine[0]} and so on)"
+        found.doubts += [Doubt(name, "i1", why, ()) for name in mine]
