@@ -7,6 +7,8 @@ import numpy as np
 from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.values.counters import check_counters, restarts_of
+from omnidyn.logs.clock.restarts import FULL
 from omnidyn.logs.log import MAX_MISSING, Log, back_remedy
 from omnidyn.logs.segments import GAP, segments
 from omnidyn.model.robot import Robot
@@ -29,7 +31,7 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], LogUnderCheck]:
     found += _backward(log, rows)
     rows = rows[np.argsort(log.t[rows], kind="stable")]
     again = np.concatenate([[False], np.diff(log.t[rows]) == 0.0]) if rows.size else np.zeros(0, dtype=bool)
-    found += _repeated(log, rows, again)
+    found += _repeated(log, rows, again) + restarts_of(log)
     rows = rows[~again]
     t = log.t[rows]
     steps = np.diff(t)
@@ -38,7 +40,9 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], LogUnderCheck]:
     chosen = log.rows(rows)
     # As in a Run: what is recorded on change is filled in, latencies that are known are taken out.
     channels = {name: chosen.aligned(name, values, []) for name, values in chosen.channels.items()} if len(t) else {}
-    work = _with_speed(LogUnderCheck(log, robot, rows, t, step, between_gaps, channels), found)
+    more, work = check_counters(LogUnderCheck(log, robot, rows, t, step, between_gaps, channels))
+    found += more
+    work = _with_speed(work, found)
     return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
 
 
@@ -123,12 +127,14 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
 
 
 def _gaps(work: LogUnderCheck) -> list[Finding]:
+    lines = work.log.lines[work.rows]
+    known = [each.line for each in work.log.restarts if each.code != FULL]  # a gap of their own
     cuts = [segment.start for segment in work.segments[1:]]
+    cuts = [k for k in cuts if not any(lines[k - 1] < line <= lines[k] for line in known)]
     if not cuts:
         return []
     lengths = np.array([work.t[k] - work.t[k - 1] for k in cuts])
     lost = int(min(np.round(lengths / work.step - 1.0).sum(), 1e15))
-    lines = work.log.lines[work.rows]
     return [
         Finding(
             "gap", WARN, "t",

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import components, place
+from omnidyn.logs.clock.restarts import Restart
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.segments import segments
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
@@ -35,7 +36,7 @@ class Log:
     file, shape (rows,). columns: which column each component came from, and how. source, sha256: of the file.
     current_unsigned: the sensor gives |i|; the sign in `channels` is that of the commanded speed.
     notes: what the readers had to decide, in words. own_clocks: topics with clocks of their own; a blank is no missing
-    value.
+    value. restarts: where its clock or a counter begins again, which the times and angles here no longer show.
     """
 
     t: FloatArray
@@ -47,6 +48,7 @@ class Log:
     current_unsigned: bool = False
     notes: tuple[str, ...] = ()
     own_clocks: bool = False
+    restarts: tuple[Restart, ...] = ()
 
     @classmethod
     def of_run(cls, run: Run) -> Log:

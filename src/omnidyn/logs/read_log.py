@@ -17,6 +17,7 @@ from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock.clock import Clock
 from omnidyn.logs.clock.counters import unrolled
 from omnidyn.logs.clock.rate import timed
+from omnidyn.logs.clock.restarts import Counter, beside_restarts, counter_restarts, full_counter, recordings
 from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.column import MOTOR_SIDE, Column
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
@@ -186,6 +187,12 @@ def log_from_table(
         )  # fmt: skip
     if robot is not None and wheels > 1:
         wheels = robot.wheels.count
+    clock = clock or Clock()
+    known = len(clock.restarts)
+    t = clock.times(table, columns.columns[TIME], notes)
+    restarts = clock.restarts[known:]
+    begins = np.flatnonzero(np.isin(table.lines, [each.line for each in restarts])).tolist()
+    counters: list[Counter] = []
     channels: dict[str, FloatArray] = {}
     for key, column in columns.columns.items():
         found = place(key)
@@ -193,9 +200,12 @@ def log_from_table(
             continue
         values = table.numbers(column.name, missing=True)
         if found[0] == "wheel_angle":
-            values, period = unrolled(values, column.unit, f"{table.source}, column {column.name}")
-            if period is not None:
-                notes.append(f"{column.name} starts over after {period:.6g} {_bare(column.unit)}: it is taken to go on")
+            read, where = values, f"{table.source}, column {column.name}"
+            values, periods, again = _unrolled(read, t, begins, column.unit, where)
+            restarts += [
+                full_counter(key, column.name, each, _bare(column.unit), int(table.lines[0])) for each in periods
+            ]
+            counters.append(Counter(key, column.name, read, again))
         values = values * column.factor
         if found[0] in SIDED:
             values = values / _divisor(column, key, robot, found[1], table.source)
@@ -207,13 +217,36 @@ def log_from_table(
         channels["pose"][:, 2] = unwrapped(channels["pose"][:, 2])
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
-    t = (clock or Clock()).times(table, columns.columns[TIME], notes)
-    log = Log(t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes), table.own_clocks)
+    restarts += counter_restarts(counters, table.lines)
+    notes += [each.note for each in restarts if each.where != TIME]
+    log = Log(
+        t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes), table.own_clocks,
+        tuple(restarts),
+    )  # fmt: skip
+    log = log.rows(~beside_restarts(t, counters)) if any(each.restarts for each in counters) else log
     empty = log.empty_rows() if table.own_clocks else np.zeros(len(log), dtype=bool)
     if empty.any() and not empty.all():  # messages of topics that nobody took
         log = log.rows(~empty)
     log = log.joined()
     return _signed(log, robot) if options.current_unsigned else log
+
+
+def _unrolled(
+    values: FloatArray, t: FloatArray, begins: Sequence[int], unit: str, where: str
+) -> tuple[FloatArray, list[float], list[int]]:
+    """(angles of a wheel that go on, what they start over after, the first row behind each restart of their counter).
+
+    begins: the first row of each recording but the first. Each goes on from where the one before it ended.
+    """
+    parts, periods, again = [], [], []
+    for part in recordings(len(values), begins):
+        readings, period, restarts = unrolled(values[part], unit, where, t[part])
+        known = [each[np.isfinite(each)] for each in (*parts[-1:], readings)]
+        shift = known[0][-1] - known[1][0] if len(known) == 2 and all(each.size for each in known) else 0.0
+        parts.append(readings + shift)
+        periods += [] if period is None else [period]
+        again += [part.start + row for row in restarts]
+    return np.concatenate(parts), list(dict.fromkeys(periods)), again
 
 
 def _bare(unit: str) -> str:

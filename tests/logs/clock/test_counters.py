@@ -28,7 +28,7 @@ def test_an_encoder_that_starts_over_goes_on(unit, size, period, signed):
     seen = np.mod(counts + offset, period)
     seen = np.where(seen >= period / 2.0, seen - period, seen) if signed else seen
     seen[5] = np.nan
-    again, found = unrolled(seen, unit, "log.csv")
+    again, found, _ = unrolled(seen, unit, "log.csv")
     assert found == pytest.approx(period)
     np.testing.assert_allclose(np.delete(again - again[0], 5), np.delete(counts - counts[0], 5), atol=1e-4)
     assert np.isnan(again[5])
@@ -36,7 +36,7 @@ def test_an_encoder_that_starts_over_goes_on(unit, size, period, signed):
 
 @pytest.mark.parametrize("counts", [TURNS * 2000.0, np.zeros(50), np.array([3.0]), np.array([]), TURNS * 0.04])
 def test_an_encoder_that_goes_on_is_left_alone(counts):
-    again, found = unrolled(counts, "ticks/2000", "log.csv")
+    again, found, _ = unrolled(counts, "ticks/2000", "log.csv")
     assert found is None
     np.testing.assert_array_equal(again, counts)
 
@@ -63,7 +63,7 @@ def test_counts_that_a_driver_made_radians_go_on_too(bits, kind):
     tick, half = 2.0 * np.pi / 4096.0, 2.0 ** (bits - 1)
     counts = np.round(TURNS * 4096.0) + half - 5000.0
     seen = (tick * (np.mod(counts + half, 2.0 * half) - half)).astype(kind).astype(float)
-    again, found = unrolled(seen, "rad", "log.csv")
+    again, found, _ = unrolled(seen, "rad", "log.csv")
     assert found == pytest.approx(tick * 2.0 * half, rel=1e-5)
     np.testing.assert_allclose(again - again[0], (counts - counts[0]) * tick, atol=tick)
 
@@ -71,6 +71,6 @@ def test_counts_that_a_driver_made_radians_go_on_too(bits, kind):
 def test_an_encoder_that_was_set_to_0_has_not_started_over():
     """It fell by nearly all that two bytes hold, but a wheel that moves by 20 a row does not jump by 3000."""
     counts = np.concatenate([np.arange(0.0, 62_500.0, 20.0), np.arange(0.0, 5000.0, 20.0)])
-    again, found = unrolled(counts, "ticks/2000", "log.csv")
-    assert found is None
-    np.testing.assert_array_equal(again, counts)
+    again, period, restarts = unrolled(counts, "ticks/2000", "log.csv")
+    assert (period, restarts) == (None, (3125,))
+    np.testing.assert_array_equal(again, 20.0 * np.arange(len(counts)))

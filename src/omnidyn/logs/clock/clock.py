@@ -7,14 +7,20 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.logs.clock.restarts import CLOCK, Restart
 from omnidyn.logs.column import Column
+from omnidyn.logs.segments import GAP
 from omnidyn.logs.table.table import Table
 
 EPOCH = 1e8  # [s]; a later time counts from 1970: the start of the log is taken off, so that no digits are lost
 DAY = 86_400.0  # [s]
 COUNTERS = (2.0**16, 2.0**32)  # counts that fit into two and four bytes
 NEAR, LONG = 50.0, 1000.0  # usual steps: the rows about the jump are no farther apart; a period is longer
+EARLY = 0.1  # of what had passed: a clock that restarted is back as near to its begin, or some line is no row
+FOLLOWING = 5  # rows at most, two at least, that then go on
+SELDOM = 0.005  # of the rows: a clock that goes back more often is read wrong
+SEAM = 1.0  # [s] at least, between two recordings: nobody knows how long it took
 HALF_A_DAY = timedelta(hours=12)
 DATES = "a date and time such as 2026-11-20T10:00:00.125"
 
@@ -36,7 +42,10 @@ class Clock:
     def __init__(self) -> None:
         self._start: float | datetime | None = None
         self._count: float | None = None  # the last one read
+        self._begin: float | None = None  # the first count of the recording
+        self._line = 0  # the last one read
         self._passed = 0.0  # counts that a clock which started over has lost
+        self.restarts: list[Restart] = []
         self._last: datetime | None = None
         self._steps: bool | None = None  # whether the column holds steps of time
         self._bare = False  # whether milliseconds stand without leading zeros
@@ -55,7 +64,7 @@ class Clock:
             self._steps = are_steps(column.name, counts)
         if self._steps:
             return self._summed(counts, column, notes)
-        counts = self._going_on(counts, column, notes)
+        counts = self._going_on(counts, table.lines, column, notes)
         known = counts[np.isfinite(counts)]
         if self._start is None and known.size:
             self._start = float(known[0]) if abs(known[0] * column.factor) > EPOCH else 0.0
@@ -81,15 +90,31 @@ class Clock:
         self._passed = float(sums[-1]) if sums.size else self._passed
         return sums * column.factor
 
-    def _going_on(self, counts: FloatArray, column: Column, notes: list[str]) -> FloatArray:
-        """The counts of a clock that starts over when its counter is full, or at midnight, as if it did not."""
+    def _going_on(self, counts: FloatArray, lines: IntArray, column: Column, notes: list[str]) -> FloatArray:
+        """The counts of a clock that starts over when its counter is full, at midnight, or with its board: going on."""
         rows = np.flatnonzero(np.isfinite(counts))
         before = [] if self._count is None else [self._count]
         read = np.concatenate([before, counts[rows]])
+        where = np.concatenate([[self._line] * len(before), lines[rows]])
+        if not read.size:
+            return counts
         steps = np.diff(read)
-        self._count = float(read[-1]) if read.size else None
-        if not steps.size or not (steps < 0.0).any() or not (steps > 0.0).any():
+        self._count, self._line = float(read[-1]), int(where[-1])
+        self._begin = float(read[0]) if self._begin is None else self._begin
+        if not (steps < 0.0).any() or not (steps > 0.0).any():
             return counts + self._passed
+        lost = self._over(read, column, notes)
+        if lost is None:
+            lost = self._begun_again(read, where, column, notes)
+        passed = self._passed + np.cumsum(np.concatenate([[0.0], lost]))
+        self._passed, counts = float(passed[-1]), counts.copy()
+        counts[rows] += passed[len(before) :]
+        return counts
+
+    @staticmethod
+    def _over(read: FloatArray, column: Column, notes: list[str]) -> FloatArray | None:
+        """What each step lacks, where every one that goes back is by the period of a counter or a day; else None."""
+        steps = np.diff(read)
         usual = float(np.median(steps[steps > 0.0]))
         for period in (*COUNTERS, DAY / abs(column.factor)):
             over = np.abs(steps + period) < NEAR * usual
@@ -97,11 +122,31 @@ class Clock:
             within = read.min() >= low and read.max() < low + period and (low == 0.0 or period in COUNTERS)
             if within and (over == (steps < 0.0)).all() and LONG * usual < period:
                 notes.append(f"{column.name} starts over after {period:.6g} {column.unit}: it is taken to go on")
-                passed = self._passed + period * np.cumsum(np.concatenate([[0], over]))
-                self._passed, counts = float(passed[-1]), counts.copy()
-                counts[rows] += passed[len(before) :]
-                return counts
-        return counts + self._passed
+                return period * over
+        return None
+
+    def _begun_again(self, read: FloatArray, lines: IntArray, column: Column, notes: list[str]) -> FloatArray:
+        """What each step lacks: where the board was started again, the way to a seam behind what stood before."""
+        steps = np.diff(read)
+        lost, cuts = np.zeros(len(steps)), np.flatnonzero(steps < 0.0)
+        begins = [self._begin, *read[cuts + 1]]
+        if len(cuts) > max(1.0, SELDOM * len(read)) or not all(
+            _is_restart(read, lines, int(cut), float(begin)) for cut, begin in zip(cuts, begins, strict=False)
+        ):
+            return lost
+        usual = np.sort(steps[steps > 0.0])
+        seam = max(SEAM / abs(column.factor), 2.0 * GAP * float(usual[int(0.95 * (len(usual) - 1))]))
+        lost[cuts] = seam - steps[cuts]
+        for cut in cuts.tolist():
+            line = int(lines[cut + 1])
+            before, behind = (f"{count * column.factor:.6g} s" for count in read[cut : cut + 2])
+            self.restarts.append(Restart(
+                CLOCK, "t", line, f"the time begins again in line {line}, at {behind} after {before}",
+                "a recording of its own behind a gap; `convert` with `split` writes them apart",
+            ))  # fmt: skip
+            notes.append(self.restarts[-1].note)
+        self._begin = float(begins[-1])  # type: ignore[arg-type]
+        return lost
 
     def _from_dates(self, table: Table, name: str, cells: tuple[str, ...], notes: list[str]) -> FloatArray:
         self._bare = self._bare or _are_bare(cells)
@@ -127,6 +172,17 @@ class Clock:
         if not isinstance(self._start, datetime):
             self._start = date
         return (date - self._start).total_seconds()
+
+
+def _is_restart(read: FloatArray, lines: IntArray, cut: int, begin: float) -> bool:
+    """Whether a time that goes back behind `cut` begins again, and no row stands in another's place.
+
+    begin: of the recording before. It is back near there, or lines that are no rows stand between; and it goes on.
+    """
+    following = read[cut + 1 : cut + 1 + FOLLOWING]
+    goes_on = len(following) > 1 and bool((np.diff(following) > 0.0).all()) and following[1] < read[cut]
+    early = read[cut + 1] - begin <= EARLY * (read[cut] - begin)
+    return goes_on and (early or int(lines[cut + 1] - lines[cut]) > 1)
 
 
 def are_steps(name: str, values: FloatArray) -> bool:

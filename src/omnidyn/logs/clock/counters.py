@@ -1,12 +1,14 @@
-"""Encoders that start over: after a turn, or where their counter is full. Their angle goes on."""
+"""Encoders that start over: after a turn, where their counter is full, or set to another value. Their angle goes on."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
-from omnidyn.model.frames import unwrapped
+from omnidyn.statistics import median, robust_std
 from omnidyn.units import TURN, parse_unit
 
 COUNTERS = (2.0**16, 2.0**32)  # counts that fit into two and four bytes
@@ -17,45 +19,93 @@ FAST = 0.3  # of a period: a wheel that usually goes so far between rows cannot 
 USUAL = 0.99
 FASTEST, TICKS = 1.5, 2.0  # where a counter starts over, it moves no farther than that many times its longest step
 WHOLE_TICKS = 0.1  # readings that were counted are as near to whole ticks
+NEIGHBOURS = 3  # steps to either side that tell how a wheel moves
+LEAST_STEPS = 4 * NEIGHBOURS
+ODD, SLACK = 2.0, 8.0  # a step is odd beyond so many neighbouring steps and so many ticks (or times the noise)
+BACK, ON = 3.0, 20.0  # an odd step is no motion beyond so many of the longest steps: against, along the motion
+TO_ZERO = 6.0  # and beyond so many of the steps beside it, where the counter is at 0 behind it
+LATE = 1.5  # usual steps of time: a longer one hides what the wheel did
 
 
-def unrolled(counts: FloatArray, unit: str, where: str) -> tuple[FloatArray, float | None]:
-    """(readings of an encoder without its jumps, what it starts over after; None where it does not).
+class Unrolled(NamedTuple):
+    """Readings without jumps, shape (rows,). period: what they start over after, or None. restarts: rows, each the
+    first one after the counter was set to another value; the readings go on as the wheel moved before and after."""
+
+    readings: FloatArray
+    period: float | None
+    restarts: tuple[int, ...]
+
+
+class _Steps(NamedTuple):
+    """size: from row to row. expected: by the steps beside it. beside: the usual size of these. rows: usual steps of
+    time that it lasts, at least 1. All of shape (steps,). tick: the least change that means motion."""
+
+    size: FloatArray
+    expected: FloatArray
+    beside: FloatArray
+    rows: FloatArray
+    tick: float
+
+
+def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = None) -> Unrolled:
+    """The readings of an encoder without its jumps.
 
     counts: as they stand in the file, shape (rows,), NaN where missing, which stays. unit: as units.py writes it; of
-    counts that a driver has made radians, the tick is found in the steps. A jump that does not go on as the wheel
-    moved before, as where an encoder was set to 0, is left as it is.
+    counts that a driver has made radians, the tick is found in the steps. t [s]: of the rows; None: of one rate.
     Raises InputError where the wheel turns so far between rows that nobody can tell how far it turned.
     """
-    known = np.isfinite(counts)
-    steps = np.diff(counts[known])
-    period = _period(counts[known], steps, unit)
-    if period is None:
-        return counts, None
-    usual = float(np.quantile(np.abs(_wrapped(steps, period)), USUAL))
-    if usual > FAST * period:
+    t = np.arange(len(counts), dtype=float) if t is None else t
+    rows = np.flatnonzero(np.isfinite(counts) & np.isfinite(t))
+    rows = rows[np.argsort(t[rows], kind="stable")]
+    readings, steps = counts[rows], np.diff(counts[rows])
+    tick = 1.0 if "/" in unit else _tick(np.abs(steps), float(np.ptp(readings)) if rows.size else 0.0)
+    period, restarts, smooth = _full(readings, steps, unit, tick), np.zeros(0, dtype=np.int64), steps
+    if period is None and len(steps) >= LEAST_STEPS:
+        found = _compared(steps, t[rows], tick)
+        odd = _odd(found)
+        period = _common(readings, found, odd, unit, tick)
+        if period is not None:
+            smooth = _wrapped(steps, period)
+            odd = odd[_far_from_whole(found, odd, period)]
+        restarts = _restarts(readings, found._replace(size=smooth), odd)
+        smooth = smooth.copy()
+        smooth[restarts] = found.expected[restarts]
+    elif period is not None:
+        smooth = _wrapped(steps, period)
+    if period is None and not restarts.size:
+        return Unrolled(counts, None, ())
+    _refuse_fast(smooth, period, where)
+    going_on = counts.copy()
+    going_on[rows] = readings + np.concatenate([[0.0], np.cumsum(smooth - steps)])
+    return Unrolled(going_on, period, tuple(int(row) for row in rows[restarts + 1]))
+
+
+def _refuse_fast(steps: FloatArray, period: float | None, where: str) -> None:
+    usual = float(np.quantile(np.abs(steps), USUAL))
+    if period is not None and usual > FAST * period:
         raise InputError(
             f"an angle starts over after {period:.6g} and moves too far between rows",
             got=f"steps of {usual:.4g}", expected=f"steps below {FAST * period:.4g}",
             remedy="log faster, or log the speed", where=where,
         )  # fmt: skip
-    return unwrapped(counts, period), period
 
 
 def _wrapped(steps: FloatArray, period: float) -> FloatArray:
     return steps - period * np.round(steps / period)
 
 
-def _period(readings: FloatArray, steps: FloatArray, unit: str) -> float | None:
-    """The least period within which all readings lie and whose jumps they show."""
+# ---- periods that are known: a turn, a full counter -------------------------------------------------------
+
+
+def _full(readings: FloatArray, steps: FloatArray, unit: str, tick: float) -> float | None:
+    """The least known period within which all readings lie and whose jumps they show."""
     if not steps.size:
         return None
-    width, size = float(np.ptp(readings)), np.abs(steps)
+    width, farthest = float(np.ptp(readings)), float(np.abs(steps).max())
     turn = TURN / parse_unit(unit).size
-    tick = 1.0 if "/" in unit else _tick(size, width)  # counts, so many of which make a turn
-    periods = [turn, *(tick * each for each in COUNTERS if tick > 0.0)]
+    periods = [turn, *(tick * each for each in COUNTERS if tick > 0.0)]  # counts, so many of which make a turn
     for period in sorted(periods):
-        if MOST_FULL * period < width <= WHOLE * period and float(size.max()) > JUMP * period:
+        if MOST_FULL * period < width <= WHOLE * period and farthest > JUMP * period:
             return period if period == turn or _goes_on(steps, period, tick) else None
     return None
 
@@ -75,3 +125,88 @@ def _tick(size: FloatArray, width: float) -> float:
     tick = float(moved.min())
     tick = float(moved.sum() / np.round(moved / tick).sum())
     return tick if float(np.abs(moved / tick - np.round(moved / tick)).max()) < WHOLE_TICKS else 0.0
+
+
+# ---- steps that the steps beside them do not explain ------------------------------------------------------
+
+
+def _compared(steps: FloatArray, t: FloatArray, tick: float) -> _Steps:
+    """The steps beside what their neighbours say of them."""
+    lasts = np.diff(t)
+    rows = np.maximum(1.0, lasts / max(median(lasts), 1e-12))
+    speed = np.pad(steps / rows, NEIGHBOURS, mode="reflect")
+    beside = np.stack([np.roll(speed, k) for k in range(-NEIGHBOURS, NEIGHBOURS + 1) if k])[:, NEIGHBOURS:-NEIGHBOURS]
+    noise = float(robust_std(np.diff(steps), 0.0))
+    expected = rows * np.median(beside[1:-1], axis=0)  # the two steps before and the two behind
+    return _Steps(steps, expected, rows * np.median(np.abs(beside), axis=0), rows, max(tick, noise))
+
+
+def _odd(steps: _Steps) -> IntArray:
+    """Steps far from what those beside them say, in order."""
+    away = np.abs(steps.size - steps.expected)
+    return np.flatnonzero(away > ODD * steps.beside + SLACK * steps.tick)
+
+
+def _common(readings: FloatArray, steps: _Steps, odd: IntArray, unit: str, tick: float) -> float | None:
+    """The size that two jumps or more have in common, where no reading lies outside of one such period."""
+    away = (steps.size - steps.expected)[odd]
+    onward = away * steps.expected[odd] < 0.0  # the wheel moves on over the end of its counter
+    if onward.sum() < 2:
+        return None
+    period, width = median(np.abs(away[onward])), float(np.ptp(readings))
+    alike = onward & (np.abs(np.abs(away) - period) <= steps.beside[odd] + SLACK * steps.tick)
+    if alike.sum() < 2 or not MOST_FULL * period < width <= WHOLE * period:
+        return None
+    sizes = np.abs(away[alike])
+    doubt = max(2.0 * float(sizes.std()) / np.sqrt(len(sizes)), tick)
+    return _round(max(float(sizes.mean()), width), doubt, TURN / parse_unit(unit).size, width, tick)
+
+
+def _round(period: float, doubt: float, turn: float, width: float, tick: float) -> float:
+    """The plainest number in doubt of a period: a turn, a power of two of ticks, a round number of ticks."""
+    low, high = max(period - doubt, width), period + doubt
+    if low <= turn <= high or not tick > 0.0:
+        return turn if low <= turn <= high else period
+    power = tick * 2.0 ** np.round(np.log2(period / tick))
+    if low <= power <= high:
+        return float(power)
+    for digits in range(1, 10):
+        unit = 10.0 ** (np.floor(np.log10(period / tick)) + 1 - digits)
+        plain = tick * unit * np.round(period / tick / unit)
+        if low <= plain <= high or unit <= 1.0:
+            return float(plain)
+    return period
+
+
+def _far_from_whole(steps: _Steps, odd: IntArray, period: float) -> BoolArray:
+    """Which odd steps are no jump by a period."""
+    away = np.abs(_wrapped(steps.size[odd] - steps.expected[odd], period))
+    return away > ODD * steps.beside[odd] + SLACK * steps.tick
+
+
+def _restarts(readings: FloatArray, steps: _Steps, odd: IntArray) -> IntArray:
+    """Odd steps that no wheel makes: beyond all others of the log, or to 0; not there and back, as a wild value is."""
+    away = (steps.size - steps.expected)[odd]
+    usual = np.ones(len(steps.size), dtype=bool)
+    usual[odd] = False
+    fastest = float((np.abs(steps.size) / steps.rows)[usual].max(initial=0.0))
+    if fastest == 0.0:  # what never turns else shows no motion to compare with
+        return odd[:0]
+    longest = fastest * steps.rows[odd] + steps.tick
+    along = away * steps.expected[odd] > 0.0
+    beyond = np.abs(away) > np.where(along, ON, BACK) * longest
+    beside = np.abs(np.pad(steps.size, 2, mode="reflect"))
+    most = np.stack([beside[odd + k] for k in (0, 1, 3, 4)]).max(axis=0) if odd.size else away
+    to_zero = np.abs(readings[odd + 1]) <= 2.0 * (steps.beside[odd] + steps.tick)
+    to_zero &= (np.abs(away) > TO_ZERO * most + SLACK * steps.tick) & (steps.rows[odd] < LATE)
+    return odd[(beyond | to_zero) & ~_there_and_back(odd, away)]
+
+
+def _there_and_back(odd: IntArray, away: FloatArray) -> BoolArray:
+    """Which odd steps are taken back within a few rows."""
+    back = np.zeros(len(odd), dtype=bool)
+    for k in range(len(odd) - 1):
+        near = odd[k + 1] - odd[k] <= NEIGHBOURS
+        if near and abs(away[k] + away[k + 1]) < 0.1 * abs(away[k]):
+            back[k : k + 2] = True
+    return back

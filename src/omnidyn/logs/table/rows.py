@@ -165,7 +165,7 @@ class RowParser:
                 f"row {row} has another number of cells than the header",
                 got=f"{len(cells)}: {text}",
                 expected=f"{len(self.layout.names)} cells",
-                remedy=_ragged_hint(self.layout.separator),
+                remedy=_ragged_hint(self.layout.separator, len(cells) > len(self.layout.names)),
                 where=f"{self.source}:{line}",
             )
 
@@ -312,10 +312,10 @@ def _mostly_numbers(cells: Sequence[str]) -> bool:
     return 2 * sum(map(dialect.looks_like_number, there)) >= len(there)
 
 
-def _ragged_hint(separator: str) -> str:
-    if separator == ",":
-        return "a decimal comma? then separate the columns by semicolons; else correct or remove the row"
-    return "correct or remove the row"
+def _ragged_hint(separator: str, more: bool) -> str:
+    """What to do about a row with more cells than the header, or with fewer."""
+    commas = "a decimal comma? then separate the columns by semicolons; else " if more and separator == "," else ""
+    return f"{commas}correct or remove the row, or leave such rows out with `skip_bad_rows`"
 
 
 def skip_note(reason: str, lines: list[int]) -> str:

@@ -168,4 +168,7 @@ def _hint(cell: str) -> str:
         return "write plain decimal digits"
     if "," in cell:
         return "write a decimal point, and no separator of thousands"
-    return "correct or remove the row; where a number is missing, leave the cell blank"
+    return (
+        "correct or remove the row, or leave such rows out with `skip_bad_rows`; where a number is missing, leave the "
+        "cell blank"
+    )
