@@ -9,6 +9,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.logs.clock.restarts import CLOCK, Restart
+from omnidyn.logs.clock.stamps import astray
 from omnidyn.logs.column import Column
 from omnidyn.logs.segments import GAP
 from omnidyn.logs.table.table import Table
@@ -64,6 +65,7 @@ class Clock:
             self._steps = are_steps(column.name, counts)
         if self._steps:
             return self._summed(counts, column, notes)
+        counts = _without_strays(counts, table.lines, column, notes)
         counts = self._going_on(counts, table.lines, column, notes)
         known = counts[np.isfinite(counts)]
         if self._start is None and known.size:
@@ -172,6 +174,19 @@ class Clock:
         if not isinstance(self._start, datetime):
             self._start = date
         return (date - self._start).total_seconds()
+
+
+def _without_strays(counts: FloatArray, lines: IntArray, column: Column, notes: list[str]) -> FloatArray:
+    """The counts, NaN where a single one lies far from all others."""
+    known = np.flatnonzero(np.isfinite(counts))
+    bad = known[astray(counts[known], DAY / abs(column.factor))]
+    if not bad.size:
+        return counts
+    first, many = f"{counts[bad[0]]:.9g} {column.unit} in line {lines[bad[0]]}", f"{len(bad)} rows have times"
+    notes.append(f"{many if len(bad) > 1 else '1 row has a time'} far from all others (first: {first}): left out")
+    counts = counts.copy()
+    counts[bad] = np.nan
+    return counts
 
 
 def _is_restart(read: FloatArray, lines: IntArray, cut: int, begin: float) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -80,7 +81,7 @@ def beside_restarts(t: FloatArray, counters: Sequence[Counter]) -> BoolArray:
 def recordings(rows: int, begins: Sequence[int]) -> list[slice]:
     """The rows of each recording of a file. begins: the first one behind each restart of its clock."""
     edges = [0, *begins, rows]
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def full_counter(component: str, column: str, period: float, unit: str, line: int) -> Restart:

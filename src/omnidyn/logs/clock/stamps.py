@@ -1,4 +1,7 @@
-"""Times in two columns, as ROS writes them: header.stamp.sec and header.stamp.nanosec are one time in seconds."""
+"""Times in two columns, as ROS writes them: header.stamp.sec and header.stamp.nanosec are one time in seconds.
+
+And times that no recording holds, far from all others.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.logs.channels import TIME
 from omnidyn.logs.table.table import Table
 
@@ -14,6 +18,19 @@ _WHOLE = ("sec", "secs", "seconds")
 _REST = {"nanoseconds": 1e-9, "nanosecs": 1e-9, "nanosec": 1e-9, "nsecs": 1e-9, "nsec": 1e-9,
          "microseconds": 1e-6, "usecs": 1e-6, "usec": 1e-6}  # fmt: skip
 _NAME = re.compile(rf"(?P<stem>.*?)(?P<rest>{'|'.join(_REST)})", re.IGNORECASE | re.DOTALL)
+
+MANY, FEW = 10, 0.01  # stamps of which some may be astray; the share that may be
+LENGTHS = 10.0  # lengths of the recording: what is farther from its middle, and more than a day, is astray
+
+
+def astray(stamps: FloatArray | IntArray, day: float) -> BoolArray:
+    """Which of the stamps, shape (n,), are no time of their recording: a few far from the rest. day: in their unit."""
+    if len(stamps) < MANY:
+        return np.zeros(len(stamps), dtype=bool)
+    times = stamps.astype(float)
+    low, middle, high = np.quantile(times, [FEW, 0.5, 1.0 - FEW])
+    far = np.abs(times - middle) > max(abs(day), LENGTHS * float(high - low))
+    return far if far.sum() <= max(1.0, FEW * len(far)) else np.zeros(len(far), dtype=bool)
 
 
 def with_joined_stamp(table: Table) -> Table:

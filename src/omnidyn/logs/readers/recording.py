@@ -6,14 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, shortened
+from omnidyn.logs.clock.stamps import astray
+from omnidyn.logs.readers.left_out import LeftOut
 from omnidyn.logs.table.header import MAX_COLUMNS
 from omnidyn.logs.table.rows import Column, refuse_infinite
 from omnidyn.logs.table.table import MAX_CELLS, Said, Table
 
 TIME_COLUMN = "t_s"
+DAY_NS = 86_400 * 10**9
 EPOCH_NS = 10**17  # later counts from 1970: the start is taken off before it becomes a float, so that no digit is lost
 
 
@@ -51,9 +55,12 @@ class Track:
         """The same by stamps; those of one stamp in their order."""
         if (self.stamps[1:] >= self.stamps[:-1]).all():
             return self
-        order = np.argsort(self.stamps, kind="stable")
-        columns = {name: values[order] for name, values in self.columns.items()}
-        return Track(self.topic, self.stamps[order], columns, self.units, self.says)
+        return self.rows(np.argsort(self.stamps, kind="stable"))
+
+    def rows(self, keep: NDArray) -> Track:
+        """The same with some of its rows: a mask or indices."""
+        columns = {name: values[keep] for name, values in self.columns.items()}
+        return Track(self.topic, self.stamps[keep], columns, self.units, self.says)
 
 
 @dataclass
@@ -72,7 +79,7 @@ class Recording:
 
         Raises InputError where no topic holds numbers.
         """
-        tracks = [track.in_order() for track in self.tracks if len(track.stamps) and track.columns]
+        tracks = [track.in_order() for track in self._without_strays() if len(track.stamps) and track.columns]
         names = (TIME_COLUMN, *(name for track in tracks for name in track.columns))
         if not tracks:
             raise self._nothing()
@@ -98,6 +105,18 @@ class Recording:
             refuse_infinite(block, lines, self.source)
             yield Table(names, block, lines, *rest, "", notes, says=says, own_clocks=own)
         yield Table(names, {}, np.zeros(0, dtype=np.int64), *rest, self.sha256, notes, says=says, own_clocks=own)
+
+    def _without_strays(self) -> list[Track]:
+        """The tracks without single stamps far from all others."""
+        stamps = np.concatenate([track.stamps for track in self.tracks] or [np.zeros(0, dtype=np.int64)])
+        bad = astray(stamps, DAY_NS)
+        if not bad.any():
+            return self.tracks
+        parts = np.split(bad, np.cumsum([len(track.stamps) for track in self.tracks])[:-1])
+        topic = next(track.topic for track, part in zip(self.tracks, parts, strict=True) if part.any())
+        left_out = LeftOut(int(bad.sum()), f"a time of {stamps[bad][0] / 1e9:.9g} s in {topic}, far from all others")
+        self.notes += left_out.notes
+        return [track.rows(~part) for track, part in zip(self.tracks, parts, strict=True)]
 
     def _nothing(self) -> InputError:
         told = [f"{each.name} ({each.type}, {each.count})" for each in self.topics if each.count]

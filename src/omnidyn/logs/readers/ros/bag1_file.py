@@ -10,6 +10,7 @@ import struct
 from collections.abc import Callable, Iterator
 from typing import BinaryIO
 
+from omnidyn.logs.readers.left_out import LeftOut
 from omnidyn.logs.readers.ros.messages import Connection, Message
 from omnidyn.logs.readers.ros.pack import DamagedError, Unpacker
 
@@ -24,7 +25,7 @@ class Bag1File:
     def __init__(self, stream: BinaryIO, size: int, unpacker: Unpacker, told: Callable[[int], None]):
         self.stream, self.size, self.unpacker, self.told = stream, size, unpacker, told
         self.connections: dict[int, Connection] = {}
-        self.damage = ""
+        self.damage, self.odd = "", LeftOut()
         self.promised: tuple[int, int] | None = None  # where the index begins, and how many records it has
         self.indexed = 0
 
@@ -97,7 +98,8 @@ class Bag1File:
             seconds, rest = _STAMP.unpack(fields["time"])
             connection = self.connections.get(_LENGTH.unpack(fields["conn"])[0])
             if connection is None:
-                raise DamagedError("a message of a connection that is nowhere told")
+                self.odd.add("a message of a connection that is nowhere told")
+                return
             yield Message(connection, seconds * 10**9 + rest, data)
 
 

@@ -50,6 +50,7 @@ def read_files(paths: Sequence[Path], source: str, options: Options) -> Recordin
             with _opened(stream, path, limit, told) as file:
                 bag.add(file.messages(bag.wants))
             damage += [file.damage] if file.damage else []
+            grown += file.odd.notes
             grown += growth(stream, size, path.name if len(paths) > 1 else "")
     if damage and not bag.count:
         raise InputError(

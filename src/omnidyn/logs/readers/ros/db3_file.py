@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from omnidyn.errors import InputError
+from omnidyn.logs.readers.left_out import LeftOut
 from omnidyn.logs.readers.ros.messages import Connection, Message
 from omnidyn.logs.readers.ros.pack import Unpacker
 
@@ -20,7 +21,7 @@ class Db3File:
 
     def __init__(self, path: Path, size: int, unpacker: Unpacker, told: Callable[[int], None]):
         self.path, self.size, self.unpacker, self.told = path, size, unpacker, told
-        self.damage = ""
+        self.damage, self.odd = "", LeftOut()
 
     def messages(self, wants: Callable[[Connection], bool]) -> Iterator[Message]:
         """All messages in the order in which they were recorded; without bytes those that nobody `wants`.
@@ -59,7 +60,8 @@ class Db3File:
         query = f"select topic_id, timestamp, case when topic_id in ({wanted}) then data end from messages order by id"
         for count, (number, stamp, data) in enumerate(db.execute(query)):
             if number not in known or not isinstance(stamp, int):
-                raise self._damaged(f"a message of topic {number}, which is nowhere told")
+                self.odd.add(f"a message of topic {number} at {stamp}, which is nowhere told or no time")
+                continue
             content = data if isinstance(data, bytes) else b""
             yield Message(known[number], stamp, self.unpacker.message(content) if content[:1] == b"\x28" else content)
             if count % 20_000 == 0:

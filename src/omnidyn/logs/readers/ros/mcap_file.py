@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from typing import BinaryIO
 
+from omnidyn.logs.readers.left_out import LeftOut
 from omnidyn.logs.readers.ros.messages import Connection, Message
 from omnidyn.logs.readers.ros.pack import DamagedError, Unpacker
 
@@ -26,7 +27,7 @@ class McapFile:
         self.stream, self.size, self.unpacker, self.told = stream, size, unpacker, told
         self.schemas: dict[int, tuple[str, str, str]] = {}
         self.channels: dict[int, Connection] = {}
-        self.damage = ""
+        self.damage, self.odd = "", LeftOut()
 
     def messages(self, _wants: Callable[[Connection], bool]) -> Iterator[Message]:
         """All messages in the order of the file; up to the first damage. Raises InputError as the Unpacker does."""
@@ -102,13 +103,23 @@ class McapFile:
             at += length
 
     def _record(self, opcode: int, content: bytes) -> Message | None:
+        """The message of a record, None for another; what cannot be used is left out."""
+        try:
+            return self._read(opcode, content)
+        except DamagedError as error:
+            self.odd.add(str(error))
+        except (struct.error, IndexError, UnicodeDecodeError):
+            self.odd.add("a record that is not what it says")
+        return None
+
+    def _read(self, opcode: int, content: bytes) -> Message | None:
         if opcode == MESSAGE:
             channel, _, log_time, _ = _MESSAGE.unpack_from(content)
             connection = self.channels.get(channel)
             if connection is None:
                 raise DamagedError(f"a message of channel {channel}, which is nowhere told")
             if log_time >= 2**63:
-                raise DamagedError("a message is of the year 2262 or later")
+                raise DamagedError(f"a message of {connection.topic} before 1970 or after 2262")
             data = content[_MESSAGE.size :]
             return Message(connection, log_time, self.unpacker.message(data) if data[:1] == b"\x28" else data)
         if opcode == SCHEMA:

@@ -22,6 +22,7 @@ from omnidyn.files import default_max_bytes, growth, open_regular, pieces, too_l
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.readers.claims import Claim, Out, tracks_of
+from omnidyn.logs.readers.left_out import LeftOut
 from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.readers.recording import Recording, Topic, topic_of
 from omnidyn.logs.readers.ros.layout import column
@@ -33,9 +34,11 @@ MAGIC = b"WPILOG"
 VERSION = 1  # the major one
 START = 0
 SIZES = {"boolean": ("u1", 1), "int64": ("i8", 8), "float": ("f4", 4), "double": ("f8", 8)}
+SIZES["int"] = SIZES["int64"]  # as it was called until 2024
 MAX_ARRAY, MAX_ENTRIES, MAX_VALUE = 64, 20_000, 2**28
 STRUCT, SCHEMA, SCHEMA_ENTRY = "struct:", "structschema", "/.schema/struct:"
 _LATE = 2**62 // 1000  # [us]
+STRAY = 20  # values in a row of entries that were nowhere started: nobody knows where the next record begins
 
 
 class Entry:
@@ -67,6 +70,7 @@ class WpilogFile:
         self.entries: dict[tuple[str, str], Entry] = {}
         self.open: dict[int, Entry] = {}
         self.damage, self.count, self.held = "", 0, 0
+        self.odd, self.stray = LeftOut(), 0
 
     def read(self) -> None:
         """All records, up to the first that is not whole. Raises InputError for another version, or too many bytes."""
@@ -88,6 +92,8 @@ class WpilogFile:
             self.damage = str(end)
         if self.damage and not self.count:
             raise self._nothing(self.damage)
+        if self.odd.count and not self.count:
+            raise self._nothing(self.odd.first)
 
     def _records(self) -> Iterator[tuple[int, int, bytes]]:
         buffer, at, done = b"", 0, self.stream.tell()
@@ -107,10 +113,10 @@ class WpilogFile:
             if d > len(buffer):
                 raise _Ends("it ends in the middle of a record")
             entry, length = int.from_bytes(buffer[a:b], "little"), int.from_bytes(buffer[b:c], "little")
-            stamp = int.from_bytes(buffer[c:d], "little")
+            stamp = int.from_bytes(buffer[c:d], "little", signed=d - c == 8)
             if length > self.size - (done + d):
                 raise _Ends("it ends in the middle of a record")
-            if sizes & 0x80 or length > MAX_VALUE or stamp > _LATE:
+            if sizes & 0x80 or length > MAX_VALUE:
                 raise _Ends(f"what stands at byte {done + at} is no record")
             if d + length > len(buffer):
                 buffer, done, at, d = buffer[at:] + self._more(length + BLOCK_BYTES), done + at, 0, d - at
@@ -125,24 +131,37 @@ class WpilogFile:
 
     def _take(self, number: int, stamp: int, value: bytes) -> None:
         if number == START:
-            self._control(value)
+            if why := self._control(value):
+                self.odd.add(why)
             return
         entry = self.open.get(number)
         if entry is None:
-            raise _Ends(f"a value of entry {number}, which is nowhere started")
+            self.odd.add(f"a value of entry {number}, which is nowhere started")
+            self.stray += 1
+            if self.stray >= STRAY:
+                raise _Ends(self.odd.first)
+            return
+        self.stray = 0
+        if not 0 <= stamp <= _LATE:
+            self.odd.add(f"a value of {printable(entry.name)} at {stamp / 1e6:.6g} s")
+            return
         entry.add(stamp, value)
         self.count += 1
         self.held += len(value) + 12 if entry.keeps else 8
         if self.held > self.max_bytes:
             raise too_large(self.source, self.max_bytes, TOO_LARGE_REMEDY)
 
-    def _control(self, value: bytes) -> None:
+    def _control(self, value: bytes) -> str:
+        """Start or end an entry. Why the record cannot be used; "" where it was."""
         if len(value) < 5:
-            raise _Ends("a control record is too short")
+            return "a control record that is too short"
         kind, number = value[0], int.from_bytes(value[1:5], "little")
         if kind == 0:
-            name, at = _text(value, 5)
-            form, _ = _text(value, at)
+            try:
+                name, at = _text(value, 5)
+                form, _ = _text(value, at)
+            except (struct.error, ValueError):
+                return "a text that is longer than its record"
             key = (name, form)
             if key not in self.entries and len(self.entries) >= MAX_ENTRIES:
                 raise _Ends(f"more than {MAX_ENTRIES} entries")
@@ -150,7 +169,8 @@ class WpilogFile:
         elif kind == 1:
             self.open.pop(number, None)
         elif kind != 2:
-            raise _Ends(f"a control record of kind {kind}")
+            return f"a control record of kind {kind}"
+        return ""
 
     def _nothing(self, why: str) -> InputError:
         return InputError(
@@ -160,12 +180,9 @@ class WpilogFile:
 
 
 def _text(value: bytes, at: int) -> tuple[str, int]:
-    try:
-        (size,) = struct.unpack_from("<I", value, at)
-    except struct.error:
-        raise _Ends("a control record is too short") from None
+    (size,) = struct.unpack_from("<I", value, at)
     if size > len(value) - at - 4:
-        raise _Ends("a text is longer than its record")
+        raise ValueError(size)
     return value[at + 4 : at + 4 + size].decode("utf-8", "replace"), at + 4 + size
 
 
@@ -179,7 +196,7 @@ def read_wpilog(path: str | os.PathLike, options: Options) -> Recording:
         stream.seek(0)
         file = WpilogFile(stream, size, source, options)
         file.read()
-        notes = list(growth(stream, size))
+        notes = [*growth(stream, size), *file.odd.notes]
     if file.damage:
         notes.append(f"the file is damaged: {file.damage}; {file.count} values before that were read")
     schemas = {
