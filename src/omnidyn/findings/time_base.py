@@ -8,7 +8,6 @@ from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.values.counters import check_counters, restarts_of
-from omnidyn.logs.clock.restarts import FULL
 from omnidyn.logs.log import MAX_MISSING, Log, back_remedy
 from omnidyn.logs.segments import GAP, segments
 from omnidyn.model.robot import Robot
@@ -128,7 +127,7 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
 
 def _gaps(work: LogUnderCheck) -> list[Finding]:
     lines = work.log.lines[work.rows]
-    known = [each.line for each in work.log.restarts if each.code != FULL]  # a gap of their own
+    known = [each.line for each in work.log.restarts if each.is_gap]  # a gap of their own
     cuts = [segment.start for segment in work.segments[1:]]
     cuts = [k for k in cuts if not any(lines[k - 1] < line <= lines[k] for line in known)]
     if not cuts:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,15 @@ class Log:
         """The log with some of its rows: a mask, indices or a slice."""
         channels = {name: values[keep] for name, values in self.channels.items()}
         return replace(self, t=self.t[keep], lines=self.lines[keep], channels=channels)
+
+    def recordings(self) -> list[Log]:
+        """The log cut where its clock or a counter begins again, and where its time goes back now and then."""
+        back = np.flatnonzero(np.diff(self.t) < 0.0) + 1
+        cuts = back if back.size <= OFTEN_BACK * len(self) else back[:0]
+        lines = [each.line for each in self.restarts if each.is_gap]
+        edges = np.unique([0, *cuts, *np.searchsorted(self.lines, lines), len(self)])
+        parts = [self.rows(slice(int(a), int(b))) for a, b in pairwise(edges)]
+        return [replace(part, restarts=()) for part in parts] if len(parts) > 1 else [self]
 
     def to_run(self, *, sort: bool = False) -> Run:
         """The Run: rows without time or numbers, padding at the end and repeated stamps left out, each said in words.
@@ -249,7 +259,8 @@ def back_remedy(times: int, rows: int, sort: str) -> str:
             "do not sort the rows: look at how the time is written (milliseconds without leading zeros?), and whether "
             "another column is the clock (`column` t=NAME:UNIT)"
         )
-    return f"split the file where two logs were joined; where rows were written out of order, {sort}"
+    split = "split the file where two logs were joined (`convert` with `split`)"
+    return f"{split}; where rows were written out of order, {sort}"
 
 
 def _held(values: FloatArray) -> FloatArray:

@@ -16,8 +16,16 @@ from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock.clock import Clock
 from omnidyn.logs.clock.counters import unrolled
+from omnidyn.logs.clock.overflow import widened
 from omnidyn.logs.clock.rate import timed
-from omnidyn.logs.clock.restarts import Counter, beside_restarts, counter_restarts, full_counter, recordings
+from omnidyn.logs.clock.restarts import (
+    Counter,
+    beside_restarts,
+    counter_restarts,
+    full_counter,
+    overflow,
+    recordings,
+)
 from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.column import MOTOR_SIDE, Column
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
@@ -206,6 +214,9 @@ def log_from_table(
                 full_counter(key, column.name, each, _bare(column.unit), int(table.lines[0])) for each in periods
             ]
             counters.append(Counter(key, column.name, read, again))
+        if found[0] == "wheel_speed":
+            values, jumps, followed = widened(values, t)
+            restarts += [overflow(key, column.name, jumps, followed, int(table.lines[0]))] if jumps else []
         values = values * column.factor
         if found[0] in SIDED:
             values = values / _divisor(column, key, robot, found[1], table.source)

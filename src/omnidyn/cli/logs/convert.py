@@ -1,6 +1,8 @@
-"""omnidyn convert IN OUT: a log of any kind as a run file, MCAP or MAT."""
+"""omnidyn convert IN OUT: a log of any kind as a run file, MCAP or MAT; with --split one for each recording in it."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import typer
 
@@ -28,6 +30,11 @@ def convert(
     ),
     max_bytes: int = log_options.MAX_BYTES,
     var: list[str] = log_options.VARIABLE,
+    split: bool = typer.Option(
+        False,
+        "--split",
+        help="Where the clock or a counter of IN restarts, another file: OUT_1, OUT_2, ..",
+    ),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
 ) -> None:
     """Write a log in another format, in SI and by channel.
@@ -39,7 +46,8 @@ def convert(
     from omnidyn.files import check_output
 
     log_options.keep_inputs([log, *beside], [robot], [map_file], out, save_map)
-    check_output(out, force)
+    if not split:
+        check_output(out, force)
     from omnidyn.logs.read_log import load_log
     from omnidyn.logs.run_file import check_format, write_run
     from omnidyn.model.robot_file import load_robot
@@ -53,8 +61,21 @@ def convert(
     with progress("reading"):
         read = load_log(log, load_robot(robot) if robot else None, options)
         maps.show(log, read.columns)
-        run = read.to_run(sort=sort)
-    for warning in run.warnings:
+        runs = [part.to_run(sort=sort) for part in (read.recordings() if split else [read])]
+    files = [out] if len(runs) == 1 else numbered(out, len(runs))
+    log_options.keep_inputs([log, *beside], [robot], [map_file], *files, save_map)
+    for path in files:
+        check_output(path, force)
+    for warning in dict.fromkeys(words for run in runs for words in run.warnings):
         say(f"omnidyn: warning: {warning}")
-    write_run(run, out, force)
-    say(f"omnidyn: wrote {out}")
+    for path, run in zip(files, runs, strict=True):
+        write_run(run, path, force)
+        say(f"omnidyn: wrote {path}")
+    if split and len(runs) == 1:
+        say("omnidyn: no clock and no counter restarts in this log: it is one recording")
+
+
+def numbered(path: str, count: int) -> list[str]:
+    """drive_1.csv, drive_2.csv, .. of drive.csv."""
+    place = Path(path)
+    return [str(place.with_name(f"{place.stem}_{k + 1}{place.suffix}")) for k in range(count)]

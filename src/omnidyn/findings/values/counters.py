@@ -14,14 +14,13 @@ from omnidyn.logs.log import Log
 
 
 def restarts_of(log: Log) -> list[Finding]:
-    """Where the reader found that the log begins again; it was mended then."""
-    return [
-        Finding(
-            each.code, NOTE if each.code == FULL else WARN, each.where, each.words, each.remedy,
-            ((each.line, each.line),) if each.code != FULL else (), int(each.code != FULL),
-        )
-        for each in log.restarts
-    ]  # fmt: skip
+    """What the reader found to begin again or to start over."""
+    found = []
+    for each in log.restarts:
+        level = FATAL if not each.mended else NOTE if each.code == FULL else WARN
+        rows = ((each.line, each.line),) if each.is_gap else ()
+        found.append(Finding(each.code, level, each.where, each.words, each.remedy, rows, len(rows)))
+    return found
 
 
 def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:

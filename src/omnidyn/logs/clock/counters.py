@@ -58,7 +58,7 @@ def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = N
     rows = np.flatnonzero(np.isfinite(counts) & np.isfinite(t))
     rows = rows[np.argsort(t[rows], kind="stable")]
     readings, steps = counts[rows], np.diff(counts[rows])
-    tick = 1.0 if "/" in unit else _tick(np.abs(steps), float(np.ptp(readings)) if rows.size else 0.0)
+    tick = 1.0 if "/" in unit else tick_of(np.abs(steps), float(np.ptp(readings)) if rows.size else 0.0)
     period, restarts, smooth = _full(readings, steps, unit, tick), np.zeros(0, dtype=np.int64), steps
     if period is None and len(steps) >= LEAST_STEPS:
         found = _compared(steps, t[rows], tick)
@@ -117,7 +117,7 @@ def _goes_on(steps: FloatArray, period: float, tick: float) -> bool:
     return bool((np.abs(_wrapped(steps[jumps], period)) <= FASTEST * longest + TICKS * tick).all())
 
 
-def _tick(size: FloatArray, width: float) -> float:
+def tick_of(size: FloatArray, width: float) -> float:
     """What all steps are whole multiples of, where they are; else 0. size: of the steps, (rows,)."""
     moved = size[(size > 0.0) & (size < JUMP * width)]
     if not moved.size:

@@ -13,15 +13,16 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.logs.segments import GAP
 from omnidyn.statistics import median
 
-CLOCK, COUNTER, FULL = "clock_restart", "counter_restart", "counter_full"
+CLOCK, COUNTER, FULL, OVERFLOW = "clock_restart", "counter_restart", "counter_full", "speed_overflow"
 MARGIN = 1.1  # of the least gap
 
 
 @dataclass(frozen=True)
 class Restart:
-    """code: CLOCK, COUNTER (set to another value) or FULL (starts over after a period). where: components, or "t".
+    """code: CLOCK, COUNTER (set to another value), FULL (over after a period) or OVERFLOW (a speed of too few bits).
 
-    line: the first one behind it. words: what was found. remedy: what was done about it, and what can be.
+    where: components, or "t". line: the first one behind it. words: what was found. remedy: what was done about it, and
+    what can be. mended: whether the log can be used as it now is.
     """
 
     code: str
@@ -29,6 +30,12 @@ class Restart:
     line: int
     words: str
     remedy: str = ""
+    mended: bool = True
+
+    @property
+    def is_gap(self) -> bool:
+        """Whether the log is cut there."""
+        return self.code in (CLOCK, COUNTER)
 
     @property
     def note(self) -> str:
@@ -87,3 +94,14 @@ def recordings(rows: int, begins: Sequence[int]) -> list[slice]:
 def full_counter(component: str, column: str, period: float, unit: str, line: int) -> Restart:
     """What is to be said of a counter that starts over after a period."""
     return Restart(FULL, component, line, f"{column} starts over after {period:.6g} {unit}", "it is taken to go on")
+
+
+def overflow(component: str, column: str, jumps: int, followed: bool, line: int) -> Restart:
+    """What is to be said of a speed that leaves its 16 bits."""
+    words = f"{column} leaves its 16 bits {jumps} time{'s' * (jumps > 1)} (2^15 - 1 is followed by -2^15)"
+    done = (
+        "2^16 was added or taken off there"
+        if followed
+        else "it changes too fast to be followed: log 32 bits, or faster"
+    )
+    return Restart(OVERFLOW, component, line, words, done, followed)
