@@ -24,6 +24,11 @@ LEAST_STEPS = 4 * NEIGHBOURS
 ODD, SLACK = 2.0, 8.0  # a step is odd beyond so many neighbouring steps and so many ticks (or times the noise)
 BACK, ON = 3.0, 20.0  # an odd step is no motion beyond so many of the longest steps: against, along the motion
 TO_ZERO = 6.0  # and beyond so many of the steps beside it, where the counter is at 0 behind it
+DOUBT = 0.01  # of a period at most
+ALONE = 0.1  # of the distance to the next number as plain: so small is the doubt of a period
+MOVING = 0.1  # of the rows at least: else the log has too little motion to compare with
+SMALL = 0.1  # of an odd step: a smaller one beside it does not matter
+TOP_SPEED = 2000.0  # [turns/s] no motor turns faster
 LATE = 1.5  # usual steps of time: a longer one hides what the wheel did
 
 
@@ -36,14 +41,16 @@ class Unrolled(NamedTuple):
     restarts: tuple[int, ...]
 
 
-class _Steps(NamedTuple):
+class Steps(NamedTuple):
     """size: from row to row. expected: by the steps beside it. beside: the usual size of these. rows: usual steps of
-    time that it lasts, at least 1. All of shape (steps,). tick: the least change that means motion."""
+    time that it lasts, at least 1. seconds: that it lasts. All of shape (steps,). tick: the least change that means
+    motion."""
 
     size: FloatArray
     expected: FloatArray
     beside: FloatArray
     rows: FloatArray
+    seconds: FloatArray
     tick: float
 
 
@@ -59,19 +66,14 @@ def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = N
     rows = rows[np.argsort(t[rows], kind="stable")]
     readings, steps = counts[rows], np.diff(counts[rows])
     tick = 1.0 if "/" in unit else tick_of(np.abs(steps), float(np.ptp(readings)) if rows.size else 0.0)
-    period, restarts, smooth = _full(readings, steps, unit, tick), np.zeros(0, dtype=np.int64), steps
-    if period is None and len(steps) >= LEAST_STEPS:
-        found = _compared(steps, t[rows], tick)
-        odd = _odd(found)
-        period = _common(readings, found, odd, unit, tick)
-        if period is not None:
-            smooth = _wrapped(steps, period)
-            odd = odd[_far_from_whole(found, odd, period)]
-        restarts = _restarts(readings, found._replace(size=smooth), odd)
+    found = compared(steps, t[rows], tick) if len(steps) >= LEAST_STEPS else None
+    period = _full(readings, steps, unit, tick) if found is None else _period(readings, found, unit, tick)
+    smooth, restarts = steps if period is None else _wrapped(steps, period), np.zeros(0, dtype=np.int64)
+    if found is not None:
+        found = found if period is None else compared(smooth, t[rows], tick)
+        restarts = _restarts(readings, found, TURN / parse_unit(unit).size)
         smooth = smooth.copy()
         smooth[restarts] = found.expected[restarts]
-    elif period is not None:
-        smooth = _wrapped(steps, period)
     if period is None and not restarts.size:
         return Unrolled(counts, None, ())
     _refuse_fast(smooth, period, where)
@@ -94,7 +96,14 @@ def _wrapped(steps: FloatArray, period: float) -> FloatArray:
     return steps - period * np.round(steps / period)
 
 
-# ---- periods that are known: a turn, a full counter -------------------------------------------------------
+# ---- periods: a turn, a full counter, or what several jumps have in common --------------------------------
+
+
+def _period(readings: FloatArray, steps: Steps, unit: str, tick: float) -> float | None:
+    """What the readings start over after, None where they do not. A jump across missing rows shows nothing."""
+    at_once = np.where(steps.rows < LATE, steps.size, 0.0)
+    known = _full(readings, at_once, unit, tick)
+    return _common(readings, steps, unit, tick) if known is None else known
 
 
 def _full(readings: FloatArray, steps: FloatArray, unit: str, tick: float) -> float | None:
@@ -130,25 +139,28 @@ def tick_of(size: FloatArray, width: float) -> float:
 # ---- steps that the steps beside them do not explain ------------------------------------------------------
 
 
-def _compared(steps: FloatArray, t: FloatArray, tick: float) -> _Steps:
+def compared(steps: FloatArray, t: FloatArray, tick: float) -> Steps:
     """The steps beside what their neighbours say of them."""
     lasts = np.diff(t)
     rows = np.maximum(1.0, lasts / max(median(lasts), 1e-12))
+    seconds = np.maximum(lasts, (t[-1] - t[0]) / len(t))  # stamps of rows that came in one packet are no times
     speed = np.pad(steps / rows, NEIGHBOURS, mode="reflect")
     beside = np.stack([np.roll(speed, k) for k in range(-NEIGHBOURS, NEIGHBOURS + 1) if k])[:, NEIGHBOURS:-NEIGHBOURS]
     noise = float(robust_std(np.diff(steps), 0.0))
-    expected = rows * np.median(beside[1:-1], axis=0)  # the two steps before and the two behind
-    return _Steps(steps, expected, rows * np.median(np.abs(beside), axis=0), rows, max(tick, noise))
+    usual = np.median(beside[1:-1], axis=0)  # the two steps before and the two behind
+    expected = np.where(np.abs(steps - rows * usual) < np.abs(steps - usual), rows * usual, usual)
+    return Steps(steps, expected, rows * np.median(np.abs(beside), axis=0), rows, seconds, max(tick, noise))
 
 
-def _odd(steps: _Steps) -> IntArray:
+def _odd(steps: Steps) -> IntArray:
     """Steps far from what those beside them say, in order."""
     away = np.abs(steps.size - steps.expected)
     return np.flatnonzero(away > ODD * steps.beside + SLACK * steps.tick)
 
 
-def _common(readings: FloatArray, steps: _Steps, odd: IntArray, unit: str, tick: float) -> float | None:
+def _common(readings: FloatArray, steps: Steps, unit: str, tick: float) -> float | None:
     """The size that two jumps or more have in common, where no reading lies outside of one such period."""
+    odd = _odd(steps)
     away = (steps.size - steps.expected)[odd]
     onward = away * steps.expected[odd] < 0.0  # the wheel moves on over the end of its counter
     if onward.sum() < 2:
@@ -157,56 +169,60 @@ def _common(readings: FloatArray, steps: _Steps, odd: IntArray, unit: str, tick:
     alike = onward & (np.abs(np.abs(away) - period) <= steps.beside[odd] + SLACK * steps.tick)
     if alike.sum() < 2 or not MOST_FULL * period < width <= WHOLE * period:
         return None
-    sizes = np.abs(away[alike])
-    doubt = max(2.0 * float(sizes.std()) / np.sqrt(len(sizes)), tick)
-    return _round(max(float(sizes.mean()), width), doubt, TURN / parse_unit(unit).size, width, tick)
+    jumps = odd[alike]
+    speed = np.pad(steps.size / steps.rows, 1, mode="reflect")
+    sizes = np.abs(steps.size[jumps] - 0.5 * steps.rows[jumps] * (speed[jumps] + speed[jumps + 2]))
+    doubt = 2.5 * float(robust_std(sizes)) / np.sqrt(len(sizes))
+    return _plainest(median(sizes), doubt, width, TURN / parse_unit(unit).size, tick)
 
 
-def _round(period: float, doubt: float, turn: float, width: float, tick: float) -> float:
-    """The plainest number in doubt of a period: a turn, a power of two of ticks, a round number of ticks."""
-    low, high = max(period - doubt, width), period + doubt
-    if low <= turn <= high or not tick > 0.0:
-        return turn if low <= turn <= high else period
-    power = tick * 2.0 ** np.round(np.log2(period / tick))
-    if low <= power <= high:
-        return float(power)
-    for digits in range(1, 10):
-        unit = 10.0 ** (np.floor(np.log10(period / tick)) + 1 - digits)
-        plain = tick * unit * np.round(period / tick / unit)
-        if low <= plain <= high or unit <= 1.0:
-            return float(plain)
-    return period
+def _plainest(period: float, doubt: float, width: float, turn: float, tick: float) -> float | None:
+    """The plainest number near a period: turns, a power of two, a round number of ticks; beyond the width of readings.
+
+    Else the next number of ticks; None where the doubt is too wide.
+    """
+    turns = turn * max(1.0, np.round(period / turn))
+    choices = [(turns, turn)]
+    if tick > 0.0:
+        power = tick * 2.0 ** np.round(np.log2(period / tick))
+        decades = tick * 10.0 ** np.arange(np.floor(np.log10(period / tick)), -1.0, -1.0)
+        choices += [(power, power), *((each * np.round(period / each), each) for each in decades)]
+    for value, apart in choices:
+        near = min(DOUBT * period, ALONE * apart, 5.0 * doubt + TICKS * tick)
+        if value > width and doubt <= ALONE * apart and abs(value - period) <= near:
+            return float(value)
+    if doubt > DOUBT * period:
+        return None
+    return max(period, width) if not tick > 0.0 else max(tick * np.round(period / tick), width + tick)
 
 
-def _far_from_whole(steps: _Steps, odd: IntArray, period: float) -> BoolArray:
-    """Which odd steps are no jump by a period."""
-    away = np.abs(_wrapped(steps.size[odd] - steps.expected[odd], period))
-    return away > ODD * steps.beside[odd] + SLACK * steps.tick
-
-
-def _restarts(readings: FloatArray, steps: _Steps, odd: IntArray) -> IntArray:
-    """Odd steps that no wheel makes: beyond all others of the log, or to 0; not there and back, as a wild value is."""
-    away = (steps.size - steps.expected)[odd]
+def _restarts(readings: FloatArray, steps: Steps, turn: float) -> IntArray:
+    """Steps that no wheel makes: beyond all others of the log, or to 0; alone, and with motion to compare with."""
+    odd = _odd(steps)
     usual = np.ones(len(steps.size), dtype=bool)
     usual[odd] = False
-    fastest = float((np.abs(steps.size) / steps.rows)[usual].max(initial=0.0))
-    if fastest == 0.0:  # what never turns else shows no motion to compare with
+    speeds = (np.abs(steps.size) / steps.rows)[usual]
+    if not odd.size or not speeds.any():
         return odd[:0]
-    longest = fastest * steps.rows[odd] + steps.tick
+    away, longest = (steps.size - steps.expected)[odd], float(speeds.max()) * steps.rows[odd] + steps.tick
     along = away * steps.expected[odd] > 0.0
     beyond = np.abs(away) > np.where(along, ON, BACK) * longest
+    beyond &= (float((speeds > 2.0 * steps.tick).mean()) > MOVING) | (np.abs(away) < speeds.sum())
+    beyond |= np.abs(away) > TOP_SPEED * turn * steps.seconds[odd]
     beside = np.abs(np.pad(steps.size, 2, mode="reflect"))
-    most = np.stack([beside[odd + k] for k in (0, 1, 3, 4)]).max(axis=0) if odd.size else away
+    most = np.stack([beside[odd + k] for k in (0, 1, 3, 4)]).max(axis=0)
     to_zero = np.abs(readings[odd + 1]) <= 2.0 * (steps.beside[odd] + steps.tick)
     to_zero &= (np.abs(away) > TO_ZERO * most + SLACK * steps.tick) & (steps.rows[odd] < LATE)
-    return odd[(beyond | to_zero) & ~_there_and_back(odd, away)]
+    return odd[(beyond | to_zero) & _alone(odd, np.abs(away), len(steps.size) - 1)]
 
 
-def _there_and_back(odd: IntArray, away: FloatArray) -> BoolArray:
-    """Which odd steps are taken back within a few rows."""
-    back = np.zeros(len(odd), dtype=bool)
-    for k in range(len(odd) - 1):
-        near = odd[k + 1] - odd[k] <= NEIGHBOURS
-        if near and abs(away[k] + away[k + 1]) < 0.1 * abs(away[k]):
-            back[k : k + 2] = True
-    return back
+def _alone(odd: IntArray, away: FloatArray, last: int) -> BoolArray:
+    """Which odd steps have none of their size beside them, as the two of a wild value have, and those of a push.
+
+    last: the last step, of which nobody knows what comes behind it; nor of the first what came before.
+    """
+    near = np.diff(odd) <= NEIGHBOURS
+    alone = (odd > 0) & (odd < last)
+    alone[:-1] &= ~near | (away[1:] < SMALL * away[:-1])
+    alone[1:] &= ~near | (away[:-1] < SMALL * away[1:])
+    return alone

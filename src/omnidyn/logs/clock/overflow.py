@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
-from omnidyn.logs.clock.counters import tick_of
+from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.logs.clock.counters import LEAST_STEPS, Steps, compared, tick_of
 from omnidyn.logs.segments import segments
 
 BITS_16 = 2.0**16
-HALF = 0.5  # of the range: a longer step between two rows is taken as a jump
-FASTEST = 1.5  # of the longest other step: over a jump, the wheel changes its speed by no more
+JUMP = 0.5  # of the range: a longer step between two rows is a jump
+SLOW = 0.15  # of the range: where the steps beside a jump are shorter, it is seen that the speed goes on over the edge
+MOSTLY = 0.5  # of the jumps, where it is so
+CLEAR = 8.0  # ticks, or noises: a longer step has a direction
+FASTEST, FOLLOWED = 1.5, 0.25  # of the longest other step: changes of speed over a jump; of the range: longest step
 REST = 0.01  # of the range: what is nearer to 0 is at rest
 WIDE = 0.8  # of the range, between the slowest and the fastest value at least
 
@@ -23,17 +26,18 @@ def widened(speeds: FloatArray, t: FloatArray) -> tuple[FloatArray, int, bool]:
     """
     rows = np.flatnonzero(np.isfinite(speeds) & np.isfinite(t))
     rows = rows[np.argsort(t[rows], kind="stable")]
-    values = speeds[rows]
-    size = _range(values)
-    if not size:
-        return speeds, 0, True
+    values, size = speeds[rows], _range(speeds[rows])
     steps = np.diff(values)
-    jumps = np.abs(steps) > HALF * size
-    longest = float(np.abs(steps[~jumps]).max(initial=0.0))
-    across = np.abs(steps[jumps]) - size  # what the speed changed over each jump
-    if not jumps.any():
+    jumps = np.abs(steps) > JUMP * size
+    if (
+        not size
+        or not jumps.any()
+        or not (jumps & _over_the_edge(compared(steps, t[rows], size / BITS_16), size)).any()
+    ):
         return speeds, 0, True
-    if longest > HALF * HALF * size or (np.abs(across) > FASTEST * longest).any():
+    longest = float(np.abs(steps[~jumps]).max(initial=0.0))
+    across = np.abs(np.abs(steps[jumps]) - size)  # what the speed changed over each jump
+    if longest > FOLLOWED * size or (across > FASTEST * longest).any():
         return speeds, int(jumps.sum()), False
     right = speeds.copy()
     for part in segments(t[rows]):
@@ -41,9 +45,16 @@ def widened(speeds: FloatArray, t: FloatArray) -> tuple[FloatArray, int, bool]:
     return right, int(jumps.sum()), True
 
 
+def _over_the_edge(steps: Steps, size: float) -> BoolArray:
+    """Steps before and behind which the speed moves on the same way, against the jump between: no reversal does."""
+    away = steps.size - steps.expected
+    onward = (away * steps.expected < 0.0) & (np.abs(steps.expected) > CLEAR * steps.tick)
+    return onward & (steps.beside < SLOW * size) & (np.abs(np.abs(away) - size) < SLOW * size)
+
+
 def _range(values: FloatArray) -> float:
     """2^16 times the step in which the speeds count, where they lie in such a range and fill it; else 0."""
-    if len(values) < 3 or not float(np.ptp(values)) > 0.0:
+    if len(values) <= LEAST_STEPS or not float(np.ptp(values)) > 0.0:
         return 0.0
     tick = 1.0 if (values == np.round(values)).all() else tick_of(np.abs(np.diff(values)), float(np.ptp(values)))
     size = BITS_16 * tick
