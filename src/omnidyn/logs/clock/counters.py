@@ -71,7 +71,7 @@ def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = N
     smooth, restarts = steps if period is None else _wrapped(steps, period), np.zeros(0, dtype=np.int64)
     if found is not None:
         found = found if period is None else compared(smooth, t[rows], tick)
-        restarts = _restarts(readings, found, TURN / parse_unit(unit).size)
+        restarts = _restarts(readings, found, TURN / parse_unit(unit).size, tick)
         smooth = smooth.copy()
         smooth[restarts] = found.expected[restarts]
     if period is None and not restarts.size:
@@ -196,7 +196,7 @@ def _plainest(period: float, doubt: float, width: float, turn: float, tick: floa
     return max(period, width) if not tick > 0.0 else max(tick * np.round(period / tick), width + tick)
 
 
-def _restarts(readings: FloatArray, steps: Steps, turn: float) -> IntArray:
+def _restarts(readings: FloatArray, steps: Steps, turn: float, tick: float) -> IntArray:
     """Steps that no wheel makes: beyond all others of the log, or to 0; alone, and with motion to compare with."""
     odd = _odd(steps)
     usual = np.ones(len(steps.size), dtype=bool)
@@ -207,7 +207,7 @@ def _restarts(readings: FloatArray, steps: Steps, turn: float) -> IntArray:
     away, longest = (steps.size - steps.expected)[odd], float(speeds.max()) * steps.rows[odd] + steps.tick
     along = away * steps.expected[odd] > 0.0
     beyond = np.abs(away) > np.where(along, ON, BACK) * longest
-    beyond &= (float((speeds > 2.0 * steps.tick).mean()) > MOVING) | (np.abs(away) < speeds.sum())
+    beyond &= (float((speeds > (0.5 * tick or 2.0 * steps.tick)).mean()) > MOVING) | (np.abs(away) < speeds.sum())
     beyond |= np.abs(away) > TOP_SPEED * turn * steps.seconds[odd]
     beside = np.abs(np.pad(steps.size, 2, mode="reflect"))
     most = np.stack([beside[odd + k] for k in (0, 1, 3, 4)]).max(axis=0)
