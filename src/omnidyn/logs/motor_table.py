@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -36,7 +37,7 @@ _SPEED_UNITS = {"rad/s": 1.0, "SI": 1.0, "rpm": _RPM}
 MOTOR = "motor"
 MOST_DUTY = 1.0
 LOG_ROWS, LOG_STEP = 200, 0.05  # more rows, closer to each other (of the spread of all), are samples in time ..
-SWEEPS = 2  # .. where the input turns more often than up and down once
+SWEEPS, SURELY_LOG = 2, 1000  # .. where the input turns more often than up and down once, or rows are so many
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ def is_motor_table(names: Iterable[str]) -> bool:
 def _bare(name: str) -> str:
     """A name in small letters; "speed [rpm]" and "speed (rpm)" are speed_rpm."""
     words = name.strip().lower().replace("[", " ").replace("(", " ").replace("]", " ").replace(")", " ")
-    return "_".join(words.replace("/", "_").split())
+    return re.sub(r"_(?:pct|percent)$", "_%", "_".join(words.replace("/", "_").split()))
 
 
 def read_motor_table(path: str | os.PathLike) -> MotorTable:
@@ -97,7 +98,7 @@ def read_motor_table(path: str | os.PathLike) -> MotorTable:
     motor = _motors(table, found[MOTOR]) if MOTOR in found else np.zeros(len(speed), dtype=np.int64)
     _refuse_log(put_in, speed, motor, table.source)
     rows = f"{len(speed)} rows without a time are taken as points at steady speed; of a log, give its `rate`"
-    notes = (*notes, rows)
+    notes = (rows, *notes)
     return MotorTable(put_in, speed, motor, kind, unit, source=table.source, sha256=table.sha256, notes=notes)
 
 
@@ -107,7 +108,7 @@ def _refuse_log(put_in: FloatArray, speed: FloatArray, motor: IntArray, source: 
     turns = np.diff(put_in)
     swings = int((np.diff(np.sign(turns[turns != 0.0])) != 0.0).sum())
     close = len(speed) >= LOG_ROWS and float(np.median(steps)) < LOG_STEP * spread
-    if close and swings > SWEEPS and not motor.any():
+    if close and (swings > SWEEPS or len(speed) >= SURELY_LOG) and not motor.any():
         raise InputError(
             "a log without a time, and no table of steady points", got=f"{len(speed)} rows that follow each other",
             expected="a row for each steady point", remedy="say how many rows a second: `rate` HZ", where=source,

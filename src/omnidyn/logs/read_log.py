@@ -34,6 +34,7 @@ from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, lo
 from omnidyn.logs.log import Log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.readers.reader import Options
+from omnidyn.logs.table.dialect import split_unit
 from omnidyn.logs.table.table import ROWS, Table
 from omnidyn.logs.table.text_file import Progress
 from omnidyn.logs.together import joined_table
@@ -154,7 +155,7 @@ def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> Colum
     else:
         used = {column.name for column in columns.columns.values()}
         columns = replace(columns, unused=tuple(name for name in table.names if name not in used))
-    columns = _delayed(columns.with_columns(more), options.latency)
+    columns = _delayed(_called_as_in(table, columns.with_columns(more)), options.latency)
     for component, column in columns.columns.items():
         if column.name not in table.names:
             close = difflib.get_close_matches(column.name, table.names, n=1, cutoff=0.5)
@@ -165,6 +166,16 @@ def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> Colum
             )  # fmt: skip
     refuse_doubtful(columns, table.source)
     return columns
+
+
+def _called_as_in(table: Table, columns: ColumnMap) -> ColumnMap:
+    """The map with columns called as in the table, where a name in it holds the unit of the header too: "x (in)"."""
+    short = {
+        key: replace(column, name=bare)
+        for key, column in columns.columns.items()
+        if column.name not in table.names and (bare := split_unit(column.name)[0]) in table.names
+    }
+    return columns.with_columns(short) if short else columns
 
 
 def _delayed(columns: ColumnMap, latency: Mapping[str, float]) -> ColumnMap:

@@ -339,7 +339,6 @@ def test_nothing_left_is_refused(write):
         ("t_s,1.5\n0,1\n", r"table\.csv:1: the table has no header: a number stands.*; got 1\.5"),
         ("t_s,,u\n1,2,3\n", r"table\.csv:1: column 2 has no name"),
         ("t_s,u,\n1,2,3\n", r"table\.csv:1: column 3 has no name"),
-        ("t,t\n1,2\n", r"table\.csv:1: two columns have the same name; got t"),
         (
             "t,u\n0,1\n1,2,3\n",
             r"table\.csv:3: row 2 has another number of cells.*; got 3: 1,2,3; expected 2 cells",

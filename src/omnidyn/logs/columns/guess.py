@@ -68,7 +68,7 @@ def guess_columns(
     _doubt_letters(names, found)
     if TIME not in found.columns:
         take_time(table, assumed, found)
-    if not numbers and not any(each.component[1:2].isdigit() for each in table.says.values()):
+    if set(numbers.values()) <= {1} and not any(each.component[1:2].isdigit() for each in table.says.values()):
         _take_bench(table, names, assumed, found)
     settle_side(table, robot, found)
     take_sides({name: side for name, (_, side) in told.items() if side}, found)
@@ -244,11 +244,13 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
     Several columns of one kind, such as left_speed and right_speed, are wheels, and nobody knows which is which.
     """
     alike: dict[str, list[str]] = {}
-    body = {component for component in found.columns if component not in (TIME, "supply")} - {"omega", "heading"}
+    numbered = {component for component in found.columns if component[1:2].isdigit()}
+    settled = numbered | {doubt.component for doubt in found.doubts if read_name(doubt.name).number is not None}
+    body = found.columns.keys() - numbered - {TIME, "supply", "omega", "heading"}
     turning = {column.name for key, column in found.columns.items() if body and key in ("omega", "heading")}
     for name in names:
         component = _bench_component(table, name)
-        if component and name not in turning:
+        if component and component not in settled and name not in turning:
             alike.setdefault(component, []).append(name)
     _drop_unspoken(alike)
     for component, mine in alike.items():
@@ -261,8 +263,9 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
         elif mine and not body:
             _forget(mine, found)
             _take_single(table, mine[0], component, assumed, found)
-    if any(place(component) and component.endswith(("1", "1_cmd")) for component in found.columns):
-        found.notes.append("no wheel has a number: taken as a log of one motor")
+    if any(component[1:2].isdigit() for component in found.columns.keys() - numbered):
+        some = "no wheel has" if not numbered else "no wheel but the first has"
+        found.notes.append(f"{some} a number: taken as a log of one motor")
 
 
 def _drop_unspoken(alike: dict[str, list[str]]) -> None:
@@ -295,7 +298,12 @@ def _forget(names: list[str], found: Guess) -> None:
 def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, str], found: Guess) -> None:
     parts = read_name(name)
     text = assumed.get(name) or assumed.get(letter_of(component)) or table.units.get(name, "")
-    unit = known_unit(text) or parts.unit or unit_of(table, name, component, None, found)
+    unit = known_unit(text) or parts.unit
+    unknown = text if text not in ("", "-", "SI") else (match[2] if (match := BRACKETS.fullmatch(name)) else "")
+    if unit is None and unknown:
+        found.doubts.append(Doubt(name, component, f"the unit {unknown} is unknown"))
+        return
+    unit = unit or unit_of(table, name, component, None, found)
     if unit is not None:
         said = name in assumed or letter_of(component) in assumed
         _enter(table, name, component, unit, said, found)

@@ -129,10 +129,11 @@ def _command_unit(table: Table, name: str, component: str, robot: Robot | None, 
         why = f"{least:.4g} to {largest:.4g} look like widths of servo pulses: log (width - 1500) / 500, a duty"
         found.doubts.append(Doubt(name, component, f"but {why}", ()))
         return None
-    looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else f"a PWM value ({_scales(largest)[-1]})"
-    volts = largest <= _most_volts(robot)
-    why = f"no unit is given, and up to {largest:.3g} {f'may be volts or {looks}' if volts else f'looks like {looks}'}"
-    found.doubts.append(Doubt(name, component, why, ("V" if volts else "", *_scales(largest))[not volts :]))
+    scales = _scales(largest)
+    looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else "a PWM value, of 0.." + scales[-1][5:]
+    volts = ("V",) * (largest <= _most_volts(robot))
+    why = f"no unit is given, and up to {largest:.3g} may be {'volts or ' * bool(volts)}{looks}"
+    found.doubts.append(Doubt(name, component, why, (*volts, *scales)))
     return None
 
 

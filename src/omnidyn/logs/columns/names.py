@@ -75,6 +75,8 @@ def read_name(name: str) -> NameParts:
     words = re.findall(r"[^\W\d_]+", spread)
     unit = unit or next((known_unit(part) for word in words for part in _parts(word) if part in _SAYS_ITS_UNIT), None)
     roles = {role for word in words for role in _roles(word)}
+    if CHANNEL in roles and all(len(word) == 1 or _roles(word) == [CHANNEL] for word in words):
+        roles = {CHANNEL}  # channel A
     number, before = (None, "") if roles <= {CHANNEL} else _number(spread)
     return NameParts(frozenset(roles), number, unit, before)
 

@@ -17,6 +17,7 @@ from omnidyn.logs.table.dialect import SAMPLE_ROWS, SEPARATOR_WORDS, SEPARATORS
 
 MAX_COLUMNS = 1000
 MAX_NAME = 1000  # characters
+INDEX = "index"  # what a column of row numbers without a name is called
 TABS_NOTE = "columns are separated by " + SEPARATOR_WORDS["\t"]
 HEAD_ROWS = 3  # at most so many lines above the first row: titles, units, names
 
@@ -142,11 +143,11 @@ def _layout(kept: list[FileLine], commented: int, separator: str, source: str) -
     body = kept[len(head.lines) :]
     if not body:
         raise InputError("no rows", got="0 samples", expected="at least one row under the header", where=source)
-    names = _names(head, separator, body, source)
+    names, renamed = _told_apart(_names(head, separator, body, source))
     layout = _with_ending(Layout(separator, tuple(names), body[0].number), body[:SAMPLE_ROWS], ending)
     names, units = _units(names, head, f"{source}:{head.lines[head.names].number}")
     titles = {name: cell for name, cell in zip(names, head.cells_of(head.titles), strict=False) if cell}
-    notes = [*_head_notes(head, commented), *_separator_notes(separator), *layout.notes]
+    notes = [*_head_notes(head, commented), *renamed, *_separator_notes(separator), *layout.notes]
     return replace(layout, names=tuple(names), units=units, titles=titles, notes=tuple(notes))
 
 
@@ -192,7 +193,10 @@ def _trimmed(cells: list[str]) -> list[str]:
 
 
 def _names(head: _Head, separator: str, body: list[FileLine], source: str) -> list[str]:
-    """The column names: one each, none blank, none a number, none twice. A blank last one has no column below it."""
+    """The column names: one each, none blank, none twice, none a number but over a row of units.
+
+    A blank last one has no column below it.
+    """
     line, names = head.lines[head.names], head.cells[head.names]
     where = f"{source}:{line.number}"
     _refuse_width(len(names), where)
@@ -200,9 +204,11 @@ def _names(head: _Head, separator: str, body: list[FileLine], source: str) -> li
         rows = (dialect.counts(row.text, separator) for row in body[:SAMPLE_ROWS])
         if all(len(names) - 1 in counts for counts in rows):
             names = names[:-1]
+    if len(names) > 1 and not names[0] and _counts_rows([row.text for row in body], separator):
+        names = [INDEX, *names[1:]]
     for k, name in enumerate(names):
-        check_name(k, names, where, got=line.text)
-        if dialect.looks_like_number(name):
+        check_name(0, names[k:], where, got=line.text, number=k + 1)
+        if dialect.looks_like_number(name) and head.units is None:  # an oscilloscope numbers its channels
             raise InputError(
                 "the table has no header: a number stands where a name should",
                 got=name,
@@ -213,12 +219,32 @@ def _names(head: _Head, separator: str, body: list[FileLine], source: str) -> li
     return names
 
 
-def check_name(k: int, names: Sequence[str], where: str, got: str | None = None) -> None:
-    """Raises InputError where the name of column k is blank, too long, or that of an earlier one. got: the header."""
-    name = names[k]
+def _counts_rows(rows: Sequence[str], separator: str) -> bool:
+    """Whether the first cells are 0, 1, 2, ..: the index of a data frame, which pandas writes without a name."""
+    cells = [row.split(separator)[0].strip(' "') for row in rows[:SAMPLE_ROWS]]
+    return cells == [str(k) for k in range(len(cells))]
+
+
+def _told_apart(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Names of which no two are alike: the second column called w is w~2; and what was done, in words."""
+    apart, notes = list(names), []
+    for k, name in enumerate(names):
+        count = names[:k].count(name)
+        if count:
+            apart[k] = f"{name}~{count + 1}"
+            notes.append(f"{name} is the name of two columns: the later one is called {apart[k]}")
+    return apart, notes
+
+
+def check_name(k: int, names: Sequence[str], where: str, got: str | None = None, number: int = 0) -> None:
+    """Raises InputError where the name of column k is blank, too long, or that of an earlier one.
+
+    got: the header. number: of the column in the file, where it is not k + 1.
+    """
+    name, number = names[k], number or k + 1
     if not name:
         raise InputError(
-            f"column {k + 1} has no name",
+            f"column {number} has no name",
             got=got,
             expected="a name for every column",
             remedy="name it or remove it",
@@ -226,14 +252,17 @@ def check_name(k: int, names: Sequence[str], where: str, got: str | None = None)
         )
     if len(name) > MAX_NAME:
         raise InputError(
-            f"the name of column {k + 1} is too long",
+            f"the name of column {number} is too long",
             got=f"{len(name)} characters, {name[:40]}...",
             expected=f"at most {MAX_NAME}",
             remedy="give it a short name, or see whether this line is the header",
             where=where,
         )
     if name in names[:k]:
-        raise InputError("two columns have the same name", got=name, expected="different names", where=where)
+        raise InputError(
+            "two columns have the same name", got=name, expected="different names",
+            remedy="give the second one another name in this line", where=where,
+        )  # fmt: skip
 
 
 def _refuse_width(columns: int, where: str) -> None:

@@ -17,6 +17,7 @@ from omnidyn.errors import shortened
 
 SECOND = 10**9
 SET_BACK, SET_FORWARD = SECOND // 20, 86_400 * SECOND  # a step of the recorder's clock beyond is no recording
+MANY = 20  # times: so often no clock is set back
 SEAM = SECOND  # what is put where the true time is not known: enough for a gap
 OTHER_CLOCK = SECOND  # two times of one message differ by less, where they are of one clock
 JUMP = SECOND // 2  # of a header against the time of reception
@@ -109,6 +110,9 @@ def _sewn(topics: Sequence[Clocked], notes: list[str]) -> list[Clocked]:
     """The topics with a second in place of each step by which the recorder's clock was set."""
     if not any(_has_step(each.receive) for each in topics):
         return list(topics)
+    if _are_shuffled(topics):
+        notes.append("the messages stand out of the order of time in the file: they were sorted")
+        return list(topics)
     order = np.concatenate([each.order for each in topics])
     receive = np.concatenate([each.receive for each in topics])[np.argsort(order)]
     order = np.sort(order)
@@ -128,6 +132,25 @@ def _sewn(topics: Sequence[Clocked], notes: list[str]) -> list[Clocked]:
 def _has_step(receive: IntArray) -> bool:
     steps = np.diff(receive)
     return bool(len(steps)) and bool(steps.min() < -SET_BACK or steps.max() > SET_FORWARD)
+
+
+def _are_shuffled(topics: Sequence[Clocked]) -> bool:
+    """Whether times go back because messages were written out of order, not because a clock was set: what stands
+    between jumps does not overlap in any topic, or they are too many."""
+    steps = [np.diff(each.receive) for each in topics]
+    if any((each > SET_FORWARD).any() for each in steps):
+        return False
+    often = max(int((each < -SET_BACK).sum()) for each in steps) > MANY
+    return often or not any(_overlap(each.receive) for each in topics)
+
+
+def _overlap(receive: IntArray) -> bool:
+    """Whether stretches of times between jumps, back or forth, overlap by more than a moment."""
+    steps = np.abs(np.diff(receive))
+    jump = max(SET_BACK, 5.0 * float(np.median(steps)) if len(steps) else 0.0)
+    stretches = np.split(receive, np.flatnonzero(steps > jump) + 1)
+    spans = sorted((int(each.min()), int(each.max())) for each in stretches if len(each))
+    return any(before[1] > after[0] + SET_BACK for before, after in itertools.pairwise(spans))
 
 
 def _is_set(receive: IntArray, k: int) -> bool:

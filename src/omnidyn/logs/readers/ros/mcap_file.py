@@ -114,7 +114,8 @@ class McapFile:
 
     def _read(self, opcode: int, content: bytes) -> Message | None:
         if opcode == MESSAGE:
-            channel, _, log_time, _ = _MESSAGE.unpack_from(content)
+            channel, _, log_time, published = _MESSAGE.unpack_from(content)
+            log_time = log_time or published
             connection = self.channels.get(channel)
             if connection is None:
                 raise DamagedError(f"a message of channel {channel}, which is nowhere told")
