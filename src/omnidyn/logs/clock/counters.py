@@ -16,6 +16,7 @@ WHOLE = 1.01  # readings of what starts over stay within this many periods
 MOST_FULL = 0.9  # and come as near to a period
 JUMP = 0.5  # of a period: more than that between two rows is no motion
 FAST = 0.3  # of a period: a wheel that usually goes so far between rows cannot be followed
+NEAR_HALF = 0.46  # of a period: a wheel that is followed from rest up to such steps can go so fast
 USUAL = 0.99
 FASTEST, TICKS = 1.5, 2.0  # where a counter starts over, it moves no farther than that many times its longest step
 WHOLE_TICKS = 0.1  # readings that were counted are as near to whole ticks
@@ -84,12 +85,20 @@ def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = N
 
 def _refuse_fast(steps: FloatArray, period: float | None, where: str) -> None:
     usual = float(np.quantile(np.abs(steps), USUAL))
-    if period is not None and usual > FAST * period:
+    if period is not None and usual > FAST * period and not _is_followed(steps, period):
         raise InputError(
             f"an angle starts over after {period:.6g} and moves too far between rows",
             got=f"steps of {usual:.4g}", expected=f"steps below {FAST * period:.4g}",
             remedy="log faster, or log the speed", where=where,
         )  # fmt: skip
+
+
+def _is_followed(steps: FloatArray, period: float) -> bool:
+    """Whether a fast wheel is followed all the way from rest: no step comes near half a period, where it would seem to
+    turn back, and none changes so much that it could have passed there unseen."""
+    size, changes = np.abs(steps) / period, np.abs(np.diff(steps)) / period
+    change = 1.0 - 2.0 * NEAR_HALF
+    return bool(size.min() < change and size.max() < NEAR_HALF and changes.max(initial=0.0) < change)
 
 
 def _wrapped(steps: FloatArray, period: float) -> FloatArray:
