@@ -60,3 +60,24 @@ def test_wrong_tables_are_refused(tmp_path):
         read(tmp_path, "input,speed [turn/s]\n1,2\n")
     with pytest.raises(InputError, match=r"columns of different lengths; got \[1, 2\]"):
         MotorTable(np.zeros(2), np.zeros(1), np.zeros(2, dtype=np.int64), "duty", "%")
+
+
+def test_a_table_says_that_its_rows_are_points(tmp_path):
+    table = read(tmp_path, "duty_pct,speed\n10,3\n50,9\n")
+    assert table.put_in.tolist() == [10.0, 50.0]
+    assert table.notes[0] == "2 rows without a time are taken as points at steady speed; of a log, give its `rate`"
+
+
+def test_a_log_without_a_time_is_no_table_of_points(tmp_path):
+    """Rows that follow each other under an input that swings, or very many of them."""
+    phase = np.linspace(0.0, 6.0 * np.pi, 300)
+    log = "\n".join(f"{6.0 * np.sin(a):.4f},{200.0 * np.sin(a - 0.3):.3f}" for a in phase)
+    with pytest.raises(
+        InputError, match=r"a log without a time.*; got 300 rows.*; say how many rows a second: `rate` HZ"
+    ):
+        read(tmp_path, f"voltage,speed\n{log}\n")
+    long = "\n".join(f"{k / 200},{k / 5}" for k in range(1200))
+    with pytest.raises(InputError, match="got 1200 rows"):
+        read(tmp_path, f"voltage,speed\n{long}\n")
+    up_and_down = "\n".join(f"{6 - abs(k - 150) / 25:.3f},{300 - 2 * abs(k - 150)}" for k in range(301))
+    assert len(read(tmp_path, f"voltage,speed\n{up_and_down}\n")) == 301

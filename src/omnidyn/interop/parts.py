@@ -73,7 +73,9 @@ def _refuse_impossible(lumps: Sequence[Lump], axles: Sequence[Axle]) -> None:
     for lump in lumps:
         sizes = np.concatenate([[lump.mass], lump.centre, lump.inertia.ravel()])
         if not np.all(np.abs(sizes) <= LARGEST):
-            raise InputError("a part beyond all robots", got=float(np.max(np.abs(sizes))), expected=f"below {LARGEST:g}")
+            raise InputError(
+                "a part beyond all robots", got=float(np.max(np.abs(sizes))), expected=f"below {LARGEST:g}"
+            )
         least = float(np.linalg.eigvalsh(lump.inertia)[0])
         if lump.mass < 0.0 or least < -NEAR * float(np.abs(lump.inertia).max()):
             raise InputError(

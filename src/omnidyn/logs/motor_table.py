@@ -36,7 +36,7 @@ _UNITS = {"V": "input_v", "%": "input_%", "A": "input_a", "duty": "input_duty"}
 _SPEED_UNITS = {"rad/s": 1.0, "SI": 1.0, "rpm": _RPM}
 MOTOR = "motor"
 MOST_DUTY = 1.0
-LOG_ROWS, LOG_STEP = 200, 0.05  # more rows, closer to each other (of the spread of all), are samples in time ..
+LOG_ROWS, LOG_STEP = 200, 0.1  # more rows, closer to each other (of the spread of all), are samples in time ..
 SWEEPS, SURELY_LOG = 2, 1000  # .. where the input turns more often than up and down once, or rows are so many
 
 

@@ -47,6 +47,15 @@ def test_a_wheel_too_fast_for_its_rows_is_refused():
         unrolled(seen, "rad", "log.csv")
 
 
+def test_a_wheel_that_is_followed_from_rest_on_may_turn_nearly_half_a_turn_between_rows():
+    rate = 0.44 * 360.0 * np.sin(np.linspace(0.0, 3.0 * np.pi, 300))
+    angle = np.cumsum(rate)
+    found = unrolled(np.mod(angle, 360.0), "deg", "log.csv")[0]
+    np.testing.assert_allclose(found - found[0], angle - angle[0], atol=1e-9)
+    with pytest.raises(InputError, match="moves too far between rows"):
+        unrolled(np.mod(np.cumsum(rate * 1.2), 360.0), "deg", "log.csv")
+
+
 def test_a_log_says_that_its_counter_starts_over(tmp_path):
     counts = np.mod(np.round(TURNS * 32768.0) + 60_000, 2**16)
     rows = [f"{0.01 * k:.2f},{count:.0f}" for k, count in enumerate(counts)]

@@ -34,6 +34,26 @@ from omnidyn.units import known_unit, parse_unit
         ("V", "voltage", 1.0),
         ("Volt", "voltage", 1.0),
         ("km/h", "speed", 1 / 3.6),
+        ("pct", "duty", 0.01),
+        ("PERCENT", "duty", 0.01),
+        ("in", "length", 0.0254),
+        ("in/s", "speed", 0.0254),
+        ("ft", "length", 0.3048),
+        ("ticks/s", "count rate", 1.0),
+        ("counts per second", "count rate", 1.0),
+        ("ticks/100ms", "count rate", 10.0),
+        ("ticks/150/s", "turn rate", 2 * math.pi / 150),
+        ("ticks/537.7/s", "turn rate", 2 * math.pi / 537.7),
+        ("ticks/s/150", "turn rate", 2 * math.pi / 150),
+        ("ticks/4096/100ms", "turn rate", 2 * math.pi / 4096 * 10),
+        ("ticks/48/min", "turn rate", 2 * math.pi / 48 / 60),
+        ("2 mm/s", "speed", 2e-3),
+        ("RPM", "turn rate", 2 * math.pi / 60),
+        ("Rad/Sec", "turn rate", 1.0),
+        ("tr/min", "turn rate", 2 * math.pi / 60),
+        ("SECOND", "time", 1.0),
+        ("Ampere", "current", 1.0),
+        ("W", "power", 1.0),
     ],
 )
 def test_one_of_a_unit_in_si(text, quantity, one_in_si):
@@ -42,7 +62,25 @@ def test_one_of_a_unit_in_si(text, quantity, one_in_si):
     assert unit.size == pytest.approx(one_in_si, rel=1e-15)
 
 
-@pytest.mark.parametrize("text", ["", "furlong", "rad/", "ticks/0", "0 mm", "pix", "1e999 m", "m/s/s", "ticks/0.0"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "furlong",
+        "rad/",
+        "ticks/0",
+        "0 mm",
+        "pix",
+        "1e999 m",
+        "m/s/s",
+        "ticks/0.0",
+        "ticks/0/s",
+        "m/0s",
+        "pix/s",
+        "V/s",
+        "MA",
+    ],
+)
 def test_what_is_no_unit_is_refused(text):
     assert known_unit(text) is None
     with pytest.raises(InputError, match="unit"):
@@ -54,7 +92,11 @@ def test_the_nearest_unit_is_named():
         parse_unit("rads/s")
 
 
-@given(st.text(max_size=20))
+def test_a_long_text_is_no_unit_and_soon_known_for_none():
+    assert known_unit("a/s" * 100_000) is None
+
+
+@given(st.text(max_size=20) | st.text(alphabet="ticks/ms0123456789. ", max_size=20))
 def test_any_text_is_a_unit_or_refused(text):
     unit = known_unit(text)
     assert unit is None or (unit.size > 0.0 and math.isfinite(unit.size))

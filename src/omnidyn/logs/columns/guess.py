@@ -37,6 +37,8 @@ from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
 
 _LETTER = re.compile(r"([a-z])\d{1,3}")
 
+_POWER = re.compile(r"(?!.*(?:duty|pwm|throttle)).*power.*", re.IGNORECASE | re.DOTALL)
+_BESIDE_POWER = {words.CURRENT, words.VOLTAGE, words.RATE, words.ANGLE}
 NOT_OF_A_MOTOR = frozenset({words.X, words.Y, "vx", "vy", words.YAW, words.SUPPLY, words.TIME})
 
 
@@ -88,13 +90,10 @@ def guess_columns(
 
 def _without_measured_power(names: list[str]) -> list[str]:
     """The names without those of a power, where others say what drives the motors; alone, a power is a duty (FTC)."""
-    powers = [name for name in names if re.search("power", name, re.IGNORECASE)]
-    drives = {words.DUTY, words.VOLTAGE}
-    others = any(
-        read_name(name).roles & drives and words.SUPPLY not in read_name(name).roles
-        for name in names if name not in powers
-    )  # fmt: skip
-    return [name for name in names if not (others and name in powers)]
+    roles = {name: read_name(name).roles for name in names}
+    powers = [name for name in names if _POWER.fullmatch(name) and not roles[name] & _BESIDE_POWER]
+    drives = [name for name in names if roles[name] & {words.DUTY, words.VOLTAGE} and words.SUPPLY not in roles[name]]
+    return names if set(drives) <= set(powers) else [name for name in names if name not in powers]
 
 
 def _take_said(table: Table, found: Guess) -> None:

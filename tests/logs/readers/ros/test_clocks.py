@@ -1,6 +1,7 @@
 """Two clocks in one bag, a clock that was set, stamps that were not: found, said, and mended where one way is right."""
 
 import numpy as np
+import pytest
 
 from omnidyn.logs.readers.ros.clocks import Clocked, trusted
 
@@ -116,3 +117,40 @@ def test_messages_that_come_late_now_and_then_are_no_jump():
     found, notes = trusted([changed(given, receive=late)])
     assert np.array_equal(found["/a"], given.header)
     assert notes == []
+
+
+def written(topics, order):
+    """The topics as they stand in a file in which message k of all, by time, is at place order[k]."""
+    return [
+        Clocked(each.topic, each.receive[rows], order[each.order][rows], each.header[rows])
+        for each in topics
+        for rows in [np.argsort(order[each.order], kind="stable")]
+    ]
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+@pytest.mark.parametrize("way", ["shuffled", "chunks", "halves", "backward", "every other chunk"])
+def test_messages_out_of_order_are_no_clock_that_was_set(way, stamped):
+    given = list(topics(a=100.0, b=30.0, c=7.0).values())
+    if not stamped:
+        given = [changed(each, header=np.zeros_like(each.header)) for each in given]
+    count = sum(len(each.receive) for each in given)
+    quarter, part = (np.array_split(np.arange(count), parts) for parts in (4, 30))
+    files = {
+        "shuffled": np.random.default_rng(0).permutation(count), "backward": np.arange(count)[::-1],
+        "chunks": np.concatenate([quarter[k] for k in (2, 0, 3, 1)]), "halves": np.roll(np.arange(count), count // 2),
+        "every other chunk": np.concatenate(part[::2] + part[1::2]),
+    }  # fmt: skip
+    order = np.empty(count, dtype=np.int64)
+    order[files[way]] = np.arange(count)
+    found, notes = trusted(written(given, order))
+    assert not any("was set" in note for note in notes)
+    for each in given:
+        assert np.array_equal(np.sort(found[each.topic]), each.header if stamped else each.receive)
+
+
+def test_a_slow_recording_whose_clock_is_set_back_is_still_told():
+    each = topics(a=10.0)["a"]
+    late = np.where(each.receive > START + 5 * S, 3 * S, 0)
+    _, notes = trusted([changed(each, each.receive - late, np.zeros_like(each.header))])
+    assert any("the clock of the recorder was set back by 2.9" in note for note in notes)

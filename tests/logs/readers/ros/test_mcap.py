@@ -289,3 +289,22 @@ def test_a_file_of_another_name_is_known_by_its_content(tmp_path, drive_file):
     other = tmp_path / "drive.csv"
     other.write_bytes(drive_file.read_bytes())
     assert read_table(other).notes[0] == "the file holds an MCAP recording, though its name ends in .csv"
+
+
+@pytest.mark.parametrize("way", ["shuffled", "chunks", "by topic"])
+def test_an_mcap_in_any_order_is_read_in_the_order_of_time(tmp_path, way):
+    maker = drive(BagMaker(), seconds=4.0)
+    base = maker.in_order()
+    quarter = len(base) // 4
+    orders = {
+        "shuffled": [base[k] for k in np.random.default_rng(0).permutation(len(base))],
+        "chunks": base[2 * quarter :] + base[quarter : 2 * quarter] + base[:quarter],
+        "by topic": sorted(base, key=lambda each: each.topic),
+    }
+    want = load_log(write_mcap(maker, tmp_path / "a.mcap", chunk=2**12)).to_run()
+    run = load_log(write_mcap(maker, tmp_path / "b.mcap", chunk=2**12, order=orders[way])).to_run()
+    assert np.array_equal(run.t, want.t)
+    turns = (run.pose[:, 2] - want.pose[:, 2]) / (2.0 * np.pi)  # whole ones, the same everywhere
+    assert np.ptp(turns[np.isfinite(turns)]) == pytest.approx(0.0, abs=1e-12)
+    for name, values in want.channels.items():
+        assert np.array_equal(run.channels[name][..., :2], values[..., :2], equal_nan=True), name
