@@ -18,6 +18,7 @@ JUMP = 0.5  # of a period: more than that between two rows is no motion
 FAST = 0.3  # of a period: a wheel that usually goes so far between rows cannot be followed
 NEAR_HALF = 0.46  # of a period: a wheel that is followed from rest up to such steps can go so fast
 USUAL = 0.99
+FILLED, OFTEN = 0.99, 0.05  # of a period; of the steps: so full, and so often over the end
 FASTEST, TICKS = 1.5, 2.0  # where a counter starts over, it moves no farther than that many times its longest step
 WHOLE_TICKS = 0.1  # readings that were counted are as near to whole ticks
 NEIGHBOURS = 3  # steps to either side that tell how a wheel moves
@@ -112,7 +113,20 @@ def _period(readings: FloatArray, steps: Steps, unit: str, tick: float) -> float
     """What the readings start over after, None where they do not. A jump across missing rows shows nothing."""
     at_once = np.where(steps.rows < LATE, steps.size, 0.0)
     known = _full(readings, at_once, unit, tick)
-    return _common(readings, steps, unit, tick) if known is None else known
+    return known or _common(readings, steps, unit, tick) or _fast(readings, at_once, tick)
+
+
+def _fast(readings: FloatArray, steps: FloatArray, tick: float) -> float | None:
+    """The power of two, or of ten, that readings from 0 up fill, where the wheel goes over its end all the time."""
+    low, high = float(readings.min()), float(readings.max())
+    if not tick > 0.0 or low < 0.0 or high < tick:
+        return None
+    for base in (2.0, 10.0):
+        period = tick * base ** np.floor(np.log(high / tick) / np.log(base) + 1.0 + 1e-12)
+        often = float((np.abs(steps) > JUMP * period).mean())
+        if low < (1.0 - FILLED) * period and high >= FILLED * period and often > OFTEN:
+            return float(period)
+    return None
 
 
 def _full(readings: FloatArray, steps: FloatArray, unit: str, tick: float) -> float | None:
