@@ -6,6 +6,7 @@ import pytest
 from omnidyn import read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.clock.counters import unrolled
+from tests.support.counted import bench, counts_of, wandering
 
 TURNS = np.cumsum(np.concatenate([np.linspace(0.0, 0.04, 600), np.linspace(0.04, -0.06, 1200)]))
 
@@ -83,3 +84,62 @@ def test_an_encoder_that_was_set_to_0_has_not_started_over():
     again, period, restarts = unrolled(counts, "ticks/2000", "log.csv")
     assert (period, restarts) == (None, (3125,))
     np.testing.assert_array_equal(again, 20.0 * np.arange(len(counts)))
+
+
+@pytest.fixture(scope="module")
+def steady():
+    """Counts of a motor that turns by up to 180 a row."""
+    t, _, speed = bench()
+    return t, counts_of(speed)
+
+
+@pytest.mark.parametrize("period", [1000.0, 777.0, 1440.0, 3000.0, 4096.0, 10_000.0, 65_536.0])
+@pytest.mark.parametrize("signed", [False, True])
+def test_any_modulus_is_found(steady, period, signed):
+    t, counts = steady
+    seen = np.mod(counts + signed * period / 2.0, period) - signed * period / 2.0
+    again, found, restarts = unrolled(seen, "ticks/2048", "log.csv", t)
+    assert (found, restarts) == (period, ())
+    np.testing.assert_array_equal(again - again[0], counts - counts[0])
+
+
+@pytest.mark.parametrize("value", [0.0, 12_345.0, -500_000.0])
+@pytest.mark.parametrize("row", [1900, 2700, 4500])
+def test_a_counter_may_begin_again_at_any_value(steady, value, row):
+    t, counts = steady
+    seen = counts.copy()
+    seen[row:] += value - seen[row]
+    again, found, restarts = unrolled(seen, "ticks/2048", "log.csv", t)
+    assert (found, restarts) == (None, (row,))
+    np.testing.assert_allclose(again, counts, atol=10.0)  # what it turned in that row is taken from those beside it
+
+
+def test_a_counter_that_starts_over_may_begin_again_too(steady):
+    t, counts = steady
+    seen = counts.copy()
+    seen[2700:] -= seen[2700]
+    again, found, restarts = unrolled(np.mod(seen, 4096.0), "ticks/2048", "log.csv", t)
+    assert (found, restarts) == (4096.0, (2700,))
+    np.testing.assert_allclose(again - again[0], counts - counts[0], atol=10.0)
+
+
+def test_a_counter_whose_end_is_passed_too_fast_is_refused(steady):
+    t, counts = steady
+    with pytest.raises(InputError, match=r"an angle starts over after 1000 and moves too far between rows"):
+        unrolled(np.mod(5.0 * counts, 1000.0), "ticks/2048", "log.csv", t)
+
+
+def test_sound_logs_are_left_alone():
+    """Reversals, slips, rows that are missing, and stamps that jitter."""
+    for seed in range(200):
+        t, counts = wandering(seed)
+        again, period, restarts = unrolled(counts, "ticks/9999", "log.csv", t)
+        assert (seed, period, restarts) == (seed, None, ())
+        assert again is counts
+
+
+def test_a_wild_value_is_no_restart(steady):
+    t, counts = steady
+    seen = counts.copy()
+    seen[2000] = 9e6
+    assert unrolled(seen, "ticks/2048", "log.csv", t).restarts == ()
