@@ -498,3 +498,26 @@ def test_a_name_of_a_thousand_characters_is_a_name(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(f"t,{'w' * 1000}\n0,1\n1,2\n")
     assert read_table(path).names == ("t", "w" * 1000)
+
+
+def test_two_columns_of_one_name_are_told_apart(write):
+    table = read_table(write("t_s,speed,speed,speed\n0,1,2,3\n1,4,5,6\n"))
+    assert table.names == ("t_s", "speed", "speed~2", "speed~3")
+    assert table.numbers("speed~3").tolist() == [3.0, 6.0]
+    assert "speed is the name of two columns: the later one is called speed~2" in table.notes
+
+
+def test_the_index_that_pandas_writes_has_a_name(write):
+    table = read_table(write(",t_s,u1_V\n0,0.0,5\n1,0.1,6\n2,0.2,7\n"))
+    assert table.names == ("index", "t_s", "u1_V")
+    assert table.numbers("u1_V").tolist() == [5.0, 6.0, 7.0]
+    with pytest.raises(InputError, match="column 1 has no name"):
+        read_table(write(",t_s,u1_V\n3,0.0,5\n1,0.1,6\n"))
+
+
+def test_numbers_may_be_names_over_a_row_of_units(write):
+    table = read_table(write("x-axis,1,2\nsecond,Volt,Ampere\n-1E-1,6,4\n0,5,3\n"))
+    assert table.names == ("x-axis", "1", "2")
+    assert dict(table.units) == {"x-axis": "second", "1": "Volt", "2": "Ampere"}
+    with pytest.raises(InputError, match="a number stands where a name should; got 1"):
+        read_table(write("x-axis,1,2\n-1E-1,6,4\n0,5,3\n"))
