@@ -202,7 +202,7 @@ def test_what_reading_left_open_is_part_of_the_result(call):
     code, out, err = call("pwm.csv")
     assert code == 4
     assert "not_taken: PWM1, PWM2 look like d1, d2" in " ".join(out.split())
-    assert "--assume d=V or --assume d=duty" in " ".join(out.split())
+    assert "up to 149 may be a PWM value, of 0..255: not taken -> say --assume d=duty/255" in " ".join(out.split())
     assert "columns that nobody took: mode" in out
     assert "doubt" not in err
     assert "time: t <- time_s [s]" in err

@@ -75,12 +75,10 @@ def test_pwm_without_a_unit_names_what_would_settle_it(pwm):
     assert verdict.useless
     assert verdict.verdict == (
         "Nothing can be done with this log: it holds no voltage and no duty: PWM1 .. PWM3, no unit is given (say "
-        "`assume` d=V, duty, % or duty/255); enc1 .. enc3, counts per turn are not known (say `assume` "
+        "`assume` d=duty/255); enc1 .. enc3, counts per turn are not known (say `assume` "
         "a=ticks/COUNTS_PER_TURN)."
     )
-    assert words(verdict, "motors") == (
-        "no motor input: PWM1 .. PWM3, no unit is given (say `assume` d=V, duty, % or duty/255)"
-    )
+    assert words(verdict, "motors") == ("no motor input: PWM1 .. PWM3, no unit is given (say `assume` d=duty/255)")
     doubts = verdict.of("not_taken")
     assert [each.message.partition(" look")[0] for each in doubts] == ["PWM1, PWM2, PWM3", "enc1, enc2, enc3"]
     assert doubts[1].remedy == "say `assume` a=ticks/COUNTS_PER_TURN"

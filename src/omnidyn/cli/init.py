@@ -29,9 +29,7 @@ KEYS = {
 
 def init(
     name: str = typer.Argument(metavar="NAME", help="Name of the robot; the file is NAME.toml."),
-    wheels: int | None = typer.Option(
-        None, min=LEAST_WHEELS, max=MOST_WHEELS, help="How many wheels; 3 or 4 is usual."
-    ),
+    wheels: int | None = typer.Option(None, min=LEAST_WHEELS, max=MOST_WHEELS, help="How many; 3 or 4 is usual."),
     like: str = typer.Option("", metavar="ROBOT", help="Take what is not given from this preset or robot file."),
     azimuth: str = typer.Option("", metavar="DEGREES", help="Where they stand, such as 60,180,300; 0 is forward."),
     wheel_radius: str = typer.Option("", metavar="M", help="Radius of a wheel [m], or one per wheel: 0.03,0.03,0.034."),

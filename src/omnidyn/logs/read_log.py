@@ -246,11 +246,14 @@ def log_from_table(
         tuple(restarts),
     )  # fmt: skip
     log = log.rows(~beside_restarts(t, counters)) if any(each.restarts for each in counters) else log
-    empty = log.empty_rows() if table.own_clocks else np.zeros(len(log), dtype=bool)
-    if empty.any() and not empty.all():  # messages of topics that nobody took
-        log = log.rows(~empty)
-    log = log.joined()
+    log = _without_other_topics(log).joined()
     return _signed(log, robot) if options.current_unsigned else log
+
+
+def _without_other_topics(log: Log) -> Log:
+    """The log without the rows of messages of topics that nobody took."""
+    empty = log.empty_rows() if log.own_clocks else np.zeros(len(log), dtype=bool)
+    return log.rows(~empty) if empty.any() and not empty.all() else log
 
 
 def _unrolled(

@@ -31,9 +31,7 @@ def convert(
     max_bytes: int = log_options.MAX_BYTES,
     var: list[str] = log_options.VARIABLE,
     split: bool = typer.Option(
-        False,
-        "--split",
-        help="Where the clock or a counter of IN restarts, another file: OUT_1, OUT_2, ..",
+        False, "--split", help="Where the clock or a counter of IN restarts, another file: OUT_1, OUT_2, .."
     ),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
 ) -> None:
