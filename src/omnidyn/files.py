@@ -7,6 +7,7 @@ import errno
 import hashlib
 import os
 import re
+import shlex
 import stat
 import tempfile
 import time
@@ -245,7 +246,9 @@ def check_output(path: str | os.PathLike, force: bool = False) -> Path:
         raise InputError("the file exists already", remedy="use `force` to replace it", where=str(path))
     folder = place.parent
     if not folder.is_dir():
-        raise InputError("the folder does not exist", got=str(folder), remedy=f"mkdir -p {folder}", where=str(path))
+        raise InputError(
+            "the folder does not exist", got=str(folder), remedy=f"mkdir -p {shlex.quote(str(folder))}", where=str(path)
+        )
     if not os.access(folder, os.W_OK):
         raise InputError("the folder is not writable", got=str(folder), where=str(path))
     return path
@@ -298,7 +301,8 @@ def write_atomic(path: str | os.PathLike, content: str | bytes, force: bool = Fa
     path = check_output(path, force)
     place = _behind_links(path)
     _remove_stale(place.parent)
-    data = content.encode("utf-8") if isinstance(content, str) else content
+    # A name of a file may hold bytes that are no text: they are shown as escapes.
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     temporary = None
     try:
         handle, temporary = tempfile.mkstemp(prefix=TEMPORARY_PREFIX, dir=place.parent)

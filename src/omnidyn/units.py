@@ -86,7 +86,7 @@ def parse_unit(text: str) -> Unit:
     Counts of an encoder with a divisor are an angle: "ticks/2000". "pwm" is 0..255 unless a divisor says otherwise.
     """
     clean = text.strip()
-    usual = _usual(clean)
+    usual = _usual(clean) if len(clean) <= MAX_TEXT else ""
     if usual in _NAMES:  # "1/min" too, which begins with a number
         return Unit(usual, *_NAMES[usual])
     match = _UNIT.fullmatch(clean) if len(clean) <= MAX_TEXT else None

@@ -28,6 +28,7 @@ from omnidyn.control.controller import Controller
 from omnidyn.errors import InputError
 from omnidyn.files import parse_toml, read_text, write_atomic
 from omnidyn.model.robot import Robot
+from omnidyn.model.robot_file import toml_literal
 
 SCHEMA = 1
 # Name -> where its class is defined. Its arguments are the robot, then options by name.
@@ -67,8 +68,9 @@ class ControllerFile:
 
     def to_toml(self) -> str:
         """The text of its file."""
-        lines = [f"schema = {SCHEMA}", f"controller = {_text(self.controller)}", f"source = {_text(self.source)}", ""]
-        return "\n".join([*lines, "[options]", *(f"{key} = {_toml(value)}" for key, value in self.options.items()), ""])
+        head = {"schema": SCHEMA, "controller": self.controller, "source": self.source}
+        lines = [[f"{key} = {toml_literal(value)}" for key, value in each.items()] for each in (head, self.options)]
+        return "\n".join([*lines[0], "", "[options]", *lines[1], ""])
 
 
 def controller_class(name: str) -> type[Any]:
@@ -210,18 +212,3 @@ def load_controller(path: str | os.PathLike) -> ControllerFile:
 def save_controller(spec: ControllerFile, path: str | os.PathLike, force: bool = False) -> Path:
     """Write a controller file. Raises InputError where it exists, unless `force`."""
     return write_atomic(path, spec.to_toml(), force)
-
-
-def _toml(value: Any) -> str:
-    """A value as TOML has it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return _text(value)
-    return f"[{', '.join(map(_toml, value))}]" if isinstance(value, list | tuple) else repr(value)
-
-
-def _text(words: str) -> str:
-    """A string as TOML has it: what is special in it is escaped."""
-    safe = "".join(c if c.isprintable() and c not in '"\\' else f"\\u{ord(c):04x}" for c in words if ord(c) < 0x10000)
-    return f'"{safe}"'

@@ -17,13 +17,13 @@ from omnidyn.errors import InputError, printable
 
 SINGLE_MAX, SINGLE_MIN = 3.4028234663852886e38, 1.1754943508222875e-38  # of float32, normal numbers
 LONGEST = 60  # of an identifier
-_C = (
-    "alignas alignof asm auto bool break case catch char class concept const constexpr continue decltype default do "
-    "delete double else enum explicit export extern final float for friend goto if import inline int long module mutable "
-    "namespace new noexcept nullptr operator override private protected public register requires restrict return short "
-    "signed sizeof static struct switch template this throw try typedef typeid typename typeof union unsigned using "
-    "virtual void volatile while and bitand bitor compl not or xor true false null main"
-)
+_C = """
+    alignas alignof asm auto bool break case catch char class concept const constexpr continue decltype default do
+    delete double else enum explicit export extern final float for friend goto if import inline int long module mutable
+    namespace new noexcept nullptr operator override private protected public register requires restrict return short
+    signed sizeof static struct switch template this throw try typedef typeid typename typeof union unsigned using
+    virtual void volatile while and bitand bitor compl not or xor true false null main
+"""
 _JAVA = (
     "abstract assert boolean byte extends finally implements instanceof interface native package permits record sealed "
     "strictfp super synchronized throws transient var yield"

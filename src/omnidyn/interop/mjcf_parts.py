@@ -30,10 +30,11 @@ KEPT = {
     },
 }  # fmt: skip
 # They say nothing of masses and wheels.
-LEFT_OUT = frozenset(
-    "option size visual statistic asset contact equality tendon actuator sensor keyframe custom site camera light "
-    "material motor position velocity general damper intvelocity cylinder muscle adhesion pair mesh".split()
-)
+_OTHERS = """
+    option size visual statistic asset contact equality tendon actuator sensor keyframe custom site camera light
+    material motor position velocity general damper intvelocity cylinder muscle adhesion pair mesh
+"""
+LEFT_OUT = frozenset(_OTHERS.split())
 _FROM_ELSEWHERE = ("mesh", "hfield", "sdf")  # shapes of a geom that stand in other files
 
 

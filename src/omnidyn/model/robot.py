@@ -94,7 +94,7 @@ class Robot(Shown, Value):
     log: what the logs of the fit that wrote the robot did beside it, and which logs these are.
     """
 
-    name: Annotated[Text, Field(min_length=1), AfterValidator(printable)]
+    name: Annotated[Text, AfterValidator(printable), Field(min_length=1, max_length=400)]
     source: Text = ""
     body: Body
     wheels: Wheels

@@ -178,7 +178,9 @@ def toml_literal(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return repr(value)
-    if isinstance(value, tuple):
+        return repr(float(value))
+    if isinstance(value, tuple | list):
         return "[" + ", ".join(map(toml_literal, value)) + "]"
+    if isinstance(value, str):  # half of a surrogate pair is no character, and no TOML has a word for it
+        value = value.encode("utf-8", "backslashreplace").decode("utf-8")
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

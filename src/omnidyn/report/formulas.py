@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from html import escape
+
+from omnidyn.report.html import escaped
 
 GREEK = {"theta": "θ", "xi": "ξ", "delta": "δ", "omega": "ω"}
 SIGNS = {"&lt;=": "≤", "&gt;=": "≥", "+-": "±"}
@@ -26,7 +27,7 @@ _RULES = (
 
 def formula(text: str) -> str:
     """The text as HTML: K_t, r1, l^2, sqrt(3) and theta as one writes them by hand; every other text as it stands."""
-    shown = escape(text)
+    shown = escaped(text)
     for sign, meant in SIGNS.items():
         shown = shown.replace(sign, meant)
     for pattern, meant in _RULES:

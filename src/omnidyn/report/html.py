@@ -11,10 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from omnidyn.document import Points, Table
+from omnidyn.errors import printable
 from omnidyn.report.style import Picture
 
 WORDS = 24  # characters of a cell that is wrapped
 STYLE = (Path(__file__).parent / "page.css").read_text("utf-8")
+
+
+def escaped(text: str) -> str:
+    """A text as HTML shows it, in an attribute too: nothing in it is HTML, turns letters around or ends a line."""
+    return escape(printable(text), quote=True)
 
 
 @dataclass(frozen=True)
@@ -50,12 +56,11 @@ def page(
     provenance: version ("omnidyn"), "command" and "inputs" (role, name, sha256); it is the last section.
     """
     every = [*sections, Section("made", "How this was made", provenance_table(provenance))]
-    links = "".join(f'<a href="#{escape(each.key, quote=True)}">{escape(each.title)}</a>' for each in every)
-    first = f"<p><strong>{escape(verdict)}</strong></p>" if verdict else ""
-    head = f"<header><h1>{escape(title)}</h1>{first}<p>{escape(introduction)}</p>{lead}<nav>{links}</nav></header>"
+    links = "".join(f'<a href="#{escaped(each.key)}">{escaped(each.title)}</a>' for each in every)
+    first = f"<p><strong>{escaped(verdict)}</strong></p>" if verdict else ""
+    head = f"<header><h1>{escaped(title)}</h1>{first}<p>{escaped(introduction)}</p>{lead}<nav>{links}</nav></header>"
     parts = (
-        f'<section id="{escape(each.key, quote=True)}"><h2>{escape(each.title)}</h2>{each.content}</section>'
-        for each in every
+        f'<section id="{escaped(each.key)}"><h2>{escaped(each.title)}</h2>{each.content}</section>' for each in every
     )
     return _document(title, head + "".join(parts))
 
@@ -68,13 +73,13 @@ def _document(title: str, body: str) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="color-scheme" content="light dark"><link rel="icon" href="data:,">'
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head>\n<body><main>{body}</main></body></html>\n"
+        f"<title>{escaped(title)}</title><style>{STYLE}</style></head>\n<body><main>{body}</main></body></html>\n"
     )
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], name: str = "plain") -> str:
     """A table of plain text; `name` is its class in page.css."""
-    top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+    top = "".join(f'<th scope="col">{escaped(cell)}</th>' for cell in head)
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     return f'<div class="wide"><table class="{name}"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
@@ -82,26 +87,26 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], name: str = "plain
 def _cell(text: str) -> str:
     """A cell; one of many words is wrapped."""
     kind = ' class="words"' if len(text) > WORDS else ""
-    return f"<td{kind}>{escape(text)}</td>"
+    return f"<td{kind}>{escaped(text)}</td>"
 
 
 def bullets(words: Sequence[str]) -> str:
     """A list of sentences; nothing where there are none."""
-    return f"<ul>{''.join(f'<li>{escape(each)}</li>' for each in words)}</ul>" if words else ""
+    return f"<ul>{''.join(f'<li>{escaped(each)}</li>' for each in words)}</ul>" if words else ""
 
 
 def paragraph(words: str) -> str:
     """One paragraph of plain text."""
-    return f"<p>{escape(words)}</p>"
+    return f"<p>{escaped(words)}</p>"
 
 
 def figure(picture: Picture) -> str:
     """A picture with its title and caption, inside the page; a box to tick makes it large, and scrolls it."""
     data = base64.b64encode(picture.svg).decode()
-    name = escape(picture.name, quote=True)
-    image = f'<img alt="{escape(picture.caption, quote=True)}" src="data:image/svg+xml;base64,{data}">'
+    name = escaped(picture.name)
+    image = f'<img alt="{escaped(picture.caption)}" src="data:image/svg+xml;base64,{data}">'
     zoom = f'<input type="checkbox" class="zoom" id="zoom-{name}"><label for="zoom-{name}">large</label>'
-    words = f"<b>{escape(picture.title)}.</b> {escape(picture.caption)}"
+    words = f"<b>{escaped(picture.title)}.</b> {escaped(picture.caption)}"
     frame = f'<div class="frame" tabindex="0">{image}</div>'
     return f'<figure id="{name}">{zoom}{frame}<figcaption>{words}</figcaption></figure>'
 
@@ -119,5 +124,7 @@ def provenance_table(provenance: Mapping[str, Any]) -> str:
 
 
 def _made(rows: Sequence[tuple[str, str]]) -> str:
-    cells = (f'<tr><th scope="row">{escape(name)}</th><td><code>{escape(text)}</code></td></tr>' for name, text in rows)
+    cells = (
+        f'<tr><th scope="row">{escaped(name)}</th><td><code>{escaped(text)}</code></td></tr>' for name, text in rows
+    )
     return f'<table class="made">{"".join(cells)}</table>'

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import Any
 
 from omnidyn.paper.claims import RULE, Claim, ClaimVerdict, headlines, verdict_counts
 from omnidyn.report.formulas import formula
-from omnidyn.report.html import STYLE, Section, figure, page
+from omnidyn.report.html import STYLE, Section, escaped, figure, page
 from omnidyn.report.style import Picture
 
 __all__ = ["SIGNS", "STYLE", "render_page"]
@@ -52,7 +51,7 @@ def _lead(claims: Sequence[Claim]) -> str:
     except KeyError:  # some claims only
         lines = []
     told = f'<ol class="lines">{"".join(f"<li>{formula(line)}</li>" for line in lines)}</ol>' if lines else ""
-    return f'{told}{_counts(claims)}<p class="rule">{escape(RULE)}</p>'
+    return f'{told}{_counts(claims)}<p class="rule">{escaped(RULE)}</p>'
 
 
 def _counts(claims: Sequence[Claim]) -> str:
@@ -74,7 +73,7 @@ def _subject(subject: str, claims: Sequence[Claim], pictures: Sequence[Picture])
 
 def _badge(verdict: ClaimVerdict) -> str:
     sign = SIGNS[verdict.short]
-    return f'<span class="badge {verdict.short}"><span aria-hidden="true">{sign}</span> {escape(verdict.value)}</span>'
+    return f'<span class="badge {verdict.short}"><span aria-hidden="true">{sign}</span> {escaped(verdict.value)}</span>'
 
 
 def _table(claims: Sequence[Claim]) -> str:
@@ -91,7 +90,7 @@ def _row(claim: Claim) -> str:
         formula(claim.printed),
         formula(claim.ours),
     )
-    return f'<tr id="{escape(claim.key, quote=True)}">{"".join(f"<td>{cell}</td>" for cell in cells)}</tr>'
+    return f'<tr id="{escaped(claim.key)}">{"".join(f"<td>{cell}</td>" for cell in cells)}</tr>'
 
 
 def _numbers(numbers: Mapping[str, Any]) -> str:
@@ -99,4 +98,4 @@ def _numbers(numbers: Mapping[str, Any]) -> str:
     if not numbers:
         return ""
     lines = (f"{name} = {json.dumps(value)}" for name, value in numbers.items())
-    return f"<details><summary>numbers</summary><pre>{escape(chr(10).join(lines))}</pre></details>"
+    return f"<details><summary>numbers</summary><pre>{chr(10).join(map(escaped, lines))}</pre></details>"

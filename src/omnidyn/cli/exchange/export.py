@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -62,10 +63,12 @@ def export(
     loaded = load_robot(robot)
     if log:
         options |= _options(kind, make, {"runs": [_run(path, loaded, max_bytes) for path in log]})
+    inputs = [robot_path(robot), *log, *([controller] if controller.endswith(".toml") else [])]
     if out not in ("", "-"):
-        files = [*log, *([controller] if controller.endswith(".toml") else [])]
-        keep_apart([out], [robot_path(robot), *files])
+        keep_apart([out], inputs)
     made = make(loaded, **options)
+    if made.folder and out not in ("", "-"):
+        keep_apart([Path(out, name) for name in made.files], inputs)
     record = provenance([robot_input(robot), *(input_file("log", path) for path in log)])
     if out == "-":
         show(made.text.rstrip("\n"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -37,7 +38,12 @@ def _checked(folder: Path, force: bool) -> Path:
     else:
         target = folder.absolute().parent
     if not target.is_dir():
-        raise InputError("the folder does not exist", got=str(target), remedy=f"mkdir -p {target}", where=str(folder))
+        raise InputError(
+            "the folder does not exist",
+            got=str(target),
+            remedy=f"mkdir -p {shlex.quote(str(target))}",
+            where=str(folder),
+        )
     if not os.access(target, os.W_OK | os.X_OK):
         raise InputError("the folder is not writable", got=str(target), where=str(folder))
     return folder

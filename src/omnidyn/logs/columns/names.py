@@ -7,6 +7,7 @@ import unicodedata
 from functools import lru_cache
 from typing import NamedTuple
 
+from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.units import Unit, known_unit
 
 (
@@ -68,7 +69,7 @@ class NameParts(NamedTuple):
 @lru_cache(4096)
 def read_name(name: str) -> NameParts:
     """The words of a column's name. A word that is not known counts as "other"."""
-    plain = _AGAIN.sub("", _without_accents(name.strip()))
+    plain = _AGAIN.sub("", _without_accents(name[-MAX_NAME:].strip()))
     plain = re.sub(r"duty[ _-]?cycle", "duty", plain.replace("v_n", "vn"), flags=re.IGNORECASE)
     stem, unit = _without_unit(plain)
     spread = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower()

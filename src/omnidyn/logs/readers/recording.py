@@ -12,6 +12,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, shortened
 from omnidyn.logs.clock.stamps import astray
 from omnidyn.logs.readers.left_out import LeftOut
+from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.logs.table.header import MAX_COLUMNS
 from omnidyn.logs.table.rows import Column, refuse_infinite
 from omnidyn.logs.table.table import MAX_CELLS, Said, Table
@@ -79,7 +80,7 @@ class Recording:
 
         Raises InputError where no topic holds numbers.
         """
-        tracks = [track.in_order() for track in self._without_strays() if len(track.stamps) and track.columns]
+        tracks = [track.in_order() for track in self._without_strays(self._named()) if len(track.stamps) and track.columns]
         names = (TIME_COLUMN, *(name for track in tracks for name in track.columns))
         if not tracks:
             raise self._nothing()
@@ -106,17 +107,26 @@ class Recording:
             yield Table(names, block, lines, *rest, "", notes, says=says, own_clocks=own)
         yield Table(names, {}, np.zeros(0, dtype=np.int64), *rest, self.sha256, notes, says=says, own_clocks=own)
 
-    def _without_strays(self) -> list[Track]:
+    def _without_strays(self, tracks: list[Track]) -> list[Track]:
         """The tracks without single stamps far from all others."""
-        stamps = np.concatenate([track.stamps for track in self.tracks] or [np.zeros(0, dtype=np.int64)])
+        stamps = np.concatenate([track.stamps for track in tracks] or [np.zeros(0, dtype=np.int64)])
         bad = astray(stamps, DAY_NS)
         if not bad.any():
-            return self.tracks
-        parts = np.split(bad, np.cumsum([len(track.stamps) for track in self.tracks])[:-1])
-        topic = next(track.topic for track, part in zip(self.tracks, parts, strict=True) if part.any())
+            return tracks
+        parts = np.split(bad, np.cumsum([len(track.stamps) for track in tracks])[:-1])
+        topic = next(track.topic for track, part in zip(tracks, parts, strict=True) if part.any())
         left_out = LeftOut(int(bad.sum()), f"a time of {stamps[bad][0] / 1e9:.9g} s in {topic}, far from all others")
         self.notes += left_out.notes
-        return [track.rows(~part) for track, part in zip(self.tracks, parts, strict=True)]
+        return [track.rows(~part) for track, part in zip(tracks, parts, strict=True)]
+
+    def _named(self) -> list[Track]:
+        """The tracks without those whose names no table takes, which are noted."""
+        longest = {id(track): max(map(len, track.columns), default=0) for track in self.tracks}
+        for track in self.tracks:
+            if longest[id(track)] > MAX_NAME:
+                words = f"a name of {longest[id(track)]} characters, more than {MAX_NAME}: its columns are left out"
+                self.notes.append(f"{shortened(track.topic, 60)}: {words}")
+        return [track for track in self.tracks if longest[id(track)] <= MAX_NAME]
 
     def _nothing(self) -> InputError:
         told = [f"{each.name} ({each.type}, {each.count})" for each in self.topics if each.count]
@@ -200,4 +210,4 @@ def topic_of(name: str, kind: str, stamps: IntArray, read: bool = False, why: st
     longest = int(steps.max(initial=0)) / 1e9
     positive = steps if len(steps) and steps.min() > 0 else steps[steps > 0]
     rate = 1e9 / float(np.median(positive, overwrite_input=True)) if positive.size else 0.0
-    return Topic(name, kind, len(stamps), rate, longest, read, why)
+    return Topic(shortened(name, MAX_NAME), kind, len(stamps), rate, longest, read, why)

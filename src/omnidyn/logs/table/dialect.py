@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from omnidyn.errors import InputError
 from omnidyn.units import known_unit
 
+MAX_NAME = 1000  # characters of the name of a column
 SEPARATORS = (",", ";", "\t")
 SEPARATOR_WORDS = {",": "a comma", ";": "a semicolon", "\t": "a tab"}
 SAMPLE_ROWS = 50  # rows that vote on the separator; a later row that differs is refused as ragged
@@ -154,7 +155,7 @@ def strip_brackets(cell: str) -> str:
 
 def split_unit(name: str) -> tuple[str, str]:
     """("w1", "rad/s") from "w1 [rad/s]" or "w1 (rad/s)"; no unit where the brackets hold none, as in "joint[0]"."""
-    match = _NAME_AND_UNIT.fullmatch(name)
+    match = _NAME_AND_UNIT.fullmatch(name) if len(name) <= MAX_NAME else None
     unit = (match[2] or match[3]) if match else ""
     return (match[1], unit) if match and is_unit(unit) else (name, "")
 

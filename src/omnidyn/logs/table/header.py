@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 from omnidyn.errors import InputError
 from omnidyn.logs.table import dialect
-from omnidyn.logs.table.dialect import SAMPLE_ROWS, SEPARATOR_WORDS, SEPARATORS
+from omnidyn.logs.table.dialect import MAX_NAME, SAMPLE_ROWS, SEPARATOR_WORDS, SEPARATORS
 
 MAX_COLUMNS = 1000
-MAX_NAME = 1000  # characters
 INDEX = "index"  # what a column of row numbers without a name is called
 TABS_NOTE = "columns are separated by " + SEPARATOR_WORDS["\t"]
 HEAD_ROWS = 3  # at most so many lines above the first row: titles, units, names

@@ -9,6 +9,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 
+HEAD, HEAD_SIZE = b"MATLAB 5.0 MAT-file, written by omnidyn", 116  # words for people, by the format
+
 
 def columns_to_mat(columns: Mapping[str, FloatArray]) -> bytes:
     """Columns as variables of n rows, NaN where missing, to the last bit."""
@@ -16,4 +18,5 @@ def columns_to_mat(columns: Mapping[str, FloatArray]) -> bytes:
 
     sink = io.BytesIO()
     savemat(sink, {name: np.ascontiguousarray(values)[:, None] for name, values in columns.items()})
-    return sink.getvalue()
+    content = sink.getvalue()
+    return HEAD.ljust(HEAD_SIZE) + content[HEAD_SIZE:]  # SciPy writes the time of day there

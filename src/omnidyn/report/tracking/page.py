@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import Any
 
 from omnidyn.control.tracking import Tracking, trackings_document
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-from omnidyn.report.html import Section, page, section
+from omnidyn.report.html import Section, escaped, page, section
 from omnidyn.report.tracking.animation import animation
 from omnidyn.report.tracking.pictures import draw_tracking, draw_voltages
 
@@ -43,5 +42,5 @@ def _moving(found: Sequence[Tracking], robot: Robot) -> str:
     data = base64.b64encode(animation(found, robot)).decode()
     names = ", ".join(each.controller for each in found)
     words = "The dot is where the path is at that time. To scale, a large robot apart."
-    image = f'<img alt="{escape(f"{robot.name} driven by {names}", quote=True)}" src="data:image/gif;base64,{data}">'
-    return f'<figure id="animation"><div class="frame">{image}</div><figcaption>{escape(words)}</figcaption></figure>'
+    image = f'<img alt="{escaped(f"{robot.name} driven by {names}")}" src="data:image/gif;base64,{data}">'
+    return f'<figure id="animation"><div class="frame">{image}</div><figcaption>{escaped(words)}</figcaption></figure>'

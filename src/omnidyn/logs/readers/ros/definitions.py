@@ -17,7 +17,7 @@ PRIMITIVES = {
 WORDS = ("string", "wstring")
 STAMPS = ("time", "duration")  # of ROS 1: secs and nsecs
 
-_ARRAY = re.compile(r"([\w/]+)(?:<=\d+)?(\[(?:<=)?(\d*)\])?", re.ASCII)
+_ARRAY = re.compile(r"([\w/]+)(?:<=\d+)?(\[(?:<=)?(\d{0,18})\])?", re.ASCII)
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _RULE = re.compile(r"^={10,}\s*$", re.MULTILINE)
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from omnidyn.logs.readers.ros.layout import Leaf
 
-MAX_DEPTH, MAX_LEAVES, MAX_SCHEMA = 8, 500, 65536
+MAX_DEPTH, MAX_LEAVES, MAX_SCHEMA, MAX_DIGITS = 8, 500, 65536, 4
 CODES = {
     "bool": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
     "uint32": "u4", "int64": "i8", "uint64": "u8", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
@@ -44,6 +44,8 @@ def _walk(name: str, schemas: Mapping[str, str], path: str, at: int, found: dict
         if match is None:  # a bit field, and what else there may be
             raise BadSchemaError(f"{declaration[:40]} in {name}")
         kind, field, count = match[1], match[2], match[3]
+        if len(count or "") > MAX_DIGITS:
+            raise BadSchemaError(f"an array of more than {MAX_LEAVES} in {name}")
         for k in range(int(count or 1)):
             here = f"{path}{field}{f'[{k}]' if count else ''}"
             if len(found) >= MAX_LEAVES:
