@@ -58,6 +58,19 @@ def test_it_starts_where_it_is_told(tmp_path):
     np.testing.assert_allclose(found, np.hstack([run.twist, run.pose]), rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("start", [1e10, 1001.0, float("nan")])
+def test_a_start_that_no_robot_has_is_refused(start, tmp_path):
+    with pytest.raises(Exception, match=r"fmi2SetReal.*status"):
+        simulated(ROBOT, tmp_path, np.zeros((5, 3)), 0.01, {"omega_rad_s": start})
+
+
+def test_a_step_that_would_take_hours_is_refused(tmp_path):
+    volts = np.array([[3.0, 5.0, 6.0]])
+    with pytest.raises(Exception, match=r"fmi2DoStep.*status"):
+        simulated(ROBOT, tmp_path, volts, 1e5)
+    assert np.isfinite(simulated(ROBOT, tmp_path, volts, 1.0)).all()
+
+
 def test_the_same_robot_gives_the_same_bytes():
     assert fmu(ROBOT).files == fmu(ROBOT).files
 

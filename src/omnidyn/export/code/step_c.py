@@ -22,6 +22,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.commands import MAX_DT
+from omnidyn.simulation.exact import inductance_position, march
 from omnidyn.simulation.exact.inductance import axis_laws, current_gain
 from omnidyn.simulation.exact.inductance_position import COUNT, GAUSS, Axes, Nodes
 from omnidyn.simulation.exact.inductance_step import AxisLaw
@@ -156,8 +157,10 @@ def _advance(program: Program, robot: Robot) -> str:
     """The step with what it checks before and after."""
     dynamic, single = robot.motor.electrical == DYNAMIC, program.single
     largest = SINGLE_MAX if single else sys.float_info.max
+    piece = inductance_position.PIECE if dynamic else march.PIECE  # [rad] at the most that a turn of the loop takes
     numbers = {
         "LARGEST": largest, "LONGEST": MAX_DT, "TWIST": FARTHEST["twist"], "POSE": FARTHEST["pose"],
+        "FULL_TURN": piece * program.most_turns,
     }  # fmt: skip
     words = {name: c_number(value, single) for name, value in numbers.items()}
     text = filled(_CHECKED, ABS="fabsf" if single else "fabs", REAL=program.real)
@@ -210,6 +213,9 @@ _REFUSE = """
     }
     if (!all_within(pose, 3, @POSE@)) {
         return OMNIDYN_STEP_BAD_POSE;
+    }
+    if (!all_within(twist + 2, 1, @FULL_TURN@ / h)) {
+        return OMNIDYN_STEP_TOO_LONG;
     }
 """
 
