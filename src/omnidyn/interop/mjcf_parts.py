@@ -35,6 +35,7 @@ _OTHERS = """
     material motor position velocity general damper intvelocity cylinder muscle adhesion pair mesh
 """
 LEFT_OUT = frozenset(_OTHERS.split())
+_NEVER_NEGATIVE = ("mass", "density", "diaginertia")  # MuJoCo takes 0 in place of some that are
 _FROM_ELSEWHERE = ("mesh", "hfield", "sdf")  # shapes of a geom that stand in other files
 
 
@@ -77,6 +78,12 @@ def _refuse(node: ET.Element, depth: int, parts: int, where: str) -> None:
             expected="boxes, spheres, cylinders, capsules and ellipsoids",
             remedy="give the body an <inertial>, and a simple shape in place of the geom", where=where,
         )  # fmt: skip
+    for name in _NEVER_NEGATIVE:
+        if any(text.startswith("-") and text.strip("-0.eE+") for text in node.get(name, "").split()):
+            raise InputError(
+                "no body has a negative mass or inertia", got=f'{name}="{node.get(name)}"', expected="0 or more",
+                remedy="correct the sign", where=where,
+            )  # fmt: skip
     if parts > MOST_PARTS or depth > DEEPEST:
         raise InputError(
             "the model is too large", got=f"{parts} elements, {depth} deep",
