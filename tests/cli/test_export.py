@@ -1,6 +1,7 @@
 """omnidyn export and omnidyn import: what is written, what is said, what is refused."""
 
 import json
+import os
 
 import pytest
 
@@ -40,6 +41,51 @@ def test_nothing_is_replaced_without_force(call, here):
     assert call("export", "json", "axebot", "-o", "robot.json", "--force")[0] == 0
     code, _, err = call("import", "json", "robot.json", "-o", "robot.json", "--force")
     assert (code, "would replace its own input" in err) == (3, True)
+
+
+@pytest.mark.parametrize(
+    "kind, name, options",
+    [
+        ("wpilib", "robot_gains.py", []), ("c-model", "omnidyn_step.c", ["--precision", "single"]),
+        ("ros2-node", "drive_loop.py", []),
+    ],
+)  # fmt: skip
+def test_a_folder_never_takes_the_place_of_what_the_export_reads(call, here, kind, name, options):
+    """A robot file that is called as a file of the export, in the folder that the export writes."""
+    (here / "out").mkdir()
+    assert call("import", "json", *exported(call, here), "-o", "robot.toml")[0] == 0
+    text = (here / "robot.toml").read_bytes()
+    (here / "out" / name).write_bytes(text)
+    for robot in (f"out/{name}", f"./out/../out/{name}"):
+        code, _, err = call("export", kind, robot, *options, "-o", "out", "--force")
+        assert (code, "the result would replace its own input" in err) == (3, True)
+    (here / "link.toml").symlink_to(here / "out" / name)
+    assert call("export", kind, "link.toml", *options, "-o", "out", "--force")[0] == 3
+    assert (here / "out" / name).read_bytes() == text
+    assert os.listdir(here / "out") == [name]
+    assert call("export", kind, "robot.toml", *options, "-o", "out", "--force")[0] == 0
+
+
+def exported(call, here):
+    """The paper's robot as JSON: the arguments that name it."""
+    assert call("export", "json", "axebot", "-o", "axebot.json")[0] == 0
+    return ["axebot.json"]
+
+
+def test_a_log_or_a_controller_in_the_folder_stays(call, here):
+    import numpy as np
+
+    (here / "out").mkdir()
+    run = omnidyn.simulate(omnidyn.load_robot("axebot"), np.tile([0.0, 3.0, -3.0], (100, 1)), 0.01)
+    omnidyn.write_run(run.replace(wheel_speed=run.wheel_speed + 0.5), here / "log.csv")
+    (here / "out" / "controllers.yaml").write_bytes((here / "log.csv").read_bytes())
+    code, _, err = call("export", "ros2-control", "axebot", "--log", "out/controllers.yaml", "-o", "out", "--force")
+    assert (code, "the result would replace its own input" in err) == (3, True)
+    (here / "loop.toml").write_text('schema = 1\ncontroller = "pid"\n[options]\nfaster = 2.0\n')
+    (here / "out" / "omnidyn_control.h").symlink_to(here / "loop.toml")
+    code, _, err = call("export", "c-controller", "axebot", "--controller", "loop.toml", "-o", "out", "--force")
+    assert (code, "the result would replace its own input" in err) == (3, True)
+    assert len(os.listdir(here / "out")) == 2
 
 
 def test_help_names_every_kind(call):
