@@ -12,7 +12,7 @@ import omnidyn
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.ros.node import ros2_node
 from omnidyn.model.drive import Drive
-from tests.export.ros.test_node import ROBOT, Plant, loaded
+from tests.export.ros.test_node import NO_NUMBERS, NO_SUPPLY, ROBOT, Plant, loaded
 from tests.export.ros.test_node import bus as bus
 from tests.support.exported import STRICT
 
@@ -88,6 +88,33 @@ def test_it_stops_without_a_pose_at_an_empty_path_and_at_what_is_none(tmp_path):
         assert loop.step(0.52) == [0.0] * 3
     loop.measured(0.6, [np.nan] * 3, [0.0] * 3)
     assert loop.told_at == 0.5
+
+
+def test_what_is_no_number_stops_the_motors_and_raises_nothing(tmp_path):
+    module = built(tmp_path / "node", controller="pid")
+    for supply in NO_SUPPLY:
+        loop = module.PathLoop()
+        for k, given in enumerate((6.0, supply, 6.0)):
+            loop.measured(k * DT, [0.0] * 3, [0.0] * 3)
+            loop.command(k * DT, (0.3, 0.1, -1.0))
+            duty = loop.step(k * DT, supply=given)
+            assert any(duty) == (given == 6.0)
+            assert (loop.status == module.BAD_SUPPLY) == (given != 6.0)
+    for bad in NO_NUMBERS:
+        loop = module.PathLoop()
+        loop.measured(0.0, [0.0] * 3, [0.0] * 3)
+        loop.measured(0.0, bad, [0.0] * 3)
+        loop.measured(0.0, [0.0] * 3, bad)
+        loop.command(0.0, bad)
+        assert (loop.pose, loop.course) == ([0.0] * 3, None)
+        loop.follow(0.0, [bad, bad])
+        assert loop.step(0.0) == [0.0] * 3
+        assert loop.status == module.STOPPED
+    for now in (0.0, 1.7e9):  # of a clock that counts from 1970 two rows so near are at one time
+        loop = module.PathLoop()
+        loop.measured(now, [0.0] * 3, [0.0] * 3)
+        loop.follow(now, [(0.0, 0.0, 0.0, 0.0), (1e-300, 1e8, 0.0, 0.0), (1.0, 1e8, 0.0, 1e8)])
+        assert np.isfinite(loop.step(now)).all()
 
 
 def test_the_node_on_a_bus(bus, tmp_path, monkeypatch):

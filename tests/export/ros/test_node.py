@@ -100,6 +100,60 @@ def test_what_is_no_command_is_none(drive, bad):
     assert loop.twist is None
 
 
+NO_NUMBERS = [
+    (np.nan, 0.0, 0.0), (1e308, -1e308, 1e308), (10**400, 0, 0), (None, 0.0, 0.0), ("x", 1.0, 2.0, 3.0), None, 1.0,
+    "abc", ([], [], []),
+]  # fmt: skip
+NO_SUPPLY = [np.nan, np.inf, 0.0, -6.0, 1e-300, None, "6", 10**400]
+
+
+@pytest.mark.parametrize("supply", NO_SUPPLY, ids=lambda value: str(value)[:9])
+def test_a_supply_that_is_none_stops_the_motors_with_a_status(drive, supply):
+    module = drive(ROBOT)
+    loop = module.DriveLoop()
+    for k, given in enumerate((6.0, supply, supply, 6.0)):
+        loop.command(k * DT, (0.1, 0.0, 0.0))
+        duty = loop.step(k * DT, supply=given)
+        assert any(duty) == (given == 6.0)
+        assert loop.status == (module.OK if given == 6.0 else module.BAD_SUPPLY)
+    assert loop.step(9.0, supply=supply) == [0.0] * 3
+    assert loop.status == module.STOPPED
+
+
+@pytest.mark.parametrize("dt", [np.nan, np.inf, 0.0, -0.01, None, "0.01"])
+def test_a_time_step_that_is_none_stops_the_motors_with_a_status(drive, dt):
+    module = drive(ROBOT)
+    loop = module.DriveLoop()
+    loop.command(0.0, (0.1, 0.0, 0.0))
+    assert loop.step(0.0, dt=dt) == [0.0] * 3
+    assert loop.status == module.BAD_TIME
+    assert loop.step(np.nan) == [0.0] * 3
+    assert loop.status == module.STOPPED
+    assert any(loop.step(0.01))
+    assert loop.status == module.OK
+
+
+@pytest.mark.parametrize("bad", NO_NUMBERS, ids=lambda value: str(value)[:9])
+def test_no_measurement_and_no_command_raises(drive, bad):
+    loop = drive(ROBOT).DriveLoop()
+    loop.command(0.0, bad)
+    loop.measured(0.0, bad)
+    assert loop.step(0.0) == [0.0] * 3
+    loop.command(0.0, (0.3, 0.0, 0.0))
+    first = loop.step(0.0)
+    loop.measured(0.01, bad)
+    assert loop.twist is None
+    assert np.isfinite(first).all()
+
+
+def test_what_numpy_calls_a_number_is_one(drive):
+    module = drive(ROBOT)
+    loop = module.DriveLoop()
+    loop.command(0.0, np.array([0.3, 0.0, 0.0], np.float32))
+    assert any(loop.step(0.0, supply=np.float32(7.2)))
+    assert loop.status == module.OK
+
+
 def test_duties_stay_in_their_range_and_keep_the_direction(drive):
     module = drive(ROBOT)
     loop = module.DriveLoop()
