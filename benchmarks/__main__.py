@@ -41,6 +41,7 @@ NAMES = {
     "group_shapes": "a shape of friction per group, a level of each wheel: taken where it is so only (half an hour)",
     "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
+    "exported_c": "exported C on a million random calls under sanitizers: findings, the slowest call (four minutes)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"

@@ -6,7 +6,7 @@ A kind is a function of a robot, and of options that have defaults. It must:
 2. take every number from the robot, by the functions of the model: no physics is written a second time;
 3. begin with `refuse`: what it refuses stands in the table of features.py, and nowhere else;
 4. say what it leaves out in two places, as comments in the file and in `Export.missing`, in the same words;
-5. spell numbers and names by spelling.py: a name may hold any character that can be shown;
+5. spell numbers and names by spelling.py, and fill templates by `filled`: a name is data, whatever it holds;
 6. give the same bytes for the same robot: no dates, no paths, no names of machines.
 """
 
