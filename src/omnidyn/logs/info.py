@@ -12,7 +12,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Points
 from omnidyn.document import Table as Cells
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, printable
 from omnidyn.files import default_max_bytes
 from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import Clock
@@ -108,7 +108,7 @@ def read_info(
         last = max(int(track.stamps.max()) for track in recording.tracks if len(track.stamps))
         span = (last - first) / 1e9
     notes = (*recording.notes, *(mapping.notes if mapping is not None else ()))
-    return Info(str(path), kind, topics, mapping, span, recording.salvaged, notes, why, recording.sha256)
+    return Info(printable(str(path)), kind, topics, mapping, span, recording.salvaged, notes, why, recording.sha256)
 
 
 @dataclass
@@ -160,7 +160,7 @@ def _of_columns(
     taken = {column.name for column in mapping.columns.values()} if mapping is not None else set()
     topics = tuple(_topic(name, each, table, name in taken) for name, each in seen.items())
     notes = (*table.notes, *(mapping.notes if mapping is not None else ()))
-    return Info(str(path), kind, topics, mapping, max(0.0, last - first), None, notes, why, table.sha256)
+    return Info(printable(str(path)), kind, topics, mapping, max(0.0, last - first), None, notes, why, table.sha256)
 
 
 def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress | None) -> Iterator[Table]:

@@ -70,6 +70,21 @@ def test_random_calls_under_sanitizers(robot, precision, count, tmp_path):
     assert valid.returned[OK] == 1000
 
 
+@pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_a_robot_of_20_grams_is_not_too_fast(electrical, precision, tmp_path):
+    """Its rates are 20000 per second: a second at full volts, forward and back, is one call."""
+    small = ROBOT.replace(
+        body=ROBOT.body.replace(mass=0.02, inertia=2e-6), motor=ROBOT.motor.replace(electrical=electrical),
+        wheels=ROBOT.wheels.replace(robot_radius=0.015, wheel_radius=0.005),
+    )  # fmt: skip
+    volts = np.random.default_rng(1).uniform(-100.0, 100.0, (200, 3))
+    volts[::2] = np.sign(volts[::2, :1])
+    twist, pose = Stepper(small, tmp_path / "c", precision).run(100.0 * volts, 1.0)
+    assert np.isfinite(pose).all()
+    assert np.abs(twist[:, 2]).max() > 10.0
+
+
 def test_the_fmu_under_sanitizers(tmp_path):
     program = of_fmu(ROBOT, tmp_path / "fmu")
     found, valid = program.run(2000, ANY), program.run(500, VALID)
