@@ -37,11 +37,11 @@ def omnidyn(*arguments, cwd, **more):
     return subprocess.run(command, cwd=cwd, env=environment(**more), capture_output=True, text=True, timeout=120)
 
 
-def waiting(module, name, *arguments, cwd):
-    """A process that waits inside `module.name`."""
+def waiting(module, name, *arguments, cwd, stdout=None):
+    """A process that waits inside `module.name`. stdout: a file for its result."""
     script = WAITING.format(module=module, name=name, arguments=list(arguments))
     command = [sys.executable, "-c", script]
-    process = subprocess.Popen(command, cwd=cwd, env=environment(), stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, cwd=cwd, env=environment(), stdout=stdout, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     for line in process.stderr:
         if line == "ready\n":
