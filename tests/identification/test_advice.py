@@ -50,7 +50,8 @@ def together(std):
     """What is advised where two numbers of value 2, with this standard error, have a correlation of 0.97."""
     names = ("friction.axes.coulomb[0]", "friction.axes.coulomb[1]")
     fit = OutputErrorEstimate(
-        robot=load_robot("axebot"), value=dict.fromkeys(names, 2.0), std=dict.fromkeys(names, std), ci95={},
+        robot=load_robot("axebot"), value=dict.fromkeys(names, 2.0), std=dict.fromkeys(names, std),
+        ci95=dict.fromkeys(names, (2.0 - 2.0 * std, 2.0 + 2.0 * std)),
         correlation=Correlation(names, np.array([[1.0, 0.97], [0.97, 1.0]])), degrees_of_freedom={},
     )  # fmt: skip
     return [words for words in advice(fit, None) if "move together" in words]

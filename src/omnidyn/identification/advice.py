@@ -17,7 +17,7 @@ from omnidyn.model.robot import GUESS
 
 LIMIT = "motor.current_limit_A"
 NEARLY = 0.7  # of what the first remedy explains, from which one behind it is worth a word
-WIDE, GOAL = 0.1, 0.05  # std over value that is worth a word, and what it could be
+WIDE, GOAL = 0.2, 0.1  # half width of the 95 % interval over the value: worth a word, and what it could be
 LONGEST = 100.0  # times as long as now: nobody records more
 TOGETHER = 0.95  # correlation of two numbers that move together
 # Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
@@ -116,12 +116,6 @@ def _guesses(fit: OutputErrorEstimate) -> Iterator[str]:
         )
 
 
-def _share(fit: OutputErrorEstimate, name: str) -> float:
-    """Standard error over value; 0 for what is no number of the robot."""
-    value = fit.value.get(name)
-    return fit.std[name] / abs(value) if value else 0.0
-
-
 def _together(fit: OutputErrorEstimate) -> Iterator[str]:
     """Numbers that move together, and are wide for it: where both are known well, it does no harm."""
     names, matrix = fit.correlation.names, fit.correlation.matrix
@@ -129,7 +123,7 @@ def _together(fit: OutputErrorEstimate) -> Iterator[str]:
         f"{first} and {names[j]} move together (correlation {matrix[i, j]:+.2f})"
         for i, first in enumerate(names) for j in range(i + 1, len(names))
         if abs(matrix[i, j]) > TOGETHER and not {first, names[j]} & set(fit.unidentifiable)
-        and max(_share(fit, first), _share(fit, names[j])) > GOAL
+        and max(fit.half_width(name) if name in fit.value else 0.0 for name in (first, names[j])) > GOAL
     ]  # fmt: skip
     if pairs:
         one = "one of them" if len(pairs) == 1 else "one of each pair"
@@ -139,11 +133,15 @@ def _together(fit: OutputErrorEstimate) -> Iterator[str]:
 def _wide(fit: OutputErrorEstimate) -> Iterator[str]:
     """What is known too roughly. A longer log helps against noise only: not where the model itself misses something."""
     shares = {
-        name: _share(fit, name) for name in fit.value if name not in fit.unidentifiable and name not in fit.at_bound
-    }
+        name: fit.half_width(name) for name in fit.value
+        if name not in fit.unidentifiable and name not in fit.at_bound
+    }  # fmt: skip
     wide = {name: share for name, share in shares.items() if share > WIDE}
     if wide:
-        known = ", ".join(f"{name} is known within {100.0 * share:.0f} % only" for name, share in wide.items())
+        known = ", ".join(
+            f"{name} is known within {100.0 * share:.0f} % only" if fit.is_known(name) else f"{name} is not known"
+            for name, share in wide.items()
+        )
         longer = (max(wide.values()) / GOAL) ** 2
         if _misses(fit):
             them = "it" if len(wide) == 1 else "them"

@@ -26,7 +26,6 @@ NOT_DETERMINED = "not determined"  # in the place of an interval: the data do no
 UNKNOWN = {"std": None, "ci95": [None, None]}  # the same for machines
 NAMED = 4  # numbers that a sentence names
 WORTH = 0.1  # by which an interval must be wider for that to be worth a table
-UNKNOWN_FROM = 0.5  # std over value from which a number is as good as not known
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
 
@@ -112,9 +111,9 @@ class Estimate(Shown):
 
     def numbers_known(self) -> str:
         """ "all 6 numbers are known, the widest (viscous friction forward) within 9 %"; what is not known is named."""
-        share = self._shares()
-        missing = [in_words(name) for name, each in share.items() if not each <= UNKNOWN_FROM]
-        known = {name: each for name, each in share.items() if each <= UNKNOWN_FROM and name not in self.at_bound}
+        share = {name: self.half_width(name) for name in self.value}
+        known = {name: each for name, each in share.items() if self.is_known(name)}
+        missing = [in_words(name) for name in share if name not in known]
         named = all_of([*missing[:NAMED], *([f"{len(missing) - NAMED} more"] if len(missing) > NAMED else [])])
         if len(missing) == len(share):
             return f"no number is known{f': not {named}' if named else ''}"
@@ -127,13 +126,16 @@ class Estimate(Shown):
             words += f"{which} within {short(max(0.1, 100.0 * known[widest]))} %"
         return f"{words}; not {named}" if missing else words
 
-    def _shares(self) -> dict[str, float]:
-        """Name -> std over value: infinite for what the data do not determine, 0 for what they do at a bound."""
-        return {
-            name: math.inf if name in self.unidentifiable
-            else 0.0 if name in self.at_bound else self.std[name] / abs(value) if value else math.inf
-            for name, value in self.value.items()
-        }  # fmt: skip
+    def half_width(self, name: str) -> float:
+        """Half the width of the 95 % interval of a number over its size; infinite for one that is not determined."""
+        value, (low, high) = self.value[name], self.ci95[name]
+        share = 0.5 * (high - low) / abs(value) if value and name not in self.unidentifiable else math.inf
+        return share if share >= 0.0 else math.inf
+
+    def is_known(self, name: str) -> bool:
+        """Whether the 95 % interval of a number holds no 0, and is no wider to each side than the number itself."""
+        low, high = self.ci95[name]
+        return (low > 0.0 or high < 0.0) and self.half_width(name) <= 1.0
 
     def summary(self) -> str:
         """The estimate as a plain table, for reading. ASCII only."""

@@ -217,7 +217,7 @@ def log_from_table(
         found = place(key)
         if found is None:
             continue
-        values = table.numbers(column.name, missing=True)
+        values = table.numbers(column.name, missing=True, skip=options.skip_bad_rows)
         if found[0] == "wheel_angle":
             read, where = values, f"{table.source}, column {column.name}"
             values, periods, again = _unrolled(read, t, begins, column.unit, where)

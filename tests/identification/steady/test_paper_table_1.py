@@ -172,7 +172,7 @@ def test_summary_and_dict(robot):
         "N m",
         "Coulomb friction turning",
     ] in rows
-    assert text.startswith("All 6 numbers are known, the widest (viscous friction turning) within 17 %.\n")
+    assert text.startswith("All 6 numbers are known, the widest (viscous friction turning) within 74 %.\n")
     assert "rows at rest count as sliding" in text
     document = json.loads(json.dumps(fit.to_dict(), allow_nan=False))
     assert document["parameters"]["friction.axes.coulomb[1]"]["value"] == fit.value["friction.axes.coulomb[1]"]

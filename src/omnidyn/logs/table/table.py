@@ -20,6 +20,7 @@ from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
 ROWS = 500_000
 MAX_CELLS = 2**24  # in one block: 128 MiB of floats
 MIN_HELD_BYTES = 64 * 2**20
+LEAST, LARGEST = 1e-100, 1e20  # sizes that a number of a log may have, beside 0: counters of 64 bits go to 2e19
 
 
 class Said(NamedTuple):
@@ -80,9 +81,10 @@ class Table:
     def __len__(self) -> int:
         return len(self.lines)
 
-    def numbers(self, name: str, *, missing: bool = False) -> FloatArray:
+    def numbers(self, name: str, *, missing: bool = False, skip: bool = False) -> FloatArray:
         """A column of numbers, shape (rows,). With `missing`, a blank or nan cell is NaN; else it is refused.
 
+        A number below LEAST in size is 0. skip: whether one beyond LARGEST is NaN; otherwise it is refused.
         Raises InputError with file, line and column at the first cell that cannot be used.
         """
         column = self.columns[name]
@@ -102,6 +104,22 @@ class Table:
                 "a number",
                 f"fill it in, or remove the row ({bad.size} of {len(self)} are missing)",
             )
+        return self._plausible(column, name, missing, skip)
+
+    def _plausible(self, column: FloatArray, name: str, missing: bool, skip: bool) -> FloatArray:
+        """The column, its numbers of a size that a sensor may give."""
+        size = np.abs(column)
+        large, small = (size > LARGEST) & np.isfinite(size), (size < LEAST) & (size > 0.0)
+        if large.any() and not skip:
+            row = int(np.argmax(large))
+            remedy = "leave the cell blank, or use `skip_bad_rows`" if missing else "correct it, or remove the row"
+            many = f" ({large.sum()} of {len(self)} are as large)" if large.sum() > 1 else ""
+            raise self.fault(
+                row, name, "no sensor gives such a number", float(column[row]), f"at most {LARGEST:g} in size{many}",
+                remedy,
+            )  # fmt: skip
+        if large.any() or small.any():
+            column = np.where(large, np.nan, np.where(small, 0.0, column))
         return column
 
     def text(self, name: str, expected: str = "text") -> tuple[str, ...]:
