@@ -125,11 +125,13 @@ def _york(
 
     A ridge keeps draws apart that determine no line.
     """
-    scale = np.sqrt(np.mean(design**2, axis=1)) + 1e-300
+    scale = np.sqrt(np.mean(design**2, axis=1))
+    scale[scale == 0.0] = 1.0
 
     def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
         matrix = matrix / (scale[:, :, None] * scale[:, None, :])
-        matrix += 1e-12 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(matrix.shape[1])
+        ridge = np.maximum(1e-12 * np.trace(matrix, axis1=1, axis2=2), 1e-300)
+        matrix += ridge[:, None, None] * np.eye(matrix.shape[1])
         return np.linalg.solve(matrix, (right / scale)[:, :, None])[:, :, 0] / scale
 
     return errors_in_variables(

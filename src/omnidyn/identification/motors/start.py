@@ -194,7 +194,7 @@ def windows_for_a_lag(logs: Sequence[MotorLog], windows: MotorWindows | None, mo
             break
         windows, change = found, found.change[found.motor == motor]
         rows = 2 * max(1, round(0.5 * EDGE_SHARE * found.length / row)) + 1  # that tell the speed at an end
-        if 2.0 * noise**2 / rows / found.length**2 <= HIDDEN * float(np.var(change)):
+        if not change.size or 2.0 * noise**2 / rows / found.length**2 <= HIDDEN * float(np.var(change)):
             break
     return windows
 

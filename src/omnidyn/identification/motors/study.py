@@ -38,6 +38,8 @@ from omnidyn.shown import FIGURE, Shown, make
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotorStudy(Shown):
@@ -204,6 +206,13 @@ def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
 def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[MotorEstimate, ...]]:
     """(numbers of the motors, a line each, and one of all where there are several)."""
     motors = [int(motor) for motor in np.unique(windows.motor)]
+    speeds = [windows.of(motor)[1] for motor in motors]
+    if all(np.ptp(speed) <= SAME_SPEED * np.abs(speed).max() for speed in speeds):
+        raise InsufficientDataError(
+            "a line needs several speeds", got=f"{speeds[0][0]:.4g} rad/s in every window",
+            expected="speeds that change", remedy="drive the motors with several inputs, or look at their sensors",
+            where=source,
+        )  # fmt: skip
     return motors, tuple(fit_line(windows, motor, source) for motor in (*motors, *([None] if motors[1:] else [])))
 
 
