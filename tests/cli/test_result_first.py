@@ -47,6 +47,7 @@ def folder(tmp_path_factory):
     volts = np.column_stack([4.0 * (k // 50 % 2), 3.0 - 6.0 * (k // 70 % 2), -4.0 * (k // 90 % 2)])
     for number in (0, 1):
         run = omnidyn.simulate(load_robot("axebot"), volts * (-1.0) ** number, 0.01)
+        assert run.twist is not None
         twist = run.twist + np.random.default_rng(number).normal(size=run.twist.shape) * 0.01
         log = Run(t=run.t, voltage=run.voltage, twist=twist, wheel_speed=run.wheel_speed)
         write_run(log, there / f"log{number}.csv")
@@ -171,7 +172,7 @@ def test_the_phases_have_their_names(folder):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(diagnosis, "diagnose", diagnosing)
         Identification.of(
-            [read_log(folder / "log0.csv")], robot, Question(free="friction", nuisances="none"), progress=said.append,
+            [read_log(folder / "log0.csv")], robot, Question(free=("friction",), nuisances=()), progress=said.append,
             save=lambda fits: said.append(f"saved {', '.join(fits)}"),
         )  # fmt: skip
     phases = [words.partition(":")[0].partition(",")[0].partition(" /")[0] for words in said]

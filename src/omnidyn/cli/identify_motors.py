@@ -48,7 +48,7 @@ def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> Non
 def _tell(
     study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, now: Callable[[str], object]
 ) -> None:  # fmt: skip
-    from omnidyn.identification.attempts import Attempts, missing_words
+    from omnidyn.attempts import Attempts, missing_words
 
     attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
     told = study.document()

@@ -20,7 +20,7 @@ from omnidyn.identification.question import OUTPUT_ERROR, Question
 PAGE = "page"
 
 if TYPE_CHECKING:
-    from omnidyn.identification.attempts import Attempts
+    from omnidyn.attempts import Attempts
     from omnidyn.identification.identify import Identification
     from omnidyn.model.robot import Robot
 
@@ -85,7 +85,7 @@ def load_meanwhile(to: Out, quick: bool) -> None:
 
 def tell(found: Identification, record: dict[str, Any], to: Out, now: Callable[[str], object]) -> None:
     """Draw the page of an identification, and show the result."""
-    from omnidyn.identification.attempts import Attempts
+    from omnidyn.attempts import Attempts
 
     attempts, report = Attempts([*found.missing], found.interrupt), ""
     if to.report and _has_page(found):
@@ -118,9 +118,9 @@ def _page(found: Identification, record: dict[str, Any]) -> str:
 
 def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
     """The paper's way, from a table of steady points; what the reader had to decide joins the warnings."""
+    from omnidyn.attempts import Attempts
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.errors import InputError
-    from omnidyn.identification.attempts import Attempts
     from omnidyn.identification.steady.steady_state import fit_steady_state
     from omnidyn.logs.steady_table import read_steady_table
     from omnidyn.model.robot_file import load_robot

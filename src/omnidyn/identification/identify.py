@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from omnidyn.arguments import check_order
+from omnidyn.attempts import COMPARISON, DIAGNOSIS, LADDER, QUICK, Attempts, Missing, missing_words
 from omnidyn.document import Document, Points, apart, sentence
 from omnidyn.errors import INTERRUPTS, InputError, UnsupportedError
 from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import STEADY as STEADY_USE
 from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.advice import advice
-from omnidyn.identification.attempts import COMPARISON, DIAGNOSIS, LADDER, QUICK, Attempts, Missing, missing_words
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out

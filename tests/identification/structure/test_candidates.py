@@ -50,6 +50,7 @@ def robot_of(layout, place):
         wheels=Wheels(azimuth_deg=azimuth, roller_angle_deg=roller, wheel_radius=0.04, robot_radius=0.15),
         motor=Motor(resistance=2.1, torque_constant=0.016, emf_constant=0.016, gear_ratio=25.0, voltage_limit=12.0),
         friction=FRICTION[place],
+        priors={},
     )
 
 
