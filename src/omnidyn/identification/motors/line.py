@@ -10,6 +10,7 @@ Intervals are by moving-block bootstrap over the windows: H. R. Kuensch, Ann. St
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,13 +53,15 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
     drawn[1:, used] = _bootstrap(design[:, used], put_in, speed_std, fit, block, windows.settled)
     numbers = dict(zip((SLOPE, BAND, INERTIA), drawn.T, strict=True)) | {LAG: drawn[:, 2] / drawn[:, 0]}
     residual = put_in - design[:, used] @ fit.parameters
-    slope = float(fit.parameters[0])
+    slope, error = float(fit.parameters[0]), float(np.sqrt(np.mean(residual**2)))
+    with np.errstate(invalid="ignore", divide="ignore"):  # of draws that are all alike there is none
+        correlation = float(np.corrcoef(drawn[1:, :2].T)[0, 1])
     return MotorEstimate(
         motor=motor, kind=windows.kind, unit=windows.unit, way=WINDOWS, source=source, count=count,
         value={name: float(each[0]) for name, each in numbers.items()},
         std={name: _robust_std(each[1:]) for name, each in numbers.items()},
         ci95={name: central_interval(each[1:]) for name, each in numbers.items()},
-        correlation=float(np.corrcoef(drawn[1:, :2].T)[0, 1]), rmse=float(np.sqrt(np.mean(residual**2))) / abs(slope),
+        correlation=correlation, rmse=error / abs(slope) if slope else math.inf,
         unidentifiable=tuple(name for name, each in numbers.items() if np.isnan(each[0])),
         one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
