@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arguments import is_frame
 from omnidyn.arrays import FloatArray
+from omnidyn.clocks import fastest_step, has_own_clock, is_staggered, samples, usual_step
 from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
 from omnidyn.shown import DATASET, FIGURE, FRAME, RUN, Shown, make
@@ -33,6 +35,7 @@ CHANNELS = {
     "pose": AXIS,
     "supply": SCALAR,
 }
+SENSORS = ("wheel_speed", "wheel_angle", "twist", "pose", "current")  # what was measured; all else are inputs
 UNITS = {
     "voltage": "V", "duty": "1", "current": "A", "wheel_angle": "rad", "wheel_speed": "rad/s",
     "wheel_speed_command": "rad/s", "twist": "m/s, m/s, rad/s", "twist_command": "m/s, m/s, rad/s",
@@ -89,6 +92,31 @@ class Run(Shown):
         return {name: value for name in CHANNELS if (value := getattr(self, name)) is not None}
 
     @property
+    def sensors(self) -> list[FloatArray]:
+        """The channels of what was measured, inputs left out."""
+        return [value for name in SENSORS if (value := getattr(self, name)) is not None]
+
+    @cached_property
+    def step(self) -> float:
+        """Usual time between two samples of the fastest sensor [s]; between two rows where all share their stamps."""
+        return fastest_step(self.t, self.sensors) if self.staggered else usual_step(self.t)
+
+    @cached_property
+    def staggered(self) -> bool:
+        """Whether its sensors have clocks of their own: a blank is then the row of another one, no missing value."""
+        return is_staggered(self.t, self.sensors)
+
+    def samples(self, channel: str) -> tuple[FloatArray, FloatArray]:
+        """(times [s], values) of the rows in which a channel holds any number; none for one that was not measured.
+
+        channel: its name, such as "twist". Raises InputError for another name.
+        """
+        if channel not in CHANNELS:
+            raise InputError("no such channel", got=channel, expected=", ".join(CHANNELS))
+        values = getattr(self, channel)
+        return samples(self.t, np.full(len(self.t), np.nan) if values is None else values)
+
+    @property
     def wheels(self) -> int | None:
         """Number of wheels, None where no channel of wheels was measured."""
         counts = {len(value[0]) for name, value in self.channels.items() if CHANNELS[name] == WHEEL}
@@ -103,9 +131,9 @@ class Run(Shown):
 
     def document(self) -> Document:
         """What was measured: a row per channel and column, with its least, mean and largest value."""
-        rows = [row for name, values in self.channels.items() for row in _rows(name, values)]
+        rows = [row for name, values in self.channels.items() for row in _rows(name, values, self.t)]
         span = float(self.t[-1] - self.t[0])
-        rate = f" at {1.0 / float(np.median(np.diff(self.t))):.4g} Hz" if len(self.t) > 1 else ""
+        rate = f" at {1.0 / self.step:.4g} Hz" if len(self.t) > 1 else ""
         head = f"{self.source or 'a run'}: {len(self.t)} samples, {span:.6g} s{rate}"
         data = {
             "source": self.source, "samples": len(self.t), "duration_s": span, "channels": list(self.channels),
@@ -168,14 +196,14 @@ def as_run(run: Any) -> Any:
     return make(RUN, run) if is_frame(run) else run
 
 
-def _rows(channel: str, values: FloatArray) -> Iterator[tuple[str, ...]]:
-    """The columns of a channel in a table: least, mean, largest, and what share is missing."""
+def _rows(channel: str, values: FloatArray, t: FloatArray) -> Iterator[tuple[str, ...]]:
+    """The columns of a channel in a table: least, mean, largest, and what share is missing at its own clock."""
     columns = values.reshape(len(values), -1)
     units = UNITS[channel].split(", ")
     for k, column in enumerate(columns.T):
         known = column[np.isfinite(column)]
         numbers = [f"{each:.4g}" for each in (known.min(), known.mean(), known.max())] if known.size else ["-"] * 3
-        missing = 1.0 - known.size / len(column)
+        missing = 0.0 if has_own_clock(t, column) else 1.0 - known.size / len(column)
         of = {WHEEL: f"wheel {k + 1}", AXIS: ("x", "y", "yaw")[k % 3], SCALAR: ""}[CHANNELS[channel]]
         name = channel.replace("_", " ") if k == 0 else ""
         yield name, of, units[k % len(units)], *numbers, f"{missing:.0%}" if missing else ""

@@ -1,13 +1,17 @@
 """The geometry of a robot from its logs: known robots, their own kinematics as a log, eq (3)."""
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 
 from omnidyn import load_robot
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.geometry import as_mecanum, wheel_geometry
+from omnidyn.logs.travel import mean_speeds
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
+from tests.support.staggered import Logged, Topic, plant
 
 
 def log_of(robot, twist, scale=1.0, noise=0.0, names=("twist_command", "wheel_speed_command")):
@@ -95,3 +99,70 @@ def test_what_mecanum_logs_do_not_show_is_the_radius_and_not_where_they_stand():
         wheel_geometry([run], "--robot-radius")
     with pytest.raises(InputError, match="give --robot-radius"):
         wheel_geometry([run.replace(twist=None)], "--robot-radius")
+
+
+BODY, WHEELS = ("twist", "pose"), ("wheel_speed", "wheel_angle")
+
+
+@lru_cache
+def driven(offset, rates):
+    """20 s of a robot with wheels at 60, 180 and 300 degrees, 0.2 m and 0.05 m, all channels, stamps apart."""
+    true = plant(20.0)
+    speeds, angles = [f"w{k}" for k in (1, 2, 3)], [f"a{k}" for k in (1, 2, 3)]
+    twist, pose = ["vx", "vy", "omega"], ["x", "y", "heading"]
+    rate = (100.0, 100.0, 30.0, 20.0) if rates else (50.0,) * 4
+    made = [
+        Topic({name: true[name] for name in names}, offset * k, each)
+        for k, (names, each) in enumerate(zip((speeds, angles, twist, pose), rate, strict=True))
+    ]
+    logged = Logged.of(made, 20.0)
+    t = np.unique(np.concatenate([stamps for stamps, _ in logged.topics]))
+    channels = {}
+    for channel, (stamps, values) in zip((*WHEELS, *BODY), logged.topics, strict=True):
+        channels[channel] = np.full((len(t), 3), np.nan)
+        channels[channel][np.searchsorted(t, stamps)] = np.column_stack(list(values.values()))
+    return Run(t=t, **channels)
+
+
+@pytest.mark.parametrize(("offset", "rates"), [(0.0, False), (20e-6, False), (0.005, True)])
+@pytest.mark.parametrize("body", BODY)
+@pytest.mark.parametrize("wheels", WHEELS)
+def test_body_and_wheels_need_no_common_stamps(body, wheels, offset, rates):
+    run = driven(offset, rates)
+    found = wheel_geometry([Run(t=run.t, **{body: getattr(run, body), wheels: getattr(run, wheels)})])
+    np.testing.assert_allclose(found.azimuth_deg, (60.0, 180.0, 300.0), atol=0.5)
+    assert 1.0 / found.per_metre == pytest.approx(0.05, rel=0.01)
+    assert found.robot_radius == pytest.approx(0.2, rel=0.01)
+    assert (found.source, found.measured) == (f"{body} and {wheels}", True)
+    assert found.residual < 0.05
+
+
+def test_the_way_of_a_turning_body_is_its_arc():
+    """A circle of 1 m radius driven sideways at 2 rad/s, its pose at 10 Hz: chords are 0.17 % short, arcs are not."""
+    t = np.arange(200) * 0.1
+    pose = np.column_stack([np.cos(2.0 * t), np.sin(2.0 * t), 2.0 * t])
+    run = Run(t=t, pose=pose, wheel_angle=np.outer(2.0 * t, [1.0, 1.0, 1.0]))
+    twist, speed = mean_speeds(run, "pose", "wheel_angle")
+    np.testing.assert_allclose(twist, np.tile([0.0, 2.0, 2.0], (len(twist), 1)), atol=1e-9)
+    np.testing.assert_allclose(speed, 2.0, rtol=1e-9)
+    assert len(twist) > 40
+
+
+def test_nothing_is_compared_across_a_gap_of_a_sensor():
+    t = np.arange(1000) * 0.02
+    gone = (t > 5.0) & (t < 9.0)
+    twist = np.where(gone[:, None], np.nan, np.tile([0.3, 0.0, 0.0], (1000, 1)))
+    found, _ = mean_speeds(Run(t=t, twist=twist, wheel_angle=np.outer(t, [1.0, 2.0, 3.0])), "twist", "wheel_angle")
+    assert 35 <= len(found) <= 40  # of 50 windows of 0.4 s, ten lie in the gap or reach into it
+    np.testing.assert_allclose(found[:, 0], 0.3)
+
+
+def test_commands_that_contradict_do_not_hide_what_was_measured():
+    """What the firmware was told is of another moment; what was measured fits."""
+    run = driven(0.0, False)
+    turned = np.roll(run.wheel_speed, 300, axis=0)
+    both = run.replace(twist_command=run.twist, wheel_speed_command=turned, pose=None)
+    found = wheel_geometry([both])
+    assert found.source == "twist and wheel_speed"
+    with pytest.raises(InputError, match="do not follow the body as omni wheels do"):
+        wheel_geometry([both.replace(twist=None)])

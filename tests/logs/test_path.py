@@ -63,3 +63,14 @@ def test_what_was_driven_is_the_middle_of_the_speeds():
     along = driven([twist, None])
     assert along[0] == pytest.approx((-0.9, 0.9), abs=5e-3)
     assert along[1:] == [None, None]
+
+
+def test_topics_with_clocks_of_their_own_leave_no_holes():
+    """The twist of the circle beside another sensor 3 ms later: the way is as long, and the circle closes."""
+    t = np.unique(np.concatenate([T, T + 0.0007]))
+    mine, others = np.isin(t, T), np.isin(t, T + 0.0007)
+    twist = np.where(mine[:, None], [1.0, 0.0, 1.0], np.nan)
+    run = Run(t=t, twist=twist, current=np.where(others[:, None], 1.0, np.nan))
+    path = path_of(run)
+    assert path.length.sum() == pytest.approx(2.0 * np.pi, rel=1e-3)
+    np.testing.assert_allclose(path.position[np.flatnonzero(mine)[-1]], [0.0, 0.0], atol=1e-3)

@@ -81,8 +81,10 @@ def init(
     how = (map_file, column, assume, (), no_header, False, False, max_bytes, var, rate)
     if not log and any(how):
         raise typer.BadParameter("--map, --column, --assume, --no-header, --rate, --max-bytes and --var are for --log.")
-    seen = from_logs(given, log, log_options.log_options(*how), mecanum) if log else None
-    found = {KEYS[key] for key in ("azimuth", "robot_radius") if given[key] is not None and key not in told}
+    seen = from_logs(given, log, log_options.log_options(*how), mecanum, bool(like)) if log else None
+    found = {
+        KEYS[key] for key in ("azimuth", "robot_radius", "wheel_radius") if given[key] is not None and key not in told
+    }
     answers = complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
     robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))
     _write(robot, path, force, json, like)

@@ -13,11 +13,15 @@ if TYPE_CHECKING:
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
 
+LEAST_RADIUS, LARGEST_RADIUS = 0.012, 0.3  # [m] of a wheel; what is outside is no radius, the speeds are of a motor
 GEARED = 1.5  # logged speeds so many times those of the wheels are speeds before a gear
 
 
-def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool) -> Geometry:
-    """Azimuths, and the radius of the robot where it turned, from logs; what is given on the command line stays."""
+def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool, copied: bool) -> Geometry:
+    """Azimuths and radii, of the robot where it turned, from logs; what is given on the command line stays.
+
+    copied: the wheels are those of a preset, whose radius then tells the gear.
+    """
     from omnidyn.logs.geometry import as_mecanum, wheel_geometry
 
     runs, maps = [], log_options.Maps()
@@ -38,6 +42,10 @@ def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanu
         say(f"omnidyn: centre to wheel {given['robot_radius']:g} m")
     elif given["robot_radius"] is None:
         say("omnidyn: the logs do not turn, or hold no turn rate: the distance from centre to wheel is not in them")
+    radius = 1.0 / seen.per_metre
+    if given["wheel_radius"] is None and seen.measured and not copied and LEAST_RADIUS < radius < LARGEST_RADIUS:
+        given["wheel_radius"] = round(radius, 4)
+        say(f"omnidyn: wheel radius {radius:.4g} m, if the logged speeds are those of the wheels, behind the gear")
     return seen
 
 

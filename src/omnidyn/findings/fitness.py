@@ -19,6 +19,7 @@ from omnidyn.findings.use import Use
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel
 from omnidyn.logs.geometry import shows_both, wheel_geometry
 from omnidyn.logs.log import Log
+from omnidyn.logs.one_clock import on_clock_of_wheels
 from omnidyn.logs.plateaus import MIN_DURATION, Plateau, first_plateaus
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
@@ -131,7 +132,7 @@ def _steady(run: Run, robot: Robot | None, lacks: _Lacks) -> Use:
         return Use(STEADY, False, why)
     if robot is not None and needs.loses_in_gear(robot):
         return Use(STEADY, False, "the robot file has a lossy gear, which a steady state does not know")
-    windows = first_plateaus(run, ENOUGH)
+    windows = first_plateaus(on_clock_of_wheels(run), ENOUGH)
     count = sum(map(_moves, windows))
     if not count:
         rest = ", only at rest" if windows else ""
@@ -163,7 +164,7 @@ def _motors(run: Run, robot: Robot | None, lacks: _Lacks) -> Use:
 def _geometry(run: Run) -> Use:
     """Where the wheels stand."""
     if not shows_both(run):
-        return Use(GEOMETRY, False, "no speeds of both the body and the wheels")
+        return Use(GEOMETRY, False, "no motion of both the body and the wheels")
     try:
         seen = wheel_geometry([run])
     except OmnidynError as error:

@@ -6,6 +6,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, smooth, white_noise
 from omnidyn.logs.channels import components
@@ -26,7 +27,7 @@ def check_limits(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     found: list[Finding] = []
     for channel in ("voltage", "duty", "current"):
         found += _saturated(work, channel)
-    found += _too_fast(work) + _sag(work) + _no_supply(work)
+    found += at_each_clock(work, _too_fast)[0] + _sag(work) + _no_supply(work)
     for channel in ("voltage", "duty"):
         more = _one_way_drive(work, channel)
         work, found = work.replace(**{channel: None}) if more else work, found + more
@@ -103,24 +104,24 @@ def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
     )]  # fmt: skip
 
 
-def _too_fast(work: LogUnderCheck) -> list[Finding]:
+def _too_fast(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Inputs that change more from row to row than the rows can tell."""
     name = next((each for each in ("voltage", "duty") if work.get(each) is not None), "")
-    values = work.get(name) if name else None
-    if values is None:
-        return []
-    fast = np.array([unresolved_rows(column) for column in values.T]).T
+    columns = work.sampled_columns(name) if name else []
+    if not columns:
+        return [], work
+    fast = np.array([unresolved_rows(column) for _, column in columns]).T
     bad = np.asarray(fast.any(axis=1))
     if bad.mean() < TOO_FAST:
-        return []
-    names = [each for each, column in zip(components(name, values.shape[1]), fast.T, strict=True) if column.any()]
+        return [], work
+    names = [each for (each, _), column in zip(columns, fast.T, strict=True) if column.any()]
     return [Finding(
         "too_fast", NOTE, " ".join(names),
         f"{' and '.join(names)} {'changes' if len(names) == 1 else 'change'} so much from row to row in "
         f"{100 * float(bad.mean()):.2g} % of the rows that what the motors got between them is not in the log",
         "log faster, or drive more slowly; a fit of the motors leaves these rows out", work.lines(bad),
         int(bad.sum()), {"share": float(bad.mean())},
-    )]  # fmt: skip
+    )], work  # fmt: skip
 
 
 def _sag(work: LogUnderCheck) -> list[Finding]:

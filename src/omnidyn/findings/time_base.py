@@ -6,10 +6,11 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
+from omnidyn.findings.signal.clocks import at_each_clock, leading, with_speed
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.values.counters import check_counters, restarts_of
 from omnidyn.logs.log import MAX_MISSING, Log, back_remedy
-from omnidyn.logs.segments import GAP, segments
+from omnidyn.logs.segments import GAP
 from omnidyn.model.robot import Robot
 from omnidyn.statistics import robust_std
 
@@ -32,33 +33,14 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], LogUnderCheck]:
     again = np.concatenate([[False], np.diff(log.t[rows]) == 0.0]) if rows.size else np.zeros(0, dtype=bool)
     found += _repeated(log, rows, again) + restarts_of(log)
     rows = rows[~again]
-    t = log.t[rows]
-    steps = np.diff(t)
-    step = float(np.clip(np.median(steps), 1e-9, 1e9)) if steps.size else 0.0
-    between_gaps = tuple(segments(t)) if len(t) else ()
-    chosen = log.rows(rows)
-    # As in a Run: what is recorded on change is filled in, latencies that are known are taken out.
-    channels = {name: chosen.aligned(name, values, []) for name, values in chosen.channels.items()} if len(t) else {}
-    more, work = check_counters(LogUnderCheck(log, robot, rows, t, step, between_gaps, channels))
-    found += more
-    work = _with_speed(work, found)
+    more, work = at_each_clock(leading(log, robot, rows), check_counters)
+    found, work = found + more, with_speed(work)
+    if work.get("wheel_speed") is not None and work.derived_speed:
+        found.append(Finding(
+            "speed_from_angle", NOTE, "", "no speed of wheels was logged: w1, .. are differences of the angles a1, ..",
+            "", (), 0, {},
+        ))  # fmt: skip
     return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
-
-
-def _with_speed(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck:
-    """Where angles of wheels were logged and no speed, the work with their differences as speed, which is said."""
-    angle = work.get("wheel_angle")
-    if angle is None or work.get("wheel_speed") is not None or len(work) < MIN_ROWS:
-        return work
-    speed = np.full(angle.shape, np.nan)
-    for segment in work.segments:
-        if segment.stop - segment.start > 2:
-            speed[segment] = np.gradient(angle[segment], work.t[segment], axis=0)
-    found.append(Finding(
-        "speed_from_angle", NOTE, "", "no speed of wheels was logged: w1, .. are differences of the angles a1, ..", "",
-        (), 0, {},
-    ))  # fmt: skip
-    return work.replace(wheel_speed=speed)
 
 
 def _empty_rows(log: Log, empty: BoolArray) -> list[Finding]:
@@ -147,8 +129,6 @@ def _gaps(work: LogUnderCheck) -> list[Finding]:
 
 
 def _jitter(work: LogUnderCheck) -> list[Finding]:
-    if work.log.own_clocks:  # the steps of topics between each other are no jitter
-        return []
     steps = np.diff(work.t)
     if len(steps) < MIN_ROWS or work.step <= 0.0:
         return []

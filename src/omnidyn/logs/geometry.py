@@ -15,15 +15,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.clocks import sampled
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.read_log import STILL
+from omnidyn.logs.travel import mean_speeds
 from omnidyn.run import Run
 
 MAX_CONDITION = 50.0  # of the directions driven: beyond it, one of them is only noise
 MAX_RESIDUAL = 0.2  # share of the wheel speeds that the fit may leave: beyond it these are not omni wheels
 AS_OMNI = (45.0, 315.0, 135.0, 225.0)  # where mecanum wheels FL, FR, RL, RR would stand if they were omni wheels
 MAX_TURNED = 15.0  # [degree] that they may seem to stand elsewhere
-SOURCES = (("twist_command", "wheel_speed_command"), ("twist", "wheel_speed"))
+COMMANDS = ("twist_command", "wheel_speed_command")
+SOURCES = (
+    COMMANDS, ("twist", "wheel_speed"), ("twist", "wheel_angle"), ("pose", "wheel_speed"), ("pose", "wheel_angle")
+)  # fmt: skip
+TOGETHER = 0.5  # of the samples of the wheels that stand in a row with one of the body: then rows are compared
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,8 @@ class Geometry:
 
     azimuth_deg and its std: counter-clockwise from forward [degree], one per wheel. per_metre: wheel speed over rim
     speed [rad/m]: 1/r behind the gear, l/r at the motor. robot_radius [m]: None where the robot never turned.
-    residual: rms of what the fit leaves over rms of the wheel speeds. source: which channels it is from.
+    residual: rms of what the fit leaves over rms of the wheel speeds. source: which channels it is from. measured:
+    whether they were measured, and not commanded.
     """
 
     azimuth_deg: tuple[float, ...]
@@ -41,37 +48,55 @@ class Geometry:
     robot_radius: float | None
     residual: float
     source: str
+    measured: bool = False
 
 
 def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:
     """Fit the geometry to commands of body and wheels where both are logged, else to what was measured.
 
-    instead: what says what these logs cannot; of mecanum wheels the radius, for where they stand is known.
+    Each channel by its own clock. instead: what says what these logs cannot; of mecanum wheels the radius, for where
+    they stand is known.
     Raises InputError where no run has such a pair of channels or wheels do not follow an omni wheel's law, and
     InsufficientDataError where the runs go in one direction only.
     """
+    first: InputError | InsufficientDataError | None = None
     for body, wheels in SOURCES:
-        usable = [_rows(twist, speed) for twist, speed in _pairs(runs, body, wheels)]
+        usable = [_moving(*_compared(run, body, wheels)) for run in runs if _has_both(run, body, wheels)]
         usable = [pair for pair in usable if len(pair[0])]
-        if usable:
-            twist, speed = (np.concatenate(parts) for parts in zip(*usable, strict=True))
+        if not usable:
+            continue
+        twist, speed = (np.concatenate(parts) for parts in zip(*usable, strict=True))
+        try:
             return _fit(twist, speed, f"{body} and {wheels}", instead)
-    raise InputError(
+        except (InputError, InsufficientDataError) as error:
+            first = first or error
+    raise first or InputError(
         "cannot tell where the wheels stand", got=", ".join(runs[0].channels) if runs else "no log",
-        expected="twist_command and wheel_speed_command, or twist and wheel_speed, all components of them",
+        expected="twist_command and wheel_speed_command, or twist or pose with wheel_speed or wheel_angle, all "
+        "components of them",
         remedy=f"say which columns they are (`column` w1=NAME), or leave the logs out and give {instead}",
     )  # fmt: skip
 
 
 def shows_both(run: Run) -> bool:
     """Whether a run has the motion of the body and of the wheels."""
-    return any(_pairs([run], body, wheels) for body, wheels in SOURCES)
+    return any(_has_both(run, body, wheels) for body, wheels in SOURCES)
 
 
-def _pairs(runs: Sequence[Run], body: str, wheels: str) -> list[tuple[FloatArray, FloatArray]]:
-    """The two channels of each run that has both."""
-    pairs = [(getattr(run, body), getattr(run, wheels)) for run in runs]
-    return [(twist, speed) for twist, speed in pairs if twist is not None and speed is not None]
+def _has_both(run: Run, body: str, wheels: str) -> bool:
+    return getattr(run, body) is not None and getattr(run, wheels) is not None
+
+
+def _compared(run: Run, body: str, wheels: str) -> tuple[FloatArray, FloatArray]:
+    """(twist, wheel speeds): row by row where they share rows, else means over windows. Shapes (n, 3), (n, wheels)."""
+    if (body, wheels) in SOURCES[:2]:
+        twist, speed = getattr(run, body), getattr(run, wheels)
+        if np.isnan(twist[:, 2]).all():  # a turn rate that was never logged counts as none
+            twist = np.column_stack([twist[:, :2], np.zeros(len(twist))])
+        keep = np.isfinite(twist).all(axis=1) & np.isfinite(speed).all(axis=1)
+        if keep.sum() > TOGETHER * min(len(sampled(twist)), len(sampled(speed))):
+            return twist[keep], speed[keep]
+    return mean_speeds(run, body, wheels)
 
 
 def as_mecanum(seen: Geometry) -> Geometry:
@@ -93,11 +118,9 @@ def as_mecanum(seen: Geometry) -> Geometry:
     return replace(seen, azimuth_deg=AS_OMNI, per_metre=seen.per_metre / float(np.sqrt(2.0)), robot_radius=radius)
 
 
-def _rows(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rows with all numbers, in motion; a turn rate that was never logged counts as none."""
-    if np.isnan(twist[:, 2]).all():
-        twist = np.column_stack([twist[:, :2], np.zeros(len(twist))])
-    keep = np.isfinite(twist).all(axis=1) & np.isfinite(speed).all(axis=1) & (np.abs(speed) > STILL).any(axis=1)
+def _moving(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Only the rows in motion."""
+    keep = (np.abs(speed) > STILL).any(axis=1)
     return twist[keep], speed[keep]
 
 
@@ -137,4 +160,5 @@ def _fit(twist: FloatArray, speed: FloatArray, source: str, instead: str) -> Geo
         robot_radius=float(np.mean(rows[2] / scale)) if turned else None,
         residual=residual,
         source=source,
+        measured=source != " and ".join(COMMANDS),
     )

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.clocks import fastest_step, has_own_clock, usual_step
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import components, place
 from omnidyn.logs.clock.restarts import Restart
@@ -54,7 +55,9 @@ class Log:
     @classmethod
     def of_run(cls, run: Run) -> Log:
         """A Run as a log; lines count its samples from 0."""
-        return cls(run.t, run.channels, np.arange(len(run)), source=run.source, notes=run.warnings)
+        return cls(
+            run.t, run.channels, np.arange(len(run)), source=run.source, notes=run.warnings, own_clocks=run.staggered
+        )
 
     def __len__(self) -> int:
         return len(self.t)
@@ -113,7 +116,7 @@ class Log:
         late = {key: each.latency for key, each in self.columns.columns.items() if each.latency and place(key)}
         if not late or len(self) < 2:
             return self
-        near = NEAR * float(np.median(np.diff(self.t)))
+        near = NEAR * fastest_step(self.t, self.channels.values())
         at = {key: self.t - seconds for key, seconds in late.items()}
         new = np.unique(np.concatenate([each for each in at.values()]))
         new = new[(new > self.t[0]) & (new < self.t[-1]) & (_distance(new, self.t) > near)]
@@ -174,7 +177,7 @@ class Log:
         for k, component in enumerate(components(channel, columns.shape[1])):
             if self.now_and_then(columns[:, k]):
                 hold = channel in NEVER_MADE_UP
-                changed[:, k] = _held(columns[:, k]) if hold else _interpolated(self.t, columns[:, k])
+                changed[:, k] = _held(columns[:, k]) if hold else filled(self.t, columns[:, k])
                 how = "held" if hold else "nothing is made up between"
                 if not self.own_clocks:
                     share = float(np.isnan(columns[:, k]).mean())
@@ -188,11 +191,13 @@ class Log:
     def now_and_then(self, values: FloatArray) -> bool:
         """Whether a component, shape (rows,), was recorded when it changed, or at times of its own.
 
-        By the share of blanks outside its gaps: where a sensor or a driver was out, it is missing.
+        By the share of blanks outside its gaps: where a sensor or a driver was out, it is missing. Fewer blanks are
+        those of a clock of its own where its steps say so.
         """
         there = np.isfinite(values)
-        covered = there | np.isfinite(_interpolated(self.t, values))
-        return (0.0 if self.own_clocks else ON_CHANGE) < 1.0 - there.sum() / max(covered.sum(), 1) < 1.0
+        covered = there | np.isfinite(filled(self.t, values))
+        blank = 1.0 - there.sum() / max(covered.sum(), 1)
+        return 0.0 < blank < 1.0 and (self.own_clocks or blank > ON_CHANGE or has_own_clock(self.t, values))
 
     def between(self, channel: str) -> BoolArray:
         """Which values of `aligned` lie between measurements, where no sensor gave any. Shape as in the channel."""
@@ -269,14 +274,14 @@ def _held(values: FloatArray) -> FloatArray:
     return np.where(last >= 0, values[last], np.nan)
 
 
-def _interpolated(t: FloatArray, values: FloatArray) -> FloatArray:
+def filled(t: FloatArray, values: FloatArray) -> FloatArray:
     """Each blank between two values on the line between them; outside, and in a gap between values, there is none."""
-    filled, known = values.copy(), np.flatnonzero(np.isfinite(values))
+    whole, known = values.copy(), np.flatnonzero(np.isfinite(values))
     for each in segments(t[known]):
         rows = known[each]
         if rows.size:
-            filled[rows[0] : rows[-1] + 1] = np.interp(t[rows[0] : rows[-1] + 1], t[rows], values[rows])
-    return filled
+            whole[rows[0] : rows[-1] + 1] = np.interp(t[rows[0] : rows[-1] + 1], t[rows], values[rows])
+    return whole
 
 
 def _nearest(at: FloatArray, t: FloatArray) -> IntArray:
@@ -292,7 +297,7 @@ def _distance(at: FloatArray, t: FloatArray) -> FloatArray:
 
 def _far_from(at: FloatArray, known: FloatArray, t: FloatArray) -> BoolArray:
     """Which times `at` have no time of `known` within half a row of `t`. Shape of `at`."""
-    near = 0.5 * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    near = 0.5 * usual_step(t)
     after = np.clip(np.searchsorted(known, at), 1, max(len(known) - 1, 1))
     return np.minimum(np.abs(at - known[after - 1]), np.abs(at - known[np.minimum(after, len(known) - 1)])) > near
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.logs.log import filled
 from omnidyn.logs.segments import segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
@@ -43,14 +44,16 @@ def path_of(run: Run, robot: Robot | None = None) -> Path | None:
     robot: tells body speeds from wheel speeds, where no others were measured. Steps across a gap are not known.
     """
     if run.pose is not None and np.isfinite(run.pose).all(axis=1).sum() > 1:
-        pose = _filled(run.pose)
+        pose = _filled(run.t if run.staggered else np.arange(len(run)), run.pose)
         body = _turned(np.diff(pose[:, :2], axis=0), -0.5 * (pose[1:, 2] + pose[:-1, 2]))
-        return Path(pose[:, :2], _without_gaps(run.t, body), POSE)
+        return Path(pose[:, :2], _without_gaps(run, body), POSE)
     twist, origin = _twist(run, robot)
     if twist is None:
         return None
+    if run.staggered:
+        twist = np.stack([filled(run.t, column) for column in twist.T], axis=1)
     middle = 0.5 * (twist[1:] + twist[:-1]) * np.diff(run.t)[:, None]
-    middle = np.nan_to_num(_without_gaps(run.t, middle))
+    middle = np.nan_to_num(_without_gaps(run, middle))
     heading = np.append(0.0, np.cumsum(middle[:, 2]))
     world = _turned(middle[:, :2], 0.5 * (heading[1:] + heading[:-1]))
     position = np.vstack([np.zeros(2), np.cumsum(world, axis=0)])
@@ -86,16 +89,15 @@ def _turned(vector: FloatArray, angle: FloatArray) -> FloatArray:
     return np.stack([cos * vector[:, 0] - sin * vector[:, 1], sin * vector[:, 0] + cos * vector[:, 1]], axis=1)
 
 
-def _without_gaps(t: FloatArray, step: FloatArray) -> FloatArray:
+def _without_gaps(run: Run, step: FloatArray) -> FloatArray:
     """The steps, NaN where one crosses a gap of the log."""
     step = step.copy()
-    step[[piece.start - 1 for piece in segments(t)[1:]]] = np.nan
+    step[[piece.start - 1 for piece in segments(run.t, usual=run.step)[1:]]] = np.nan
     return step
 
 
-def _filled(pose: FloatArray) -> FloatArray:
-    """The pose with what is missing between two known ones on the line between them."""
-    rows = np.arange(len(pose))
+def _filled(at: FloatArray, pose: FloatArray) -> FloatArray:
+    """The pose with what is missing between two known ones on the line between them. at: places on it, (samples,)."""
     known = np.isfinite(pose).all(axis=1)
-    columns = [np.interp(rows, rows[known], column[known], left=np.nan, right=np.nan) for column in pose.T]
+    columns = [np.interp(at, at[known], column[known], left=np.nan, right=np.nan) for column in pose.T]
     return np.stack(columns, axis=1)

@@ -78,7 +78,7 @@ def first_plateaus(run: Run, most: int) -> tuple[Plateau, ...]:
 
 
 def _plateaus(run: Run, fixed: tuple[float, float] | None) -> Iterator[Plateau]:
-    angle, run_segments = live_angle(run), segments(run.t)
+    angle, run_segments = live_angle(run), segments(run.t, usual=run.step)
     for number, hold in enumerate(holds(run)):
         for segment in _between_gaps(run_segments, _share(hold, *fixed) if fixed else hold):
             rows = segment if fixed else _settled(run, segment, angle)
@@ -169,7 +169,7 @@ def holds(run: Run) -> list[slice]:
     """
     changes = command_changes(run)
     if changes is None:
-        return [window for segment in segments(run.t) for window in _cut(run.t, segment)]
+        return [window for segment in segments(run.t, usual=run.step) for window in _cut(run.t, segment)]
     cuts = np.flatnonzero(changes)
     return [slice(int(a), int(b)) for a, b in zip([0, *cuts], [*cuts, len(run)], strict=True) if b > a]
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
+from omnidyn.clocks import is_staggered
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock.clock import Clock
@@ -247,6 +248,7 @@ def log_from_table(
     )  # fmt: skip
     log = log.rows(~beside_restarts(t, counters)) if any(each.restarts for each in counters) else log
     log = _without_other_topics(log).joined()
+    log = replace(log, own_clocks=log.own_clocks or is_staggered(log.t, log.channels.values()))
     return _signed(log, robot) if options.current_unsigned else log
 
 

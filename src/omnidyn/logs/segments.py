@@ -10,16 +10,17 @@ from omnidyn.statistics import median
 GAP = 3.5  # a step so many times the usual one is a gap: three samples or more are lost
 
 
-def segments(t: FloatArray, gap: float = GAP) -> list[slice]:
+def segments(t: FloatArray, gap: float = GAP, usual: float | None = None) -> list[slice]:
     """The segments of a log, which lie between its gaps, in order. t [s], shape (n,), increasing.
 
-    A gap is a step longer than `gap` times the median step, and than twice the step that 95 % of all stay below:
-    a log on change has long steps without a gap.
+    A gap is a step longer than `gap` times the usual step, and than twice the step that 95 % of all stay below:
+    a log on change has long steps without a gap. usual: the median step by default; `Run.step` of a run, whose rows
+    may be those of many sensors.
     """
     if len(t) < 3:
         return [slice(0, len(t))]
     steps = np.diff(t)
-    long = gap * median(steps)
+    long = gap * (median(steps) if usual is None else usual)
     if not (steps > long).any():
         return [slice(0, len(t))]
     limit = max(long, 2.0 * float(np.quantile(steps, 0.95)))

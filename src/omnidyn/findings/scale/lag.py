@@ -9,6 +9,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import NOTE, WARN, Finding
+from omnidyn.findings.signal.clocks import sampled_with
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import electric_speed, emf, ground, ohmic, volts, wheels_twist
 from omnidyn.findings.signal.robust import Slope, central_rate, clusters, ratio, smooth, windowed
@@ -35,14 +36,14 @@ def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     found: list[Finding] = []
     if len(work) < 3 * MIN_ROWS or work.step <= 0.0:
         return found, work
-    for pair in _pairs(work):
-        line = lag(work, pair.y, pair.x)
+    for own, pair in _pairs(work):
+        line = lag(own, pair.y, pair.x)
         if line is None or not line.error < VAGUE:
             continue
         rows = line.value
         if abs(rows) < NOTE_FROM or abs(rows) < SURE * line.error:
             continue
-        found.append(_finding(work, pair, line))
+        found.append(_finding(own, pair, line))
     return found, work
 
 
@@ -59,8 +60,8 @@ def _finding(work: LogUnderCheck, pair: Pair, line: Slope) -> Finding:
     )  # fmt: skip
 
 
-def _pairs(work: LogUnderCheck) -> Iterator[Pair]:
-    """What can be compared; `late` is the channel whose lag is positive."""
+def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, Pair]]:
+    """What can be compared, and in which rows; `late` is the channel whose lag is positive."""
     speed = work.full("wheel_speed")
     seen = ground(work)
     if speed is not None and seen is not None and work.geometry is not None:
@@ -68,14 +69,18 @@ def _pairs(work: LogUnderCheck) -> Iterator[Pair]:
         assert own is not None
         length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
         axes = seen.axes
-        yield Pair("wheel_speed", seen.name, own[:, axes] * length[axes], seen.twist[:, axes] * length[axes],
-                   f"wheel_speed {seen.name}")  # fmt: skip
+        pair = Pair("wheel_speed", seen.name, own[:, axes] * length[axes], seen.twist[:, axes] * length[axes],
+                    f"wheel_speed {seen.name}")  # fmt: skip
+        yield work, pair
+    # A current jumps with the voltage, a speed does not: between samples of the current nothing is on a line.
+    here = sampled_with(work, "current", ("voltage", "duty", "supply", "wheel_speed"))
+    speed = here.full("wheel_speed")
     if speed is not None:
-        yield from _of_motors(work, speed)
+        yield from ((here, pair) for pair in _of_motors(here, speed))
     pose, twist = work.get("pose"), work.get("twist")
     if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
         rate = central_rate(unwrapped(pose[:, 2]), work.t, 1)
-        yield Pair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
+        yield work, Pair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
 
 
 def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[Pair]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,13 +30,29 @@ SENSORS = ("current", "wheel_speed", "twist")
 MIN_ROWS = 40  # below that nothing is said from statistics
 
 
+class Clock(NamedTuple):
+    """Rows of a log in which a sensor has its samples, and the components that were sampled then."""
+
+    rows: IntArray
+    components: frozenset[str]
+
+
+class Merged(NamedTuple):
+    """A log in order of time with the samples of all its clocks, the leading one first; rows: index into the log."""
+
+    log: Log
+    rows: IntArray
+    clocks: tuple[Clock, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class LogUnderCheck:
-    """A log in order of time.
+    """A log in order of time, in the rows of one clock: of the wheels, where their speed was recorded.
 
     log: as recorded. robot: or None. rows: index into the log of each row kept, increasing in time. t [s], step: the
-    usual one [s]. segments: the rows between two gaps. channels: as in Log, what is not to be trusted is NaN.
-    known: facts that families pass on, such as "ground_ratio".
+    usual one [s]. segments: the rows between two gaps. channels: as in Log, what is not to be trusted is NaN; commands
+    of another clock are held, measurements on the line between two of them. known: facts that families pass on, such
+    as "ground_ratio". merged: the samples of all clocks. sampled: components of this clock; None where there is one.
     """
 
     log: Log
@@ -47,6 +63,8 @@ class LogUnderCheck:
     segments: tuple[slice, ...]
     channels: Mapping[str, FloatArray]
     known: Mapping[str, Any] = field(default_factory=dict)
+    merged: Merged | None = None
+    sampled: frozenset[str] | None = None
 
     def __len__(self) -> int:
         return len(self.t)
@@ -82,6 +100,21 @@ class LogUnderCheck:
         names = components(channel, values.shape[1] if values.ndim == 2 else 0)
         table = values.reshape(len(values), -1)
         return [(name, table[:, k]) for k, name in enumerate(names) if np.isfinite(table[:, k]).any()]
+
+    @property
+    def derived_speed(self) -> bool:
+        """Whether a speed of the wheels was not logged; one that is there is made of their angles."""
+        logged = self.log.channels.get("wheel_speed")
+        return logged is None or not bool(np.isfinite(logged).any())
+
+    def sampled_columns(self, channel: str) -> list[tuple[str, FloatArray]]:
+        """As `columns`, of the components that were sampled in these rows, and so can be judged one by one."""
+        derived = channel == "wheel_speed" and self.derived_speed
+        return [
+            (name, values)
+            for name, values in self.columns(channel)
+            if self.sampled is None or (name.replace("w", "a") if derived else name) in self.sampled
+        ]
 
     def lines(self, bad: BoolArray) -> tuple[Span, ...]:
         """Lines of the file where `bad`, shape (rows kept,), holds."""

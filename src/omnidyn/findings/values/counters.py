@@ -28,7 +28,7 @@ def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     found: list[Finding] = []
     if work.log.columns.columns:
         return found, work
-    for component, values in work.columns("wheel_angle"):
+    for component, values in work.sampled_columns("wheel_angle"):
         try:
             going_on, period, rows = unrolled(values, "rad", component, work.t)
         except InputError:  # too fast to be followed: no jump can be told from motion

@@ -20,7 +20,7 @@ def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     found = []
     changed = _changed(work)
     for channel in MEASURED:
-        for component, values in work.columns(channel):
+        for component, values in work.sampled_columns(channel):
             k = place(component)[1]  # type: ignore[index]
             own = work.recorded(channel, k)
             bad = np.zeros(len(work), dtype=bool)

@@ -35,7 +35,7 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     expected = expected_wheel_speed(work, without="wheel_speed")
     for channel in SENSORS:
         # The longest repeat first: a wheel that sticks is no witness against the others.
-        columns = [(*each, _repeats(each[1])) for each in work.columns(channel)]
+        columns = [(*each, _repeats(each[1])) for each in work.sampled_columns(channel)]
         for component, values, repeats in sorted(columns, key=lambda each: -_longest(each[1], each[2])):
             k = place(component)[1]  # type: ignore[index]
             judge = _Judge(work, values, repeats)

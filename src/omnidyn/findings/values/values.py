@@ -6,6 +6,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.findings.signal.robust import HELD, quantum, smooth, turned_by, white_noise
@@ -23,7 +24,13 @@ SAME = 0.03  # a scale so near 1 is 1, within what noise makes of it
 
 
 def check_values(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
-    """All findings on single channels; what sticks or spikes is masked, what is dead taken out."""
+    """All findings on single channels, each at its own clock; what sticks, spikes or is dead is masked."""
+    found, work = at_each_clock(work, _at_its_clock)
+    return found, work if len(work) < MIN_ROWS else _with_dead_wheel(work, found)
+
+
+def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """The same of the channels that were sampled in these rows."""
     found = _missing(work)
     if len(work) < MIN_ROWS:
         return found, work
@@ -32,7 +39,7 @@ def check_values(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     for family in (_constant, check_stuck, check_spikes):
         more, work = family(work)
         found += more
-    return found, _with_dead_wheel(work, found)
+    return found, work
 
 
 def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck:
@@ -61,7 +68,7 @@ def _missing(work: LogUnderCheck) -> list[Finding]:
     if work.log.own_clocks:  # a topic has nothing to say before its first message and behind its last
         return found
     for channel in work.channels:
-        for component, values in work.columns(channel):
+        for component, values in work.sampled_columns(channel):
             bad = ~np.isfinite(values)
             share = float(bad.mean())
             if share > 0.0:
@@ -81,7 +88,7 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
     expected = ("the commanded speed", command) if command is not None else expected_wheel_speed(work)
     groups: dict[tuple[str, float], list[tuple[str, float, float]]] = {}
     for channel in SENSORS:
-        for component, values in work.columns(channel):
+        for component, values in work.sampled_columns(channel):
             k = place(component)[1]  # type: ignore[index]
             own = values[work.recorded(channel, k)]
             step = quantum(own)
@@ -148,7 +155,7 @@ def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     for channel in work.channels:
         columns = work.columns(channel)
         flat = {name: bool(np.nanmax(values) == np.nanmin(values)) for name, values in columns}
-        for component, values in columns:
+        for component, values in work.sampled_columns(channel):
             if not flat[component] or channel in ("supply",):
                 continue
             k = place(component)[1]  # type: ignore[index]
