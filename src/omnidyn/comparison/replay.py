@@ -164,7 +164,7 @@ def _prepared(run: Run, applied: str, hold: float) -> tuple[list[slice], FloatAr
     inputs, alone = np.asarray(getattr(run, applied)), applied != DUTY or run.supply is None
     supply = None if alone or not np.isfinite(run.supply).any() else run.supply  # type: ignore[arg-type]
     table = inputs if supply is None else np.column_stack([inputs, supply])
-    stretches = segments(run.t)
+    stretches = segments(run.t, usual=run.step)
     held, usable = np.empty_like(table), np.zeros(len(run), dtype=bool)
     for rows in stretches:
         held[rows], usable[rows] = held_inputs(run.t[rows], table[rows], hold)
@@ -256,7 +256,7 @@ def _view(
     moving = given.set_point is None  # a speed loop rests before its first command
     if log is None:
         return seen_at_once(robot, given, held=moving)
-    t, drive, row = run.t, robot.drive.latency, float(np.median(np.diff(run.t)))
+    t, drive, row = run.t, robot.drive.latency, run.step
     late = {name: log.latency.of(name, drive, row) for name in LATE}
     if of_angles:
         late["wheel_speed"] = late["wheel_angle"]
@@ -319,7 +319,7 @@ def _loop_warnings(robot: Robot, run: Run, applied: str, parts: list[tuple[Run, 
         warnings.append(
             f"the integral of the speed loop was not logged: it starts at 0 in {moving} pieces that start moving"
         )
-    usual = float(np.median(np.diff(run.t)))
+    usual = run.step
     if applied == "voltage" and usual * (drive.rate or 0.0) > 1.5:
         warnings.append(
             f"the speed loop sets the voltage every {1e3 / (drive.rate or 1.0):.3g} ms, the log has one every "

@@ -10,6 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.plateaus import STEPWISE
+from omnidyn.statistics import stretches
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -58,19 +59,34 @@ def refined(
     return fine, put_in, wide
 
 
+def _integrals(t: FloatArray, u: FloatArray, pieces: Rows) -> tuple[FloatArray, FloatArray]:
+    """The integral of an input up to each row, of held values and of the curve. Shapes (rows,)."""
+    steps = np.diff(t)
+    held, curved = u[:-1] * steps, 0.5 * (u[1:] + u[:-1]) * steps
+    for begin, end, curve in _curves(t, u, pieces):
+        curved[begin : end - 1] = np.diff(curve.antiderivative()(t[begin:end]))
+    one, other = (np.append(0.0, np.cumsum(np.nan_to_num(each))) for each in (held, curved))
+    return one, other
+
+
 class InputIntegral:
     """The integral of an input over any rows of a piece: of held values where it comes in steps, else of the curve.
 
     Straight lines from row to row would cut the crests of a sine of 20 rows by almost a percent.
     """
 
-    def __init__(self, t: FloatArray, u: FloatArray, pieces: Rows):
-        steps = np.diff(t)
-        held, curved = u[:-1] * steps, 0.5 * (u[1:] + u[:-1]) * steps
-        for begin, end, curve in _curves(t, u, pieces):
-            curved[begin : end - 1] = np.diff(curve.antiderivative()(t[begin:end]))
+    def __init__(self, t: FloatArray, u: FloatArray, pieces: Rows, given: tuple[FloatArray, FloatArray] | None = None):
+        """given: times and values of the input where it has stamps of its own; u is then what held in each row."""
         self._u = u
-        self._held, self._curved = (np.append(0.0, np.cumsum(np.nan_to_num(each))) for each in (held, curved))
+        if given is None:
+            self._held, self._curved = _integrals(t, u, pieces)
+            return
+        own, values = given
+        new = np.append(True, (values[1:] != values[:-1]) & np.isfinite(values[:-1]))
+        held, _ = _integrals(own, values, ())
+        whole = [(int(a), int(b) - 1) for a, b in stretches(np.isfinite(values[new]))]
+        _, curved = _integrals(own[new], values[new], whole)
+        self._held, self._curved = np.interp(t, own, held), np.interp(t, own[new], curved)
 
     def over(self, window: slice) -> float:
         """From the first row of a window to its last, in units of the input times seconds."""

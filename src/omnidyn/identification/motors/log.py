@@ -9,13 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.clocks import usual_step
 from omnidyn.errors import InputError
 from omnidyn.findings.needs import MOTOR_INPUTS, motor_input
+from omnidyn.logs.one_clock import on_clock_of
 from omnidyn.logs.plateaus import live_angle
 from omnidyn.logs.segments import segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
-from omnidyn.run import Run
+from omnidyn.run import SENSORS, Run
 from omnidyn.statistics import stretches
 
 # Unit of each input, and how many of it in one SI unit.
@@ -30,6 +32,7 @@ class MotorLog:
 
     put_in: in `unit`, of `kind` (INPUTS). speed [rad/s] and angle [rad], as measured; one of them may be None.
     motion [rad/s]: by the angle where there is one. motion_from: its origin in words. pieces: rows between gaps.
+    given: the input as it held, at the times of all sensors, where they share no stamps: rows are those of the motion.
     """
 
     run: Run
@@ -40,10 +43,16 @@ class MotorLog:
     motion: FloatArray
     motion_from: str
     pieces: tuple[slice, ...]
+    given: tuple[FloatArray, FloatArray] | None = None
 
     @property
     def t(self) -> FloatArray:
         return self.run.t
+
+    @property
+    def step(self) -> float:
+        """Usual time from row to row [s]: the rows are those of the motors, whatever other sensors there are."""
+        return usual_step(self.t)
 
     @property
     def unit(self) -> str:
@@ -81,6 +90,9 @@ def motor_logs(
 
 
 def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog:
+    moved = "pose" if speed == GROUND else "wheel_speed" if live_angle(run) is None else "wheel_angle"
+    given = (run.t, getattr(run, kind) * INPUTS[kind][1]) if run.staggered and kind not in SENSORS else None
+    run = on_clock_of(run, moved)
     put_in, pieces = getattr(run, kind) * INPUTS[kind][1], tuple(segments(run.t))
     if speed == GROUND:
         if run.pose is None or robot is None or not np.isfinite(run.pose[:, 2]).any():
@@ -97,7 +109,7 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     if motion is None:
         raise InputError("the log has no speed and no angle of the motors", got=", ".join(run.channels),
                          expected="wheel_angle or wheel_speed", where=run.source)  # fmt: skip
-    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces)
+    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, given)
 
 
 def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:

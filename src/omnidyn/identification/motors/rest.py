@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.clocks import usual_step
 from omnidyn.identification.motors.edge import edge_interval
 from omnidyn.identification.motors.log import MotorLog
 from omnidyn.logs.plateaus import find_plateaus
@@ -108,7 +109,7 @@ def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_Column]:
 def _largest(log: MotorLog, motor: int) -> float:
     """The largest speed that lasts [rad/s]: of medians over BLOCK seconds, which spikes do not move."""
     known = log.motion[np.isfinite(log.motion[:, motor]), motor]
-    rows = max(1, round(BLOCK / float(np.median(np.diff(log.t))))) if len(log.t) > 1 else 1
+    rows = max(1, round(BLOCK / log.step)) if len(log.t) > 1 else 1
     whole = len(known) - len(known) % rows
     medians = np.median(known[:whole].reshape(-1, rows), axis=1) if whole else known
     return float(np.abs(medians).max(initial=0.0))
@@ -202,7 +203,7 @@ def _span(edge: _Edge, lag: float, risk: float) -> Span:
     t, put_in = column.t[rows], column.put_in[rows]
     tries = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
     first, last = edge_interval(
-        t, put_in, column.speed[rows], tries, lags=_lags(lag, float(np.median(np.diff(t)))), stop=edge.stop,
+        t, put_in, column.speed[rows], tries, lags=_lags(lag, usual_step(t)), stop=edge.stop,
         least_std=column.tick / math.sqrt(6.0), risk=risk,
     )  # fmt: skip
     # a row on either side: loggers write an input in the row in which it is set, or in which it is answered

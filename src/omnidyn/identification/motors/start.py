@@ -121,7 +121,7 @@ def motor_starts(
     logs: Sequence[MotorLog], windows: MotorWindows | None, motors: Sequence[int]
 ) -> tuple[MotorStart, ...]:
     """Both directions of each motor, as far as the logs show it to turn or to rest there."""
-    found, row = [], max(float(np.median(np.diff(log.t))) for log in logs if len(log.t) > 1)
+    found, row = [], max(log.step for log in logs if len(log.t) > 1)
     for motor in motors:
         way = orientation_of(logs, motor)
         own = windows_for_a_lag(logs, windows, motor)
@@ -186,7 +186,7 @@ def windows_for_a_lag(logs: Sequence[MotorLog], windows: MotorWindows | None, mo
     if windows is None or windows.settled:
         return windows
     noise = max(_noise_of(log.motion[:, motor]) for log in logs)
-    row = max(float(np.median(np.diff(log.t))) for log in logs if len(log.t) > 1)
+    row = max(log.step for log in logs if len(log.t) > 1)
     for least in (each for each in LENGTHS if each >= windows.length):
         try:
             found = motor_windows(logs, least=least) if least > windows.length else windows

@@ -32,7 +32,7 @@ LEAST_POINTS = 3  # of a line with intervals
 
 def is_slow(logs: Sequence[MotorLog]) -> bool:
     """Whether the rows of the logs are too far apart for windows of them."""
-    return any(len(log.t) > 1 and float(np.median(np.diff(log.t))) > SLOW_ROW for log in logs)
+    return any(log.step > SLOW_ROW for log in logs)
 
 
 def points_of_logs(logs: Sequence[MotorLog]) -> MotorTable:

@@ -130,7 +130,7 @@ def _usual_speed(logs: Sequence[MotorLog]) -> float:
 
 def _smear(log: MotorLog, length: float) -> float:
     """Time over which `_Reader` averages the speed at an end of a window [s]."""
-    row = float(np.median(np.diff(log.t))) if len(log.t) > 1 else 0.0
+    row = log.step
     return 2.0 * row * max(1, round(EDGE_SHARE * length / row / 2.0)) if row > 0.0 else 0.0
 
 
@@ -208,7 +208,12 @@ class _Reader:
         self.rest = np.full(log.motors, np.nan)
         self._largest = np.nanmax(np.abs(log.put_in), axis=0, initial=0.0)
         self._put_in = [
-            InputIntegral(log.t, log.put_in[:, m], rows_with(np.isfinite(log.put_in[:, m]), log.pieces))
+            InputIntegral(
+                log.t,
+                log.put_in[:, m],
+                rows_with(np.isfinite(log.put_in[:, m]), log.pieces),
+                None if log.given is None else (log.given[0], log.given[1][:, m]),
+            )
             for m in range(log.motors)
         ]
 

@@ -18,6 +18,7 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import CURRENT, VOLTAGE, force_origin
 from omnidyn.identification.recordings import count_once
 from omnidyn.identification.steady.points import refuse_losses
+from omnidyn.logs.one_clock import on_clock_of_wheels
 from omnidyn.logs.plateaus import ANGLE, COMMANDS, SAME_COMMAND, Plateau, find_plateaus, pool
 from omnidyn.model.actuation import asked_voltage, reaching
 from omnidyn.model.dynamics import frame_wrench
@@ -158,7 +159,7 @@ def steady_windows(
     found, empty = [], []
     for number, run in enumerate(runs):
         _check_wheels(run, robot)
-        run = _with_voltage(run, robot) if origin == VOLTAGE else run
+        run = on_clock_of_wheels(_with_voltage(run, robot) if origin == VOLTAGE else run)
         windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
         empty += [] if windows else [run.source]
         found += [(number, run, each) for each in windows]
@@ -183,7 +184,7 @@ def held_forces(
     run: Run, robot: Robot, speed: str, origin: str, window: tuple[float, float] | None = None
 ) -> HeldForces:
     """The windows of a run one by one; in ForcePoints those of one command are a single point. As `force_points`."""
-    run = _with_voltage(run, robot) if origin == VOLTAGE else run
+    run = on_clock_of_wheels(_with_voltage(run, robot) if origin == VOLTAGE else run)
     found = list(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
     arm = np.array([1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
     force = [_point(run, robot, each, speed, origin)["wrench"] / arm for each in found]

@@ -42,7 +42,7 @@ def why_no_transient(runs: Sequence[Run], robot: Robot) -> str:
     if any(run.current is None or (run.wheel_speed is None and run.wheel_angle is None) for run in runs):
         return ""
     settled = SETTLED * settling_time(robot)
-    row = min(float(np.median(np.diff(run.t))) if len(run) > 1 else 0.0 for run in runs)
+    row = min(run.step for run in runs)
     if settled > row:
         return ""
     return (

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.clocks import usual_step
 from omnidyn.identification.output_error.problem.differences import JUMP, LOST, NEARLY, UNEVEN
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.structure.motion import Motion
@@ -24,8 +25,8 @@ def losses(piece: Piece) -> IntArray:
     Rows of clocks of their own lack none, and every change has its time. A speed loop is not looked into.
     """
     record, rows = piece.record, slice(piece.first, piece.last + 1)
-    row = np.diff(record.t[rows]) / np.median(np.diff(record.t[rows]))
-    if record.set_point is not None or np.mean(np.abs(row - np.round(row)) <= UNEVEN) < NEARLY:
+    row = np.diff(record.t[rows]) / usual_step(record.t[rows])
+    if record.staggered or record.set_point is not None or np.mean(np.abs(row - np.round(row)) <= UNEVEN) < NEARLY:
         return np.zeros(0, dtype=int)
     voltage = np.nan_to_num(record.voltage[rows])
     jumps = (np.abs(np.diff(voltage, axis=0)) > JUMP * np.ptp(voltage, axis=0).max()).any(axis=1)

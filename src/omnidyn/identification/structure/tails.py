@@ -16,6 +16,7 @@ from scipy.special import bdtrc
 from scipy.stats import mannwhitneyu
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.clocks import time_of_row
 from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
 from omnidyn.identification.output_error.fit import NU
 from omnidyn.identification.output_error.kernel.of_rows import row_terms
@@ -49,7 +50,7 @@ def wild_samples(seen: Misfit, moved: Sequence[Motion]) -> dict[str, Wild]:
         for j, c in enumerate(columns):
             new = linear.of_column(k, j, left[j][:, None])[:, 0]
             series.setdefault(c, []).append((new, change[k][rows.there[k][j]]))
-    found, near = {}, NEAR / float(np.median([np.median(np.diff(motion.t)) for motion in moved]))
+    found, near = {}, NEAR / float(np.median([motion.piece.step for motion in moved]))
     for c, pieces in series.items():
         new, by = (np.concatenate(each) for each in zip(*pieces, strict=True))
         scale = float(robust_std(new, 0.0)) if new.size else 0.0
@@ -67,7 +68,7 @@ def _change(motion: Motion) -> FloatArray:
     """How much the motion changes about each row (n,): the largest change over a row, in kinetic energy."""
     step = np.diff(motion.twist, axis=0, prepend=motion.twist[:1])
     energy = np.einsum("ni,ij,nj->n", step, mass_matrix(motion.robot), step)
-    about = 1 + 2 * round(AFTER / float(np.median(np.diff(motion.t))))
+    about = 1 + 2 * round(AFTER / time_of_row(motion.t, motion.piece.record.staggered))
     return np.asarray(maximum_filter1d(energy, about, mode="nearest"))
 
 

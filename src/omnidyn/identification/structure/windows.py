@@ -15,6 +15,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.clocks import usual_step
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.structure.linear import TINY, Rows
 from omnidyn.identification.structure.motion import Motion
@@ -170,7 +171,7 @@ def _column(
     stands = (motion.twist == 0.0).all(axis=1)
     moved = np.maximum.accumulate(np.where(stands, 0, at))
     rests = stands & (motion.t - motion.t[moved] >= settled)
-    step = float(np.median(np.diff(motion.t[known])))
+    step = usual_step(motion.t[known])
     moves = rows.moves[k][j] & ~stands
     return _Column(k, j, known, rows.steps[k][j] == 1, moves[known], rests[known], since[known], holds[known], step)
 

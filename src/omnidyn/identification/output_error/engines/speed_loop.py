@@ -68,7 +68,7 @@ class LoopEngine(ImplicitEngine):
             Direction(p.name, up, down) for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True)
         ]
         own = self.problem.where(f"{LATE}current")
-        more = [float(values[own]) - self._period] if own >= 0 and self._jumps(t) else []
+        more = [float(values[own]) - self._period] if own >= 0 and self._jumps(piece) else []
         seen = looped_samples(
             robot, t, set_point, directions, [*late, *more], self.tol, travel_of(piece.record.columns), SETTLED
         )
@@ -85,9 +85,9 @@ class LoopEngine(ImplicitEngine):
     def _period(self) -> float:
         return 1.0 / (self.problem.robot.drive.rate or np.inf)
 
-    def _jumps(self, t: FloatArray) -> bool:
-        """Whether a log whose rows are at t does not see what a current does between two ticks."""
-        return self._period < SLOW_LOOP * float(np.median(np.diff(t))) or self.problem.robot.motor.electrical == DYNAMIC
+    def _jumps(self, piece: Piece) -> bool:
+        """Whether a log does not see what a current does between two ticks."""
+        return self._period < SLOW_LOOP * piece.step or self.problem.robot.motor.electrical == DYNAMIC
 
 
 def _driven(piece: Piece) -> tuple[FloatArray, FloatArray]:

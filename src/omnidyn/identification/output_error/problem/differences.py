@@ -19,7 +19,8 @@ from math import comb
 
 import numpy as np
 
-from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.clocks import sampled
 from omnidyn.run import Run
 from omnidyn.statistics import MAD_TO_STD, TEXT, find_tick, stretches
 
@@ -52,7 +53,7 @@ def differences(runs: Sequence[Run]) -> Differences | None:
 
     All logs are looked at together: what is too short or too slow to tell goes with the others.
     """
-    logs = [run for run in runs if _known(run.wheel_speed)]
+    logs = [_of_wheels(run)[0] for run in runs if _known(run.wheel_speed)]
     if not logs or len({run.wheels for run in logs}) > 1 or any(_known(run.wheel_angle) for run in logs):
         return None
     for stamped in (False, True):
@@ -70,11 +71,23 @@ def added_up(run: Run, found: Differences) -> tuple[FloatArray, BoolArray]:
 
     The angle goes on over a loss as if nothing was turned there: what follows has a start of its own.
     """
-    turned, lost = _turned(run, found)
+    own, rows = _of_wheels(run)
+    turned, lost = _turned(own, found)
     angle = np.cumsum(np.nan_to_num(turned), axis=0) * found.ticks
+    assert own.wheel_speed is not None
+    angle[:, ~np.isfinite(own.wheel_speed).any(axis=0)] = np.nan
+    whole, gone = np.full((len(run), angle.shape[1]), np.nan), np.zeros(len(run), dtype=bool)
+    whole[rows], gone[rows] = angle, lost
+    return whole, gone
+
+
+def _of_wheels(run: Run) -> tuple[Run, slice | IntArray]:
+    """The run in the rows in which the wheels were sampled, and these rows: all, where sensors share their stamps."""
     assert run.wheel_speed is not None
-    angle[:, ~np.isfinite(run.wheel_speed).any(axis=0)] = np.nan
-    return angle, lost
+    if not run.staggered or not np.isfinite(run.wheel_speed).all(axis=1).any():
+        return run, slice(None)
+    rows = sampled(run.wheel_speed)
+    return run.replace(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()}), rows
 
 
 def _known(values: FloatArray | None) -> bool:

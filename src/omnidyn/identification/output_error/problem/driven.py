@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.clocks import time_of_row
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twist
 from omnidyn.model.robot import Robot
@@ -36,7 +37,7 @@ def _of_record(record: Record, robot: Robot) -> float:
     for first, last in record.pieces:
         rows = slice(first, last + 1)
         t = record.t[rows]
-        step = float(np.median(np.diff(t)))
+        step = time_of_row(t, record.staggered)
         voltage = np.nan_to_num(np.abs(record.voltage[rows])).max(axis=1)
         for width in {max(LEAST_ROWS, round(window / step)) for window in WINDOWS}:
             means = []

@@ -64,7 +64,7 @@ def motion(records: Sequence[Record], robot: Robot) -> Motion:
         moved |= others & ~known
         dead &= known & [not np.any(np.diff(own[np.isfinite(own)])) for own in twist.T]
         for first, last in record.pieces:
-            rows = max(window_rows(record.t[first : last + 1]) // 2, 1)
+            rows = max(window_rows(record, first, last) // 2, 1)
             for axis in np.flatnonzero(known).tolist():
                 moved[axis] |= _moved(twist, axis, first, last, rows)
     held = np.zeros(3) if moved.all() else _most_drive(records, measured, robot)

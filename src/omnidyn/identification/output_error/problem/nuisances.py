@@ -48,7 +48,7 @@ LEAD = 5  # rows whose mean is where a free start begins
 
 def earliest(records: Sequence[Record]) -> float:
     """The latency [s] before which no log is plausible: a row, and what a filter looks ahead."""
-    rows = [float(np.median(np.diff(record.t))) for record in records if len(record.t) > 1]
+    rows = [record.step_of(slice(None)) for record in records if len(record.t) > 1]
     return -(max(rows, default=0.0) + FILTER)
 
 

@@ -36,6 +36,11 @@ class Piece:
     margin: FloatArray
     start_std: FloatArray | None = None
 
+    @property
+    def step(self) -> float:
+        """Usual time between two samples [s]."""
+        return self.record.step_of(slice(self.first, self.last + 1))
+
     def start_prior(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(pull (3,) of what is known of the start, its information (3,)), 0 for what is not free; state (3 + C,)."""
         if self.start_std is None:

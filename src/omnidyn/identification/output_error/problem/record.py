@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.clocks import usual_step
 from omnidyn.document import short
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.findings.needs import LOOP_REMEDY, has_set_speeds
@@ -59,6 +60,15 @@ class Record:
                 object.__setattr__(self, name, _read_only(given))
 
     @property
+    def staggered(self) -> bool:
+        """Whether its outputs have clocks of their own: a row is then one of several sensors."""
+        return self.run is not None and self.run.staggered
+
+    def step_of(self, rows: slice) -> float:
+        """Usual time between two of these rows [s]; of the fastest output where each has a clock of its own."""
+        return self.run.step if self.run is not None and self.staggered else usual_step(self.t[rows])
+
+    @property
     def span(self) -> float:
         return float(self.t[-1] - self.t[0]) or 1.0
 
@@ -100,7 +110,7 @@ def record(
     finite = np.isfinite(inputs)
     _refuse_wheels_without_input(run, robot, finite)
     known = np.full(len(run), True) if finite.all() else np.asarray(finite.all(axis=1))
-    parts = segments(run.t)
+    parts = segments(run.t, usual=run.step)
     pieces = [piece for s in _cut(parts, found.lost) for piece in _whole(known, s.start, s.stop)]
     if len(parts) > 1:
         lost = [float(run.t[b.start] - run.t[a.stop - 1]) for a, b in pairwise(parts)]

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.clocks import usual_step
 from omnidyn.model.frames import body_to_world
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
@@ -136,7 +137,7 @@ def goes_along(change: FloatArray, tried: Iterator[FloatArray], rate: FloatArray
     if len(third) < LEAST:
         return False
     noise = TO_STD * np.median(third, axis=0)
-    noise = np.where(noise > 0.0, noise, TO_STD * third.mean(axis=0)) * float(np.median(np.diff(t)))
+    noise = np.where(noise > 0.0, noise, TO_STD * third.mean(axis=0)) * usual_step(t)
     for own in tried:
         off = change - own
         off = off[np.isfinite(off).all(axis=1)]

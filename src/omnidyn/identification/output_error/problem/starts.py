@@ -14,14 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.clocks import time_of_row, usual_step
 from omnidyn.compiled.kernel import kernel, maker
 from omnidyn.identification.output_error.problem.primitives import Mapping
 from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.logs.log import filled
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
-from omnidyn.statistics import difference_noise, median
+from omnidyn.statistics import difference_noise
 
 WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
@@ -46,13 +48,13 @@ def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
     names = [name for name, _ in record.columns]
     if "twist" in names:
         first = names.index("twist")
-        return record.outputs[:, first : first + 3]
+        return _together(record, range(first, first + 3))
     if "wheel_speed" in names:
         first = names.index("wheel_speed")
-        return twist_from_wheel_speed(robot.wheels, record.outputs[:, first : first + robot.wheels.count])
+        return twist_from_wheel_speed(robot.wheels, _together(record, range(first, first + robot.wheels.count)))
     if "wheel_angle" in names:
         first = names.index("wheel_angle")
-        return twist_from_wheel_speed(robot.wheels, _rates(record, slice(first, first + robot.wheels.count)))
+        return twist_from_wheel_speed(robot.wheels, _rates(record, range(first, first + robot.wheels.count)))
     if "position" in names and np.isfinite(heading := record.outputs[:, names.index("heading")]).any():
         first = names.index("position")
         rates = _rates(record, [first, first + 1, names.index("heading")])
@@ -60,14 +62,29 @@ def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
     return None
 
 
-def _rates(record: Record, columns: slice | list[int]) -> FloatArray:
+def _together(record: Record, columns: Sequence[int]) -> FloatArray:
+    """Outputs by column; with clocks of their own in the rows of the first, the others on the line. (rows, columns)."""
+    own = slice(columns.start, columns.stop) if isinstance(columns, range) else columns
+    values = record.outputs[:, own]
+    if not record.staggered:
+        return values
+    return np.where(
+        np.isfinite(values[:, :1]), np.stack([filled(record.t, column) for column in values.T], axis=1), np.nan
+    )
+
+
+def _rates(record: Record, columns: Sequence[int]) -> FloatArray:
     """Slope of columns over a few rows, NaN outside of the pieces. Shape (rows, columns)."""
-    values, t = record.outputs[:, columns], record.t
+    values, t = _together(record, columns), record.t
     found = np.full(values.shape, np.nan)
     for first, last in record.pieces:
-        near = max(1, round(0.5 * SLOPE / float(np.median(np.diff(t[first : min(last, first + SAMPLE) + 1])))))
         rows = np.arange(first, last + 1)
-        low, high = np.maximum(rows - near, first), np.minimum(rows + near, last)
+        rows = rows[np.isfinite(values[rows, 0])] if record.staggered else rows
+        if len(rows) < 2:
+            continue
+        near = max(1, round(0.5 * SLOPE / usual_step(t[rows[: SAMPLE + 1]])))
+        at = np.arange(len(rows))
+        low, high = rows[np.maximum(at - near, 0)], rows[np.minimum(at + near, len(rows) - 1)]
         found[rows] = (values[high] - values[low]) / (t[high] - t[low])[:, None]
     return found
 
@@ -106,7 +123,7 @@ def friction_values(mapping: Mapping, values: FloatArray, found: FloatArray) -> 
 def _parts(record: Record) -> list[tuple[int, int, int]]:
     """(first, last, rows of a window) of what is looked at of each piece."""
     ends = [(first, min(last, first + ENOUGH)) for first, last in record.pieces]
-    return [(first, last, window_rows(record.t[first : last + 1])) for first, last in ends]
+    return [(first, last, window_rows(record, first, last)) for first, last in ends]
 
 
 def _windows(
@@ -126,9 +143,10 @@ def _windows(
     return Windows(np.concatenate(designs), np.concatenate(changes), most)
 
 
-def window_rows(t: FloatArray) -> int:
-    """Rows of a window."""
-    return max(LEAST_ROWS, round(WINDOW / median(np.diff(t[: SAMPLE + 1]))))
+def window_rows(record: Record, first: int, last: int) -> int:
+    """Rows of a window in a piece."""
+    t = record.t[first : last + 1][: SAMPLE + 1]
+    return max(LEAST_ROWS, round(WINDOW / time_of_row(t, record.staggered)))
 
 
 def measured_rows(v: FloatArray, rows: int) -> float:

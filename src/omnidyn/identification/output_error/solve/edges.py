@@ -42,5 +42,5 @@ class Edges:
 
 def _row(problem: Fitted) -> float:
     """The usual time from row to row [s]; 0 where there is none."""
-    apart = [np.diff(piece.record.t[piece.first : piece.last + 1][: ENOUGH_ROWS + 1]) for piece in problem.pieces[:1]]
-    return float(np.median(apart[0])) if apart and apart[0].size else 0.0
+    piece = next(iter(problem.pieces), None)
+    return piece.record.step_of(slice(piece.first, min(piece.last, piece.first + ENOUGH_ROWS) + 1)) if piece else 0.0

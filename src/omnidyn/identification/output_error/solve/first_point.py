@@ -59,7 +59,7 @@ def _with_latencies(solver: Solver, begun: State) -> State:
     own = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
     if not own:
         return begun
-    row = float(np.median(np.diff(problem.pieces[0].record.t[: 2 * LATENCIES + 1])))
+    row = problem.pieces[0].record.step_of(slice(2 * LATENCIES + 1))
     tried = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
 
     def cost(late: float) -> FloatArray:

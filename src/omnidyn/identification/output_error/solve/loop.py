@@ -109,8 +109,10 @@ def left_out(records: Sequence[Record], pieces: Sequence[Piece]) -> list[str]:
 def _begins_at_rest(twist: FloatArray | None, first: int, last: int) -> bool:
     if twist is None:
         return True
-    rows = twist[first : min(first + STILL, last + 1)]
-    scatter = np.nanstd(np.diff(twist[first : last + 1], axis=0), axis=0) / np.sqrt(2.0 * len(rows))
+    known = twist[first : last + 1]
+    known = known[np.isfinite(known).all(axis=1)] if np.isnan(known).any() else known
+    rows = known[:STILL]
+    scatter = np.nanstd(np.diff(known, axis=0), axis=0) / np.sqrt(2.0 * len(rows))
     return bool((np.abs(np.nanmean(rows, axis=0)) <= CLEAR * scatter).all())
 
 
@@ -169,7 +171,7 @@ def retimed(solver: Solver, point: Point, watch: Progress) -> Point:
     late = [j for j, p in enumerate(problem.parameters) if p.part == LATENCY]
     own = [j for j in late if problem.names[j].partition("@")[0] == CURRENTS]
     short = shortened(problem, SETTING_OFF)
-    row = min(float(np.median(np.diff(p.record.t[p.first : p.last + 1]))) for p in short.pieces)
+    row = min(p.step for p in short.pieces)
     if not own or not period:
         return point
     reach = range(-AROUND, AROUND + 1) if period >= SLOW_LOOP * row else (-1, 0)  # a fast loop settles between rows
