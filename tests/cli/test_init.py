@@ -19,6 +19,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+from tests.support.staggered import Logged, Topic, plant
 
 MINI = ["--azimuth", "60,180,300", "--wheel-radius", "0.04", "--robot-radius", "0.125", "--mass", "8"]
 
@@ -507,3 +508,21 @@ def test_radii_may_differ_from_wheel_to_wheel(call, here):
                         "--mass", "2.8")  # fmt: skip
     assert code == 3
     assert "--wheel-radius: not a list of numbers; got 3cm" in err
+
+
+@pytest.mark.parametrize("wheels", ["wheel_speed", "wheel_angle"])
+def test_a_log_of_pose_and_wheels_shows_their_radius_too(call, here, wheels):
+    """A pose at 20 Hz, wheels at 50 Hz, 3 ms apart: only the mass has to be given."""
+    names = [f"{wheels[6] if wheels == 'wheel_angle' else 'w'}{k}" for k in (1, 2, 3)]
+    true = plant(20.0)
+    pose = Topic({name: true[name] for name in ("x", "y", "heading")}, 3e-3, 20.0)
+    Logged.of([Topic({name: true[name] for name in names}), pose], 20.0).csv(here / "log.csv")
+    code, out, err = call("init", "bot", "--log", "log.csv", "--mass", "10")
+    assert (code, out) == (0, "bot.toml\n")
+    assert f"from pose and {wheels}" in err
+    assert "if the logged speeds are those of the wheels, behind the gear" in err
+    robot = load_robot(here / "bot.toml")
+    np.testing.assert_allclose(robot.wheels.azimuth_deg, (60.0, 180.0, 300.0), atol=0.5)
+    assert robot.wheels.wheel_radius == pytest.approx(0.05, rel=0.01)
+    assert robot.wheels.robot_radius == pytest.approx(0.2, rel=0.01)
+    assert robot.priors["wheels.wheel_radius_m"].source == f"logs: pose and {wheels}"

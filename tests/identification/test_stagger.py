@@ -12,7 +12,9 @@ from tests.support.staggered import Logged, topics
 SECONDS = 20.0
 
 
-@pytest.mark.parametrize(("number", "offset", "jitter"), [(4, 3e-3, 0.0), (8, 20e-6, 1e-3)])
+@pytest.mark.parametrize(
+    ("number", "offset", "jitter"), [pytest.param(4, 3e-3, 0.0, marks=pytest.mark.long), (8, 20e-6, 1e-3)]
+)
 def test_whole_logs(tmp_path, number, offset, jitter):
     """Four topics; eight, of which each wheel has one."""
     equal = Logged.of(topics(number, 0.0, seconds=SECONDS), SECONDS).csv(tmp_path / "equal.csv")
@@ -43,6 +45,7 @@ def bench(path, offset, rows=3000):
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("offset", "off"), [(3e-6, OFF_NUMBER), (3e-3, 0.5)])
 def test_motors(tmp_path, offset, off):
     """Slope and dead band: off those of equal stamps by so much of their interval; steps come elsewhere in a row."""
