@@ -21,13 +21,16 @@ from omnidyn.findings.fitness import uses
 from omnidyn.findings.limits import check_limits
 from omnidyn.findings.motion import check_motion
 from omnidyn.findings.oddities import check_oddities
+from omnidyn.findings.scale.derivatives import check_derivatives, check_path
 from omnidyn.findings.scale.lag import check_lag
 from omnidyn.findings.scale.scale import check_dead_wheels, check_scale
+from omnidyn.findings.scale.turn_rate import check_turn_rate
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
-from omnidyn.findings.slip import check_slip
+from omnidyn.findings.slip import check_axes, check_slip
 from omnidyn.findings.time_base import begin, between
 from omnidyn.findings.use import joined as joined_uses
 from omnidyn.findings.values.values import check_values
+from omnidyn.findings.wiring.twist_frame import check_twist_frame
 from omnidyn.findings.wiring.wheels import check_wiring
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
@@ -37,8 +40,9 @@ __all__ = ["check", "check_blocks", "check_log"]
 
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
-    check_values, check_limits, check_wiring, check_dead_wheels, check_slip, check_scale, check_lag, check_filters,
-    check_energy, check_motion, check_oddities, check_excitation,
+    check_values, check_limits, check_twist_frame, check_derivatives, check_path, check_turn_rate, check_wiring,
+    check_dead_wheels, check_slip, check_axes, check_scale, check_lag, check_filters, check_energy, check_motion,
+    check_oddities, check_excitation,
 )  # fmt: skip
 
 # What only a whole log can show: dropped unless every block shows it.

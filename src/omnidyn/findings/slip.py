@@ -17,6 +17,8 @@ from omnidyn.statistics import robust_std
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
 LEAST, SURE = 0.025, 5.5  # of the ratio; standard errors, over all stretches that are looked at
 STAND_IN = 0.1  # the least where one wheel is dead and another channel stands in for it
+APART = 0.03  # of the ratio, between two axes
+MANY = 12  # windows in motion along an axis
 STRETCHES = 3
 FASTER = 12.0  # mean square of the speed in one part of the log over that in the other, at most
 SPINS = 0.25  # of the path: less is no slip but a wheel that spins
@@ -94,13 +96,44 @@ def _witness(own: FloatArray, axes: list[int]) -> bool:
 
 
 def _levelled(work: LogUnderCheck, floor: FloatArray, own: FloatArray, length: FloatArray) -> FloatArray:
-    """Weights that give floor and wheels the same slope about yaw as along x and y."""
+    """Weights that give floor and wheels the same slope along x, along y and about yaw."""
     ids, count = work.windows()
-    linear, yaw = slope(floor[:, :2], own[:, :2], ids, count), slope(floor[:, 2], own[:, 2], ids, count)
-    apart = abs(linear.value - yaw.value)
-    if not (apart > 0.03 and apart > 5.0 * np.hypot(linear.error, yaw.error)) or min(linear.value, yaw.value) <= 0.1:
-        return length
-    return length * np.array([1.0, 1.0, linear.value / yaw.value])
+    linear = slope(floor[:, :2], own[:, :2], ids, count)
+    weights = length.copy()
+    for k in range(3):
+        axis = slope(floor[:, k], own[:, k], ids, count)
+        apart = abs(linear.value - axis.value)
+        if apart > APART and apart > 5.0 * np.hypot(linear.error, axis.error) and min(linear.value, axis.value) > 0.1:
+            weights[k] *= linear.value / axis.value
+    return weights
+
+
+def check_axes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """The finding on x or y, of which the robot covers another share of what the wheels roll than of the other axes."""
+    speed, seen = work.full("wheel_speed"), ground(work)
+    own = None if speed is None or seen is None else wheels_twist(work, speed, seen.width)
+    if seen is None or own is None or len(work) < 3 * MIN_ROWS or seen.axes[:2] != [0, 1]:
+        return [], work
+    ids, count = work.windows()
+    lines = [slope(seen.twist[:, k], own[:, k], ids, count) for k in range(2)]
+    k = int(np.argmax([abs(line.value - 1.0) for line in lines]))
+    off, other = lines[k], lines[1 - k]
+    apart, error = abs(off.value - other.value), float(np.hypot(off.error, other.error))
+    if min(line.windows for line in lines) < MANY or not apart > max(APART, SURE * error):
+        return [], work
+    if not (min(off.value, other.value) > 0.1 and abs(other.value - 1.0) < 0.5 * apart):
+        return [], work
+    axis, straight = ("x", "y")[k], ("x", "y")[1 - k]
+    found = Finding(
+        "axis_ratio", WARN, axis,
+        f"along {axis} the robot covers {off.value:.3g} (+-{off.error:.2g}) of the path that its wheels roll, along "
+        f"{straight} {other.value:.3g}: its rollers slip, or its wheels do not stand as the robot file says",
+        "check azimuth_deg; else take the motion over the floor for friction along this axis", (), 0,
+        {"ratio": off.value, "error": off.error, "other": other.value},
+    )  # fmt: skip
+    values = work.channels[seen.name].copy()
+    values[:, k] = values[:, k] / off.value if seen.name == "twist" else np.nan
+    return [found], work.replace(**{seen.name: values})
 
 
 def _contrast(

@@ -29,6 +29,7 @@ from omnidyn.logs.clock.restarts import (
 )
 from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.column import MOTOR_SIDE, Column
+from omnidyn.logs.columns.frame_of import turn_to_body, with_frames
 from omnidyn.logs.columns.guess import guess_columns, refuse_doubtful
 from omnidyn.logs.columns.guess_time import refuse_second_time
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, load_map, parse_column
@@ -157,6 +158,7 @@ def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> Colum
         used = {column.name for column in columns.columns.values()}
         columns = replace(columns, unused=tuple(name for name in table.names if name not in used))
     columns = _delayed(_called_as_in(table, columns.with_columns(more)), options.latency)
+    columns = with_frames(columns, options.assume)
     for component, column in columns.columns.items():
         if column.name not in table.names:
             close = difflib.get_close_matches(column.name, table.names, n=1, cutoff=0.5)
@@ -240,6 +242,7 @@ def log_from_table(
         channels["pose"][:, 2] = unwrapped(channels["pose"][:, 2])
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
+    notes += turn_to_body(t, channels, columns, table.source)
     restarts += counter_restarts(counters, table.lines)
     notes += [each.note for each in restarts if each.where != TIME]
     log = Log(

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, WARN, Finding
+from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import BEYOND, beyond_stall, emf, stall_current, volts
-from omnidyn.findings.signal.robust import central_rate, slope, smooth, windowed
+from omnidyn.findings.signal.robust import slope
 from omnidyn.logs.channels import components
-from omnidyn.model.frames import unwrapped
-from omnidyn.units import DEGREE, TURN
+from omnidyn.units import DEGREE, TURN, known_unit, parse_unit
 
 UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file is not exact either
 
@@ -21,6 +19,9 @@ UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file 
 TURN_UNITS = {"rpm read as rad/s": 60.0 / TURN, "deg/s read as rad/s": 1.0 / DEGREE,
               "turns/s read as rad/s": 1.0 / TURN, "rad/s read as rpm": TURN / 60.0,
               "rad/s read as deg/s": DEGREE}  # fmt: skip
+ANGLE_UNITS = {"deg read as rad": 1.0 / DEGREE, "turns read as rad": 1.0 / TURN, "rad read as deg": DEGREE}
+LENGTH_UNITS = {"mm read as m": 1e3, "cm read as m": 1e2, "m read as mm": 1e-3, "m read as cm": 1e-2}
+SPEED_UNITS = {"mm/s read as m/s": 1e3, "cm/s read as m/s": 1e2, "m/s read as mm/s": 1e-3, "m/s read as cm/s": 1e-2}
 CURRENT_UNITS = {"mA read as A": 1e3, "A read as mA": 1e-3}
 TIME_UNITS = {"ms read as s": 1e3, "us read as s": 1e6, "ns read as s": 1e9, "s read as ms": 1e-3}
 
@@ -41,57 +42,16 @@ def unit_finding(where: str, words: str, factor: float) -> Finding:
     )  # fmt: skip
 
 
-def own_derivatives(work: LogUnderCheck) -> list[Finding]:
-    """Position and speed of the same thing: their ratio is 1, or a unit is wrong."""
-    found = []
-    for name, against, rate, speed, units in _pairs(work):
-        ids, count = work.windows()
-        line = slope(rate, speed, ids, count)
-        if (
-            line.value == 0.0
-            or not line.differs(1.0, 0.03, 6.0)
-            or line.windows < 4
-            or _likeness(rate, speed, ids, count) < 0.95
-        ):
-            continue
-        # rate = line * speed: speed is 1/line too large, or the time is.
-        unit, clock = unit_of(1.0 / line.value, units), unit_of(1.0 / line.value, TIME_UNITS)
-        words = f"{against} changes {line.value:.4g} times as fast as {name} says"
-        if unit:
-            found.append(unit_finding(name, f"{words}: {unit}?", 1.0 / line.value))
-        elif clock or (line.value < 0.02 or line.value > 50.0):
-            found.append(Finding(
-                "time_unit", FATAL, "t",
-                f"{words}: the time is not in the unit given" + (f" ({clock}?)" if clock else ""),
-                "give the unit of the time column, such as `column` t=NAME:ms", (), 0, {"ratio": line.value},
-            ))  # fmt: skip
-        else:
-            found.append(Finding(
-                "scale", WARN, name, words + f" (+-{line.error:.2g})",
-                "one of the two has a wrong scale, or the rows are too far apart to see how it moves", (), 0,
-                {"ratio": line.value, "error": line.error},
-            ))  # fmt: skip
-    return found
-
-
-def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
-    """Correlation, about 0, of window means: 1 where one is the other times a number."""
-    good = np.isfinite(y) & np.isfinite(x)
-    a, b = (windowed(ids, count, np.where(good, each, 0.0)) for each in (y, x))
-    return float(abs(a @ b) / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
-
-
-def _pairs(work: LogUnderCheck) -> Iterator[tuple[str, str, FloatArray, FloatArray, dict[str, float]]]:
-    """(speed, position, derivative of the position, speed smoothed alike, units of the speed)."""
-    half = max(1, round(0.05 / work.step)) if work.step > 0.0 else 1
-    pose, twist = work.get("pose"), work.get("twist")
-    if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
-        rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
-        yield "omega", "heading", rate, smooth(twist[:, 2], 2 * half + 1), TURN_UNITS
-    angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
-    if angle is not None and speed is not None and angle.shape == speed.shape:
-        for name, a, w in zip(components("wheel_speed", speed.shape[1]), angle.T, speed.T, strict=True):
-            yield name, name.replace("w", "a"), central_rate(a, work.t, half), smooth(w, 2 * half + 1), TURN_UNITS
+def possible(units: Mapping[str, float], work: LogUnderCheck, component: str) -> dict[str, float]:
+    """Those of the unit mistakes that the unit allows in which a component was read; SI where nobody knows it."""
+    column = work.log.columns.columns.get(component)
+    unit = known_unit(column.unit) if column is not None else None
+    size = 1.0 if unit is None else unit.size
+    return {
+        name: factor
+        for name, factor in units.items()
+        if abs(parse_unit(name.rpartition(" ")[2]).size / size - 1.0) < 1e-6
+    }
 
 
 def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:

@@ -13,7 +13,6 @@ from omnidyn.findings.scale.mistakes import (
     current_unit,
     duty_as_voltage,
     emf_alone,
-    own_derivatives,
     unit_finding,
     unit_of,
 )
@@ -44,7 +43,7 @@ def check_scale(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on units and scales; the work with the wheel speeds put right."""
     if len(work) < MIN_ROWS:
         return [], work
-    found = own_derivatives(work)
+    found: list[Finding] = []
     for part in (current_unit, duty_as_voltage, _speeds, _single_wheels):
         more, work = part(work)
         found += more

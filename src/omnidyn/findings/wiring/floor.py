@@ -9,7 +9,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
-from omnidyn.findings.signal.reference import ground, wheels_twist
+from omnidyn.findings.signal.reference import ground, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.findings.wiring.frame import commands_agree
 from omnidyn.findings.wiring.orders import BETTER, WINDOWS, Answer, Wiring, choose, code_of, means, rivals_of, wirings
@@ -132,16 +132,50 @@ def axes_finding(work: LogUnderCheck, answer: Answer) -> Finding:
     """Fatal: axes of what was measured over the floor are exchanged, or have the opposite sign."""
     channel, names = _axes_names(work)
     wrong = answer.best.touched(names)
+    if (turn := _turn_of_pose(work, answer.best)) is not None:
+        channel, wrong = "twist and pose", wrong + turned_names(turn)
     heading = wrong == ["heading"] or wrong == ["omega"]
     also = " (a positive speed of all wheels must turn the robot counter-clockwise)" if heading else ""
     return Finding(
         code_of(answer.best), FATAL, " ".join(wrong),
-        f"{channel} against the wheels: {answer.best.words(names)}{also}; as logged they share "
+        f"{channel} against the wheels: {_axes_words(answer.best, names, turn)}{also}; as logged they share "
         f"{100 * (1 - answer.logged):.0f} % of their motion, put right {100 * (1 - answer.left):.0f} %"
         + (", or else all wheels have the opposite sign" if heading else ""),
-        "set `invert` for that column in the mapping, or turn the wheels' signs in the same way",
-        (), 0, {"explained_as_logged": 1.0 - answer.logged, "explained_put_right": 1.0 - answer.left},
+        f"set `invert` for {'that column' if len(wrong) == 1 else 'these columns'} in the mapping, or turn the wheels' "
+        "signs in the same way", (), 0,
+        {"explained_as_logged": 1.0 - answer.logged, "explained_put_right": 1.0 - answer.left},
     )  # fmt: skip
+
+
+def _axes_words(wiring: Wiring, names: tuple[str, ...], turn: FloatArray | None) -> str:
+    """What is wrong with the axes of the twist, and of the pose where it goes with them."""
+    words = wiring.words(names)
+    if turn is None or not (also := turned_names(turn)):
+        return words
+    return f"{words}, and so {'has' if len(also) == 1 else 'have'} {' and '.join(also)} of the pose"
+
+
+def turned_names(turn: FloatArray) -> list[str]:
+    """Which of x, y and heading such a matrix changes."""
+    return [name for name, row, own in zip(("x", "y", "heading"), turn, np.eye(3), strict=True) if (row != own).any()]
+
+
+def _turn_of_pose(work: LogUnderCheck, wiring: Wiring) -> FloatArray | None:
+    """The matrix that puts the pose right beside the twist; None where it does not go with it.
+
+    A mirrored frame has y, heading, vy and omega mirrored. A pose that agrees with the twist as logged goes with it:
+    axes A of the plane and the sign s of the turn are those of another frame where det A = s.
+    """
+    seen, pose, twist = ground(work), work.full("pose"), work.full("twist")
+    if seen is None or seen.name != "twist" or pose is None or twist is None or len(wiring.order) != 3:
+        return None
+    turn = wiring.matrix
+    if np.linalg.det(turn[:2, :2]) != turn[2, 2]:
+        return None
+    body, width = pose_twist(work, pose)
+    told, own = means(work, body, smooth(twist, width))
+    size = np.sqrt((told**2).sum() * (own**2).sum())
+    return turn if size > 0.0 and (told * own).sum() > 0.9 * size else None
 
 
 def mended_axes(work: LogUnderCheck, wiring: Wiring) -> LogUnderCheck:
@@ -156,6 +190,8 @@ def mended_axes(work: LogUnderCheck, wiring: Wiring) -> LogUnderCheck:
         values = values * signs if tuple(wiring.order) == tuple(range(len(wiring.order))) else values * np.nan
     else:
         values[:, seen.axes] = wiring.applied(values[:, seen.axes])
+        if (turn := _turn_of_pose(work, wiring)) is not None:
+            work = work.replace(pose=work.channels["pose"] @ turn.T)
     return work.replace(**{seen.name: values})
 
 

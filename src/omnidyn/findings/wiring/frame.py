@@ -8,6 +8,7 @@ from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import pose_twist, wheels_twist
 from omnidyn.findings.wiring.orders import means
+from omnidyn.findings.wiring.turned import is_turned, marker_finding, turned, with_marker
 from omnidyn.model.wheels import wheel_speed
 
 
@@ -42,9 +43,12 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
         return [_unlike(plain)], work.replace(pose=None)
     if not trusted and left < 0.6 * (1.0 - alike**2) + 0.005:
         return [], work
+    if plain > 0.95 * alike and mirror > 0.0:
+        return _small_turn(work)
     if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
         return [], work
     words = f"turned by {angle:.0f} deg" + (" and mirrored" if mirror < 0.0 else "")
+    how = f"take the angle off its heading: `assume` marker={-angle:.0f}deg" if mirror > 0.0 else "mirror it back"
     mended = pose * [1.0, mirror, mirror]
     unit = np.exp(-1.0j * np.radians(angle))
     place = (mended[:, 0] + 1.0j * mended[:, 1]) * unit
@@ -52,9 +56,23 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
     return [Finding(
         "pose_frame", WARN, "x y", f"x and y of the pose are {words} against its heading and the wheels (likeness "
         f"{plain:.2f} as logged, {alike:.2f} put right)",
-        "turn the frame of the pose, or correct its heading by that angle, before world speeds are used", (), 0,
+        f"turn the frame of the pose, or {how}", (), 0,
         {"angle_deg": angle, "mirrored": float(mirror < 0.0), "likeness": alike, "likeness_as_logged": plain},
     )], work.replace(pose=mended)  # fmt: skip
+
+
+def _small_turn(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """A marker that is mounted at an angle too small to show in the likeness."""
+    speed, pose = work.full("wheel_speed"), work.full("pose")
+    assert speed is not None
+    assert pose is not None
+    body, width = pose_twist(work, pose)
+    own = wheels_twist(work, speed, width)
+    assert own is not None
+    turn = turned(work, body[:, :2], own[:, :2], body[:, 2])
+    if turn is None or not is_turned(turn):
+        return [], work
+    return [marker_finding(turn, "the motion of the wheels")], with_marker(work, pose, turn.angle)
 
 
 def _unlike(plain: float) -> Finding:

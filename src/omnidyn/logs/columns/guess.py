@@ -19,9 +19,10 @@ from omnidyn.logs.columns.component import (
     component_of_parts,
     numbered_kind,
 )  # fmt: skip
+from omnidyn.logs.columns.frame_of import FRAMES
 from omnidyn.logs.columns.guess_side import settle_side, take_sides
 from omnidyn.logs.columns.guess_time import take_time
-from omnidyn.logs.columns.guess_unit import implausible, unit_of
+from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, unit_of
 from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, floats, is_numeric, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import BRACKETS, NameParts, read_name
@@ -56,13 +57,14 @@ def guess_columns(
     says the side of the gear too. taken: column -> component, where the user says it
     himself: nothing is doubted of them. Raises InputError for an unknown unit in `assume`.
     """
-    told = {each: unit_and_side(text) for name, text in (assume or {}).items() for each in _meant(name, table.names)}
+    units = {name: text for name, text in (assume or {}).items() if name not in FRAMES}
+    told = {each: unit_and_side(text) for name, text in units.items() for each in _meant(name, table.names)}
     assumed = {name: unit.text for name, (unit, _) in told.items()}
     found = Guess(robot=robot)
     names = [name for name in table.names if is_numeric(table.columns[name]) and name not in table.says]
     names = _without_measured_power(names)
     table = replace(table, units={**_units_of_letters(names, assumed, table.units), **table.units})
-    _take_said(table, found)
+    _take_said(table, assumed, found)
     numbers = wheel_numbers(table, names, found)
     for name in names:
         _take(table, name, numbers, assumed, robot, found)
@@ -96,14 +98,18 @@ def _without_measured_power(names: list[str]) -> list[str]:
     return names if set(drives) <= set(powers) else [name for name in names if name not in powers]
 
 
-def _take_said(table: Table, found: Guess) -> None:
-    """Columns of which the format itself says what they are: the first of a kind is taken."""
+def _take_said(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
+    """Columns of which the format itself says what they are: the first of a kind is taken, where it can be that."""
     for name, said in table.says.items():
+        given = assumed.get(name) or assumed.get(said.component) or assumed.get(letter_of(said.component))
+        unit = given or table.units.get(name) or si_suffix(said.component or TIME).replace("_", "/")
         if said.why:
             found.doubts.append(Doubt(name, said.component, said.why, ()))
         elif said.component and said.component not in found.columns:
-            unit = table.units.get(name) or si_suffix(said.component).replace("_", "/")
-            found.columns[said.component] = Column(name, unit)
+            if given or not (doubt := doubt_of_rate(table, name, said.component, unit)):
+                found.columns[said.component] = Column(name, unit)
+            else:
+                found.doubts.append(doubt)
 
 
 def _meant(name: str, names: Iterable[str]) -> list[str]:

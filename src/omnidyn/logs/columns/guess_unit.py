@@ -38,9 +38,8 @@ def unit_of(table: Table, name: str, component: str, robot: Robot | None, found:
     if suffix == "rad" and component != "heading" and _are_counts(floats(table.columns[name])):
         found.doubts.append(Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
         return None
-    if component in ("omega", "omega_cmd") and (largest := _usual_size(floats(table.columns[name]))) > FASTEST_TURN:
-        why = f"no unit is given, and up to {largest:.3g} is no turn rate of a robot in rad/s"
-        found.doubts.append(Doubt(name, component, why, ("deg/s", "rad/s")))
+    if doubt := doubt_of_rate(table, name, component):
+        found.doubts.append(doubt)
         return None
     found.si[name] = SI.get(suffix, suffix)
     return parse_unit(found.si[name])
@@ -77,6 +76,21 @@ def _scales(largest: float) -> tuple[str, ...]:
     full = next((each for each in FULL_SCALES if largest <= each), 0)
     scale = (f"duty/{full:g}",) if full else ("duty/FULL_SCALE",)
     return ("duty",) * (largest <= MOST_DUTY) + ("%",) * (1.0 < largest <= MOST_PERCENT) + scale * (largest > 1.0)
+
+
+def doubt_of_rate(table: Table, name: str, component: str, unit: str = "") -> Doubt | None:
+    """The doubt about a turn rate of the robot that is too large for rad/s; None where there is none.
+
+    unit: that the format gives, "" where there is none.
+    """
+    if component not in ("omega", "omega_cmd") or unit not in ("", "rad/s"):
+        return None
+    largest = _usual_size(floats(table.columns[name]))
+    if largest <= FASTEST_TURN:
+        return None
+    given = "its format means rad/s" if unit else "no unit is given"
+    return Doubt(name, component, f"{given}, and up to {largest:.3g} is no turn rate of a robot in rad/s",
+                 ("deg/s", "rad/s"))  # fmt: skip
 
 
 def _turns_in_degrees(values: FloatArray) -> bool:

@@ -18,6 +18,7 @@ from omnidyn.units import ANGLE, CURRENT, DUTY, LENGTH, SPEED, TURN_RATE, VOLTAG
 from omnidyn.units import TIME as TIME_QUANTITY
 
 SIDED = ("wheel_angle", "wheel_speed", "wheel_speed_command")
+FRAMED = ("vx", "vy", "vx_cmd", "vy_cmd", "heading")
 SCHEMA = 1
 
 _QUANTITIES = {
@@ -52,6 +53,11 @@ class ColumnMap:
                 raise InputError(
                     what or "only speeds and angles of wheels have a motor side", got=f"{component}: {column}",
                     expected="side wheel",
+                )  # fmt: skip
+            if column.frame and component not in FRAMED:
+                raise InputError(
+                    "only a heading and velocities of the robot have a frame", got=f"{component}: {column}",
+                    expected=f"no frame, or one of {', '.join(FRAMED)}",
                 )  # fmt: skip
 
     def with_columns(self, more: Mapping[str, Column]) -> ColumnMap:
@@ -159,11 +165,12 @@ def map_to_toml(columns: ColumnMap) -> str:
         keys |= {"side": column.side} if column.side != WHEEL_SIDE else {}
         keys |= {"invert": True} if column.invert else {}
         keys |= {"latency_s": float(column.latency)} if column.latency else {}
+        keys |= {"frame": column.frame} if column.frame else {}
         lines += ["", f"[{component}]", *(f"{key} = {toml_literal(value)}" for key, value in keys.items())]
     return "\n".join(lines) + "\n"
 
 
-_KEYS = {"column": str, "unit": str, "side": str, "invert": bool, "latency_s": (int, float)}
+_KEYS = {"column": str, "unit": str, "side": str, "invert": bool, "latency_s": (int, float), "frame": str}
 
 
 def load_map(path: str | os.PathLike) -> ColumnMap:
@@ -194,4 +201,5 @@ def _column_of(table: Any) -> Column:
         if not isinstance(value, _KEYS[key]) or (key == "latency_s" and isinstance(value, bool)):
             raise InputError(f"{key} has the wrong type", got=value, expected="text, true or false, or a number")
     latency = float(table.get("latency_s", 0.0))
-    return Column(table["column"], table["unit"], table.get("side", WHEEL_SIDE), table.get("invert", False), latency)
+    side, invert = table.get("side", WHEEL_SIDE), table.get("invert", False)
+    return Column(table["column"], table["unit"], side, invert, latency, table.get("frame", ""))

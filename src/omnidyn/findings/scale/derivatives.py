@@ -1,0 +1,222 @@
+"""Positions against the speeds of the same thing: their ratio is 1, or a unit, a sign, a scale or the time is wrong.
+
+Which of the two is wrong a third channel says, where one tells the same; else the units in which they were read do: a
+column that was read in rad/s cannot be "rad/s read as rpm".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.findings.finding import FATAL, WARN, Finding
+from omnidyn.findings.scale.mistakes import (
+    ANGLE_UNITS,
+    LENGTH_UNITS,
+    SPEED_UNITS,
+    TIME_UNITS,
+    TURN_UNITS,
+    possible,
+    unit_finding,
+    unit_of,
+)
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.reference import expected_wheel_speed, pose_twist, wheels_twist
+from omnidyn.findings.signal.robust import Slope, central_rate, slope, smooth, windowed
+from omnidyn.findings.time_base import LONGEST_STEP, SHORTEST_STEP
+from omnidyn.logs.channels import components
+from omnidyn.model.frames import unwrapped
+
+LEAST, SURE = 0.03, 6.0  # of the ratio; standard errors
+ALIKE = 0.95  # likeness of window means, from which one channel is taken for a multiple of the other
+SAME = 0.03  # ratios that differ by less are one
+SPEED_SIDE, POSITION_SIDE = "speed", "position"
+
+
+class Pair(NamedTuple):
+    """A speed and the rate of its position, shapes (rows, k), means over the same rows.
+
+    of: channel and columns of the speed; on: those of the position. witness: another channel that says the same.
+    """
+
+    speed: str
+    position: str
+    value: FloatArray
+    rate: FloatArray
+    of: tuple[str, tuple[int, ...]]
+    on: tuple[str, tuple[int, ...]]
+    witness: tuple[str, FloatArray] | None
+    speed_units: Mapping[str, float]
+    position_units: Mapping[str, float]
+
+
+def check_derivatives(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """Findings on positions and their speeds; the work with the wrong one of them put right."""
+    if len(work) < MIN_ROWS or not SHORTEST_STEP <= work.step <= LONGEST_STEP:
+        return [], work
+    found: list[Finding] = []
+    lines = [(pair, line) for pair in _pairs(work) if (line := _off(work, pair)) is not None]
+    ratios = np.array([line.value for _, line in lines])
+    if len({pair.of[0] for pair, _ in lines}) > 1 and np.ptp(ratios) < SAME * np.abs(ratios).mean():
+        return [_of_time(lines[0])], replace(work, t=work.t * ratios.mean(), step=work.step * float(ratios.mean()))
+    for pair, line in _joined(lines):
+        finding, work = _judged(work, pair, line)
+        found.append(finding)
+    return found, work
+
+
+def check_path(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """The same of x and y against the twist, once both are in one frame."""
+    pair = _path(work) if len(work) >= MIN_ROWS and SHORTEST_STEP <= work.step <= LONGEST_STEP else None
+    line = None if pair is None else _off(work, pair)
+    if pair is None or line is None:
+        return [], work
+    finding, work = _judged(work, pair, line)
+    return [finding], work
+
+
+def _off(work: LogUnderCheck, pair: Pair) -> Slope | None:
+    """rate = slope * speed, where that is surely not 1 and the two are alike otherwise."""
+    ids, count = work.windows()
+    line = slope(pair.rate, pair.value, ids, count)
+    good = line.value != 0.0 and line.differs(1.0, LEAST, SURE) and line.windows >= 4
+    return line if good and _likeness(pair.rate, pair.value, ids, count) >= ALIKE else None
+
+
+def _joined(lines: list[tuple[Pair, Slope]]) -> list[tuple[Pair, Slope]]:
+    """Wheels that are off by one ratio as one pair."""
+    wheels = [(pair, line) for pair, line in lines if pair.of[0] == "wheel_speed"]
+    ratios = np.array([line.value for _, line in wheels])
+    if len(wheels) < 2 or np.ptp(ratios) > SAME * np.abs(ratios).mean():
+        return lines
+    columns = tuple(k for pair, _ in wheels for k in pair.of[1])
+    first = wheels[0][0]
+    witness = [pair.witness for pair, _ in wheels]
+    joined = first._replace(
+        speed=" ".join(pair.speed for pair, _ in wheels), position=" ".join(pair.position for pair, _ in wheels),
+        value=np.hstack([pair.value for pair, _ in wheels]), rate=np.hstack([pair.rate for pair, _ in wheels]),
+        of=(first.of[0], columns), on=(first.on[0], columns),
+        witness=None if None in witness else (witness[0][0], np.hstack([each[1] for each in witness])),  # type: ignore[index]
+    )  # fmt: skip
+    line = Slope(float(ratios.mean()), max(each.error for _, each in wheels), wheels[0][1].windows)
+    return [*((pair, each) for pair, each in lines if pair.of[0] != "wheel_speed"), (joined, line)]
+
+
+def _judged(work: LogUnderCheck, pair: Pair, line: Slope) -> tuple[Finding, LogUnderCheck]:
+    """What is wrong, and the work with it put right."""
+    ratio = line.value  # the speed is 1/ratio times too large, or the position ratio times
+    by, side = _blamed(work, pair, ratio)
+    units = {SPEED_SIDE: unit_of(1.0 / ratio, possible(pair.speed_units, work, _component(pair.of))),
+             POSITION_SIDE: unit_of(ratio, possible(pair.position_units, work, _component(pair.on)))}  # fmt: skip
+    if not side:
+        side = POSITION_SIDE if units[POSITION_SIDE] and not units[SPEED_SIDE] else SPEED_SIDE
+    name, other = (pair.speed, pair.position) if side == SPEED_SIDE else (pair.position, pair.speed)
+    change = "change" if " " in pair.position else "changes"
+    words = (
+        f"{pair.position} {change} {ratio:.4g} times as fast as {pair.speed} {'say' if ' ' in pair.speed else 'says'}"
+    )
+    words += f", and {by} agrees with {other}" if by else ""
+    clock = unit_of(1.0 / ratio, TIME_UNITS)
+    if units[side]:
+        finding = unit_finding(name, f"{words}: {units[side]}?", 1.0 / ratio if side == SPEED_SIDE else ratio)
+    elif clock:
+        finding = _of_time((pair, line))
+    elif ratio < 0.0:
+        both = name if by else f"{pair.speed} {pair.position}"
+        which = f"{name} has the opposite sign" if by else "one of the two has the opposite sign"
+        finding = Finding(
+            "inverted", FATAL, both, f"{words}: {which}", "set `invert` for that column in the mapping", (), 0,
+            {"ratio": ratio, "error": line.error},
+        )  # fmt: skip
+    else:
+        which = f"{name} has a wrong scale" if by else "one of the two has a wrong scale, or the rows are too far apart"
+        finding = Finding(
+            "scale", WARN, name, f"{words} (+-{line.error:.2g})",
+            f"{which}{'' if by else ' to see how it moves'}", (), 0, {"ratio": ratio, "error": line.error},
+        )  # fmt: skip
+    return finding, _scaled(
+        work, *(pair.of if side == SPEED_SIDE else pair.on), ratio if side == SPEED_SIDE else 1 / ratio
+    )
+
+
+def _blamed(work: LogUnderCheck, pair: Pair, ratio: float) -> tuple[str, str]:
+    """(what else was measured, which of the two it contradicts); "" and "" where nothing else tells."""
+    if pair.witness is None:
+        return "", ""
+    name, values = pair.witness
+    ids, count = work.windows()
+    line = slope(values, pair.value, ids, count)  # 1 where the speed is right, the ratio where its position is
+    if not np.isfinite(line.error) or line.windows < 4 or _likeness(values, pair.value, ids, count) < ALIKE:
+        return "", ""
+    off_speed, off_position = abs(line.value - 1.0), abs(line.value / ratio - 1.0)
+    if min(off_speed, off_position) > 0.5 * max(off_speed, off_position):
+        return "", ""
+    return name, POSITION_SIDE if off_speed < off_position else SPEED_SIDE
+
+
+def _of_time(which: tuple[Pair, Slope]) -> Finding:
+    pair, line = which
+    clock = unit_of(1.0 / line.value, TIME_UNITS)
+    return Finding(
+        "time_unit", FATAL, "t",
+        f"{pair.position} {'change' if ' ' in pair.position else 'changes'} {line.value:.4g} times as fast as "
+        f"{pair.speed} {'say' if ' ' in pair.speed else 'says'}: the time is not in the unit given"
+        + (f" ({clock}?)" if clock else ""),
+        "give the unit of the time column, such as `column` t=NAME:ms", (), 0, {"ratio": line.value},
+    )  # fmt: skip
+
+
+def _component(of: tuple[str, tuple[int, ...]]) -> str:
+    return components(of[0], of[1][0] + 1 if of[0].startswith("wheel") else 0)[of[1][0]]
+
+
+def _scaled(work: LogUnderCheck, channel: str, columns: tuple[int, ...], factor: float) -> LogUnderCheck:
+    values = work.channels[channel].copy()
+    values[:, list(columns)] *= factor
+    return work.replace(**{channel: values})
+
+
+def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
+    """Correlation, about 0, of window means: 1 where one is the other times a number. Shapes (rows, k)."""
+    good = np.isfinite(y) & np.isfinite(x)
+    a, b = (np.concatenate([windowed(ids, count, column) for column in np.where(good, each, 0.0).T]) for each in (y, x))
+    return float(abs(a @ b) / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
+
+
+def _pairs(work: LogUnderCheck) -> Iterator[Pair]:
+    """Heading and omega, angle and speed of each wheel."""
+    half = max(1, round(0.05 / work.step))
+    pose, twist = work.get("pose"), work.get("twist")
+    speed = work.full("wheel_speed")
+    own = None if speed is None else wheels_twist(work, speed, 2 * half + 1)
+    if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
+        rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
+        witness = None if own is None else ("what the wheels say", own[:, 2:])
+        yield Pair("omega", "heading", smooth(twist[:, 2:], 2 * half + 1), rate[:, None], ("twist", (2,)),
+                   ("pose", (2,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
+    angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
+    if angle is None or speed is None or angle.shape != speed.shape or "wheel_speed" not in work.log.channels:
+        return
+    expected = expected_wheel_speed(work)
+    for k, name in enumerate(components("wheel_speed", speed.shape[1])):
+        witness = None if expected is None else (expected[0], smooth(expected[1][:, [k]], 2 * half + 1))
+        rate = central_rate(angle[:, k], work.t, half)[:, None]
+        yield Pair(name, name.replace("w", "a"), smooth(speed[:, [k]], 2 * half + 1), rate, ("wheel_speed", (k,)),
+                   ("wheel_angle", (k,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
+
+
+def _path(work: LogUnderCheck) -> Pair | None:
+    """x and y against vx and vy."""
+    pose, twist = work.full("pose"), work.full("twist")
+    if pose is None or twist is None:
+        return None
+    body, width = pose_twist(work, pose)
+    speed = work.full("wheel_speed")
+    own = None if speed is None else wheels_twist(work, speed, width)
+    witness = None if own is None else ("what the wheels say", own[:, :2])
+    return Pair("vx vy", "x y", smooth(twist[:, :2], width), body[:, :2], ("twist", (0, 1)), ("pose", (0, 1)), witness,
+                SPEED_UNITS, LENGTH_UNITS)  # fmt: skip

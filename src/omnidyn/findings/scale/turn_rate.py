@@ -1,0 +1,45 @@
+"""A gyroscope in another unit than the wheels: deg/s read as rad/s, where the wheels say how fast the robot turns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omnidyn.findings.finding import Finding
+from omnidyn.findings.scale.mistakes import TURN_UNITS, possible, unit_finding, unit_of
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.reference import electric_speed, wheels_twist
+from omnidyn.findings.signal.robust import slope
+
+NEAR = 0.5  # of the logarithm: what is off by less is in the right unit
+LEAST_TURN = 0.05  # of the motion of the wheels
+
+
+def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """The finding on the unit of omega; the work with it put right.
+
+    The wheels are blamed (elsewhere) where they are off against the path or the motors too, or where only their unit
+    can have been mistaken.
+    """
+    speed, twist = work.full("wheel_speed"), work.get("twist")
+    own = None if speed is None or len(work) < MIN_ROWS else wheels_twist(work, speed)
+    if own is None or twist is None or not np.isfinite(twist[:, 2]).any():
+        return [], work
+    ids, count = work.windows()
+    yaw = slope(twist[:, 2], own[:, 2], ids, count)
+    unit = unit_of(yaw.value, possible(TURN_UNITS, work, "omega")) if yaw.windows >= 4 else ""
+    if not unit or not yaw.differs(1.0, NEAR):
+        return [], work
+    for axes in ([0], [1]):
+        if np.isfinite(twist[:, axes]).any():
+            path = slope(twist[:, axes], own[:, axes], ids, count)
+            if path.windows >= 4 and path.value > 0.0 and abs(np.log(path.value)) > NEAR:
+                return [], work
+    implied = electric_speed(work)
+    if implied is not None:
+        turned = slope(implied, speed, ids, count)  # type: ignore[arg-type]
+        if turned.windows >= 4 and turned.value > 0.0 and abs(np.log(turned.value)) > NEAR:
+            return [], work
+    words = f"omega is {yaw.value:.4g} times what the wheels say of the turning: {unit}?"
+    values = twist.copy()
+    values[:, 2] /= yaw.value
+    return [unit_finding("omega", words, yaw.value)], work.replace(twist=values)

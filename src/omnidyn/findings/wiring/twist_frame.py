@@ -1,0 +1,145 @@
+"""The twist against the motion of the pose: in the frame of the room, turned (a marker at an angle), or mirrored."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.findings.finding import FATAL, WARN, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.reference import pose_twist, wheels_twist
+from omnidyn.findings.signal.robust import smooth
+from omnidyn.findings.wiring.turned import ALIKE, Turned, is_turned, marker_finding, turned, with_marker
+from omnidyn.model.frames import unwrapped
+
+BETTER = 0.35  # the right frame leaves at most so much of what the one as logged leaves
+NAMES = ("x", "y", "heading")
+
+
+class Found(NamedTuple):
+    """signs: of x, y and heading. room: whether the twist is in the frame of the room. turn: what is left."""
+
+    signs: tuple[float, float, float]
+    room: bool
+    turn: Turned
+
+    @property
+    def left(self) -> float:
+        """What no turn explains, and what the frame as it stands leaves."""
+        return 1.0 - (self.turn.plain if self.room else self.turn.alike)
+
+
+def check_twist_frame(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """Findings on twist against pose, else on what was commanded against it; the work with them in one frame."""
+    pose, twist, command = work.full("pose"), work.full("twist"), work.full("twist_command")
+    if pose is None or len(work) < 3 * MIN_ROWS or work.step <= 0.0:
+        return [], work
+    if twist is not None:
+        return _against_twist(work, pose, twist)
+    if command is None or work.full("wheel_speed") is not None:
+        return [], work
+    body, width = pose_twist(work, pose)
+    turn = turned(work, body[:, :2], smooth(command[:, :2], width), body[:, 2])
+    if turn is None or not is_turned(turn):
+        return [], work
+    return [marker_finding(turn, "the commanded twist")], with_marker(work, pose, turn.angle)
+
+
+def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> tuple[list[Finding], LogUnderCheck]:
+    plain = _found(work, pose, twist, (1.0, 1.0, 1.0), False)
+    if plain is None:
+        return [], work
+    if plain.turn.plain > ALIKE and not is_turned(plain.turn):
+        return [], work
+    tried = [_found(work, pose, twist, (1.0, 1.0, 1.0), True)]
+    tried += [_found(work, pose, twist, (1.0, *signs), False) for signs in product((1.0, -1.0), repeat=2)]
+    known = [each for each in tried if each is not None]
+    best = min(known, key=lambda each: each.left)
+    room = known[0]
+    if room.left < best.left + 0.02 and 1.0 - room.left > ALIKE and room.left < BETTER * (1.0 - plain.turn.plain):
+        return [_room_finding(plain, room)], work.replace(twist=_as_in_body(work, pose, twist))
+    if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > ALIKE and best.left < BETTER * plain.left:
+        return [_mirror_finding(plain, best)], work.replace(pose=pose * best.signs)
+    if is_turned(plain.turn):
+        return _turned(work, pose, twist, plain.turn)
+    return [], work
+
+
+def _found(
+    work: LogUnderCheck, pose: FloatArray, twist: FloatArray, signs: tuple[float, float, float], room: bool
+) -> Found | None:
+    body, width = pose_twist(work, pose * signs)
+    own = smooth(twist[:, :2], width) if not room else smooth(_as_in_body(work, pose, twist)[:, :2], width)
+    turn = turned(work, body[:, :2], own, body[:, 2])
+    return None if turn is None else Found(signs, room, turn)
+
+
+def _as_in_body(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> FloatArray:
+    """The twist, taken as one in the frame of the room, in that of the robot."""
+    plane = (twist @ [1.0, 1.0j, 0.0]) * np.exp(-1j * unwrapped(pose[:, 2]))
+    return np.column_stack([plane.real, plane.imag, twist[:, 2]])
+
+
+def _room_finding(plain: Found, room: Found) -> Finding:
+    return Finding(
+        "twist_frame", FATAL, "vx vy",
+        f"vx and vy are in the frame of the room, not of the robot: they are the rates of x and y (likeness "
+        f"{room.turn.plain:.2f}; {plain.turn.plain:.2f} as logged)",
+        "turn them by the heading: `assume` twist=room", (), 0,
+        {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain},
+    )  # fmt: skip
+
+
+def _mirror_finding(plain: Found, best: Found) -> Finding:
+    wrong = [name for name, sign in zip(NAMES, best.signs, strict=True) if sign < 0.0]
+    have = "has" if len(wrong) == 1 else "have"
+    return Finding(
+        "pose_frame", FATAL, " ".join(wrong),
+        f"{' and '.join(wrong)} of the pose {have} the opposite sign of what vx, vy and omega say (likeness "
+        f"{plain.turn.plain:.2f} as logged, {best.turn.alike:.2f} put right)",
+        "set `invert` for those columns in the mapping", (), 0,
+        {"likeness": best.turn.alike, "likeness_as_logged": plain.turn.plain, "mirrored": 1.0},
+    )  # fmt: skip
+
+
+def _turned(
+    work: LogUnderCheck, pose: FloatArray, twist: FloatArray, turn: Turned
+) -> tuple[list[Finding], LogUnderCheck]:
+    """A twist and a pose that are turned against each other: what else is known says which of them is wrong."""
+    body, width = pose_twist(work, pose)
+    for name, other in _others(work, width):
+        against = turned(work, other, smooth(twist[:, :2], width), body[:, 2])
+        if against is None or against.alike < ALIKE:
+            continue
+        if abs(against.angle - turn.angle) < abs(against.angle):  # the other agrees with the pose
+            return [_sensor_finding(against, name)], work.replace(twist=_turned_back(twist, against.angle))
+        return [marker_finding(turn, f"the twist ({name} agrees)")], with_marker(work, pose, turn.angle)
+    return [marker_finding(turn, "the twist")], with_marker(work, pose, turn.angle)
+
+
+def _others(work: LogUnderCheck, width: int) -> list[tuple[str, FloatArray]]:
+    """What else says how the robot moves in the plane: (name, velocity, shape (rows, 2))."""
+    speed, command = work.full("wheel_speed"), work.full("twist_command")
+    own = None if speed is None else wheels_twist(work, speed, width)
+    found = [] if own is None else [("the motion of the wheels", own[:, :2])]
+    return found + ([] if command is None else [("the commanded twist", smooth(command[:, :2], width))])
+
+
+def _sensor_finding(turn: Turned, name: str) -> Finding:
+    degrees = float(np.degrees(turn.angle))
+    return Finding(
+        "twist_frame", WARN, "vx vy",
+        f"vx and vy are turned by {degrees:.1f} deg (+-{np.degrees(turn.error):.1g}) against the pose, and {name} "
+        "agrees with the pose: their sensor is mounted at an angle",
+        f"turn them back: `assume` twist={degrees:.1f}deg", (), 0,
+        {"angle_deg": degrees, "error_deg": float(np.degrees(turn.error)), "likeness": turn.alike,
+         "likeness_as_logged": turn.plain},
+    )  # fmt: skip
+
+
+def _turned_back(twist: FloatArray, angle: float) -> FloatArray:
+    plane = (twist @ [1.0, 1.0j, 0.0]) * np.exp(-1j * angle)
+    return np.column_stack([plane.real, plane.imag, twist[:, 2]])
